@@ -1,0 +1,47 @@
+"""Errors a user can act on: one sentence each that says what, where and what to do, with an exit code."""
+
+from __future__ import annotations
+
+
+class RthsError(Exception):
+    """Base of all errors shown to the user as one sentence; `exit_code` is the process's (0 is success)."""
+
+    exit_code = 2
+
+
+class InputError(RthsError):
+    """A file or value the user gave cannot be used (exit 2)."""
+
+
+class PlanError(InputError):
+    """The plan holds an unknown key, a wrong type or an impossible value (exit 2)."""
+
+
+class RigError(RthsError):
+    """A laboratory is not ready, failed, or returned what is no measurement (exit 3)."""
+
+    exit_code = 3
+
+
+class InterlockError(RthsError):
+    """The test was stopped by a limit (exit 3)."""
+
+    exit_code = 3
+
+
+class LostError(RthsError):
+    """The other laboratory, the recorder or the network was lost or never came (exit 4)."""
+
+    exit_code = 4
+
+
+class ProtocolError(RthsError):
+    """A message or an event that the protocol of the test does not allow in the present state."""
+
+
+class LocalProtocolError(ProtocolError):
+    """This side tried what the protocol does not allow: a fault of this program."""
+
+
+class RemoteProtocolError(ProtocolError):
+    """The other side sent what the protocol does not allow."""
