@@ -1,0 +1,1 @@
+"""What imposes the computed motion on a specimen: dead time, hydraulic actuator, shaking table."""

@@ -1,0 +1,97 @@
+"""What the three processes share at their command lines: options, reports, errors as one sentence."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from common import plan as plans
+from common import reality as realities
+from common.errors import RthsError
+from common.laboratory import Report
+from common.plan import Plan
+from common.reality import Reality
+
+DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+
+
+def plan_arguments(parser: argparse.ArgumentParser, *, optional: bool = False) -> None:
+    """PLAN and the options that change it."""
+    if optional:
+        parser.add_argument("plan", nargs="?", metavar="PLAN", help="TOML file of the test (default: the default test)")
+    else:
+        parser.add_argument("plan", metavar="PLAN", help="TOML file of the test; 'default' or 'paper' for those that ship")
+    parser.add_argument("--duration", type=float, metavar="S", help="length of the test in seconds")
+    parser.add_argument("--scale", type=float, metavar="X", help="factor on the ground motion")
+    parser.add_argument("--seed", type=int, metavar="N", help="seed of every random draw")
+
+
+def reality_argument(parser: argparse.ArgumentParser) -> None:
+    """The option that says what the laboratory really does."""
+    parser.add_argument("--reality", type=Path, metavar="FILE", help="what the laboratories really do (stays secret)")
+
+
+def json_argument(parser: argparse.ArgumentParser, text: str) -> None:
+    """The option for machine-readable output."""
+    parser.add_argument("--json", action="store_true", help=text)
+
+
+def load_plan(args: argparse.Namespace) -> Plan:
+    """The plan that the command line asks for; raises PlanError."""
+    return plans.load(plan_path(args.plan)).with_test(duration=args.duration, scale=args.scale, seed=args.seed)
+
+
+def plan_path(name: str | None) -> Path:
+    """The file behind the name of a plan that ships ('default', 'paper'), or the path itself."""
+    if name is None or (name in ("default", "paper") and not Path(name).exists()):
+        return Path(__file__).resolve().parent.parent / "rths" / "plans" / f"{name or 'default'}.toml"
+    return Path(name)
+
+
+def load_reality(path: Path | None, plan: Plan) -> Reality:
+    """The reality of the command line, the plan itself where there is none; raises PlanError."""
+    return realities.load(path, plan) if path else realities.as_planned(plan)
+
+
+def json_report(kind: str, data: Mapping[str, Any]) -> None:
+    """One JSON object per line on standard output."""
+    sys.stdout.write(json.dumps({"kind": kind, **data}) + "\n")
+    sys.stdout.flush()
+
+
+def text_report(kind: str, data: Mapping[str, Any]) -> None:
+    """Plain lines on standard error."""
+    match kind:
+        case "state":
+            line = f"{data['lab']}: {data['state']}"
+        case "event":
+            line = f"{data['lab']}: {data['text']}"
+        case "progress" if "drift" in data:
+            line = (
+                f"t {data['t']:7.2f} s  drift {data['drift'] * 1e3:+7.3f} mm  "
+                f"round trip {data['round_trip'] * 1e6:5.0f} µs  late {data['missed']:.0f}"
+            )
+        case _:
+            return
+    sys.stderr.write(line + "\n")
+
+
+def reporter(as_json: bool) -> Report:
+    """The report that the command line asks for."""
+    return json_report if as_json else text_report
+
+
+def guarded(main: Callable[[], int]) -> int:
+    """Run a command; a user's mistake becomes one sentence on standard error and an exit code."""
+    try:
+        return main()
+    except RthsError as error:
+        sys.stderr.write(f"rths: {error}\n")
+        return error.exit_code
+    except KeyboardInterrupt:
+        sys.stderr.write("rths: stopped by the user.\n")
+        return 3

@@ -1,0 +1,156 @@
+"""A laboratory's loop in real time: fetch messages, wait, tick, and leave in order."""
+
+from __future__ import annotations
+
+import gc
+import signal
+import sys
+from collections.abc import Callable, Mapping
+from types import FrameType
+from typing import Protocol
+
+from common.laboratory import Laboratory
+from common.messages import Message
+
+IDLE_NS = 5_000_000  # how often the handshake looks after itself
+LEAVE_NS = 5_000_000_000  # how long the last words may take
+PROGRESS_NS = 200_000_000
+
+
+class Loop(Protocol):
+    """What the master's and the slave's loop have in common."""
+
+    lab: Laboratory
+    ticks: int
+
+    def take(self, message: Message, received_ns: int) -> None:
+        """Act on a message."""
+
+    def poll(self) -> None:
+        """Move the handshake on."""
+
+    def earliest(self, tick: int) -> int:
+        """When a tick may begin, ns."""
+
+    def latest(self, tick: int) -> int:
+        """When it begins whether its message has come or not, ns."""
+
+    def heard(self, tick: int) -> bool:
+        """Whether its message has come."""
+
+    def tick(self, tick: int) -> None:
+        """One control interval."""
+
+    def finish(self) -> None:
+        """All ticks are done."""
+
+    def stop(self, reason: str) -> None:
+        """Somebody wants the test to end."""
+
+    def disarm(self) -> None:
+        """Bring the rig to a stop."""
+
+    def leave(self) -> None:
+        """Last words."""
+
+    @property
+    def left(self) -> bool:
+        """Whether they were heard."""
+
+    @property
+    def progress(self) -> Mapping[str, float]:
+        """What a user watches."""
+
+
+def drive(loop: Loop, stopping: Callable[[], str]) -> None:
+    """Run a test to its end; `stopping` gives the reason to end it early, empty while there is none."""
+    handshake(loop, stopping)
+    calm()
+    if run(loop, stopping):
+        loop.finish()
+    loop.disarm()
+    depart(loop)
+
+
+def handshake(loop: Loop, stopping: Callable[[], str]) -> None:
+    """Until the start is agreed or the test is over."""
+    lab = loop.lab
+    while not lab.running and not lab.exchange.ended and not stopping():
+        loop.poll()
+        fetch(loop, lab.clock.now() + IDLE_NS)
+
+
+def run(loop: Loop, stopping: Callable[[], str]) -> bool:
+    """All ticks; False where the test ended before the last."""
+    lab = loop.lab
+    reported = 0
+    for tick in range(lab.plan.ticks):
+        wait(loop, tick)
+        if reason := stopping():
+            loop.stop(reason)
+        if not lab.running:
+            return False
+        loop.tick(tick)
+        lab.send_samples()
+        if lab.clock.now() - reported >= PROGRESS_NS:
+            reported = lab.clock.now()
+            lab.report("progress", {"tick": tick, "t": tick * lab.plan.test.interval, **loop.progress})
+    wait(loop, lab.plan.ticks)
+    return lab.running
+
+
+def wait(loop: Loop, tick: int) -> None:
+    """Until the time of a tick, and then for its message as long as it may be waited for."""
+    fetch_until(loop, loop.earliest(tick))
+    while not loop.heard(tick) and loop.lab.running and loop.lab.clock.now() < loop.latest(tick):
+        fetch(loop, loop.latest(tick))
+
+
+def fetch(loop: Loop, deadline: int) -> bool:
+    """Take one message that comes before the deadline; whether there was one."""
+    received = loop.lab.endpoint.receive(max(deadline - loop.lab.clock.now(), 0) * 1e-9)
+    if received is None:
+        return False
+    loop.take(received.message, received.received_ns)
+    return True
+
+
+def fetch_until(loop: Loop, deadline: int) -> None:
+    """Take messages until the deadline, and those that are there already."""
+    while loop.lab.clock.now() < deadline:
+        fetch(loop, deadline)
+    while fetch(loop, 0):
+        pass
+
+
+def depart(loop: Loop) -> None:
+    """Last words until they are heard, for a bounded time."""
+    deadline = loop.lab.clock.now() + LEAVE_NS
+    while not loop.left and loop.lab.clock.now() < deadline:
+        loop.leave()
+        fetch(loop, loop.lab.clock.now() + IDLE_NS)
+    loop.leave()
+
+
+def calm() -> None:
+    """Keep the interpreter from pausing the loop: no garbage collection, quick hand-over between threads."""
+    sys.setswitchinterval(1e-4)
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+
+
+class Stopper:
+    """Turns SIGINT and SIGTERM into a reason to stop."""
+
+    def __init__(self) -> None:
+        self._reason = ""
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._caught)
+
+    def _caught(self, number: int, _frame: FrameType | None) -> None:
+        self._reason = f"stopped by the user ({signal.Signals(number).name})."
+
+    def __call__(self) -> str:
+        """The reason, empty while there is none."""
+        return self._reason

@@ -1,0 +1,108 @@
+"""What the loops of both laboratories share: place in the protocol, stream to the recorder, reports."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+from common.clock import Clock
+from common.endpoint import Endpoint
+from common.errors import InterlockError, LostError, RthsError
+from common.exchange import Event, Exchange, State
+from common.messages import Message, Recorder, Resend
+from common.outlet import Outlet
+from common.plan import Plan
+
+REPEAT_NS = 100_000_000  # an unanswered request is sent again after this long
+
+Report = Callable[[str, Mapping[str, Any]], None]
+
+
+def silent(_kind: str, _data: Mapping[str, Any]) -> None:
+    """A report that nobody reads."""
+
+
+class Setting(NamedTuple):
+    """What a loop is given by its surroundings."""
+
+    plan: Plan
+    endpoint: Endpoint
+    clock: Clock
+    report: Report = silent
+
+
+class Laboratory:
+    """State shared by the master's and the slave's loop; composed by both."""
+
+    def __init__(self, name: str, setting: Setting) -> None:
+        self.name = name
+        self.plan = setting.plan
+        self.endpoint = setting.endpoint
+        self.clock = setting.clock
+        self.report = setting.report
+        self.exchange = Exchange()
+        self.interval_ns = round(setting.plan.test.interval * 1e9)
+        self.start_ns = 0  # own clock, tick 0
+        self.epoch_ns = 0  # Unix time of tick 0 on the master's base
+        self.outlet = Outlet(0, name)
+        self.error: RthsError | None = None
+        self.heard_ns = setting.clock.now()
+        self.recorder: Recorder | None = None
+
+    def enter(self, session: int) -> None:
+        """Take part in a session."""
+        self.exchange.session = session
+        self.endpoint.enter(session)
+        self.outlet = Outlet(session, self.name)
+
+    def tick_ns(self, tick: int) -> int:
+        """Nominal time of a tick on this laboratory's clock."""
+        return self.start_ns + tick * self.interval_ns
+
+    def note(self, code: str, text: str, *, level: str = "info", tick: int = 0, **values: float) -> None:
+        """Record and report an event."""
+        t = tick * self.plan.test.interval
+        at = self.epoch_ns + tick * self.interval_ns
+        self.outlet.add("event", at, at, (t, self.name, level, code, text, values))
+        self.report("event", {"t": t, "lab": self.name, "level": level, "code": code, "text": text} | values)
+
+    def fail(self, event: Event, error: RthsError, *, code: str, tick: int = 0, remote: bool = False) -> None:
+        """End the test for this laboratory; the first cause stays."""
+        if self.exchange.ended:
+            return
+        self.exchange.happen(event, remote=remote, cause=str(error))
+        self.error = error
+        self.note(code, str(error), level="error", tick=tick)
+
+    def lost(self, who: str, seconds: float, tick: int = 0) -> None:
+        """End the test because someone has been silent for too long."""
+        self.fail(Event.LOSE, LostError(f"{who} has been silent for {seconds:g} s."), code="lost", tick=tick)
+
+    def tripped(self, lab: str, text: str, tick: int) -> None:
+        """End the test because the other laboratory has stopped its rig."""
+        self.fail(Event.TRIP, InterlockError(f"The {lab} stopped the test: {text}"), code="remote_trip", tick=tick, remote=True)
+
+    def listen_to_recorder(self, message: Message) -> None:
+        """Take note of the recorder's state, and send again what it has missed."""
+        if isinstance(message, Recorder):
+            self.recorder = message
+        elif isinstance(message, Resend) and message.lab == self.name and self.exchange.belongs(message.session):
+            for piece in self.outlet.again(message):
+                self.endpoint.send(piece)
+
+    def send_samples(self, *, everything: bool = False) -> None:
+        """Send what the recorder shall have."""
+        for piece in self.outlet.pieces(everything=everything):
+            self.endpoint.send(piece)
+
+    def recorder_has_all(self) -> bool:
+        """Whether the recorder says that it has this laboratory's whole stream."""
+        recorder = self.recorder
+        if recorder is None or not self.exchange.belongs(recorder.session):
+            return False
+        return (recorder.master_next if self.name == "master" else recorder.slave_next) >= self.outlet.total
+
+    @property
+    def running(self) -> bool:
+        """Whether ticks may go on."""
+        return self.exchange.state in (State.SCHEDULED, State.RUNNING)

@@ -1,0 +1,63 @@
+"""Messages that a link plug-in delays or loses, handed out tick by tick.
+
+A message with the extra delay d is there from the first tick at or after its nominal time plus d; a
+newer one wins over an older (contract, section 3).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Generic, Protocol, TypeVar
+
+Frame = TypeVar("Frame")
+
+
+class LinkModel(Protocol):
+    """A link plug-in, constructed as `Class(seed=…, **options)`."""
+
+    def fate(self, direction: str, seq: int, t: float) -> float | None:
+        """Seconds of extra delay of a message sent at test time `t`, None for lost."""
+
+
+class PerfectLink:
+    """No delay, no loss."""
+
+    def fate(self, direction: str, seq: int, t: float) -> float | None:  # noqa: ARG002
+        """No extra delay."""
+        return 0.0
+
+
+class Mailbox(Generic[Frame]):
+    """Receiving end of one direction. `nominal` is how many ticks after its own a message is used."""
+
+    def __init__(self, link: LinkModel, direction: str, interval: float, nominal: int) -> None:
+        self._link = link
+        self._direction = direction
+        self._interval = interval
+        self._nominal = nominal
+        self._waiting: list[tuple[int, int, Frame]] = []
+        self.newest_seen = -1
+        self._taken = -1
+
+    def put(self, seq: int, frame: Frame) -> None:
+        """Take in a message of the tick `seq` as it comes from the wire."""
+        self.newest_seen = max(self.newest_seen, seq)
+        extra = self._link.fate(self._direction, seq, seq * self._interval)
+        if extra is None:
+            return
+        ticks = math.ceil(extra / self._interval - 1e-9)
+        self._waiting.append((seq + self._nominal + max(ticks, 0), seq, frame))
+
+    def take(self, tick: int) -> Frame | None:
+        """The newest message that is there at this tick; None where there is none newer than the last."""
+        there = [entry for entry in self._waiting if entry[0] <= tick and entry[1] > self._taken]
+        if not there:
+            return None
+        newest = max(there, key=_seq)
+        self._taken = newest[1]
+        self._waiting = [entry for entry in self._waiting if entry[1] > self._taken]
+        return newest[2]
+
+
+def _seq(entry: tuple[int, int, object]) -> int:
+    return entry[1]

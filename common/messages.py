@@ -1,0 +1,181 @@
+"""Every message between the processes of a test, as frozen records of plain values.
+
+Times are integers in ns on the sender's monotonic clock unless the name says otherwise. `session` is
+the random number under which the master registered the slave; 0 before that.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Register(NamedTuple):
+    """Master to slave: take part in this test."""
+
+    session: int
+    protocol: int
+    plan: str  # digest
+
+
+class Registered(NamedTuple):
+    """Slave to master: ready to be armed."""
+
+    session: int
+
+
+class Refused(NamedTuple):
+    """Slave to master: will not take part, and why."""
+
+    session: int
+    reason: str
+
+
+class Arm(NamedTuple):
+    """Master to slave: make the rig ready to move."""
+
+    session: int
+
+
+class Armed(NamedTuple):
+    """Slave to master: the rig is ready."""
+
+    session: int
+
+
+class Sync(NamedTuple):
+    """Master to slave: one exchange of clock readings."""
+
+    session: int
+    seq: int
+    sent_ns: int
+
+
+class SyncReply(NamedTuple):
+    """Slave to master: the answer, with the slave's own readings."""
+
+    session: int
+    seq: int
+    received_ns: int
+    sent_ns: int
+
+
+class Start(NamedTuple):
+    """Master to slave: tick 0 is at this time of the slave's clock."""
+
+    session: int
+    start_ns: int
+    epoch_ns: int  # Unix time of tick 0, master's wall clock
+
+
+class Scheduled(NamedTuple):
+    """Slave to master: the start is agreed."""
+
+    session: int
+
+
+class Command(NamedTuple):
+    """Master to slave, one per tick: the targets of the interval's end."""
+
+    session: int
+    seq: int
+    sent_ns: int
+    shift_ns: int  # how far the slave's clock has drifted from the master's since the start, estimated
+    table_target: float
+    damper_command: float
+
+
+class Feedback(NamedTuple):
+    """Slave to master, one per tick: the measurements at the tick, and the command they answer."""
+
+    session: int
+    seq: int
+    command_seq: int
+    command_received_ns: int
+    sent_ns: int
+    table_displacement: float
+    table_acceleration: float
+    damper_stroke: float
+    damper_force: float
+
+
+class Stop(NamedTuple):
+    """Master to slave: the test ends after this many ticks."""
+
+    session: int
+    ticks: int
+    reason: str
+
+
+class Stopped(NamedTuple):
+    """Slave to master: the rig is disarmed."""
+
+    session: int
+    ticks: int
+
+
+class Trip(NamedTuple):
+    """Either way: this laboratory has stopped its rig, and why."""
+
+    session: int
+    lab: str
+    code: str
+    text: str
+
+
+class Samples(NamedTuple):
+    """Laboratory to recorder: a piece of its stream, items numbered from `first`."""
+
+    session: int
+    lab: str
+    first: int
+    items: bytes
+
+
+class Finished(NamedTuple):
+    """Laboratory to recorder: its stream ends after this many items."""
+
+    session: int
+    lab: str
+    total: int
+
+
+class Recorder(NamedTuple):
+    """Recorder to the laboratories, ten times a second: its state, and how far it has each stream."""
+
+    session: int
+    state: str  # ready, recording, failed, done
+    plan: str
+    reason: str
+    master_next: int
+    slave_next: int
+
+
+class Resend(NamedTuple):
+    """Recorder to a laboratory: send these items again."""
+
+    session: int
+    lab: str
+    first: int
+    last: int
+
+
+Message = (
+    Register
+    | Registered
+    | Refused
+    | Arm
+    | Armed
+    | Sync
+    | SyncReply
+    | Start
+    | Scheduled
+    | Command
+    | Feedback
+    | Stop
+    | Stopped
+    | Trip
+    | Samples
+    | Finished
+    | Recorder
+    | Resend
+)

@@ -1,0 +1,103 @@
+"""A laboratory's stream to the recorder: items in order, sent in pieces, kept for sending again.
+
+An item is `[topic, log_ns, publish_ns, values…]`; the pieces are sent between ticks, so that nothing is
+written in the loop and a slow recorder costs it nothing.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Any
+
+import msgpack
+
+from common.messages import Finished, Message, Resend, Samples
+
+PIECE = 10  # items; at 500 ticks per second a piece leaves every 10 to 20 ms
+KEPT = 4_000  # pieces kept for sending again, a minute or more
+
+
+class Outlet:
+    """Sending end of one laboratory's stream."""
+
+    def __init__(self, session: int, lab: str) -> None:
+        self._session = session
+        self._lab = lab
+        self._pending: list[list[Any]] = []
+        self._sent: deque[Samples] = deque(maxlen=KEPT)
+        self.total = 0
+
+    def add(self, topic: str, log_ns: int, publish_ns: int, values: tuple[Any, ...]) -> None:
+        """Queue one item."""
+        self._pending.append([topic, log_ns, publish_ns, *values])
+        self.total += 1
+
+    def pieces(self, *, everything: bool = False) -> list[Message]:
+        """The messages to send now: whole pieces, or `everything` that waits."""
+        messages: list[Message] = []
+        while len(self._pending) >= PIECE or (everything and self._pending):
+            items, self._pending = self._pending[:PIECE], self._pending[PIECE:]
+            first = self.total - len(self._pending) - len(items)
+            piece = Samples(self._session, self._lab, first, msgpack.packb(items))
+            self._sent.append(piece)
+            messages.append(piece)
+        return messages
+
+    def again(self, request: Resend) -> list[Message]:
+        """The pieces that hold the items asked for, as far as they are still kept."""
+        return [
+            piece
+            for piece in self._sent
+            if request.first < piece.first + PIECE and piece.first <= request.last
+        ]
+
+    def finished(self) -> Finished:
+        """The message that says how long the stream is."""
+        return Finished(self._session, self._lab, self.total)
+
+
+class Inlet:
+    """Receiving end of one stream: hands items on in order, and says which are missing."""
+
+    def __init__(self) -> None:
+        self.next = 0
+        self.total: int | None = None
+        self.lost = 0
+        self._early: dict[int, Samples] = {}
+
+    def take(self, piece: Samples) -> list[list[Any]]:
+        """The items that are now complete and in order; repeated pieces give none."""
+        if piece.first < self.next:
+            return []
+        self._early[piece.first] = piece
+        return self._ready()
+
+    def _ready(self) -> list[list[Any]]:
+        items: list[list[Any]] = []
+        while (piece := self._early.pop(self.next, None)) is not None:
+            new = msgpack.unpackb(piece.items)
+            self.next += len(new)
+            items += new
+        return items
+
+    def missing(self) -> tuple[int, int] | None:
+        """First and last item of the first hole, None where there is none."""
+        if self._early:
+            return self.next, min(self._early) - 1
+        if self.total is not None and self.next < self.total:
+            return self.next, self.total - 1
+        return None
+
+    def give_up(self) -> list[list[Any]]:
+        """Count the first hole as lost and hand on what follows it."""
+        hole = self.missing()
+        if hole is None:
+            return []
+        self.lost += hole[1] + 1 - hole[0]
+        self.next = hole[1] + 1
+        return self._ready()
+
+    @property
+    def complete(self) -> bool:
+        """Whether the stream has ended and all of it, but what is lost, was handed on."""
+        return self.total is not None and self.next >= self.total

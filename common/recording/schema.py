@@ -1,0 +1,52 @@
+"""Protobuf descriptions of the recorded messages, derived from the table of signals."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
+
+from common.signals import Kind, Signal
+
+_FIELD = descriptor_pb2.FieldDescriptorProto
+_TYPES = {
+    Kind.NUMBER: _FIELD.TYPE_DOUBLE,
+    Kind.STOREYS: _FIELD.TYPE_DOUBLE,
+    Kind.COUNT: _FIELD.TYPE_UINT32,
+    Kind.INDEX: _FIELD.TYPE_INT32,
+    Kind.STAMP: _FIELD.TYPE_INT64,
+    Kind.FLAG: _FIELD.TYPE_BOOL,
+    Kind.TEXT: _FIELD.TYPE_STRING,
+}
+
+
+def schema_file(topic: str, rows: tuple[Signal, ...], storeys: int) -> descriptor_pb2.FileDescriptorProto:
+    """Protobuf description of a topic's message, fields in the order of the signal table."""
+    name = topic.capitalize()
+    file = descriptor_pb2.FileDescriptorProto(name=f"rths/{topic}.proto", package="rths", syntax="proto3")
+    message = file.message_type.add(name=name)
+    for number, row in enumerate(rows, start=1):
+        if row.kind is Kind.VALUES:
+            entry = message.nested_type.add(name="ValuesEntry")
+            entry.options.map_entry = True
+            entry.field.add(name="key", number=1, type=_FIELD.TYPE_STRING, label=_FIELD.LABEL_OPTIONAL)
+            entry.field.add(name="value", number=2, type=_FIELD.TYPE_DOUBLE, label=_FIELD.LABEL_OPTIONAL)
+            message.field.add(
+                name=row.name,
+                number=number,
+                type=_FIELD.TYPE_MESSAGE,
+                type_name=f".rths.{name}.ValuesEntry",
+                label=_FIELD.LABEL_REPEATED,
+            )
+            continue
+        several = row.kind is Kind.STOREYS and storeys > 1
+        label = _FIELD.LABEL_REPEATED if several else _FIELD.LABEL_OPTIONAL
+        message.field.add(name=row.name, number=number, type=_TYPES[row.kind], label=label)
+    return file
+
+
+def message_class(file: descriptor_pb2.FileDescriptorProto, name: str) -> type[Any]:
+    """The Python class of a described message."""
+    pool = descriptor_pool.DescriptorPool()
+    pool.Add(file)
+    return cast(type[Any], message_factory.GetMessageClass(pool.FindMessageTypeByName(name)))

@@ -1,0 +1,132 @@
+"""Writing a recording."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, cast
+
+from google.protobuf import descriptor_pb2
+from mcap.writer import CompressionType, Writer
+
+from common.errors import InputError
+from common.recording.schema import message_class, schema_file
+from common.signals import Signal
+
+CHUNK_SIZE = 64 * 1024
+
+
+class Spool:
+    """What the MCAP library writes into: held in memory until `drain`, so that it knows when a disk fails."""
+
+    def __init__(self, stream: io.FileIO) -> None:
+        self._stream = stream
+        self._held = bytearray()
+        self._drained = 0
+
+    def write(self, data: bytes) -> int:
+        """Hold some bytes."""
+        self._held += data
+        return len(data)
+
+    def tell(self) -> int:
+        """The place in the file at which the next byte will stand."""
+        return self._drained + len(self._held)
+
+    def flush(self) -> None:
+        """Draining is a step of its own, whose errors are dealt with."""
+
+    def drain(self) -> None:
+        """Write what is held; raises OSError, with what was half-written cut off again."""
+        written = 0
+        try:
+            while written < len(self._held):
+                written += self._stream.write(self._held[written:])
+        except OSError:
+            self._stream.truncate(self._drained)
+            raise
+        self._drained += written
+        self._held.clear()
+
+
+class Recording:
+    """A recording being written. `topics` are the channels it holds, in the names of the signal table."""
+
+    def __init__(self, path: Path, test: str, storeys: int, topics: Mapping[str, tuple[Signal, ...]]) -> None:
+        self._path = path
+        try:
+            self._stream = path.open("wb", buffering=0)
+        except OSError as error:
+            raise InputError(
+                f"Cannot write the recording {path}: {error.strerror}; give a writable place with -o."
+            ) from None
+        self._spool = Spool(self._stream)
+        self._writer = Writer(
+            cast(io.BufferedWriter, self._spool), chunk_size=CHUNK_SIZE, compression=CompressionType.ZSTD
+        )
+        self._writer.start(profile="", library="rths")
+        self._names = {topic: [row.name for row in rows] for topic, rows in topics.items()}
+        self._classes: dict[str, type[Any]] = {}
+        self._channels: dict[str, int] = {}
+        self._numbers = dict.fromkeys(topics, 0)
+        for topic, rows in topics.items():
+            file = schema_file(topic, rows, storeys)
+            self._classes[topic] = message_class(file, f"rths.{topic.capitalize()}")
+            schema = self._writer.register_schema(
+                f"rths.{topic.capitalize()}",
+                "protobuf",
+                descriptor_pb2.FileDescriptorSet(file=[file]).SerializeToString(),
+            )
+            units = json.dumps({row.name: row.unit for row in rows}, ensure_ascii=False)
+            self._channels[topic] = self._writer.register_channel(
+                f"rths/{test}/{topic}", "protobuf", schema, {"units": units}
+            )
+
+    def add(self, topic: str, log_ns: int, publish_ns: int, values: tuple[Any, ...] | list[Any]) -> None:
+        """Write one message; `values` in the order of the signal table. The sequence is the message's seq."""
+        names = self._names[topic]
+        message = self._classes[topic](**dict(zip(names, values, strict=True)))
+        sequence = values[0] if names[0] == "seq" else self._numbers[topic]
+        self._numbers[topic] += 1
+        self._writer.add_message(
+            self._channels[topic],
+            log_time=log_ns,
+            publish_time=publish_ns,
+            sequence=int(sequence) & 0xFFFFFFFF,
+            data=message.SerializeToString(),
+        )
+
+    def metadata(self, name: str, values: Mapping[str, str]) -> None:
+        """Write a metadata record."""
+        self._writer.add_metadata(name, dict(values))
+
+    def attach(self, name: str, data: bytes, media_type: str) -> None:
+        """Write an attachment; its times are zero so that the same test gives the same file."""
+        self._writer.add_attachment(create_time=0, log_time=0, name=name, media_type=media_type, data=data)
+
+    def flush(self) -> None:
+        """Hand everything to the operating system; raises OSError where the disk does not take it.
+
+        What a failed write left half-done is cut off, so that the file stays readable up to there.
+        """
+        self._writer.flush()  # type: ignore[no-untyped-call]
+        self._spool.drain()
+
+    def sync(self) -> None:
+        """Have the operating system put it onto the disk."""
+        os.fdatasync(self._stream.fileno())
+
+    def close(self, summary: Mapping[str, str]) -> None:
+        """Write the summary and the index, and close."""
+        self.metadata("summary", summary)
+        self._writer.finish()  # type: ignore[no-untyped-call]
+        self._spool.drain()
+        self.sync()
+        self._stream.close()
+
+    def abandon(self) -> None:
+        """Close without index, after the disk has failed."""
+        self._stream.close()

@@ -1,0 +1,113 @@
+"""The interface behind which a laboratory stands: emulated, real, or a user's own model.
+
+A rig is constructed as `Class(interval=…, seed=…, **options)`. Every value is at the laboratory's own
+scale, in SI units.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple, Protocol, TypeVar
+
+from common.errors import RigError, RthsError
+
+Result = TypeVar("Result")
+
+
+class ColumnCommand(NamedTuple):
+    """What laboratory A is told."""
+
+    actuator_command: float  # m
+
+
+class ColumnMeasurement(NamedTuple):
+    """What laboratory A reads."""
+
+    column_displacement: float  # m
+    column_force: float  # N
+
+
+class TableCommand(NamedTuple):
+    """What laboratory B is told."""
+
+    table_command: float  # m
+    damper_command: float  # N
+
+
+class TableMeasurement(NamedTuple):
+    """What laboratory B reads."""
+
+    table_displacement: float  # m
+    table_acceleration: float  # m/s²
+    damper_stroke: float  # m
+    damper_force: float  # N
+
+
+class Rig(Protocol):
+    """A laboratory."""
+
+    def arm(self) -> None:
+        """Be ready to move; raise RigError with a reason if not."""
+
+    def read(self) -> Iterable[float]:
+        """The measurements at the present tick."""
+
+    def write(self, command: Any) -> None:
+        """Apply a command over the coming interval."""
+
+    def disarm(self) -> None:
+        """Come to a safe stop; must not raise."""
+
+
+class GuardedRig:
+    """A rig whose every failure becomes one sentence that names it.
+
+    `measurement` is the NamedTuple that `read` must fill.
+    """
+
+    def __init__(self, rig: Rig, name: str, measurement: Callable[..., Any]) -> None:
+        self._rig = rig
+        self._name = name
+        self._measurement = measurement
+        self._width: int = len(measurement._fields)  # type: ignore[attr-defined]
+
+    def arm(self) -> None:
+        """Arm; raises RigError with the rig's own reason."""
+        self._call("arm", self._rig.arm)
+
+    def read(self) -> Any:
+        """The measurements as the NamedTuple; raises RigError where they are no finite numbers of the right count."""
+        values = self._call("read", self._rig.read)
+        try:
+            reading = tuple(map(float, values))
+        except (TypeError, ValueError):
+            raise RigError(f"{self._name}: read() returned {values!r}, not numbers.") from None
+        if len(reading) != self._width:
+            names = ", ".join(self._measurement._fields)  # type: ignore[attr-defined]
+            raise RigError(f"{self._name}: read() returned {len(reading)} numbers, not {self._width} ({names}).")
+        if not all(map(math.isfinite, reading)):
+            raise RigError(f"{self._name}: read() returned {reading}, which is not finite.")
+        return self._measurement(*reading)
+
+    def write(self, command: Any) -> None:
+        """Apply a command; raises RigError where the rig fails."""
+        self._call("write", self._rig.write, command)
+
+    def disarm(self) -> str:
+        """Disarm; a rig that raises all the same is reported in the text returned, empty where all is well."""
+        try:
+            self._rig.disarm()
+        except Exception as error:  # a plug-in may raise anything; the stop must go on
+            return f"{self._name}: disarm() failed: {error}"
+        return ""
+
+    def _call(self, what: str, function: Callable[..., Result], *arguments: Any) -> Result:
+        try:
+            return function(*arguments)
+        except RigError as error:
+            raise RigError(f"{self._name}: {error}") from None
+        except RthsError:
+            raise
+        except Exception as error:  # a plug-in may raise anything; the user gets a sentence
+            raise RigError(f"{self._name}: {what}() failed: {type(error).__name__}: {error}") from error

@@ -1,0 +1,166 @@
+"""Dataclasses filled from TOML tables: every key, type and range is checked before anything moves."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import math
+import re
+from collections.abc import Iterable, Mapping
+from typing import Any, TypeVar
+
+from common.errors import PlanError
+
+Table = TypeVar("Table")
+
+Storeys = tuple[float, ...]
+
+
+@dataclasses.dataclass(frozen=True)
+class Rule:
+    """What a value must fulfil, beside its type."""
+
+    text: str
+    unit: str = ""
+    above: float | None = None
+    least: float | None = None
+    most: float | None = None
+    choices: tuple[str, ...] = ()
+    pattern: str = ""
+    infinite: bool = False
+
+    def allowed(self) -> str:
+        """The allowed range in words."""
+        if self.choices:
+            return "one of " + ", ".join(self.choices)
+        if self.pattern:
+            return f"text that matches {self.pattern}"
+        bounds = []
+        if self.above is not None:
+            bounds.append(f"above {self.above:g}")
+        if self.least is not None:
+            bounds.append(f"at least {self.least:g}")
+        if self.most is not None:
+            bounds.append(f"at most {self.most:g}")
+        return " and ".join(bounds or ["finite"]) + (f" {self.unit}" if self.unit else "")
+
+    def admits(self, value: float | str) -> bool:
+        """Whether one value lies in the range."""
+        if isinstance(value, str):
+            return (not self.choices or value in self.choices) and bool(
+                re.fullmatch(self.pattern or ".*", value)
+            )
+        return (
+            not math.isnan(value)
+            and (self.infinite or not math.isinf(value))
+            and (self.above is None or value > self.above)
+            and (self.least is None or value >= self.least)
+            and (self.most is None or value <= self.most)
+        )
+
+
+def key(
+    text: str,
+    *,
+    default: Any,
+    unit: str = "",
+    above: float | None = None,
+    least: float | None = None,
+    most: float | None = None,
+    choices: Iterable[str] = (),
+    pattern: str = "",
+    more: bool = False,
+    infinite: bool = False,
+) -> Any:
+    """Field of a plan's table: a default, a text for the reference, and the allowed range.
+
+    With `more`, the field is a dict that takes every further number of the table: the parameters of
+    a model that a registry checks by the model's name.
+    """
+    rule = Rule(text, unit, above, least, most, tuple(choices), pattern, infinite)
+    metadata = {"rule": rule, "more": more}
+    if isinstance(default, dict):
+        return dataclasses.field(default_factory=default.copy, metadata=metadata)
+    return dataclasses.field(default=default, metadata=metadata)
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """A hint that names the known word nearest to `word`, or lists all of them."""
+    names = sorted(known)
+    match = difflib.get_close_matches(word, names, n=1)
+    return f"did you mean {match[0]}?" if match else "known here: " + ", ".join(names)
+
+
+def fill(cls: type[Table], values: object, where: str) -> Table:
+    """Instance of a table's dataclass from parsed TOML; `where` names the table in errors.
+
+    Raises:
+        PlanError: unknown key, wrong type or value out of range.
+    """
+    if not isinstance(values, Mapping):
+        raise PlanError(f"[{where}] must be a table, not {values!r}.")
+    fields = {field.name.rstrip("_"): field for field in table_fields(cls)}
+    open_to_more = next((field for field in fields.values() if field.metadata["more"]), None)
+    given: dict[str, Any] = {open_to_more.name: {}} if open_to_more else {}
+    for name, value in values.items():
+        if name in fields and fields[name] is not open_to_more:
+            given[fields[name].name] = convert(fields[name], value, where)
+        elif open_to_more:
+            given[open_to_more.name][name] = as_type("float", value, f"{name} in [{where}]")
+        else:
+            raise PlanError(f"Unknown key '{name}' in [{where}]: {nearest(str(name), fields)}")
+    return cls(**given)
+
+
+def table_fields(cls: object) -> tuple[dataclasses.Field[Any], ...]:
+    """The fields of a table's dataclass or of an instance of it."""
+    return dataclasses.fields(cls)  # type: ignore[arg-type]
+
+
+def convert(field: dataclasses.Field[Any], value: object, where: str) -> object:
+    """One value, converted to the field's type and checked against its range."""
+    if "table" in field.metadata:
+        return fill(field.metadata["table"], value, f"{where}.{field.name}")
+    rule: Rule = field.metadata["rule"]
+    name = f"{field.name.rstrip('_')} in [{where}]"
+    if field.type == "Storeys":
+        items = value if isinstance(value, list) else [value]
+        return tuple(in_range(as_type("float", item, name), rule, name) for item in items)
+    return in_range(as_type(str(field.type), value, name), rule, name)
+
+
+def as_type(kind: str, value: object, name: str) -> Any:
+    """`value` as a float, int, bool, str or table; an int is accepted for a float, nothing else is bent."""
+    if kind == "float" and isinstance(value, int | float) and not isinstance(value, bool):
+        return float(value)
+    types: dict[str, type] = {"int": int, "str": str, "bool": bool}
+    if kind in types and isinstance(value, types[kind]) and (kind == "bool" or not isinstance(value, bool)):
+        return value
+    if kind.startswith("dict") and isinstance(value, dict):
+        return value
+    words = {"float": "a number", "int": "a whole number", "str": "a text in quotes", "bool": "true or false"}
+    raise PlanError(f"{name} must be {words.get(kind, 'a table')}, not {value!r}.")
+
+
+def in_range(value: Any, rule: Rule, name: str) -> Any:
+    """`value` itself, or a PlanError that names the allowed range and, for a choice, the nearest name."""
+    if isinstance(value, int | float | str) and not isinstance(value, bool) and not rule.admits(value):
+        hint = nearest(value, rule.choices) if rule.choices and isinstance(value, str) else ""
+        raise PlanError(f"{name} is {value!r}, but must be {rule.allowed()}{'; ' + hint if hint else ''}.")
+    return value
+
+
+def plain(table: Any) -> dict[str, Any]:
+    """A table's dataclass back as nested plain values, in TOML's own types, defaults included."""
+    result: dict[str, Any] = {}
+    for field in table_fields(table):
+        value = getattr(table, field.name)
+        if field.metadata.get("more"):
+            result |= value
+            continue
+        if dataclasses.is_dataclass(value):
+            value = plain(value)
+        elif isinstance(value, tuple):
+            value = value[0] if len(value) == 1 else list(value)
+        result[field.name.rstrip("_")] = value
+    return result

@@ -1,0 +1,129 @@
+"""The one table of signals: what a recording holds, in which unit, and what each signal means.
+
+The MCAP schemas, the listings, the plots, the exports and the limits all derive from this table.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import NamedTuple
+
+
+class Kind(Enum):
+    """How a signal is stored: the protobuf type of its field."""
+
+    NUMBER = "double"
+    STOREYS = "double per storey"  # a scalar where the structure has one storey
+    COUNT = "uint32"
+    INDEX = "int32"  # a count in which -1 says "none yet"
+    STAMP = "int64"
+    FLAG = "bool"
+    TEXT = "string"
+    VALUES = "map<string, double>"
+
+
+class Signal(NamedTuple):
+    """One field of a recorded message."""
+
+    name: str
+    unit: str
+    text: str
+    kind: Kind = Kind.NUMBER
+
+
+SEQ = Signal("seq", "", "tick number", Kind.COUNT)
+TIME = Signal("t", "s", "test time of the tick")
+
+MASTER = (
+    SEQ,
+    TIME,
+    Signal("ground_acceleration", "m/s²", "ground acceleration"),
+    Signal("displacement", "m", "displacement relative to the ground", Kind.STOREYS),
+    Signal("velocity", "m/s", "velocity relative to the ground", Kind.STOREYS),
+    Signal("acceleration", "m/s²", "acceleration relative to the ground", Kind.STOREYS),
+    Signal("absolute_acceleration", "m/s²", "absolute acceleration", Kind.STOREYS),
+    Signal("column_target", "m", "specimen deformation wanted at this tick"),
+    Signal("actuator_command", "m", "command written, to be reached at the end of the interval"),
+    Signal("column_displacement", "m", "specimen deformation measured"),
+    Signal("column_force", "N", "restoring force of the specimen measured"),
+    Signal("numerical_force", "N", "restoring force of the numerical columns of the storey", Kind.STOREYS),
+    Signal("damper_force_used", "N", "damper force used, at the damper's own scale"),
+    Signal("damper_force_seq", "", "tick at which that force was measured, -1 for none yet", Kind.INDEX),
+    Signal("damper_force_age", "s", "its age at use"),
+    Signal("table_target", "m", "absolute floor displacement wanted at the end of the interval, as sent"),
+    Signal("damper_command", "N", "motor force of the damper, as sent"),
+)
+
+SLAVE = (
+    SEQ,
+    TIME,
+    Signal("command_seq", "", "tick of the command in force, -1 for none yet", Kind.INDEX),
+    Signal("table_target", "m", "absolute floor displacement wanted, as received"),
+    Signal("damper_command", "N", "motor force of the damper, as received"),
+    Signal("table_command", "m", "command written to the table, to be reached at the end of the interval"),
+    Signal("table_displacement", "m", "table displacement measured"),
+    Signal("table_acceleration", "m/s²", "table acceleration measured"),
+    Signal("damper_stroke", "m", "stroke of the damper measured"),
+    Signal("damper_force", "N", "force of the damper on the table measured"),
+)
+
+LATENCY = (
+    SEQ,
+    Signal("wake_lateness", "s", "start of the tick after its nominal time"),
+    Signal("compute_time", "s", "from the start of the tick's work to the command handed to the link"),
+    Signal("command_one_way", "s", "command from the master to the slave"),
+    Signal("slave_time", "s", "from the command's arrival to the feedback handed to the link"),
+    Signal("feedback_one_way", "s", "feedback from the slave to the master"),
+    Signal("round_trip", "s", "from the command handed to the link to its feedback received"),
+    Signal("clock_offset", "s", "slave clock minus master clock, estimated"),
+    Signal("clock_offset_bound", "s", "largest possible error of that estimate"),
+    Signal("deadline_missed", "", "the tick's work or its answer came too late for the next tick", Kind.FLAG),
+    Signal("tick_ns", "ns", "nominal time of the tick, master clock", Kind.STAMP),
+    Signal("wake_ns", "ns", "start of the tick, master clock", Kind.STAMP),
+    Signal("command_sent_ns", "ns", "command handed to the link, master clock", Kind.STAMP),
+    Signal("command_received_ns", "ns", "command received, slave clock", Kind.STAMP),
+    Signal("feedback_sent_ns", "ns", "feedback handed to the link, slave clock", Kind.STAMP),
+    Signal("feedback_received_ns", "ns", "feedback received, master clock", Kind.STAMP),
+    Signal("feedback_used_ns", "ns", "feedback used by the next tick, master clock", Kind.STAMP),
+)
+
+EVENT = (
+    TIME,
+    Signal("lab", "", "master, slave or recorder", Kind.TEXT),
+    Signal("level", "", "info, warning or error", Kind.TEXT),
+    Signal("code", "", "short name of what happened", Kind.TEXT),
+    Signal("text", "", "a sentence", Kind.TEXT),
+    Signal("values", "", "numbers that belong to it", Kind.VALUES),
+)
+
+TOPICS: dict[str, tuple[Signal, ...]] = {
+    "master": MASTER,
+    "slave": SLAVE,
+    "latency": LATENCY,
+    "event": EVENT,
+}
+
+TICK_TOPICS = ("master", "slave", "latency")
+
+MEASURED = {
+    "master": ("column_displacement", "column_force"),
+    "slave": ("table_displacement", "table_acceleration", "damper_stroke", "damper_force"),
+}
+
+RESPONSES = ("column_displacement", "column_force", "table_acceleration", "damper_force")
+
+
+def signal(topic: str, name: str) -> Signal:
+    """The row of `name` in `topic`; raises KeyError where there is none."""
+    for row in TOPICS[topic]:
+        if row.name == name:
+            return row
+    raise KeyError(f"{topic}/{name}")
+
+
+def topic_of(name: str) -> str:
+    """Topic in which a signal is found first (master, slave, latency); raises KeyError where there is none."""
+    for topic in TICK_TOPICS:
+        if any(row.name == name for row in TOPICS[topic]):
+            return topic
+    raise KeyError(name)

@@ -1,0 +1,20 @@
+"""What the master checks before its rig moves: the measurements it read and the commands it computed."""
+
+from __future__ import annotations
+
+from common.limits import Guard
+from common.plan import Limits
+from common.rig import ColumnMeasurement
+from master.step import Outputs
+
+
+class MasterLimits:
+    """The plan's limits on laboratory A and on what is sent to laboratory B."""
+
+    def __init__(self, limits: Limits) -> None:
+        self._measurements = Guard(limits, ColumnMeasurement._fields)
+        self._outputs = Guard(limits, Outputs._fields)
+
+    def violation(self, measured: ColumnMeasurement, outputs: Outputs) -> str:
+        """A sentence on the first value beyond its limit, empty where there is none."""
+        return self._measurements.violation(measured) or self._outputs.violation(outputs)

@@ -1,0 +1,206 @@
+"""The whole test as one compiled rollout: building, both laboratories, the exchange between them.
+
+It is the simulation that a recording is compared with, and the reference for the real loops.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from common import signals as table
+from common.plan import Plan
+from models import substructure
+from models.compiled import jit
+from models.labs import column_lab, noise, table_lab
+from models.registry import Array
+from models.substructure import ACTUATOR_COMMAND, COLUMN_TARGET, DAMPER_COMMAND, STOREYS, TABLE_TARGET
+
+Index = NDArray[np.int64]
+
+MEASURED_A = ("column_displacement", "column_force")
+MEASURED_B = ("table_displacement", "table_acceleration", "damper_stroke", "damper_force")
+
+
+class Rollout(NamedTuple):
+    """What a rollout gives: one row per tick."""
+
+    outputs: Array  # (ticks, 5 + 5·storeys): the master's, in the order of `substructure`
+    measured_a: Array  # (ticks, 2)
+    measured_b: Array  # (ticks, 4)
+    damper_force_used: Array  # (ticks,)
+    finite: bool  # False where the loop diverged; the rows from there on are zero
+    ticks: int  # rows filled
+
+
+class Exchange(NamedTuple):
+    """Which message each tick used: the link's whole effect on the loop."""
+
+    command: Index  # (ticks,): command in force at the slave's tick, −1 for none yet
+    feedback: Index  # (ticks,): feedback used at the master's tick, −1 for none yet
+
+
+def on_time(ticks: int) -> Exchange:
+    """Every message there in time: command k at tick k, feedback k at tick k + 1."""
+    return Exchange(np.arange(ticks), np.arange(ticks) - 1)
+
+
+def simulate(
+    plan: Plan, ground: Array, *, seed: int | None = None, exchange: Exchange | None = None
+) -> Rollout:
+    """Closed loop of the plan's nominal models over the whole test.
+
+    `ground` as `substructure.ground_rows` gives it. Without a `seed` the sensors are free of noise; with
+    one they read what the emulated laboratories read under that seed of the plan.
+    """
+    ticks = plan.ticks
+    lab_a = column_lab.build(plan.test.interval, plan.actuator, plan.column)
+    lab_b = table_lab.build(plan.test.interval, plan.table, plan.damper)
+    sensors = plan.sensors
+    noise_a, noise_b = np.zeros((ticks, len(MEASURED_A))), np.zeros((ticks, len(MEASURED_B)))
+    if seed is not None:
+        noise_a = noise.Noise(noise.lab_seed(seed, noise.LAB_A), noise.levels_a(sensors)).rows(ticks)
+        noise_b = noise.Noise(noise.lab_seed(seed, noise.LAB_B), noise.levels_b(sensors)).rows(ticks)
+    master = substructure.build(plan, ground)
+    outputs = np.zeros((ticks, master.output.size))
+    measured_a, measured_b, used = np.zeros((ticks, 2)), np.zeros((ticks, 4)), np.zeros(ticks)
+    filled = roll(
+        *master,
+        *lab_a,
+        *lab_b,
+        *(exchange or on_time(ticks)),
+        noise_a,
+        noise_b,
+        outputs,
+        measured_a,
+        measured_b,
+        used,
+    )
+    return Rollout(outputs, measured_a, measured_b, used, filled == ticks, filled)
+
+
+@jit
+def roll(
+    codes: Index,
+    scalars: Array,
+    mass: Array,
+    coefficients: Array,
+    column_params: Array,
+    compensator_params: Array,
+    ground: Array,
+    state: Array,
+    column_memory: Array,
+    compensator_memory: Array,
+    target: Array,
+    output: Array,
+    code_a: int,
+    taps_a: Array,
+    rows_a: Array,
+    specimen: Array,
+    history_a: Array,
+    memory_a: Array,
+    state_a: Array,
+    taps_b: Array,
+    matrices: Array,
+    spring: Array,
+    history_b: Array,
+    state_b: Array,
+    scratch: Array,
+    command: Index,
+    feedback: Index,
+    noise_a: Array,
+    noise_b: Array,
+    outputs: Array,
+    measured_a: Array,
+    measured_b: Array,
+    used: Array,
+) -> int:
+    """Fill the last four arrays tick by tick; return how many ticks stayed finite."""
+    displacement, force = 0.0, 0.0
+    y, y_acceleration, stroke, damper_force = 0.0, 0.0, 0.0, 0.0
+    for tick in range(outputs.shape[0]):
+        measured_a[tick, 0] = displacement + noise_a[tick, 0]
+        measured_a[tick, 1] = force + noise_a[tick, 1]
+        used[tick] = measured_b[feedback[tick], 3] if feedback[tick] >= 0 else 0.0
+        substructure.advance(
+            codes,
+            scalars,
+            mass,
+            coefficients,
+            column_params,
+            compensator_params,
+            ground,
+            state,
+            column_memory,
+            compensator_memory,
+            target,
+            output,
+            tick,
+            measured_a[tick, 0],
+            measured_a[tick, 1],
+            used[tick],
+        )
+        if not np.isfinite(output[ACTUATOR_COMMAND]):
+            return tick
+        outputs[tick] = output
+        displacement, force = column_lab.advance(
+            code_a, taps_a, rows_a, specimen, history_a, memory_a, state_a, output[ACTUATOR_COMMAND]
+        )
+        measured_b[tick, 0] = y + noise_b[tick, 0]
+        measured_b[tick, 1] = y_acceleration + noise_b[tick, 1]
+        measured_b[tick, 2] = stroke + noise_b[tick, 2]
+        measured_b[tick, 3] = damper_force + noise_b[tick, 3]
+        sent = command[tick]
+        table_target = outputs[sent, TABLE_TARGET] if sent >= 0 else 0.0
+        motor = outputs[sent, DAMPER_COMMAND] if sent >= 0 else 0.0
+        y, y_acceleration, stroke, damper_force = table_lab.advance(
+            taps_b, matrices, spring, history_b, state_b, scratch, table_target, motor
+        )
+    return outputs.shape[0]
+
+
+def signals(plan: Plan, rollout: Rollout) -> dict[str, Array]:
+    """The rollout's signals by name, as a recording names them; (ticks,) or (ticks, storeys) each."""
+    n, rows = plan.storeys, slice(0, rollout.ticks)
+    result = {
+        "t": np.arange(rollout.ticks) * plan.test.interval,
+        "ground_acceleration": rollout.outputs[rows, substructure.GROUND_ACCELERATION],
+        "column_target": rollout.outputs[rows, COLUMN_TARGET],
+        "actuator_command": rollout.outputs[rows, ACTUATOR_COMMAND],
+        "table_target": rollout.outputs[rows, TABLE_TARGET],
+        "damper_command": rollout.outputs[rows, DAMPER_COMMAND],
+        "table_command": rollout.outputs[rows, TABLE_TARGET],
+        "damper_force_used": rollout.damper_force_used[rows],
+    }
+    for place, name in enumerate(substructure.STOREY_ROWS):
+        start = STOREYS + place * n
+        values = rollout.outputs[rows, start : start + n]
+        result[name] = values[:, 0] if n == 1 else values
+    for place, name in enumerate(MEASURED_A):
+        result[name] = rollout.measured_a[rows, place]
+    for place, name in enumerate(MEASURED_B):
+        result[name] = rollout.measured_b[rows, place]
+    return result
+
+
+def rows(plan: Plan, rollout: Rollout) -> Iterator[tuple[str, tuple[Any, ...]]]:
+    """The rollout's messages as a recording holds them: topic and values in the order of the signal table."""
+    columns: dict[str, Any] = signals(plan, rollout)
+    ticks = rollout.ticks
+    feedback = np.arange(ticks) - 1
+    columns |= {
+        "seq": np.arange(ticks),
+        "command_seq": np.arange(ticks),
+        "damper_force_seq": feedback,
+        "damper_force_age": np.where(feedback < 0, 0.0, plan.test.interval),
+    }
+    tables = {
+        topic: list(zip(*(columns[row.name].tolist() for row in table.TOPICS[topic]), strict=True))
+        for topic in ("master", "slave")
+    }
+    for tick in range(ticks):
+        for topic, values in tables.items():
+            yield topic, values[tick]

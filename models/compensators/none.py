@@ -1,0 +1,17 @@
+"""No compensation: the command is the target."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from models.compiled import jit
+
+
+class Params(NamedTuple):
+    """This method has no parameters."""
+
+
+@jit
+def step(target: float) -> float:
+    """The target (m) itself."""
+    return target

@@ -1,0 +1,4 @@
+"""Rows of an integrator's state."""
+
+DISPLACEMENT, VELOCITY, ACCELERATION, NEXT_DISPLACEMENT, NEXT_VELOCITY = range(5)
+ROWS = 8

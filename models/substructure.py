@@ -1,0 +1,171 @@
+"""The master's computation of one control interval: building, compensator, damper control.
+
+    M·ẍ + C·ẋ + f_numerical(x) + specimen = −M·1·z̈ + λ·damper_force
+
+At tick k the forces measured at the displacement x_k complete the equation of motion; the integrator
+then gives x_{k+1}, from which the targets of the interval's end follow (contract, sections 2 and 3).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from common.plan import Plan, resolve
+from models import compensators, integrators, specimens
+from models.compiled import jit
+from models.ground_motion import GroundMotion, ground_displacement, load, resample
+from models.integrators.state import ACCELERATION, DISPLACEMENT, NEXT_DISPLACEMENT, NEXT_VELOCITY, VELOCITY
+from models.registry import Array
+from models.structures import shear_building
+
+Codes = NDArray[np.int64]
+
+# places in `codes` and `scalars`
+INTEGRATOR, SPECIMEN, COMPENSATOR, STOREY, FLOOR = range(5)
+INTERVAL, RATIO, REPRESENTS, FORCE_SCALE, MOTOR_GAIN = range(5)
+
+# places in the output row; one value per storey each from STOREYS on
+GROUND_ACCELERATION, COLUMN_TARGET, ACTUATOR_COMMAND, TABLE_TARGET, DAMPER_COMMAND = range(5)
+STOREYS = 5
+STOREY_ROWS = ("displacement", "velocity", "acceleration", "absolute_acceleration", "numerical_force")
+
+
+class Substructure(NamedTuple):
+    """Arrays of the numerical side, in the order `advance` takes them."""
+
+    codes: Codes
+    scalars: Array
+    mass: Array  # (n,) kg
+    coefficients: Array  # of the integrator
+    column_params: Array  # (n, parameters) of the numerical columns
+    compensator_params: Array
+    ground: Array  # (2, ticks + 1): acceleration m/s², displacement m
+    state: Array  # (rows, n) of the integrator
+    column_memory: Array  # (n, memory)
+    compensator_memory: Array
+    target: Array  # (1,): the specimen's target of the present tick, m
+    output: Array
+
+
+def build(plan: Plan, ground: Array) -> Substructure:
+    """The numerical side of a plan at rest; `ground` as `ground_rows` gives it.
+
+    Raises:
+        InputError: a model, method or parameter that the registries do not know.
+    """
+    structure, column = plan.structure, plan.column
+    mass, stiffness = np.array(structure.mass), np.array(structure.stiffness)
+    own = stiffness.copy()
+    own[column.storey - 1] *= 1.0 - column.represents / column.columns_per_storey
+    model = structure.columns
+    packed = [specimens.pack(model.model, stiffness=float(k), **model.parameters) for k in own]
+    M, C, K = shear_building.matrices(mass, stiffness, np.array(structure.damping))
+    method = integrators.build(structure.integrator, M, C, K, plan.test.interval, structure.rho_infinity)
+    kind, compensator = compensators.build(plan.compensator.kind, plan.compensator.parameters)
+    force_scale = plan.damper.force_scale if plan.control.amd else 0.0
+    motor_gain = plan.control.gain / plan.damper.force_scale if force_scale else 0.0
+    scalars = [
+        plan.test.interval,
+        column.deformation_ratio,
+        float(column.represents),
+        force_scale,
+        motor_gain,
+    ]
+    n = plan.storeys
+    return Substructure(
+        np.array([method.code, packed[0][0], kind, column.storey - 1, plan.damper.floor - 1]),
+        np.array(scalars),
+        mass,
+        method.coefficients,
+        np.stack([params for _, params, _ in packed]),
+        compensator,
+        ground,
+        integrators.rest(n),
+        np.stack([memory for _, _, memory in packed]),
+        np.zeros(compensators.STATE_SIZE),
+        np.zeros(1),
+        np.zeros(STOREYS + len(STOREY_ROWS) * n),
+    )
+
+
+def motion(plan: Plan) -> GroundMotion:
+    """The record of the plan, unscaled; raises InputError where it cannot be read."""
+    return load(plan.ground_motion.record, resolve(plan, ""))
+
+
+def ground_rows(plan: Plan, record: GroundMotion) -> Array:
+    """Scaled ground acceleration (m/s²) and displacement (m) at every tick and the test's end; (2, ticks + 1)."""
+    interval = plan.test.interval
+    acceleration = resample(record.scaled(plan.ground_motion.scale), interval, plan.ticks * interval)
+    return np.stack([acceleration, ground_displacement(acceleration, interval)])
+
+
+@jit
+def advance(
+    codes: Codes,
+    scalars: Array,
+    mass: Array,
+    coefficients: Array,
+    column_params: Array,
+    compensator_params: Array,
+    ground: Array,
+    state: Array,
+    column_memory: Array,
+    compensator_memory: Array,
+    target: Array,
+    output: Array,
+    tick: int,
+    column_displacement: float,
+    column_force: float,
+    damper_force: float,
+) -> None:
+    """One tick: from the measurements at t_k to the commands for the interval's end, into `output`.
+
+    `column_displacement` m and `column_force` N as measured at t_k, `damper_force` N at the damper's own
+    scale as used. The arrays are those of `Substructure`; the states move on by one interval.
+    """
+    n = mass.size
+    storey, floor = codes[STOREY], codes[FLOOR]
+    interval, ratio = scalars[INTERVAL], scalars[RATIO]
+    forcing = output[
+        STOREYS + 3 * n : STOREYS + 4 * n
+    ]  # scratch until the absolute acceleration takes its place
+    forces = output[STOREYS + 4 * n : STOREYS + 5 * n]
+    for i in range(n):
+        forcing[i] = -mass[i] * ground[0, tick]
+    forcing[floor] += scalars[FORCE_SCALE] * damper_force
+    for i in range(n):
+        drift = shear_building.storey_drift(state[NEXT_DISPLACEMENT], i)
+        forces[i] = specimens.step(codes[SPECIMEN], column_params[i], column_memory[i], drift)
+        restoring = forces[i]
+        if i == storey:
+            restoring += scalars[REPRESENTS] * column_force
+        shear_building.add_nodal(-restoring, i, forcing)
+    integrators.step(codes[INTEGRATOR], coefficients, state, forcing, interval)
+
+    previous_target = target[0]
+    target[0] = ratio * shear_building.storey_drift(state[NEXT_DISPLACEMENT], storey)
+    rate = ratio * shear_building.storey_drift(state[NEXT_VELOCITY], storey)
+    bend = ratio * shear_building.storey_drift(state[ACCELERATION], storey)
+    output[GROUND_ACCELERATION] = ground[0, tick]
+    output[COLUMN_TARGET] = previous_target
+    output[ACTUATOR_COMMAND] = compensators.step(
+        codes[COMPENSATOR],
+        compensator_params,
+        compensator_memory,
+        target[0],
+        rate,
+        bend,
+        previous_target - column_displacement,
+        interval,
+    )
+    output[TABLE_TARGET] = state[NEXT_DISPLACEMENT, floor] + ground[1, tick + 1]
+    output[DAMPER_COMMAND] = scalars[MOTOR_GAIN] * state[NEXT_VELOCITY, floor]
+    for i in range(n):
+        output[STOREYS + i] = state[DISPLACEMENT, i]
+        output[STOREYS + n + i] = state[VELOCITY, i]
+        output[STOREYS + 2 * n + i] = state[ACCELERATION, i]
+        output[STOREYS + 3 * n + i] = state[ACCELERATION, i] + ground[0, tick]

@@ -1,0 +1,69 @@
+"""`python -m recorder PLAN --connect tcp/master:7447`: records a test on any machine that reaches the master."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+from common import cli
+from common.clock import MonotonicClock
+from common.drive import Stopper
+from common.endpoint import Endpoint
+from common.laboratory import Setting
+
+WAIT_S = 0.02
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the recorder."""
+    cli.plan_arguments(parser)
+    parser.add_argument("--connect", default=cli.DEFAULT_ENDPOINT, metavar="ENDPOINT", help="where the master listens")
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="the recording (default: a name in the plan's folder)")
+    cli.json_argument(parser, "report as JSON lines on standard output")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the recorder; its exit code."""
+    from common.zenoh_link import ZenohLink
+    from models import substructure
+    from recorder import files
+    from recorder.loop import RecorderLoop
+    from recorder.sink import FileSink, ThreadedSink
+
+    stopping = Stopper()
+    report = cli.reporter(args.json)
+    plan = cli.load_plan(args)
+    motion = substructure.motion(plan)
+    path = args.output or files.default_path(plan, time.strftime("%Y%m%d-%H%M%S"))
+    recording = files.begin(path, plan, motion, substructure.ground_rows(plan, motion))
+    link = ZenohLink("recorder", plan.test.name, connect=args.connect)
+    try:
+        setting = Setting(plan, Endpoint(link, plan.digest()), MonotonicClock(), report)
+        loop = RecorderLoop(setting, ThreadedSink(FileSink(recording, setting.clock)))
+        while not loop.done:
+            if (received := setting.endpoint.receive(WAIT_S)) is not None:
+                loop.take(received.message, received.received_ns)
+            loop.poll()
+            if reason := stopping():
+                loop.stop(reason)
+        summary = loop.close()
+    finally:
+        link.close()
+    report("recording", {"file": str(path), "summary": dict(summary)})
+    if loop.error is not None:
+        raise loop.error
+    return 0
+
+
+def main() -> int:
+    """Entry of `python -m recorder`."""
+    parser = argparse.ArgumentParser(prog="python -m recorder", description=__doc__)
+    add_arguments(parser)
+    args = parser.parse_args()
+    return cli.guarded(lambda: run(args))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,58 @@
+"""The file of a test: its name, what is written before the first sample."""
+
+from __future__ import annotations
+
+import os
+import platform
+from importlib import metadata
+from pathlib import Path
+
+from common.clock import unix_ns
+from common.errors import InputError
+from common.plan import Plan
+from common.recording.reader import GROUND
+from common.recording.writer import Recording
+from common.signals import TOPICS
+from models.ground_motion import GroundMotion
+from models.registry import Array
+
+PACKAGES = ("rths", "eclipse-zenoh", "mcap", "msgpack", "numba", "numpy", "protobuf", "scipy")
+
+
+def default_path(plan: Plan, now: str) -> Path:
+    """Where a recording goes when nobody says: `<folder>/<test>-<time>.mcap`; the folder is made.
+
+    Raises:
+        InputError: the folder cannot be made or written to.
+    """
+    folder = Path(plan.recording.folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"Cannot make the folder {folder} for recordings: {error.strerror}; give a file with -o.") from None
+    if not os.access(folder, os.W_OK):
+        raise InputError(f"The folder {folder} for recordings is not writable: give a file with -o.")
+    return folder / f"{plan.test.name}-{now}.mcap"
+
+
+def begin(path: Path, plan: Plan, record: GroundMotion, ground: Array) -> Recording:
+    """A recording with schemas, plan, versions, host and ground motion written and flushed."""
+    recording = Recording(path, plan.test.name, plan.storeys, TOPICS)
+    recording.metadata("plan", {"toml": plan.toml(), "digest": plan.digest()})
+    recording.metadata("versions", {name: metadata.version(name) for name in PACKAGES})
+    recording.metadata("host", host())
+    recording.metadata(GROUND, {"record": record.describe(), "scale": repr(plan.ground_motion.scale)})
+    recording.attach(GROUND, ground.astype("<f8").tobytes(), "application/octet-stream")
+    recording.flush()
+    return recording
+
+
+def host() -> dict[str, str]:
+    """The machine the recorder runs on."""
+    return {
+        "system": platform.platform(),
+        "machine": platform.machine(),
+        "processors": str(os.cpu_count()),
+        "python": platform.python_version(),
+        "recorded_unix_ns": str(unix_ns()),
+    }

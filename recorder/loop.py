@@ -1,0 +1,172 @@
+"""The recorder's loop: takes both streams in order, asks again for what is missing, says what it could not get."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from common import signals
+from common.clock import Clock
+from common.endpoint import Endpoint
+from common.errors import InputError, LostError
+from common.laboratory import REPEAT_NS, Report, Setting
+from common.messages import Finished, Message, Recorder, Register, Resend, Samples
+from common.outlet import Inlet
+from common.plan import Plan
+from recorder.sink import Item, Sink
+
+PATIENCE_NS = 1_000_000_000  # a hole that is not filled by then is lost
+SILENCE_NS = 5_000_000_000  # a test from which nothing is heard for so long is over
+LABS = ("master", "slave")
+CONSEQUENCE = "remote_trip"  # the other laboratory's cause counts
+MISSED_AT = [row.name for row in signals.LATENCY].index("deadline_missed")
+
+
+class RecorderLoop:
+    """Receives one test and hands it to a sink."""
+
+    def __init__(self, setting: Setting, sink: Sink) -> None:
+        self._plan: Plan = setting.plan
+        self._endpoint: Endpoint = setting.endpoint
+        self._clock: Clock = setting.clock
+        self._report: Report = setting.report
+        self._sink = sink
+        self._digest = setting.plan.digest()
+        self._inlets = {lab: Inlet() for lab in LABS}
+        self._hole_since: dict[str, int] = {}
+        self._session = 0
+        self._said_ns = -REPEAT_NS
+        self._heard_ns = setting.clock.now()
+        self._seen: dict[str, set[int]] = {topic: set() for topic in signals.TICK_TOPICS}
+        self._missed = 0
+        self._outcome = ("", "")
+        self._said_failure = False
+        self.error: InputError | LostError | None = None
+        self.done = False
+
+    # -- messages ---------------------------------------------------------------------------------
+
+    def take(self, message: Message, received_ns: int) -> None:
+        """Act on one message of a laboratory."""
+        if isinstance(message, Register):
+            self._register(message)
+        if not self._session or message.session != self._session:
+            return
+        self._heard_ns = received_ns
+        match message:
+            case Samples() if message.lab in LABS:
+                self._write(self._inlets[message.lab].take(message))
+            case Finished() if message.lab in LABS:
+                self._inlets[message.lab].total = message.total
+            case _:
+                pass
+
+    def _register(self, request: Register) -> None:
+        if self._session:
+            return
+        if request.plan != self._digest:
+            self.error = InputError(
+                f"The plans differ (master {request.plan}, recorder {self._digest}): "
+                "give all three the same file and options."
+            )
+            self._say()
+            self.done = True
+            return
+        self._session = request.session
+        self._endpoint.enter(request.session)
+        self._said_ns = -REPEAT_NS
+
+    def _write(self, items: list[Item]) -> None:
+        for item in items:
+            self._count(item)
+        if items:
+            self._sink.put(items)
+
+    def _count(self, item: Item) -> None:
+        topic, values = item[0], item[3:]
+        if topic == "event":
+            self._take_event(values)
+            return
+        self._seen[topic].add(values[0])
+        if topic == "latency":
+            self._missed += bool(values[MISSED_AT])
+
+    def _take_event(self, values: Item) -> None:
+        """Take note of why the test ended: the first cause, or what led to it where that arrives later."""
+        _, _, level, code, text, _ = values
+        settled = self._outcome[0] not in ("", CONSEQUENCE)
+        if (level == "error" or code == "stop") and not settled and (code != CONSEQUENCE or not self._outcome[0]):
+            self._outcome = (code, text)
+
+    # -- housekeeping -----------------------------------------------------------------------------
+
+    def poll(self) -> None:
+        """Say how far it is, ask for what is missing, notice when all is there or nobody is left."""
+        now = self._clock.now()
+        if now - self._said_ns >= REPEAT_NS:
+            self._said_ns = now
+            self._fill_holes(now)
+            self._say()
+        self._end(now)
+
+    def _say(self) -> None:
+        failure = self._sink.failure or (str(self.error) if self.error else "")
+        state = "failed" if failure else "recording" if self._session else "ready"
+        if failure and not self._said_failure:
+            self._said_failure = True
+            self._report("event", {"lab": "recorder", "level": "error", "code": "recording_lost", "text": failure})
+        nexts = (self._inlets[lab].next for lab in LABS)
+        self._endpoint.send(Recorder(self._session, state, self._digest, failure, *nexts))
+
+    def _fill_holes(self, now: int) -> None:
+        for lab, inlet in self._inlets.items():
+            hole = inlet.missing()
+            if hole is None:
+                self._hole_since.pop(lab, None)
+                continue
+            since = self._hole_since.setdefault(lab, now)
+            if now - since > PATIENCE_NS:
+                self._hole_since.pop(lab)
+                self._write(inlet.give_up())
+            else:
+                self._endpoint.send(Resend(self._session, lab, *hole))
+
+    def _end(self, now: int) -> None:
+        silent = now - self._heard_ns
+        if all(inlet.complete for inlet in self._inlets.values()):
+            self.done = True
+        elif not self._session and silent > self._plan.link.connect_timeout * 1e9:
+            seconds = self._plan.link.connect_timeout
+            self.error = LostError(f"No master was heard within {seconds:g} s: check the address after --connect.")
+            self.done = True
+        elif self._session and silent > SILENCE_NS:
+            if not self._outcome[0]:
+                self._outcome = ("lost", "The laboratories fell silent.")
+                self.error = LostError("The laboratories fell silent; what came until then is recorded.")
+            self.done = True
+
+    def stop(self, reason: str) -> None:
+        """End the recording because somebody wants it so."""
+        self.error = LostError(reason)
+        self._outcome = ("stop", reason)
+        self._say()
+        self.done = True
+
+    def close(self) -> Mapping[str, str]:
+        """Say goodbye, write the summary, close the file; the summary as written."""
+        self._say()
+        summary = self.summary()
+        self._sink.close(summary)
+        return summary
+
+    def summary(self) -> dict[str, str]:
+        """What was expected, what is recorded, what is missing, how it ended."""
+        result: dict[str, Any] = {"ticks_expected": self._plan.ticks}
+        for topic, seen in self._seen.items():
+            result[f"{topic}_recorded"] = len(seen)
+            result[f"{topic}_gaps"] = sum(1 for seq in range(max(seen, default=-1)) if seq not in seen)
+        result["items_lost"] = sum(inlet.lost for inlet in self._inlets.values())
+        result["items_dropped"] = self._sink.dropped
+        result["deadline_misses"] = self._missed
+        result["outcome"], result["cause"] = self._outcome[0] or "unknown", self._outcome[1]
+        return {name: str(value) for name, value in result.items()}

@@ -1,0 +1,116 @@
+"""Where the recorder's items go: straight into the file, or through a bounded queue and a thread."""
+
+from __future__ import annotations
+
+import threading
+from queue import Empty, Full, Queue
+from typing import Any, Protocol
+
+from common.clock import Clock
+from common.recording.writer import Recording
+
+FLUSH_NS = 100_000_000
+SYNC_NS = 1_000_000_000
+QUEUE_ITEMS = 60_000  # forty seconds of a default test
+
+Item = list[Any]
+
+
+class Sink(Protocol):
+    """Takes items for the file."""
+
+    failure: str  # why nothing can be written any more, empty while it can
+    dropped: int  # items that were not written
+
+    def put(self, items: list[Item]) -> None:
+        """Take items; never waits for the disk in real time."""
+
+    def close(self, summary: dict[str, str]) -> None:
+        """Write what is left and the summary."""
+
+
+class FileSink:
+    """Writes straight away, flushing ten times a second and syncing once."""
+
+    def __init__(self, recording: Recording, clock: Clock) -> None:
+        self._recording = recording
+        self._clock = clock
+        self._flushed_ns = self._synced_ns = clock.now()
+        self.failure = ""
+        self.dropped = 0
+
+    def put(self, items: list[Item]) -> None:
+        """Write items; after a failure of the disk they are only counted."""
+        if self.failure:
+            self.dropped += len(items)
+            return
+        for topic, log_ns, publish_ns, *values in items:
+            self._recording.add(topic, log_ns, publish_ns, values)
+        self.keep_up()
+
+    def keep_up(self) -> None:
+        """Flush and sync where it is time."""
+        now = self._clock.now()
+        try:
+            if now - self._flushed_ns >= FLUSH_NS:
+                self._flushed_ns = now
+                self._recording.flush()
+            if now - self._synced_ns >= SYNC_NS:
+                self._synced_ns = now
+                self._recording.sync()
+        except OSError as error:
+            self.failure = f"the disk does not take it ({error.strerror})."
+
+    def close(self, summary: dict[str, str]) -> None:
+        """Finish the file; after a failure it stays readable up to there."""
+        try:
+            if not self.failure:
+                self._recording.close(summary)
+                return
+        except OSError as error:
+            self.failure = f"the disk does not take it ({error.strerror})."
+        self._recording.abandon()
+
+
+class ThreadedSink:
+    """A bounded queue in front of another sink, emptied by a thread: a slow disk costs drops, never time."""
+
+    def __init__(self, sink: FileSink, capacity: int = QUEUE_ITEMS) -> None:
+        self._sink = sink
+        self._queue: Queue[list[Item]] = Queue(maxsize=max(capacity // 10, 1))
+        self._overflow = 0
+        self._ending = threading.Event()
+        self._thread = threading.Thread(target=self._work, name="rths-recorder-disk")
+        self._thread.start()
+
+    @property
+    def failure(self) -> str:
+        """Why nothing can be written any more."""
+        if self._overflow and not self._sink.failure:
+            return f"the disk is too slow: {self._overflow} samples were dropped."
+        return self._sink.failure
+
+    @property
+    def dropped(self) -> int:
+        """Items that were not written."""
+        return self._overflow + self._sink.dropped
+
+    def put(self, items: list[Item]) -> None:
+        """Queue items, or count them where the queue is full."""
+        try:
+            self._queue.put_nowait(items)
+        except Full:
+            self._overflow += len(items)
+
+    def _work(self) -> None:
+        while not (self._ending.is_set() and self._queue.empty()):
+            try:
+                self._sink.put(self._queue.get(timeout=0.05))
+            except Empty:
+                self._sink.keep_up()
+
+    def close(self, summary: dict[str, str]) -> None:
+        """Write what is queued, then the summary."""
+        self._ending.set()
+        self._thread.join()
+        self._sink.close(summary)

@@ -1,0 +1,98 @@
+"""`rths VERB …`: distributed real-time hybrid testing from one command line."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import sys
+from pathlib import Path
+
+import common
+from common import cli
+
+VERBS = {
+    "run": "run the whole test on this machine",
+    "master": "run laboratory A of a test on several machines",
+    "slave": "run laboratory B of a test on several machines",
+    "record": "record a test on several machines",
+    "simulate": "compute the closed loop of nominal models",
+    "inspect": "say what is in a recording",
+    "plot": "draw a recording",
+    "replay": "compute a recording's commands again and compare to the last bit",
+    "compare": "compare two recordings or simulations signal by signal",
+    "import": "make a recording of data of your own",
+    "export": "write a recording as CSV, Parquet or MAT",
+}
+
+MODULES = {"import": "rths.import_", "master": "master.__main__", "slave": "slave.__main__", "record": "recorder.__main__"}
+
+
+def check_home() -> str:
+    """A sentence where the `common` that Python found is not the one beside this program, else empty."""
+    here, found = Path(__file__).resolve().parent.parent, Path(common.__file__).resolve().parent.parent
+    if here == found:
+        return ""
+    return f"rths: another package named 'common' in {found} hides this program's; start rths from elsewhere."
+
+
+def parser_for(verb: str) -> argparse.ArgumentParser:
+    """The parser of one command."""
+    module = importlib.import_module(MODULES.get(verb, f"rths.{verb}"))
+    example = EXAMPLES[verb]
+    parser = argparse.ArgumentParser(
+        prog=f"rths {verb}",
+        description=f"{VERBS[verb].capitalize()}.",
+        epilog=f"example: {example}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    module.add_arguments(parser)
+    parser.set_defaults(run=module.run)
+    return parser
+
+
+EXAMPLES = {
+    "run": "rths run --duration 10 --scale 0.2",
+    "master": "rths master default --listen tcp/0.0.0.0:7447",
+    "slave": "rths slave default --connect tcp/192.0.2.1:7447",
+    "record": "rths record default --connect tcp/192.0.2.1:7447 -o test.mcap",
+    "simulate": "rths simulate default --ideal --no-amd",
+    "inspect": "rths inspect runs/default-20260101-120000.mcap",
+    "plot": "rths plot runs/default-20260101-120000.mcap -o pictures",
+    "replay": "rths replay runs/default-20260101-120000.mcap",
+    "compare": "rths compare a.mcap b.mcap --tolerance 0",
+    "import": "rths import drive.csv --map drive.toml -o drive.mcap",
+    "export": "rths export runs/default-20260101-120000.mcap -o test.csv",
+}
+
+
+def overview() -> str:
+    """What `rths --help` shows."""
+    width = max(map(len, VERBS))
+    rows = "\n".join(f"  {verb:<{width}}  {text}" for verb, text in VERBS.items())
+    return (
+        "usage: rths VERB [options]\n\nDistributed real-time hybrid testing: two laboratories, one structure, 2 ms.\n\n"
+        f"{rows}\n\n'rths VERB --help' explains each with an example.\n"
+    )
+
+
+def main() -> int:
+    """Entry of the console script."""
+    words = sys.argv[1:]
+    if not words or words[0] in ("-h", "--help"):
+        sys.stdout.write(overview())
+        return 0 if words else 2
+    if complaint := check_home():
+        sys.stderr.write(complaint + "\n")
+        return 2
+    verb = words[0]
+    if verb not in VERBS:
+        from common.schema import nearest
+
+        sys.stderr.write(f"rths: unknown command '{verb}': {nearest(verb, VERBS)}\n")
+        return 2
+    args = parser_for(verb).parse_args(words[1:])
+    return cli.guarded(lambda: int(args.run(args)))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

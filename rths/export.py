@@ -1,0 +1,58 @@
+"""`rths export`: a recording as CSV, Parquet or MAT."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from common.recording.reader import Run
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of `export`."""
+    parser.add_argument("file", type=Path, metavar="FILE", help="a recording (MCAP)")
+    parser.add_argument(
+        "-o", "--output", type=Path, required=True, metavar="OUT", help="the file to write: .csv, .parquet or .mat"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Export."""
+    from common.recording.reader import read
+    from rths import tabular
+
+    columns = flat(read(args.file))
+    tabular.write(args.output, columns)
+    ticks = len(next(iter(columns.values())))
+    sys.stdout.write(f"{args.output}: {ticks} ticks, {len(columns)} columns, SI units\n")
+    return 0
+
+
+def flat(recording: Run) -> dict[str, Any]:
+    """One column per signal, named `<topic>_<signal>`, with `_<storey>` where there are several; one row per tick.
+
+    A tick that a topic does not have is NaN there, or 0 in a column of whole numbers.
+    """
+    import numpy as np
+
+    ticks = np.unique(np.concatenate(list(recording.sequences.values())))
+    columns: dict[str, Any] = {"seq": ticks}
+    for topic, values in recording.columns.items():
+        places = np.searchsorted(ticks, recording.sequences[topic])
+        for name, column in values.items():
+            if name == "seq":
+                continue
+            whole = np.full((ticks.size, *column.shape[1:]), np.nan if column.dtype.kind == "f" else 0, column.dtype)
+            whole[places] = column
+            columns |= spread(f"{topic}_{name}", whole)
+    return columns
+
+
+def spread(name: str, column: Any) -> dict[str, Any]:
+    """A column by itself, or one per storey."""
+    if column.ndim == 1:
+        return {name: column}
+    return {f"{name}_{storey + 1}": column[:, storey].copy() for storey in range(column.shape[1])}

@@ -1,0 +1,85 @@
+"""`rths inspect`: what is in a recording."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from common import cli
+from rths.terminal import quantity, table
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of `inspect`."""
+    parser.add_argument("file", type=Path, metavar="FILE", help="a recording (MCAP)")
+    cli.json_argument(parser, "write the report as JSON on standard output")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Report on a recording."""
+    from common.recording.reader import read
+    from rths.summary import summarize
+
+    summary = summarize(read(args.file))
+    if args.json:
+        sys.stdout.write(json.dumps(summary) + "\n")
+    else:
+        write_report(summary)
+    return 0
+
+
+def write_report(summary: dict[str, Any]) -> None:
+    """The report as text."""
+    say = sys.stdout.write
+    say(f"\n{summary['file']}: test '{summary['test']}'" + ("" if summary["finished"] else ", cut off before its end") + "\n")
+    motion = summary["ground_motion"]
+    if motion:
+        say(f"ground motion: {motion['record']}, scaled by {motion['scale']}\n")
+    write_completeness(summary)
+    write_peaks(summary["peaks"])
+    write_latency(summary)
+    for event in summary["events"]:
+        if event["level"] != "info":
+            say(f"{event['level']} at t {event['t']:.3f} s ({event['lab']}): {event['text']}\n")
+    outcome = summary["recorder"]
+    if outcome:
+        say(f"outcome: {outcome.get('cause') or outcome.get('outcome', 'unknown')}\n")
+    say(f"open it: rths plot {summary['file']}, or any MCAP viewer (Foxglove, Lichtblick, PlotJuggler, Rerun)\n")
+
+
+def write_completeness(summary: dict[str, Any]) -> None:
+    """Ticks expected, recorded and missing."""
+    expected = summary["ticks_expected"]
+    rows = [["topic", "expected", "recorded", "missing", "holes"]]
+    for topic, facts in summary["topics"].items():
+        holes = " ".join(f"{first}–{last}" for first, last in facts["holes"]) or "none"
+        rows.append([topic, str(expected or "?"), str(facts["recorded"]), str(facts["missing"]), holes])
+    sys.stdout.write("\n")
+    table(rows)
+
+
+def write_peaks(peaks: dict[str, dict[str, Any]]) -> None:
+    """Largest magnitudes."""
+    rows = [["signal", "peak", "at"]]
+    rows += [
+        [name, quantity(facts["peak"], facts["unit"]), f"{facts['t']:.3f} s" if facts["t"] is not None else ""]
+        for name, facts in peaks.items()
+    ]
+    sys.stdout.write("\n")
+    table(rows)
+
+
+def write_latency(summary: dict[str, Any]) -> None:
+    """Percentiles of the segments, and late ticks."""
+    segments = summary["latency"]
+    if not segments:
+        return
+    names = list(next(iter(segments.values())))
+    rows = [["latency, µs", *names]]
+    rows += [[segment, *(f"{facts[name] * 1e6:.0f}" for name in names)] for segment, facts in segments.items()]
+    sys.stdout.write("\n")
+    table(rows)
+    sys.stdout.write(f"late ticks: {summary['late_ticks']}\n")

@@ -1,0 +1,167 @@
+"""`rths plot`: pictures of a recording."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from common.errors import InputError
+
+if TYPE_CHECKING:
+    from common.recording.reader import Run
+
+FORMATS = ("png", "svg", "pdf")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of `plot`."""
+    parser.add_argument("file", type=Path, metavar="FILE", help="a recording (MCAP)")
+    parser.add_argument("-o", "--output", type=Path, metavar="FOLDER", help="where to (default: beside the recording)")
+    parser.add_argument("--format", choices=FORMATS, default="png", help="format of the pictures (default: png)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Draw whatever the recording has signals for."""
+    from common.recording.reader import read
+
+    recording = read(args.file)
+    folder = args.output or args.file.with_suffix("")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"Cannot make the folder {folder}: {error.strerror}; give another with -o.") from None
+    drawn = [name for name, draw in PICTURES.items() if picture(recording, draw, folder / f"{name}.{args.format}")]
+    if not drawn:
+        raise InputError(f"{args.file} has no signals for any picture: see rths inspect {args.file}.")
+    for name in drawn:
+        sys.stdout.write(f"{folder / name}.{args.format}\n")
+    return 0
+
+
+def picture(recording: Run, draw: Callable[[Run, Any], bool], path: Path) -> bool:
+    """Draw one picture into a file; False where the recording lacks its signals."""
+    from rths.figure import figure
+
+    canvas = figure()
+    if not draw(recording, canvas):
+        return False
+    canvas.suptitle(caption(recording), fontsize=8, x=0.01, ha="left")
+    try:
+        canvas.savefig(path)
+    except OSError as error:
+        raise InputError(f"Cannot write {path}: {error.strerror}; give another folder with -o.") from None
+    return True
+
+
+def caption(recording: Run) -> str:
+    """What was tested, under which motion."""
+    motion = recording.metadata.get("ground_motion", {})
+    return f"{recording.test}: {motion['record']}, × {motion['scale']}" if motion else recording.test
+
+
+def histories(recording: Run, canvas: Any) -> bool:
+    """Time histories: ground, drift, forces, damper."""
+    rows = [
+        ("ground_acceleration", 1.0, "ground\nm/s²"),
+        ("column_displacement", 1e3, "column\ndeformation, mm"),
+        ("column_force", 1e-3, "column\nforce, kN"),
+        ("absolute_acceleration", 1.0, "floor\nacceleration, m/s²"),
+        ("damper_stroke", 1e3, "damper\nstroke, mm"),
+        ("damper_force", 1.0, "damper\nforce, N"),
+    ]
+    present = [(name, factor, label) for name, factor, label in rows if recording.signal(name) is not None]
+    if not present:
+        return False
+    axes = canvas.subplots(len(present), 1, sharex=True, squeeze=False)[:, 0]
+    for axis, (name, factor, label) in zip(axes, present, strict=True):
+        axis.plot(time_of(recording, name), factor * recording.signal(name), linewidth=0.7)
+        axis.set_ylabel(label)
+    axes[-1].set_xlabel("time, s")
+    return True
+
+
+def time_of(recording: Run, name: str) -> Any:
+    """Test time of a signal's messages."""
+    for topic in ("slave", "master"):
+        if name in recording.columns.get(topic, {}) and recording.columns[topic][name] is recording.signal(name):
+            return recording.columns[topic]["t"]
+    return recording.columns["master"]["t"]
+
+
+def hysteresis(recording: Run, canvas: Any) -> bool:
+    """Force against deformation of the column, and against stroke of the damper."""
+    loops = [
+        ("column_displacement", 1e3, "column deformation, mm", "column_force", 1e-3, "column force, kN"),
+        ("damper_stroke", 1e3, "damper stroke, mm", "damper_force", 1.0, "damper force, N"),
+    ]
+    present = [row for row in loops if recording.signal(row[0]) is not None and recording.signal(row[3]) is not None]
+    if not present:
+        return False
+    axes = canvas.subplots(1, len(present), squeeze=False)[0]
+    for axis, (x, x_factor, x_label, y, y_factor, y_label) in zip(axes, present, strict=True):
+        axis.plot(x_factor * recording.signal(x), y_factor * recording.signal(y), linewidth=0.5)
+        axis.set_xlabel(x_label)
+        axis.set_ylabel(y_label)
+    return True
+
+
+def tracking(recording: Run, canvas: Any) -> bool:
+    """Target and measurement of both transfer systems around the strongest motion, and their error."""
+    import numpy as np
+
+    pairs = [
+        ("master", "column_target", "column_displacement", "column deformation, mm", 0),
+        ("slave", "table_command", "table_displacement", "table displacement, mm", 1),
+    ]
+    present = [row for row in pairs if {row[1], row[2]} <= recording.columns.get(row[0], {}).keys()]
+    if not present:
+        return False
+    axes = canvas.subplots(2, len(present), sharex="col", squeeze=False)
+    for place, (topic, target, measured, label, shift) in enumerate(present):
+        columns = recording.columns[topic]
+        t = columns["t"][shift:]
+        wanted, got = columns[target][: t.size] * 1e3, columns[measured][shift:] * 1e3
+        middle = t[int(np.argmax(np.abs(wanted)))]
+        window = (t >= middle - 1.5) & (t <= middle + 1.5)
+        axes[0, place].plot(t[window], wanted[window], label="target")
+        axes[0, place].plot(t[window], got[window], "--", label="measured")
+        axes[0, place].set_ylabel(label)
+        axes[0, place].legend(loc="upper right")
+        axes[1, place].plot(t[window], (got - wanted)[window])
+        axes[1, place].set_ylabel("measured − target, mm")
+        axes[1, place].set_xlabel("time, s")
+    return True
+
+
+def latency(recording: Run, canvas: Any) -> bool:
+    """Where the time of a tick goes: distribution of every segment, and the round trip over the test."""
+    import numpy as np
+
+    from rths.summary import SEGMENTS
+
+    columns = recording.columns.get("latency", {})
+    values = {name: columns[name][np.isfinite(columns[name])] * 1e6 for name in SEGMENTS if name in columns}
+    values = {name: column for name, column in values.items() if column.size and column.max() > 0.0}
+    if not values:
+        return False
+    upper, lower = canvas.subplots(2, 1)
+    for name, column in values.items():
+        ordered = np.sort(np.maximum(column, 1.0))
+        upper.plot(ordered, 1.0 - np.arange(ordered.size) / ordered.size, label=name.replace("_", " "))
+    upper.set(xscale="log", yscale="log", xlabel="time, µs", ylabel="share of ticks above")
+    upper.legend(loc="lower left")
+    seq = columns["seq"][np.isfinite(columns["round_trip"])]
+    lower.plot(seq, values["round_trip"], ".", markersize=1)
+    lower.set(yscale="log", xlabel="tick", ylabel="round trip, µs")
+    return True
+
+
+PICTURES: dict[str, Callable[[Any, Any], bool]] = {
+    "histories": histories,
+    "hysteresis": hysteresis,
+    "tracking": tracking,
+    "latency": latency,
+}

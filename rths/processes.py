@@ -1,0 +1,91 @@
+"""The three processes of a test on one machine: started, listened to, stopped in order."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from typing import Any, NamedTuple
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+class Said(NamedTuple):
+    """One report of one process."""
+
+    process: str
+    data: dict[str, Any]
+
+
+class Processes:
+    """Master, slave and recorder; their reports in one queue, their complaints kept."""
+
+    def __init__(self) -> None:
+        self._running: dict[str, subprocess.Popen[str]] = {}
+        self._queue: SimpleQueue[Said] = SimpleQueue()
+        self._threads: list[threading.Thread] = []
+        self.complaints: dict[str, str] = {}
+
+    def start(self, name: str, arguments: Sequence[str]) -> None:
+        """Start `python -m name arguments --json`, out of reach of the terminal's Ctrl-C."""
+        process = subprocess.Popen(
+            [sys.executable, "-m", name, *arguments, "--json"],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+            env={**os.environ, "PYTHONPATH": str(ROOT)},
+        )
+        self._running[name] = process
+        for read in (self._listen, self._keep):
+            thread = threading.Thread(target=read, args=(name, process), daemon=True)
+            thread.start()
+            self._threads.append(thread)
+
+    def _listen(self, name: str, process: subprocess.Popen[str]) -> None:
+        assert process.stdout is not None  # noqa: S101 - it is a pipe
+        for line in process.stdout:
+            self._queue.put(Said(name, json.loads(line)))
+
+    def _keep(self, name: str, process: subprocess.Popen[str]) -> None:
+        assert process.stderr is not None  # noqa: S101 - it is a pipe
+        self.complaints[name] = process.stderr.read().strip()
+
+    def said(self, timeout: float) -> Said | None:
+        """The next report, waiting at most `timeout` s."""
+        try:
+            return self._queue.get(timeout=timeout)
+        except Empty:
+            return None
+
+    def ended(self) -> dict[str, int]:
+        """Exit codes of the processes that have ended."""
+        return {name: code for name, process in self._running.items() if (code := process.poll()) is not None}
+
+    def all_ended(self) -> bool:
+        """Whether all processes have ended and all they said was read."""
+        if len(self.ended()) < len(self._running):
+            return False
+        for thread in self._threads:
+            thread.join()
+        return self._queue.empty()
+
+    def interrupt(self, name: str) -> None:
+        """Ask one process to stop in order."""
+        if self._running[name].poll() is None:
+            self._running[name].send_signal(signal.SIGINT)
+
+    def kill(self) -> None:
+        """End what is still there."""
+        for process in self._running.values():
+            if process.poll() is None:
+                process.kill()
+            process.wait()
+

@@ -1,0 +1,155 @@
+"""`rths run`: the whole test on this machine, real time or virtual, with its summary."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from common import cli
+from common.drive import Stopper
+from common.errors import InputError, InterlockError, LostError, RthsError
+from common.plan import Plan
+from common.reality import Reality
+from rths.terminal import Progress
+
+ERRORS = {2: InputError, 3: InterlockError, 4: LostError}
+POLL_S = 0.1
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of `run`."""
+    cli.plan_arguments(parser, optional=True)
+    cli.reality_argument(parser)
+    clock = parser.add_mutually_exclusive_group()
+    clock.add_argument("--real-time", action="store_true", help="three processes, wall clock (default)")
+    clock.add_argument("--virtual", action="store_true", help="one process, virtual clock, as fast as it goes")
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="the recording (default: runs/<test>-<time>.mcap)")
+    cli.json_argument(parser, "write the summary as JSON on standard output")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run a test; its exit code."""
+    plan = cli.load_plan(args)
+    reality = cli.load_reality(args.reality, plan)
+    output = args.output or default_path(plan)
+    check_writable(output)
+    stopping = Stopper()
+    error = in_virtual_time(plan, reality, output, stopping) if args.virtual else in_real_time(args, plan, output, stopping)
+    if output.exists() and output.stat().st_size:
+        show(output, args.json)
+    if error is not None:
+        raise error
+    return 0
+
+
+def default_path(plan: Plan) -> Path:
+    """Where the recording goes when nobody says."""
+    from recorder.files import default_path as path
+
+    return path(plan, time.strftime("%Y%m%d-%H%M%S"))
+
+
+def check_writable(path: Path) -> None:
+    """Raise InputError where a recording cannot be written there."""
+    folder = path.parent
+    if not folder.is_dir():
+        raise InputError(f"There is no folder {folder} for the recording: make it, or give another file with -o.")
+    if not os.access(folder, os.W_OK) or path.is_dir() or (path.exists() and not os.access(path, os.W_OK)):
+        raise InputError(f"Cannot write the recording {path}: give a writable place with -o.")
+
+
+def in_virtual_time(plan: Plan, reality: Reality, output: Path, stopping: Stopper) -> RthsError | None:
+    """The test in this process; the error that ended it."""
+    from rths import virtual
+
+    started = time.monotonic()
+    error = virtual.run(virtual.assemble(plan, reality, output, virtual_report), stopping)
+    seconds = time.monotonic() - started
+    sys.stderr.write(f"{plan.test.duration:g} s of test in {seconds:.1f} s of computing\n")
+    return error
+
+
+def virtual_report(kind: str, data: Any) -> None:
+    """Events of a test in virtual time, on standard error."""
+    if kind == "event":
+        cli.text_report(kind, data)
+
+
+def in_real_time(args: argparse.Namespace, plan: Plan, output: Path, stopping: Stopper) -> RthsError | None:
+    """The test in three processes; the error that ended it."""
+    from common.zenoh_link import listenable
+    from rths.processes import Processes
+
+    processes = Processes()
+    progress = Progress(plan.test.duration)
+    endpoint = listenable()
+    progress.say(f"{plan.test.name}: {plan.test.duration:g} s, starting master, slave and recorder")
+    try:
+        start_all(processes, args, endpoint, output)
+        follow(processes, progress, stopping)
+    finally:
+        processes.kill()
+        progress.end()
+    return verdict(processes)
+
+
+def start_all(processes: Any, args: argparse.Namespace, endpoint: str, output: Path) -> None:
+    """Start the three processes with the plan's options."""
+    words = [str(cli.plan_path(args.plan))]
+    for option in ("duration", "scale", "seed"):
+        value = getattr(args, option)
+        if value is not None:
+            words += [f"--{option}", repr(value)]
+    secret = ["--reality", str(args.reality)] if args.reality else []
+    processes.start("master", [*words, *secret, "--listen", endpoint])
+    processes.start("slave", [*words, *secret, "--connect", endpoint])
+    processes.start("recorder", [*words, "--connect", endpoint, "-o", str(output)])
+
+
+def follow(processes: Any, progress: Progress, stopping: Stopper) -> None:
+    """Show what the processes say until all have ended; pass a wish to stop on to the master, once."""
+    asked = False
+    while not processes.all_ended():
+        said = processes.said(POLL_S)
+        if said is not None and said.data["kind"] == "progress" and said.process == "master":
+            progress.show(said.data)
+        elif said is not None and said.data["kind"] == "event":
+            progress.say(f"{said.data['lab']}: {said.data['text']}")
+        failed = {name: code for name, code in processes.ended().items() if code}
+        if (stopping() or failed) and not asked:
+            asked = True
+            for name in ("master", "slave", "recorder"):
+                if name == "master" or (failed and name not in failed):
+                    processes.interrupt(name)
+
+
+def verdict(processes: Any) -> RthsError | None:
+    """The error to show: of the process that failed first in the order of causes."""
+    codes = processes.ended()
+    for code in (2, 1, 3, 4):
+        for name in ("master", "slave", "recorder"):
+            if codes.get(name, 0) == code:
+                text = processes.complaints.get(name, "").removeprefix("rths: ")
+                return ERRORS.get(code, LostError)(text or f"The {name} ended with exit code {code}.")
+    for name, code in codes.items():
+        if code:
+            return LostError(f"The {name} was killed (signal {-code}); the recording holds what came until then.")
+    return None
+
+
+def show(path: Path, as_json: bool) -> None:
+    """Write the summary of a recording."""
+    from common.recording.reader import read
+    from rths.inspect import write_report
+    from rths.summary import summarize
+
+    summary = summarize(read(path))
+    if as_json:
+        sys.stdout.write(json.dumps(summary) + "\n")
+    else:
+        write_report(summary)

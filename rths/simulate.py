@@ -1,0 +1,124 @@
+"""`rths simulate`: the closed loop of nominal models, without laboratories or network."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from common import cli
+from common.plan import Compensator, Control, Plan, ideal
+
+if TYPE_CHECKING:
+    from models.closed_loop import Rollout
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of `simulate`."""
+    cli.plan_arguments(parser)
+    parser.add_argument("--ideal", action="store_true", help="transfer systems that follow at once, no compensation")
+    parser.add_argument("--uncompensated", action="store_true", help="the actuator without compensation")
+    parser.add_argument("--no-amd", action="store_true", help="the building without the damper")
+    parser.add_argument("--noise", action="store_true", help="with the sensors' noise, from the plan's seed")
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="write the simulation as a recording")
+    cli.json_argument(parser, "write the summary as JSON on standard output")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Simulate; 1 where the loop left the plan's limits."""
+    from models import substructure
+    from models.closed_loop import signals, simulate
+
+    plan = adapted(cli.load_plan(args), args)
+    motion = substructure.motion(plan)
+    ground = substructure.ground_rows(plan, motion)
+    rollout = simulate(plan, ground, seed=plan.test.seed if args.noise else None)
+    summary = summarize(plan, signals(plan, rollout), rollout) | {"ground_motion": motion.describe()}
+    if args.output:
+        write(args.output, plan, rollout, motion, ground)
+        summary["file"] = str(args.output)
+    if args.json:
+        sys.stdout.write(json.dumps(summary) + "\n")
+    else:
+        show(plan, summary)
+    return 1 if summary["beyond_limit"] else 0
+
+
+def adapted(plan: Plan, args: argparse.Namespace) -> Plan:
+    """The plan with the options' changes."""
+    if args.ideal:
+        plan = ideal(plan)
+    if args.uncompensated:
+        plan = replace(plan, compensator=Compensator("none", {}))
+    if args.no_amd:
+        plan = replace(plan, control=Control(amd=False, gain=plan.control.gain))
+    return plan
+
+
+def summarize(plan: Plan, columns: dict[str, Any], rollout: Rollout) -> dict[str, Any]:
+    """Peaks, drift of the specimen's storey, and the first value beyond a limit."""
+    import numpy as np
+
+    from common import signals
+
+    peaks = {}
+    for name, values in columns.items():
+        if name != "t" and values.size:
+            unit = signals.signal(signals.topic_of(name), name).unit
+            peaks[name] = {"peak": float(np.max(np.abs(values))), "unit": unit}
+    drift = columns["column_target"] / plan.column.deformation_ratio
+    return {
+        "test": plan.test.name,
+        "ticks": rollout.ticks,
+        "peak_drift": float(np.max(np.abs(drift), initial=0.0)),
+        "peaks": peaks,
+        "beyond_limit": beyond(plan, columns, rollout.ticks),
+    }
+
+
+def beyond(plan: Plan, columns: dict[str, Any], ticks: int) -> str:
+    """A sentence on the first value beyond a limit of the plan, empty where there is none."""
+    import numpy as np
+
+    first = (ticks, "")
+    for name, most in vars(plan.limits).items():
+        values = np.abs(columns[name]).reshape(ticks, -1).max(axis=1, initial=0.0)
+        over = np.flatnonzero(~(values <= most))
+        if over.size and over[0] < first[0]:
+            t = over[0] * plan.test.interval
+            first = (int(over[0]), f"{name} is beyond its limit of {most:g} from t = {t:.3f} s on: the loop is unstable.")
+    if not first[1] and ticks < plan.ticks:
+        return f"the loop diverges: no finite number after t = {ticks * plan.test.interval:.3f} s."
+    return first[1]
+
+
+def show(plan: Plan, summary: dict[str, Any]) -> None:
+    """The summary as text."""
+    from rths.terminal import quantity, table
+
+    sys.stdout.write(f"simulation of '{plan.test.name}', {summary['ticks']} ticks of {plan.test.interval:g} s\n")
+    sys.stdout.write(f"ground motion: {summary['ground_motion']}, scaled by {plan.ground_motion.scale:g}\n\n")
+    rows = [["signal", "peak"]]
+    rows += [[name, quantity(facts["peak"], facts["unit"])] for name, facts in summary["peaks"].items()]
+    table(rows)
+    sys.stdout.write(f"peak drift of the specimen's storey: {quantity(summary['peak_drift'], 'm')}\n")
+    if summary["beyond_limit"]:
+        sys.stdout.write(summary["beyond_limit"][0].upper() + summary["beyond_limit"][1:] + "\n")
+    if "file" in summary:
+        sys.stdout.write(f"written to {summary['file']}\n")
+
+
+def write(path: Path, plan: Plan, rollout: Rollout, motion: Any, ground: Any) -> None:
+    """The simulation as a recording: the master's and the slave's topics."""
+    from models.closed_loop import rows
+    from recorder import files
+
+    recording = files.begin(path, plan, motion, ground)
+    interval_ns = round(plan.test.interval * 1e9)
+    for topic, values in rows(plan, rollout):
+        at = values[0] * interval_ns
+        recording.add(topic, at, at, values)
+    recording.close({"outcome": "simulation", "cause": "simulation of the nominal models"})

@@ -1,0 +1,83 @@
+"""What a recording amounts to: peaks, completeness, latency; used by `run` and `inspect`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from common import signals
+from common.plan import Plan, parse
+from common.recording.reader import Run
+from common.signals import Kind
+
+PERCENTILES = (50, 90, 99, 99.9)
+SEGMENTS = ("wake_lateness", "compute_time", "command_one_way", "slave_time", "feedback_one_way", "round_trip")
+
+
+def plan_of(run: Run) -> Plan | None:
+    """The plan inside a recording, None where there is none."""
+    text = run.metadata.get("plan", {}).get("toml")
+    return parse(text, run.path.parent, f"the plan in {run.path}") if text else None
+
+
+def summarize(run: Run) -> dict[str, Any]:
+    """Everything that `inspect` reports, as plain values."""
+    plan = plan_of(run)
+    return {
+        "file": str(run.path),
+        "test": run.test,
+        "finished": run.finished,
+        "ground_motion": run.metadata.get("ground_motion", {}),
+        "ticks_expected": plan.ticks if plan else None,
+        "topics": {topic: completeness(run, topic, plan) for topic in run.columns},
+        "recorder": {name: value for name, value in run.metadata.get("summary", {}).items()},
+        "peaks": peaks(run),
+        "latency": latency(run),
+        "late_ticks": int(np.sum(run.columns["latency"]["deadline_missed"])) if run.has("latency") else None,
+        "events": run.events,
+    }
+
+
+def completeness(run: Run, topic: str, plan: Plan | None) -> dict[str, Any]:
+    """How many messages of a topic there are, how many are missing, and the first holes."""
+    sequence = run.sequences[topic]
+    last = plan.ticks if plan else int(sequence.max(initial=-1)) + 1
+    missing = np.setdiff1d(np.arange(last), sequence)
+    breaks = np.flatnonzero(np.diff(missing) > 1) + 1
+    holes = [[int(part[0]), int(part[-1])] for part in np.split(missing, breaks) if part.size]
+    return {
+        "recorded": int(sequence.size),
+        "missing": int(missing.size),
+        "holes": holes[:10],
+        "repeated": int(sequence.size - np.unique(sequence).size),
+    }
+
+
+def peaks(run: Run) -> dict[str, dict[str, Any]]:
+    """Largest magnitude of every recorded quantity with a unit, and when it occurs."""
+    result = {}
+    for topic in ("master", "slave"):
+        t = run.columns.get(topic, {}).get("t")
+        for row in signals.TOPICS[topic]:
+            values = run.columns.get(topic, {}).get(row.name)
+            if row.kind not in (Kind.NUMBER, Kind.STOREYS) or values is None or not values.size or row.name == "t":
+                continue
+            magnitude = np.abs(values).reshape(len(values), -1).max(axis=1)
+            place = int(np.argmax(magnitude))
+            at = float(t[place]) if t is not None else None
+            result[f"{topic}/{row.name}"] = {"peak": float(magnitude[place]), "t": at, "unit": row.unit}
+    return result
+
+
+def latency(run: Run) -> dict[str, dict[str, float]]:
+    """Percentiles of every segment of the ticks' time, s, over the ticks in which it was measured."""
+    columns = run.columns.get("latency", {})
+    result = {}
+    for name in SEGMENTS:
+        values = columns.get(name, np.array([]))
+        values = values[np.isfinite(values)]
+        if values.size:
+            result[name] = {f"p{p:g}": float(np.percentile(values, p)) for p in PERCENTILES}
+            result[name]["max"] = float(values.max())
+    return result

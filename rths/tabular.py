@@ -1,0 +1,99 @@
+"""Tables of numbers in the formats of other programs: CSV, Parquet, MAT, NPZ."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from common.errors import InputError
+
+Columns = dict[str, NDArray[np.float64]]
+
+READABLE = (".csv", ".parquet", ".mat", ".npz")
+WRITABLE = (".csv", ".parquet", ".mat")
+
+
+def read(path: Path) -> Columns:
+    """Numeric columns by name; raises InputError where the file cannot be read or holds none."""
+    readers = {".csv": _read_csv, ".parquet": _read_parquet, ".mat": _read_mat, ".npz": _read_npz}
+    suffix = path.suffix.lower()
+    if suffix not in readers:
+        raise InputError(f"Cannot tell the format of {path}: give a file that ends in {', '.join(READABLE)}.")
+    if not path.is_file():
+        raise InputError(f"There is no file {path}.")
+    try:
+        columns = readers[suffix](path)
+    except Exception as error:  # each library has its own exceptions for a damaged file
+        raise InputError(f"Cannot read {path}: {str(error).splitlines()[0]}.") from error
+    if not columns:
+        raise InputError(f"{path} holds no numeric column.")
+    return columns
+
+
+def _read_csv(path: Path) -> Columns:
+    from pyarrow import csv
+
+    return _numeric(csv.read_csv(path))
+
+
+def _read_parquet(path: Path) -> Columns:
+    from pyarrow import parquet
+
+    return _numeric(parquet.read_table(path))
+
+
+def _numeric(table: Any) -> Columns:
+    import pyarrow as pa
+
+    columns = {}
+    for name in table.column_names:
+        kind = table.schema.field(name).type
+        if pa.types.is_integer(kind) or pa.types.is_floating(kind):
+            columns[name.strip()] = np.array(table[name].to_numpy(), dtype=np.float64)
+    return columns
+
+
+def _read_mat(path: Path) -> Columns:
+    from scipy.io import loadmat
+
+    items = loadmat(path, squeeze_me=True)
+    return {
+        name: np.asarray(value, dtype=np.float64)
+        for name, value in items.items()
+        if not name.startswith("__") and isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype.kind in "iuf"
+    }
+
+
+def _read_npz(path: Path) -> Columns:
+    with np.load(path) as archive:
+        return {name: archive[name].astype(np.float64) for name in archive.files if archive[name].ndim == 1}
+
+
+def write(path: Path, columns: dict[str, NDArray[Any]]) -> None:
+    """Write columns of equal length; raises InputError where the format is unknown or the file not writable."""
+    suffix = path.suffix.lower()
+    if suffix not in WRITABLE:
+        raise InputError(f"Cannot write {path}: give a file that ends in {', '.join(WRITABLE)}.")
+    try:
+        if suffix == ".mat":
+            from scipy.io import savemat
+
+            savemat(path, columns, oned_as="column")
+        else:
+            _write_arrow(path, suffix, columns)
+    except OSError as error:
+        raise InputError(f"Cannot write {path}: {error.strerror or error}; give a writable place with -o.") from None
+
+
+def _write_arrow(path: Path, suffix: str, columns: dict[str, NDArray[Any]]) -> None:
+    import pyarrow as pa
+    from pyarrow import csv, parquet
+
+    table = pa.table(columns)
+    if suffix == ".csv":
+        csv.write_csv(table, path)
+    else:
+        parquet.write_table(table, path)

@@ -1,0 +1,1 @@
+"""Laboratory B: drives the shaking table that carries the active mass damper."""

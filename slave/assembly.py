@@ -1,0 +1,33 @@
+"""Everything the slave's loop is made of, built and warmed up before anything moves."""
+
+from __future__ import annotations
+
+from common import schema
+from common.laboratory import Setting
+from common.mailbox import LinkModel
+from common.plugins import construct, find
+from common.reality import Reality
+from common.rig import GuardedRig, TableMeasurement
+from models.labs import noise, table_lab
+from slave.loop import SlaveLoop
+from slave.rig import TableLab
+
+
+def build_rig(reality: Reality) -> GuardedRig:
+    """Laboratory B as the plan and the reality have it; raises InputError where it cannot be constructed."""
+    plan, rig = reality.plan, reality.slave
+    arguments = {"interval": plan.test.interval, "seed": noise.lab_seed(reality.seed, noise.LAB_B)}
+    if not rig.class_:
+        emulated = {name: schema.plain(getattr(plan, name)) for name in ("table", "damper", "sensors")}
+        return GuardedRig(TableLab(**arguments, **emulated), "laboratory B", TableMeasurement)
+    kind = find(rig.class_, reality.base, "[slave.rig]")
+    return GuardedRig(
+        construct(kind, arguments | rig.options, "[slave.rig]"), f"laboratory B ({kind.__name__})", TableMeasurement
+    )
+
+
+def build_loop(setting: Setting, reality: Reality, link: LinkModel) -> SlaveLoop:
+    """The slave's loop, its kernels compiled."""
+    plan = reality.plan
+    table_lab.advance(*table_lab.build(plan.test.interval, plan.table, plan.damper), 0.0, 0.0)
+    return SlaveLoop(setting, build_rig(reality), link)

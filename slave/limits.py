@@ -1,0 +1,20 @@
+"""What the slave checks before its rig moves: the measurements it read and the command it was sent."""
+
+from __future__ import annotations
+
+from common.limits import Guard
+from common.messages import Command
+from common.plan import Limits
+from common.rig import TableMeasurement
+
+
+class SlaveLimits:
+    """The plan's limits on laboratory B."""
+
+    def __init__(self, limits: Limits) -> None:
+        self._measurements = Guard(limits, TableMeasurement._fields)
+        self._command = Guard(limits, Command._fields)
+
+    def violation(self, measured: TableMeasurement, command: Command) -> str:
+        """A sentence on the first value beyond its limit, empty where there is none."""
+        return self._measurements.violation(measured) or self._command.violation(command)

@@ -1,0 +1,252 @@
+"""The slave's loop: handshake, one tick after the other, orderly end.
+
+`poll` and `tick` do everything that must be done and never wait; `drive.py` fetches messages and waits
+in real time, and virtual time calls the same two.
+"""
+
+from __future__ import annotations
+
+from common.errors import InputError, InterlockError, LostError, RigError
+from common.exchange import Event, State
+from common.laboratory import REPEAT_NS, Laboratory, Setting
+from common.mailbox import LinkModel, Mailbox
+from common.messages import (
+    Arm,
+    Armed,
+    Command,
+    Feedback,
+    Message,
+    Recorder,
+    Refused,
+    Register,
+    Registered,
+    Resend,
+    Scheduled,
+    Start,
+    Stop,
+    Stopped,
+    Sync,
+    SyncReply,
+    Trip,
+)
+from common.plan import PROTOCOL_VERSION
+from common.rig import GuardedRig, TableCommand, TableMeasurement
+from slave.limits import SlaveLimits
+
+NO_COMMAND = Command(0, -1, 0, 0, 0.0, 0.0)
+
+
+class SlaveLoop:
+    """Laboratory B in a test."""
+
+    def __init__(self, setting: Setting, rig: GuardedRig, link: LinkModel) -> None:
+        self.lab = Laboratory("slave", setting)
+        self._rig = rig
+        self._limits = SlaveLimits(setting.plan.limits)
+        self._commands: Mailbox[Command] = Mailbox(link, "command", setting.plan.test.interval, nominal=0)
+        self._received_ns: dict[int, int] = {}
+        self._command = NO_COMMAND
+        self._shift_ns = 0
+        self._said_ns = -REPEAT_NS
+        self._digest = setting.plan.digest()
+        self.ticks = 0
+
+    # -- messages ---------------------------------------------------------------------------------
+
+    def take(self, message: Message, received_ns: int) -> None:
+        """Act on one message of the master or the recorder."""
+        lab = self.lab
+        lab.listen_to_recorder(message)
+        if isinstance(message, Register):
+            self._register(message)
+        if isinstance(message, Recorder | Resend) or not lab.exchange.belongs(message.session):
+            return
+        lab.heard_ns = received_ns
+        match message:
+            case Command():
+                self._take_command(message, received_ns)
+            case Arm():
+                self._arm()
+            case Sync():
+                lab.endpoint.send(SyncReply(message.session, message.seq, received_ns, lab.clock.now()))
+            case Start():
+                self._schedule(message)
+            case Stop():
+                self._stop(message)
+            case Trip() if not lab.exchange.ended:
+                lab.tripped(message.lab, message.text, self.ticks)
+            case _:
+                pass
+
+    def _take_command(self, command: Command, received_ns: int) -> None:
+        if not self.lab.exchange.fresh(command.seq):
+            return
+        self._shift_ns = command.shift_ns
+        self._received_ns[command.seq] = received_ns
+        self._commands.put(command.seq, command)
+
+    def _register(self, request: Register) -> None:
+        lab = self.lab
+        if lab.exchange.state is State.IDLE:
+            complaint = self._complaint(request)
+            if complaint:
+                lab.endpoint.send(Refused(request.session, complaint))
+                lab.fail(Event.REFUSE, InputError(f"This slave refuses the test: {complaint}"), code="refused")
+                return
+            lab.enter(request.session)
+            self._move(Event.REGISTER)
+        if lab.exchange.belongs(request.session):
+            lab.endpoint.send(Registered(request.session))
+        else:
+            lab.endpoint.send(Refused(request.session, "it takes part in another test already."))
+
+    def _complaint(self, request: Register) -> str:
+        if request.protocol != PROTOCOL_VERSION:
+            return f"the master speaks protocol {request.protocol}, the slave {PROTOCOL_VERSION}: install one version."
+        if request.plan != self._digest:
+            return (
+                f"the plans differ (master {request.plan}, slave {self._digest}): "
+                "give both laboratories the same file and options."
+            )
+        return ""
+
+    def _arm(self) -> None:
+        lab = self.lab
+        if lab.exchange.state is State.REGISTERED:
+            try:
+                self._rig.arm()
+            except RigError as error:
+                lab.endpoint.send(Refused(lab.exchange.session, str(error)))
+                lab.fail(Event.TRIP, error, code="not_armed")
+                return
+            self._move(Event.ARM)
+        lab.endpoint.send(Armed(lab.exchange.session))
+
+    def _schedule(self, start: Start) -> None:
+        if self.lab.exchange.state is State.ARMED:
+            self.lab.start_ns = start.start_ns
+            self.lab.epoch_ns = start.epoch_ns
+            self._move(Event.SCHEDULE)
+        self.lab.endpoint.send(Scheduled(self.lab.exchange.session))
+
+    def _stop(self, request: Stop) -> None:
+        if self.lab.exchange.allows(Event.STOP):
+            self.lab.exchange.happen(Event.STOP, remote=True, cause=request.reason)
+
+    def _move(self, event: Event) -> None:
+        self.lab.exchange.happen(event)
+        self.lab.report("state", {"lab": "slave", "state": self.lab.exchange.state.value})
+
+    def poll(self) -> None:
+        """Before the first tick: give up when nobody comes, or when the master has fallen silent."""
+        lab = self.lab
+        seconds = lab.plan.link.connect_timeout
+        if lab.exchange.ended or lab.exchange.state is State.SCHEDULED:
+            return
+        if lab.clock.now() - lab.heard_ns > seconds * 1e9:
+            error = LostError(f"No master was heard within {seconds:g} s: check the address after --connect.")
+            lab.fail(Event.LOSE, error, code="nobody")
+
+    # -- ticks ------------------------------------------------------------------------------------
+
+    def tick_ns(self, tick: int) -> int:
+        """Nominal time of a tick on the slave's clock, its drift from the master's followed."""
+        return self.lab.tick_ns(tick) + self._shift_ns
+
+    def tick(self, tick: int) -> None:
+        """One control interval (contract, section 3); a tick that comes a whole interval late keeps its command."""
+        lab = self.lab
+        if lab.exchange.state is State.SCHEDULED:
+            lab.exchange.happen(Event.RUN)
+        held = lab.clock.now() >= self.tick_ns(tick + 1)
+        if not held and (command := self._commands.take(tick)) is not None:
+            self._command = command
+        command = self._command
+        try:
+            measured = self._rig.read()
+            violation = self._limits.violation(measured, command)
+            if not violation:
+                self._rig.write(TableCommand(command.table_target, command.damper_command))
+        except RigError as error:
+            lab.fail(Event.TRIP, error, code="rig", tick=tick)
+            return
+        self._answer(tick, measured)
+        self.ticks = tick + 1
+        if violation:
+            lab.fail(Event.TRIP, InterlockError(violation), code="limit", tick=tick)
+        elif lab.clock.now() - max(lab.heard_ns, lab.start_ns) > lab.plan.link.loss_timeout * 1e9:
+            lab.lost("The master", lab.plan.link.loss_timeout, tick)
+
+    def _answer(self, tick: int, measured: TableMeasurement) -> None:
+        lab, command = self.lab, self._command
+        received_ns = self._received_ns.pop(command.seq, 0) if command.seq == tick else 0
+        sent_ns = lab.clock.now()
+        lab.endpoint.send(Feedback(lab.exchange.session, tick, command.seq, received_ns, sent_ns, *measured))
+        log_ns = lab.epoch_ns + tick * lab.interval_ns
+        publish_ns = log_ns + sent_ns - self.tick_ns(tick)
+        values = (
+            tick,
+            tick * lab.plan.test.interval,
+            command.seq,
+            command.table_target,
+            command.damper_command,
+            command.table_target,
+            *measured,
+        )
+        lab.outlet.add("slave", log_ns, publish_ns, values)
+
+    # -- end --------------------------------------------------------------------------------------
+
+    def stop(self, reason: str) -> None:
+        """Stop because somebody at this laboratory wants it so."""
+        self.lab.fail(Event.TRIP, InterlockError(reason), code="stop", tick=self.ticks)
+
+    def disarm(self) -> None:
+        """Bring the rig to a safe stop; once, before leaving."""
+        if complaint := self._rig.disarm():
+            self.lab.note("disarm", complaint, level="warning", tick=self.ticks)
+
+    def leave(self) -> None:
+        """Tell the master and give the recorder the rest; may be called again until `left`."""
+        lab = self.lab
+        now = lab.clock.now()
+        if now - self._said_ns < REPEAT_NS // 2:
+            return
+        self._said_ns = now
+        session = lab.exchange.session
+        if lab.exchange.state is State.STOPPING:
+            lab.exchange.happen(Event.FINISH)
+        if lab.exchange.state is State.DONE:
+            lab.endpoint.send(Stopped(session, self.ticks))
+        elif lab.error is not None and session:
+            lab.endpoint.send(Trip(session, "slave", "stopped", str(lab.error)))
+        lab.send_samples(everything=True)
+        lab.endpoint.send(lab.outlet.finished())
+
+    @property
+    def left(self) -> bool:
+        """Whether the recorder has all."""
+        settled = self.lab.exchange.ended
+        return settled and (self.lab.recorder_has_all() or self.lab.recorder is None)
+
+    @property
+    def progress(self) -> dict[str, float]:
+        """What a user watches while it runs."""
+        return {}
+
+    # -- pacing -----------------------------------------------------------------------------------
+
+    def earliest(self, tick: int) -> int:
+        """A tick begins as soon as its command comes, ns."""
+        return self.tick_ns(tick - 1)
+
+    def latest(self, tick: int) -> int:
+        """For the command of a tick it is waited until then, ns."""
+        return self.tick_ns(tick) + round(self.lab.plan.link.wait_share * self.lab.interval_ns)
+
+    def heard(self, tick: int) -> bool:
+        """Whether what the tick waits for has come: its command, or a later one."""
+        return self._commands.newest_seen >= tick
+
+    def finish(self) -> None:
+        """All ticks are done; the master says when the test ends."""
