@@ -7,9 +7,8 @@ of a known message, or whose check fails, is rejected with a reason and reaches 
 from __future__ import annotations
 
 import hashlib
-import math
-from collections.abc import Callable
 from enum import Enum
+from math import isfinite
 from typing import Any, get_args, get_type_hints
 
 import msgpack
@@ -17,7 +16,8 @@ import msgpack
 from common.messages import Message
 
 CHECK_SIZE = 8
-MOST_TEXT = 2_000
+MOST_COUNT = 2**63
+MOST_TIME = 2**62  # ns, a century and a half
 MOST_BYTES = 1_000_000
 
 MESSAGES: tuple[type[Any], ...] = get_args(Message)
@@ -43,33 +43,36 @@ class RejectedFrame(ValueError):  # noqa: N818 - it is a finding about a frame, 
         self.reason = reason
 
 
-def _whole(value: object) -> bool:
-    return type(value) is int and -1 <= value < 2**63
+class _Shape:
+    """What the fields of one message must be: exact types, whole numbers and times in range, floats finite."""
+
+    def __init__(self, message: type[Any]) -> None:
+        hints = get_type_hints(message)
+        self.message = message
+        self.types = tuple(hints[name] for name in message._fields)
+        self._times = self._places(message, int, times=True)
+        self._counts = self._places(message, int, times=False)
+        self._floats = self._places(message, float, times=False)
+        self._texts = self._places(message, str, times=False) + self._places(message, bytes, times=False)
+
+    def _places(self, message: type[Any], kind: type, *, times: bool) -> tuple[int, ...]:
+        names = enumerate(message._fields)
+        return tuple(place for place, name in names if self.types[place] is kind and name.endswith("_ns") is times)
+
+    def admits(self, fields: list[Any]) -> bool:
+        """Whether fields of the right types have values that a message may have."""
+        total = 0.0
+        for place in self._floats:
+            total += fields[place]
+        return (
+            isfinite(total)
+            and all(-1 <= fields[place] < MOST_COUNT for place in self._counts)
+            and all(-MOST_TIME < fields[place] < MOST_TIME for place in self._times)
+            and all(len(fields[place]) <= MOST_BYTES for place in self._texts)
+        )
 
 
-def _signed(value: object) -> bool:
-    return type(value) is int and -(2**62) < value < 2**62
-
-
-def _finite(value: object) -> bool:
-    return type(value) is float and math.isfinite(value)
-
-
-def _text(value: object) -> bool:
-    return type(value) is str and len(value) <= MOST_TEXT
-
-
-def _bytes(value: object) -> bool:
-    return type(value) is bytes and len(value) <= MOST_BYTES
-
-
-def _checks(message: type[Any]) -> tuple[Callable[[object], bool], ...]:
-    by_type = {int: _whole, float: _finite, str: _text, bytes: _bytes}
-    hints = get_type_hints(message)
-    return tuple(_signed if name.endswith("_ns") else by_type[hints[name]] for name in message._fields)
-
-
-CHECKS = tuple(_checks(message) for message in MESSAGES)
+SHAPES = tuple(_Shape(message) for message in MESSAGES)
 
 
 def session_key(session: int, plan_digest: str) -> bytes:
@@ -104,11 +107,10 @@ def decode(frame: bytes, key: bytes) -> Message:
     kind, *fields = content
     if type(kind) is not int or not 0 <= kind < len(MESSAGES):
         raise RejectedFrame(Reject.KIND)
-    checks = CHECKS[kind]
-    if len(fields) != len(checks):
+    shape = SHAPES[kind]
+    if len(fields) != len(shape.types):
         raise RejectedFrame(Reject.FIELDS)
-    for check, field in zip(checks, fields, strict=True):
-        if not check(field):
-            raise RejectedFrame(Reject.VALUE)
-    message: Message = MESSAGES[kind](*fields)
+    if tuple(map(type, fields)) != shape.types or not shape.admits(fields):
+        raise RejectedFrame(Reject.VALUE)
+    message: Message = shape.message(*fields)
     return message

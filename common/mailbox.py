@@ -45,11 +45,13 @@ class Mailbox(Generic[Frame]):
         extra = self._link.fate(self._direction, seq, seq * self._interval)
         if extra is None:
             return
-        ticks = math.ceil(extra / self._interval - 1e-9)
-        self._waiting.append((seq + self._nominal + max(ticks, 0), seq, frame))
+        ticks = math.ceil(extra / self._interval - 1e-9) if extra > 0.0 else 0
+        self._waiting.append((seq + self._nominal + ticks, seq, frame))
 
     def take(self, tick: int) -> Frame | None:
         """The newest message that is there at this tick; None where there is none newer than the last."""
+        if not self._waiting:
+            return None
         there = [entry for entry in self._waiting if entry[0] <= tick and entry[1] > self._taken]
         if not there:
             return None

@@ -70,7 +70,6 @@ class GuardedRig:
         self._rig = rig
         self._name = name
         self._measurement = measurement
-        self._width: int = len(measurement._fields)  # type: ignore[attr-defined]
 
     def arm(self) -> None:
         """Arm; raises RigError with the rig's own reason."""
@@ -80,15 +79,20 @@ class GuardedRig:
         """The measurements as the NamedTuple; raises RigError where they are no finite numbers of the right count."""
         values = self._call("read", self._rig.read)
         try:
-            reading = tuple(map(float, values))
+            reading = self._measurement(*map(float, values))
         except (TypeError, ValueError):
-            raise RigError(f"{self._name}: read() returned {values!r}, not numbers.") from None
-        if len(reading) != self._width:
-            names = ", ".join(self._measurement._fields)  # type: ignore[attr-defined]
-            raise RigError(f"{self._name}: read() returned {len(reading)} numbers, not {self._width} ({names}).")
-        if not all(map(math.isfinite, reading)):
-            raise RigError(f"{self._name}: read() returned {reading}, which is not finite.")
-        return self._measurement(*reading)
+            raise RigError(self._complaint(values)) from None
+        if not math.isfinite(sum(reading)):
+            raise RigError(f"{self._name}: read() returned {tuple(reading)}, which is not finite.")
+        return reading
+
+    def _complaint(self, values: Any) -> str:
+        fields: tuple[str, ...] = self._measurement._fields  # type: ignore[attr-defined]
+        try:
+            count = len(list(map(float, values)))
+        except (TypeError, ValueError):
+            return f"{self._name}: read() returned {values!r}, not numbers."
+        return f"{self._name}: read() returned {count} numbers, not {len(fields)} ({', '.join(fields)})."
 
     def write(self, command: Any) -> None:
         """Apply a command; raises RigError where the rig fails."""

@@ -25,7 +25,7 @@ def configuration(role: str, listen: str, connect: str) -> zenoh.Config:
     """Configuration of one role: no discovery, one static link, short lease, constant retry."""
     config = zenoh.Config()
     settings: dict[str, object] = {
-        "mode": "router" if role == "master" else "peer",
+        "mode": "router" if role == "master" else "client",
         "listen/endpoints": [listen] if listen else [],
         "connect/endpoints": [connect] if connect else [],
         "connect/timeout_ms": -1,

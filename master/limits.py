@@ -11,9 +11,9 @@ from master.step import Outputs
 class MasterLimits:
     """The plan's limits on laboratory A and on what is sent to laboratory B."""
 
-    def __init__(self, limits: Limits) -> None:
+    def __init__(self, limits: Limits, storeys: int) -> None:
         self._measurements = Guard(limits, ColumnMeasurement._fields)
-        self._outputs = Guard(limits, Outputs._fields)
+        self._outputs = Guard(limits, Outputs._fields, several=("displacement",) if storeys > 1 else ())
 
     def violation(self, measured: ColumnMeasurement, outputs: Outputs) -> str:
         """A sentence on the first value beyond its limit, empty where there is none."""

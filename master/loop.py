@@ -57,7 +57,7 @@ class MasterLoop:
         plan = setting.plan
         self._rig = rig
         self._step = step
-        self._limits = MasterLimits(plan.limits)
+        self._limits = MasterLimits(plan.limits, plan.storeys)
         self._feedback: Mailbox[Feedback] = Mailbox(link, "feedback", plan.test.interval, nominal=1)
         self._offset = ClockOffset()
         self._account = Account(self.lab, self._offset)
@@ -79,10 +79,12 @@ class MasterLoop:
     def take(self, message: Message, received_ns: int) -> None:
         """Act on one message of the slave or the recorder."""
         lab = self.lab
+        if isinstance(message, Feedback):
+            if lab.exchange.belongs(message.session):
+                self._take_feedback(message, received_ns)
+            return
         lab.listen_to_recorder(message)
         match message:
-            case Feedback() if lab.exchange.belongs(message.session):
-                self._take_feedback(message, received_ns)
             case Trip() if lab.exchange.belongs(message.session) and not lab.exchange.ended:
                 lab.tripped(message.lab, message.text, self.ticks)
             case Refused() if lab.exchange.belongs(message.session):

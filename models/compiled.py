@@ -47,4 +47,4 @@ if not os.environ.get("NUMBA_CACHE_DIR"):
 
 def jit(function: Function) -> Function:
     """Compile a kernel on its first call; divisions by zero give inf or nan as in NumPy; the GIL is released."""
-    return cast(Function, numba.njit(cache=True, error_model="numpy", nogil=True)(function))
+    return cast(Function, numba.njit(cache=True, error_model="numpy", nogil=True, forceinline=True)(function))

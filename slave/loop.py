@@ -56,6 +56,10 @@ class SlaveLoop:
     def take(self, message: Message, received_ns: int) -> None:
         """Act on one message of the master or the recorder."""
         lab = self.lab
+        if isinstance(message, Command):
+            if lab.exchange.belongs(message.session):
+                self._take_command(message, received_ns)
+            return
         lab.listen_to_recorder(message)
         if isinstance(message, Register):
             self._register(message)
@@ -63,8 +67,6 @@ class SlaveLoop:
             return
         lab.heard_ns = received_ns
         match message:
-            case Command():
-                self._take_command(message, received_ns)
             case Arm():
                 self._arm()
             case Sync():
@@ -81,6 +83,7 @@ class SlaveLoop:
     def _take_command(self, command: Command, received_ns: int) -> None:
         if not self.lab.exchange.fresh(command.seq):
             return
+        self.lab.heard_ns = received_ns
         self._shift_ns = command.shift_ns
         self._received_ns[command.seq] = received_ns
         self._commands.put(command.seq, command)
