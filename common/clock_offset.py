@@ -17,28 +17,19 @@ class ClockOffset:
         self._length = length
         self._minima: deque[tuple[int, int]] = deque(maxlen=blocks)
         self._in_block = length
+        self.offset = 0  # other clock minus own clock, ns
+        self.bound = 0  # largest error of it, ns: half the shortest round trip; asymmetry cannot be seen
 
     def add(self, t1: int, t2: int, t3: int, t4: int) -> None:
         """Take in one exchange."""
         pair = ((t4 - t1) - (t3 - t2), ((t2 - t1) + (t3 - t4)) // 2)
-        if self._in_block >= self._length:
+        self._in_block += 1
+        if self._in_block > self._length:
             self._minima.append(pair)
-            self._in_block = 0
+            self._in_block = 1
         elif pair < self._minima[-1]:
             self._minima[-1] = pair
-        self._in_block += 1
-
-    @property
-    def known(self) -> bool:
-        """Whether any exchange has been taken in."""
-        return bool(self._minima)
-
-    @property
-    def offset(self) -> int:
-        """Other clock minus own clock, ns."""
-        return min(self._minima)[1] if self._minima else 0
-
-    @property
-    def bound(self) -> int:
-        """Largest error of the offset, ns: half the shortest round trip; asymmetry cannot be seen."""
-        return max(min(self._minima)[0], 0) // 2 if self._minima else 0
+        else:
+            return
+        shortest, self.offset = min(self._minima)
+        self.bound = max(shortest, 0) // 2

@@ -64,12 +64,16 @@ class _Shape:
         total = 0.0
         for place in self._floats:
             total += fields[place]
-        return (
-            isfinite(total)
-            and all(-1 <= fields[place] < MOST_COUNT for place in self._counts)
-            and all(-MOST_TIME < fields[place] < MOST_TIME for place in self._times)
-            and all(len(fields[place]) <= MOST_BYTES for place in self._texts)
-        )
+        for place in self._counts:
+            if not -1 <= fields[place] < MOST_COUNT:
+                return False
+        for place in self._times:
+            if not -MOST_TIME < fields[place] < MOST_TIME:
+                return False
+        for place in self._texts:
+            if len(fields[place]) > MOST_BYTES:
+                return False
+        return isfinite(total)
 
 
 SHAPES = tuple(_Shape(message) for message in MESSAGES)

@@ -52,14 +52,12 @@ class Mailbox(Generic[Frame]):
         """The newest message that is there at this tick; None where there is none newer than the last."""
         if not self._waiting:
             return None
-        there = [entry for entry in self._waiting if entry[0] <= tick and entry[1] > self._taken]
-        if not there:
+        newest: tuple[int, int, Frame] | None = None
+        for entry in self._waiting:
+            if entry[0] <= tick and entry[1] > (newest[1] if newest else self._taken):
+                newest = entry
+        if newest is None:
             return None
-        newest = max(there, key=_seq)
         self._taken = newest[1]
         self._waiting = [entry for entry in self._waiting if entry[1] > self._taken]
         return newest[2]
-
-
-def _seq(entry: tuple[int, int, object]) -> int:
-    return entry[1]

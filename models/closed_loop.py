@@ -95,6 +95,7 @@ def roll(
     column_memory: Array,
     compensator_memory: Array,
     target: Array,
+    balance: Array,
     output: Array,
     code_a: int,
     taps_a: Array,
@@ -137,6 +138,7 @@ def roll(
             column_memory,
             compensator_memory,
             target,
+            balance,
             output,
             tick,
             measured_a[tick, 0],
@@ -145,7 +147,8 @@ def roll(
         )
         if not np.isfinite(output[ACTUATOR_COMMAND]):
             return tick
-        outputs[tick] = output
+        for place in range(output.size):
+            outputs[tick, place] = output[place]
         displacement, force = column_lab.advance(
             code_a, taps_a, rows_a, specimen, history_a, memory_a, state_a, output[ACTUATOR_COMMAND]
         )

@@ -47,6 +47,7 @@ class Substructure(NamedTuple):
     column_memory: Array  # (n, memory)
     compensator_memory: Array
     target: Array  # (1,): the specimen's target of the present tick, m
+    balance: Array  # (n,): external minus restoring force, N
     output: Array
 
 
@@ -61,7 +62,7 @@ def build(plan: Plan, ground: Array) -> Substructure:
     own = stiffness.copy()
     own[column.storey - 1] *= 1.0 - column.represents / column.columns_per_storey
     model = structure.columns
-    packed = [specimens.pack(model.model, stiffness=float(k), **model.parameters) for k in own]
+    specimen, column_params, column_memory = specimens.build(model.model, own.tolist(), model.parameters)
     M, C, K = shear_building.matrices(mass, stiffness, np.array(structure.damping))
     method = integrators.build(structure.integrator, M, C, K, plan.test.interval, structure.rho_infinity)
     kind, compensator = compensators.build(plan.compensator.kind, plan.compensator.parameters)
@@ -76,17 +77,18 @@ def build(plan: Plan, ground: Array) -> Substructure:
     ]
     n = plan.storeys
     return Substructure(
-        np.array([method.code, packed[0][0], kind, column.storey - 1, plan.damper.floor - 1]),
+        np.array([method.code, specimen, kind, column.storey - 1, plan.damper.floor - 1]),
         np.array(scalars),
         mass,
         method.coefficients,
-        np.stack([params for _, params, _ in packed]),
+        column_params,
         compensator,
         ground,
         integrators.rest(n),
-        np.stack([memory for _, _, memory in packed]),
+        column_memory,
         np.zeros(compensators.STATE_SIZE),
         np.zeros(1),
+        np.zeros(n),
         np.zeros(STOREYS + len(STOREY_ROWS) * n),
     )
 
@@ -116,6 +118,7 @@ def advance(
     column_memory: Array,
     compensator_memory: Array,
     target: Array,
+    balance: Array,
     output: Array,
     tick: int,
     column_displacement: float,
@@ -130,26 +133,22 @@ def advance(
     n = mass.size
     storey, floor = codes[STOREY], codes[FLOOR]
     interval, ratio = scalars[INTERVAL], scalars[RATIO]
-    forcing = output[
-        STOREYS + 3 * n : STOREYS + 4 * n
-    ]  # scratch until the absolute acceleration takes its place
-    forces = output[STOREYS + 4 * n : STOREYS + 5 * n]
     for i in range(n):
-        forcing[i] = -mass[i] * ground[0, tick]
-    forcing[floor] += scalars[FORCE_SCALE] * damper_force
+        balance[i] = -mass[i] * ground[0, tick]
+    balance[floor] += scalars[FORCE_SCALE] * damper_force
     for i in range(n):
-        drift = shear_building.storey_drift(state[NEXT_DISPLACEMENT], i)
-        forces[i] = specimens.step(codes[SPECIMEN], column_params[i], column_memory[i], drift)
-        restoring = forces[i]
+        drift = shear_building.storey_drift(state, NEXT_DISPLACEMENT, i)
+        force = specimens.step(codes[SPECIMEN], column_params, column_memory, i, drift)
+        output[STOREYS + 4 * n + i] = force
         if i == storey:
-            restoring += scalars[REPRESENTS] * column_force
-        shear_building.add_nodal(-restoring, i, forcing)
-    integrators.step(codes[INTEGRATOR], coefficients, state, forcing, interval)
+            force += scalars[REPRESENTS] * column_force
+        shear_building.add_storey_force(-force, i, balance)
+    integrators.step(codes[INTEGRATOR], coefficients, state, balance, interval)
 
     previous_target = target[0]
-    target[0] = ratio * shear_building.storey_drift(state[NEXT_DISPLACEMENT], storey)
-    rate = ratio * shear_building.storey_drift(state[NEXT_VELOCITY], storey)
-    bend = ratio * shear_building.storey_drift(state[ACCELERATION], storey)
+    target[0] = ratio * shear_building.storey_drift(state, NEXT_DISPLACEMENT, storey)
+    rate = ratio * shear_building.storey_drift(state, NEXT_VELOCITY, storey)
+    bend = ratio * shear_building.storey_drift(state, ACCELERATION, storey)
     output[GROUND_ACCELERATION] = ground[0, tick]
     output[COLUMN_TARGET] = previous_target
     output[ACTUATOR_COMMAND] = compensators.step(

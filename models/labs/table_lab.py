@@ -66,7 +66,8 @@ def advance(
     scratch[MOTOR_COMMAND] = motor_command
     scratch[COMMAND_AFTER] = delay.delayed(history, taps, 0)
     for i in range(matrices.shape[0]):
-        scratch[:STATES] = state
+        for row in range(STATES):
+            scratch[row] = state[row]
         scratch[COMMAND_BEFORE] = scratch[COMMAND_AFTER]
         scratch[COMMAND_AFTER] = delay.delayed(history, taps, i + 1)
         for row in range(STATES):

@@ -1,4 +1,4 @@
-"""Linear specimen `f = k·δ`."""
+"""Linear elastic column `f = k·δ`."""
 
 from __future__ import annotations
 
@@ -14,10 +14,7 @@ class Params(NamedTuple):
     stiffness: float  # N/m
 
 
-STATE_SIZE = 0
-
-
 @jit
-def step(p: Array, deformation: float) -> float:
-    """Force (N) at a deformation (m)."""
-    return p[0] * deformation
+def step(p: Array, i: int, deformation: float) -> float:
+    """Force (N) at a deformation (m) of the column described in row `i`."""
+    return p[i, 0] * deformation

@@ -23,6 +23,7 @@ tag=$$
 work=$(mktemp -d)
 context=$work/context
 started=
+bridge_was_there=
 
 say() { printf 'compose_check: %4d s: %s\n' "$SECONDS" "$*"; }
 skip() { say "skipped: $*"; exit 77; }
@@ -48,12 +49,14 @@ cleanup() {
 
 in_context() { (cd "$context" && "$@"); }
 
-# The engine leaves the machine's firewall, routes and devices alone; the test's own network needs none of them.
+# The engine leaves the machine's firewall and forwarding alone: the test's own network needs neither.
+# BuildKit needs the default bridge, which is removed again.
 start_engine() {
+    if [ -e /sys/class/net/docker0 ]; then bridge_was_there=yes; fi
     export DOCKER_HOST=unix://$work/docker.sock
     setsid nice dockerd --host "$DOCKER_HOST" --pidfile "$work/dockerd.pid" \
         --data-root "$work/data" --exec-root "$work/exec" \
-        --bridge=none --iptables=false --ip6tables=false --ip-forward=false --ip-masq=false \
+        --iptables=false --ip6tables=false --ip-forward=false --ip-masq=false \
         > "$work/dockerd.log" 2>&1 &
     started=$!
     for _ in $(seq 60); do
@@ -73,6 +76,7 @@ stop_engine() {
     done
     kill -9 "$started" 2> /dev/null
     awk -v under="$work/" 'index($2, under) == 1 {print $2}' /proc/mounts | sort -r | xargs -r umount
+    [ -n "$bridge_was_there" ] || ip link delete docker0 2> /dev/null
 }
 
 make_base() {
