@@ -62,7 +62,7 @@ def build(plan: Plan, ground: Array) -> Substructure:
     own = stiffness.copy()
     own[column.storey - 1] *= 1.0 - column.represents / column.columns_per_storey
     model = structure.columns
-    specimen, column_params, column_memory = specimens.build(model.model, own.tolist(), model.parameters)
+    packed = [specimens.pack(model.model, stiffness=float(k), **model.parameters) for k in own]
     M, C, K = shear_building.matrices(mass, stiffness, np.array(structure.damping))
     method = integrators.build(structure.integrator, M, C, K, plan.test.interval, structure.rho_infinity)
     kind, compensator = compensators.build(plan.compensator.kind, plan.compensator.parameters)
@@ -77,15 +77,15 @@ def build(plan: Plan, ground: Array) -> Substructure:
     ]
     n = plan.storeys
     return Substructure(
-        np.array([method.code, specimen, kind, column.storey - 1, plan.damper.floor - 1]),
+        np.array([method.code, packed[0][0], kind, column.storey - 1, plan.damper.floor - 1]),
         np.array(scalars),
         mass,
         method.coefficients,
-        column_params,
+        np.stack([params for _, params, _ in packed]),
         compensator,
         ground,
         integrators.rest(n),
-        column_memory,
+        np.stack([memory for _, _, memory in packed]),
         np.zeros(compensators.STATE_SIZE),
         np.zeros(1),
         np.zeros(n),
@@ -137,18 +137,18 @@ def advance(
         balance[i] = -mass[i] * ground[0, tick]
     balance[floor] += scalars[FORCE_SCALE] * damper_force
     for i in range(n):
-        drift = shear_building.storey_drift(state, NEXT_DISPLACEMENT, i)
-        force = specimens.step(codes[SPECIMEN], column_params, column_memory, i, drift)
+        drift = shear_building.storey_drift(state[NEXT_DISPLACEMENT], i)
+        force = specimens.step(codes[SPECIMEN], column_params[i], column_memory[i], drift)
         output[STOREYS + 4 * n + i] = force
         if i == storey:
             force += scalars[REPRESENTS] * column_force
-        shear_building.add_storey_force(-force, i, balance)
+        shear_building.add_nodal(-force, i, balance)
     integrators.step(codes[INTEGRATOR], coefficients, state, balance, interval)
 
     previous_target = target[0]
-    target[0] = ratio * shear_building.storey_drift(state, NEXT_DISPLACEMENT, storey)
-    rate = ratio * shear_building.storey_drift(state, NEXT_VELOCITY, storey)
-    bend = ratio * shear_building.storey_drift(state, ACCELERATION, storey)
+    target[0] = ratio * shear_building.storey_drift(state[NEXT_DISPLACEMENT], storey)
+    rate = ratio * shear_building.storey_drift(state[NEXT_VELOCITY], storey)
+    bend = ratio * shear_building.storey_drift(state[ACCELERATION], storey)
     output[GROUND_ACCELERATION] = ground[0, tick]
     output[COLUMN_TARGET] = previous_target
     output[ACTUATOR_COMMAND] = compensators.step(

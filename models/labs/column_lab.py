@@ -19,9 +19,9 @@ class ColumnLab(NamedTuple):
     code: int  # of the specimen
     taps: Array  # of the delayed command
     rows: Array  # of the actuator's propagation
-    specimen: Array  # (1, parameters) of the specimen
+    specimen: Array  # of the specimen
     history: Array  # commands written, newest first
-    memory: Array  # (1, memory) of the specimen
+    memory: Array  # of the specimen
     state: Array  # (displacement m, force N)
 
 
@@ -29,7 +29,7 @@ def build(interval: float, actuator: Actuator, column: Column) -> ColumnLab:
     """Laboratory at rest with the nominal or true parameters given."""
     segments = delay.split(interval, actuator.delay)
     rows = first_order.propagators(actuator.gain, actuator.time_constant, segments.lengths)
-    code, params, memory = specimens.build(column.model, [column.stiffness], column.parameters)
+    code, params, memory = specimens.pack(column.model, stiffness=column.stiffness, **column.parameters)
     return ColumnLab(code, segments.taps, rows, params, np.zeros(segments.memory), memory, np.zeros(2))
 
 
@@ -52,7 +52,7 @@ def advance(
     for i in range(rows.shape[0]):
         after = delay.delayed(history, taps, i + 1)
         displacement = first_order.step(rows[i], displacement, before, after)
-        force = specimens.step(code, specimen, memory, 0, displacement)
+        force = specimens.step(code, specimen, memory, displacement)
         before = after
     state[0] = displacement
     state[1] = force
