@@ -1,74 +1,147 @@
-"""Integration methods of the numerical substructure: one file each, listed here.
+"""Explicit integration methods for `M·a + C·v + f(x) = p(t)` with measured forces: one file each, listed here.
 
-All solve `M·a + C·v + f(x) = p` with forces measured at a displacement that is known before them, and
-are second order.
+At tick k the state's row NEXT_DISPLACEMENT holds x_k, at which all restoring forces were evaluated or
+measured; `step` takes `g = p_k − f(x_k)` and gives v_k, a_k and x_{k+1}. For every method
+`M·a_k + C·v_k = g_k` holds. A method is a file with `coefficients`, `initial_state` and `step`; it is added
+by its line in `INTEGRATORS` and one in `step`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from common.errors import InputError
-from common.schema import nearest
+from common.schema import Rule, nearest
 from models.compiled import jit
 from models.integrators import central_difference, cr, kr_alpha, newmark_explicit
-from models.integrators.state import rest
+from models.integrators.state import ROWS
 from models.registry import Array
-
-__all__ = ["INTEGRATORS", "Integrator", "Method", "build", "rest", "step"]
 
 
 @dataclass(frozen=True)
 class Integrator:
-    """One method: its code in the dispatch below, its matrices, its start from x0 and v0."""
+    """One method: its code in `step`, what prepares it, what it takes beside the matrices, what it claims."""
 
+    name: str
     code: int
-    coefficients: Callable[[Array, Array, Array, float, float], Array]
-    start: Callable[[Array, Array, Array, Array, Array, float], Array]
-    stable_below: float  # largest ω·Δt of an undamped linear structure
+    coefficients: Callable[..., Array]  # (M, C, K, interval, **options) -> (m, n, n)
+    initial_state: Callable[..., Array]  # (c, M, C, x0, v0, g0, interval) -> (ROWS, n)
+    stability: str
+    limit: float = math.inf  # stable while the highest ω·h stays below
+    order: int = 2
+    options: Mapping[str, float] = field(default_factory=dict)  # with defaults
+    rules: Mapping[str, Rule] = field(default_factory=dict)  # ranges of the options
 
+
+BOUNDED = "stable while the highest ω·interval is below 2, whatever the damping"
+ALWAYS = "stable for any ω·interval while no stiffness exceeds the initial one"
 
 INTEGRATORS = {
-    "newmark_explicit": Integrator(0, newmark_explicit.coefficients, newmark_explicit.start, 2.0),
-    "central_difference": Integrator(1, central_difference.coefficients, central_difference.start, 2.0),
-    "cr": Integrator(2, cr.coefficients, cr.start, np.inf),
-    "kr_alpha": Integrator(3, kr_alpha.coefficients, kr_alpha.start, np.inf),
+    method.name: method
+    for method in (
+        Integrator(
+            "newmark_explicit",
+            0,
+            newmark_explicit.coefficients,
+            newmark_explicit.initial_state,
+            BOUNDED,
+            limit=2.0,
+        ),
+        Integrator(
+            "central_difference",
+            1,
+            central_difference.coefficients,
+            central_difference.initial_state,
+            BOUNDED,
+            limit=2.0,
+        ),
+        Integrator("cr", 2, cr.coefficients, cr.initial_state, ALWAYS),
+        Integrator(
+            "kr_alpha",
+            3,
+            kr_alpha.coefficients,
+            kr_alpha.initial_state,
+            ALWAYS,
+            options={"rho_infinity": 0.5},
+            rules={"rho_infinity": Rule("spectral radius at infinity", least=0.0, most=1.0)},
+        ),
+    )
 }
 
 
 @dataclass(frozen=True)
 class Method:
-    """A method made for one structure and interval."""
+    """A method prepared for one structure and interval: what `step` takes, and what a start needs."""
 
     code: int
-    coefficients: Array
+    coefficients: Array  # (m, n, n)
+    integrator: Integrator
+    M: Array
+    C: Array
+    interval: float  # s
+
+    def start(self, x0: Array, v0: Array, g0: Array) -> Array:
+        """State (ROWS, n) before the first step for displacement m, velocity m/s and force N, (n,) each, at t_0.
+
+        `g0` is `p(t_0) − f(x0)`, without damping. From rest under a load that does not begin at zero this
+        keeps order 2, where a state of zeros keeps order 1.
+        """
+        return self.integrator.initial_state(self.coefficients, self.M, self.C, x0, v0, g0, self.interval)
 
 
-def build(name: str, M: Array, C: Array, K: Array, interval: float, rho_infinity: float) -> Method:
-    """The method for a structure; raises InputError for an unknown name, or where the interval is unstable."""
+def rest(n: int) -> Array:
+    """State (ROWS, n) before the first step of a structure at rest that is not loaded yet, for any method."""
+    return np.zeros((ROWS, n))
+
+
+def build(
+    name: str, M: Array, C: Array, K: Array, interval: float, rho_infinity: float | None = None
+) -> Method:
+    """A method prepared for matrices (n, n) in kg, N·s/m, N/m and an interval in s.
+
+    `K` is the initial stiffness of everything, measured or computed. `rho_infinity` goes to methods that
+    have such an option, which take their default without it.
+
+    Raises:
+        InputError: the method is unknown, an option is out of range, or the test would diverge.
+    """
     if name not in INTEGRATORS:
         raise InputError(f"Unknown integrator '{name}' in [structure]: {nearest(name, INTEGRATORS)}")
-    method = INTEGRATORS[name]
-    fastest = float(np.sqrt(np.linalg.eigvals(np.linalg.solve(M, K)).real.max(initial=0.0)))
-    if fastest * interval >= method.stable_below:
+    integrator = INTEGRATORS[name]
+    options = dict(integrator.options)
+    if rho_infinity is not None and "rho_infinity" in options:
+        options["rho_infinity"] = rho_infinity
+    for option, value in options.items():
+        rule = integrator.rules[option]
+        if not rule.admits(value):
+            raise InputError(f"{option} of integrator '{name}' is {value:g}, but must be {rule.allowed()}.")
+    check_stability(integrator, M, K, interval)
+    c = integrator.coefficients(M, C, K, interval, **options)
+    return Method(integrator.code, c, integrator, M, C, interval)
+
+
+def check_stability(integrator: Integrator, M: Array, K: Array, interval: float) -> None:
+    """Raise InputError where the highest mode of the initial stiffness is beyond the method's limit."""
+    omega = math.sqrt(float(np.abs(np.linalg.eigvals(np.linalg.solve(M, K))).max()))
+    if omega * interval >= integrator.limit:
         raise InputError(
-            f"Integrator '{name}' in [structure] is unstable: ω·Δt of the fastest mode is {fastest * interval:.2f}, "
-            f"but must be below {method.stable_below:g}; choose 'cr' or 'kr_alpha', or a shorter interval."
+            f"Integrator '{integrator.name}' diverges at ω·interval = {omega * interval:.3g} of the highest"
+            f" mode: take an interval below {integrator.limit / omega:.3g} s, or cr or kr_alpha."
         )
-    return Method(method.code, np.ascontiguousarray(method.coefficients(M, C, K, interval, rho_infinity)))
 
 
 @jit
-def step(code: int, c: Array, s: Array, g: Array, interval: float) -> None:
-    """Move a state on by one tick; `g` is the external minus the restoring force at NEXT_DISPLACEMENT, N."""
-    if code == 0:
-        newmark_explicit.step(c, s, g, interval)
-    elif code == 1:
+def step(kind: int, c: Array, s: Array, g: Array, interval: float) -> None:
+    """One tick of the method with code `kind`: `g` (n,) N, not changed, moves the state `s` on by the interval."""
+    if kind == 1:
         central_difference.step(c, s, g, interval)
-    elif code == 2:
+    elif kind == 2:
         cr.step(c, s, g, interval)
-    else:
+    elif kind == 3:
         kr_alpha.step(c, s, g, interval)
+    else:
+        newmark_explicit.step(c, s, g, interval)

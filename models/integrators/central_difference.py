@@ -1,10 +1,17 @@
-"""Central difference method.
+"""Central difference method, with the damping at the same instant as the forces.
 
-    (M/Δt² + C/(2Δt))·x_{k+1} = g_k + (2M/Δt²)·x_k − (M/Δt² − C/(2Δt))·x_{k−1}
+    M·(x_{k+1} − 2·x_k + x_{k−1})/h² + C·(x_{k+1} − x_{k−1})/(2h) = g_k
 
-(Chopra, Dynamics of Structures, section 5.3). Second order, no numerical damping, stable for ω·Δt < 2.
-Velocity and acceleration of the tick are the central differences; the next velocity is estimated as
-v_k + Δt·a_k.
+A. K. Chopra, Dynamics of Structures (4th ed. 2012), section 5.3; as the method of the first hybrid tests:
+K. Takanashi et al., Bull. Earthquake Resistant Structure Research Center 8 (1974). The recursion carries
+the increment `d_k = x_k − x_{k−1}` in place of x_{k−1}, which avoids the difference of large numbers:
+
+    (M + h/2·C)·d_{k+1} = h²·g_k + (M − h/2·C)·d_k
+
+Order 2; stable up to ω·h = 2 for the highest mode, whatever its damping; no numerical damping.
+
+Not to be confused with the variant that takes C at t_{k−1/2}, which needs no inverse where C is full but
+is of first order and has a smaller stability limit.
 """
 
 from __future__ import annotations
@@ -19,48 +26,49 @@ from models.integrators.state import (
     NEXT_DISPLACEMENT,
     NEXT_VELOCITY,
     VELOCITY,
-    rest,
+    begin,
+    stack,
 )
 from models.registry import Array
 
-PREVIOUS, LOAD = MEMORY, MEMORY + 1  # x_{k−1}, and a scratch row
+INCREMENT = MEMORY  # d_k before the step at tick k
+NEXT_INCREMENT = MEMORY + 1  # scratch
+
+FORCE, REPEAT = range(2)  # h²·(M + h/2·C)⁻¹, and (M + h/2·C)⁻¹·(M − h/2·C)
 
 
-def coefficients(M: Array, C: Array, _K: Array, interval: float, _rho_infinity: float) -> Array:
-    """Inverse of the left-hand matrix, and the two on the right; shape (3, n, n)."""
-    inertia, damping = M / interval**2, C / (2.0 * interval)
-    return np.stack([np.linalg.inv(inertia + damping), 2.0 * inertia, inertia - damping])
+def coefficients(M: Array, C: Array, K: Array, interval: float) -> Array:
+    """Coefficients (2, n, n) of `step` from matrices (n, n) in kg, N·s/m and N/m; K is not needed."""
+    inverse = np.linalg.inv(M + 0.5 * interval * C)
+    return stack(interval**2 * inverse, inverse @ (M - 0.5 * interval * C))
 
 
-def start(M: Array, C: Array, x0: Array, v0: Array, g0: Array, interval: float) -> Array:
-    """State from which the first step gives x0 and v0 at its tick; `g0` is the force balance there, N."""
-    state = rest(x0.size)
-    state[NEXT_DISPLACEMENT], state[NEXT_VELOCITY] = x0, v0
-    state[PREVIOUS] = x0 - interval * v0 + 0.5 * interval**2 * np.linalg.solve(M, g0 - C @ v0)
-    return state
+def initial_state(c: Array, M: Array, C: Array, x0: Array, v0: Array, g0: Array, interval: float) -> Array:
+    """State (ROWS, n) before the first step, for displacement x0 m, velocity v0 m/s and force g0 N at t_0."""
+    a0 = np.linalg.solve(M, g0 - C @ v0)
+    s = begin(x0, v0, a0)
+    s[INCREMENT] = interval * v0 - 0.5 * interval**2 * a0
+    return s
 
 
 @jit
 def step(c: Array, s: Array, g: Array, interval: float) -> None:
-    """Move on by one tick; `g` is the external minus the restoring force at NEXT_DISPLACEMENT, N."""
+    """One tick: force `g` (n,) N at x_k, without damping, moves the state `s` on by the interval (s)."""
     n = g.size
     for i in range(n):
-        load = g[i]
+        d = 0.0
         for j in range(n):
-            load += c[1, i, j] * s[NEXT_DISPLACEMENT, j] - c[2, i, j] * s[PREVIOUS, j]
-        s[LOAD, i] = load
+            d += c[FORCE, i, j] * g[j] + c[REPEAT, i, j] * s[INCREMENT, j]
+        s[NEXT_INCREMENT, i] = d
+    rate = 1.0 / interval
     for i in range(n):
-        following = 0.0
-        for j in range(n):
-            following += c[0, i, j] * s[LOAD, j]
-        previous, displacement = s[PREVIOUS, i], s[NEXT_DISPLACEMENT, i]
-        velocity = (following - previous) / (2.0 * interval)
-        acceleration = ((following - displacement) - (displacement - previous)) / (interval * interval)
-        s[DISPLACEMENT, i] = displacement
-        s[VELOCITY, i] = velocity
-        s[ACCELERATION, i] = acceleration
-        s[PREVIOUS, i] = displacement
-        s[LOAD, i] = following
-        s[NEXT_VELOCITY, i] = velocity + interval * acceleration
-    for i in range(n):
-        s[NEXT_DISPLACEMENT, i] = s[LOAD, i]
+        d = s[NEXT_INCREMENT, i]
+        v = 0.5 * rate * (s[INCREMENT, i] + d)
+        a = rate * rate * (d - s[INCREMENT, i])
+        x = s[NEXT_DISPLACEMENT, i]
+        s[DISPLACEMENT, i] = x
+        s[VELOCITY, i] = v
+        s[ACCELERATION, i] = a
+        s[INCREMENT, i] = d
+        s[NEXT_DISPLACEMENT, i] = x + d
+        s[NEXT_VELOCITY, i] = v + interval * a

@@ -1,9 +1,20 @@
-"""CR method: explicit and unconditionally stable without numerical damping (Chen and Ricles 2008).
+"""CR method: explicit in displacement and velocity, always stable.
 
-    v_{k+1} = v_k + Δt·α·a_k,   x_{k+1} = x_k + Δt·v_k + Δt²·α·a_k,   M·a_k + C·v_k = g_k
-    α = 4·(4M + 2Δt·C + Δt²·K)⁻¹·M
+    w_{k+1} = w_k + h·α₁·b_k,    x_{k+1} = x_k + h·w_k + h²·α₂·b_k
+    M·b_k + C·w_k = g_k,    α₁ = α₂ = 4·(4M + 2h·C + h²·K)⁻¹·M
 
-Second order; K is the initial stiffness of the whole structure, specimen included.
+C. Chen and J. M. Ricles, Development of direct integration algorithms for structural dynamics using
+discrete control theory, J. Eng. Mech. ASCE 134 (2008), 676-683, eqs. (2), (24). Its poles are those of
+Newmark's average acceleration: order 2, no numerical damping, stable for any ω·h as long as no stiffness
+exceeds the K of the coefficients.
+
+Since α₁ = α₂, the published velocity is `w_{k+1} = (x_{k+1} − x_k)/h`, the velocity of t_{k+1/2}: right to
+first order only where it is read at t_{k+1}. So w stays in the memory here, and the rows of the state hold
+`v_k = (w_k + w_{k+1})/2`, the next velocity carried on by another half step, and the acceleration with
+which `M·a_k + C·v_k = g_k`. The displacements are the published ones.
+
+Not to be confused with Chang's explicit methods, whose velocity needs the force at t_{k+1}, nor with
+the semi-explicit ones, which treat only the displacement explicitly.
 """
 
 from __future__ import annotations
@@ -18,45 +29,52 @@ from models.integrators.state import (
     NEXT_DISPLACEMENT,
     NEXT_VELOCITY,
     VELOCITY,
-    rest,
+    begin,
+    stack,
 )
 from models.registry import Array
 
-RESIDUAL = MEMORY  # a scratch row
+MIDWAY_VELOCITY = MEMORY  # w_k before the step at tick k
+CHANGE = MEMORY + 1  # w_{k+1} − w_k, scratch
+
+FORCE, DAMPING, INVERSE_MASS, RATE = range(4)  # h·α₁·M⁻¹, that times C, M⁻¹, M⁻¹·C
 
 
-def coefficients(M: Array, C: Array, K: Array, interval: float, _rho_infinity: float) -> Array:
-    """Inverse of M, C and Δt·α; shape (3, n, n)."""
-    alpha = 4.0 * np.linalg.solve(4.0 * M + 2.0 * interval * C + interval**2 * K, M)
-    return np.stack([np.linalg.inv(M), C, interval * alpha])
+def coefficients(M: Array, C: Array, K: Array, interval: float) -> Array:
+    """Coefficients (4, n, n) of `step` from matrices (n, n) in kg, N·s/m and N/m; K with all initial stiffness."""
+    inverse = np.linalg.inv(M)
+    force = interval * np.linalg.inv(M + 0.5 * interval * C + 0.25 * interval**2 * K)
+    return stack(force, force @ C, inverse, inverse @ C)
 
 
-def start(M: Array, C: Array, x0: Array, v0: Array, g0: Array, interval: float) -> Array:  # noqa: ARG001
-    """State from which the first step gives x0 and v0 at its tick."""
-    state = rest(x0.size)
-    state[NEXT_DISPLACEMENT], state[NEXT_VELOCITY] = x0, v0
-    return state
+def initial_state(c: Array, M: Array, C: Array, x0: Array, v0: Array, g0: Array, interval: float) -> Array:
+    """State (ROWS, n) before the first step, for displacement x0 m, velocity v0 m/s and force g0 N at t_0."""
+    s = begin(x0, v0, np.linalg.solve(M, g0 - C @ v0))
+    s[MIDWAY_VELOCITY] = np.linalg.solve(np.eye(x0.size) - 0.5 * c[DAMPING], v0 - 0.5 * c[FORCE] @ g0)
+    return s
 
 
 @jit
 def step(c: Array, s: Array, g: Array, interval: float) -> None:
-    """Move on by one tick; `g` is the external minus the restoring force at NEXT_DISPLACEMENT, N."""
+    """One tick: force `g` (n,) N at x_k, without damping, moves the state `s` on by the interval (s)."""
     n = g.size
-    for i in range(n):
-        residual = g[i]
-        for j in range(n):
-            residual -= c[1, i, j] * s[NEXT_VELOCITY, j]
-        s[RESIDUAL, i] = residual
-    for i in range(n):
-        s[DISPLACEMENT, i] = s[NEXT_DISPLACEMENT, i]
-        s[VELOCITY, i] = s[NEXT_VELOCITY, i]
-        acceleration = 0.0
-        for j in range(n):
-            acceleration += c[0, i, j] * s[RESIDUAL, j]
-        s[ACCELERATION, i] = acceleration
     for i in range(n):
         change = 0.0
         for j in range(n):
-            change += c[2, i, j] * s[ACCELERATION, j]
-        s[NEXT_DISPLACEMENT, i] = s[DISPLACEMENT, i] + interval * (s[VELOCITY, i] + change)
-        s[NEXT_VELOCITY, i] = s[VELOCITY, i] + change
+            change += c[FORCE, i, j] * g[j] - c[DAMPING, i, j] * s[MIDWAY_VELOCITY, j]
+        s[CHANGE, i] = change
+    for i in range(n):
+        half = 0.5 * s[CHANGE, i]
+        v = s[MIDWAY_VELOCITY, i] + half
+        midway = v + half
+        x = s[NEXT_DISPLACEMENT, i]
+        s[DISPLACEMENT, i] = x
+        s[VELOCITY, i] = v
+        s[MIDWAY_VELOCITY, i] = midway
+        s[NEXT_DISPLACEMENT, i] = x + interval * midway
+        s[NEXT_VELOCITY, i] = midway + half
+    for i in range(n):
+        a = 0.0
+        for j in range(n):
+            a += c[INVERSE_MASS, i, j] * g[j] - c[RATE, i, j] * s[VELOCITY, j]
+        s[ACCELERATION, i] = a

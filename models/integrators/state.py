@@ -1,4 +1,7 @@
-"""The state that all integrators share: one row per quantity, one column per storey."""
+"""Rows of an integrator's state `s`, shape (ROWS, n): one column per degree of freedom.
+
+The rows from MEMORY on are each method's own.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +9,22 @@ import numpy as np
 
 from models.registry import Array
 
-DISPLACEMENT, VELOCITY, ACCELERATION = 0, 1, 2  # at the present tick
-NEXT_DISPLACEMENT = 3  # at the next tick, known before its forces are measured
-NEXT_VELOCITY = 4  # at the next tick, as far as it is known without its forces
-MEMORY = 5  # first of the rows that belong to the method
+DISPLACEMENT, VELOCITY, ACCELERATION = range(3)  # at the present tick t_k: m, m/s, m/s²
+NEXT_DISPLACEMENT = 3  # x_{k+1}, m, known before the force at it is measured
+NEXT_VELOCITY = 4  # explicit estimate of v(t_{k+1}), m/s
+MEMORY = 5
 ROWS = 8
 
 
-def rest(storeys: int) -> Array:
-    """State of a building at rest; shape (ROWS, storeys)."""
-    return np.zeros((ROWS, storeys))
+def begin(x0: Array, v0: Array, a0: Array) -> Array:
+    """State before the first step, memory left at zero: motion (n,) of t_0 in both the present and next rows."""
+    s = np.zeros((ROWS, x0.size))
+    s[[DISPLACEMENT, NEXT_DISPLACEMENT]] = x0
+    s[[VELOCITY, NEXT_VELOCITY]] = v0
+    s[ACCELERATION] = a0
+    return s
+
+
+def stack(*matrices: Array) -> Array:
+    """Matrices (n, n) as the coefficients (m, n, n) of a kernel, C-contiguous."""
+    return np.ascontiguousarray(np.stack(matrices), dtype=np.float64)

@@ -1,59 +1,80 @@
-"""Force-deformation models of columns, experimental and numerical: one file each, listed here."""
+"""Force-deformation models of columns, independent of rate: one file each, listed here.
+
+They serve for the column in laboratory A and for the numerical columns of each storey. A model is a file
+with `Params`, `RULES`, `STATE_SIZE` and `step`; it is added by its line in `SPECIMENS` and one in `step`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from common.errors import InputError
-from common.schema import nearest
+from common.schema import Rule, nearest
 from models import registry
 from models.compiled import jit
 from models.registry import Array
 from models.specimens import bilinear, bouc_wen, linear
 
-MEMORY = 4  # numbers that a model may remember
+
+def no_fault(_params: Any) -> str:
+    """Parameters that are each in their range fit together."""
+    return ""
 
 
 @dataclass(frozen=True)
 class Specimen:
-    """One model: its code in the dispatch below and its parameters, the stiffness (N/m) first."""
+    """One model: its code in `step`, its parameters with their ranges, the length of its memory."""
 
+    name: str
     code: int
     params: type[Any]
+    rules: Mapping[str, Rule]
+    state_size: int
+    fault: Callable[[Any], str] = no_fault
 
 
 SPECIMENS = {
-    "linear": Specimen(0, linear.Params),
-    "bilinear": Specimen(1, bilinear.Params),
-    "bouc_wen": Specimen(2, bouc_wen.Params),
+    model.name: model
+    for model in (
+        Specimen("linear", 0, linear.Params, linear.RULES, linear.STATE_SIZE),
+        Specimen("bilinear", 1, bilinear.Params, bilinear.RULES, bilinear.STATE_SIZE),
+        Specimen("bouc_wen", 2, bouc_wen.Params, bouc_wen.RULES, bouc_wen.STATE_SIZE, bouc_wen.fault),
+    )
 }
+STATE_SIZE = max(model.state_size for model in SPECIMENS.values())
 
 
-def build(name: str, stiffnesses: Sequence[float], parameters: Mapping[str, float]) -> tuple[int, Array, Array]:
-    """Code, parameters (columns, parameters) and memory at rest (columns, MEMORY) of columns of one model.
+def pack(name: str, **params: float) -> tuple[int, Array, Array]:
+    """Code, parameters (in the order of the model's `Params`) and memory at rest (STATE_SIZE,) of a model.
 
     Raises:
-        InputError: the model or a parameter is unknown, or no column can have such a value.
+        InputError: the model or a parameter is unknown, missing, not finite or out of its range.
     """
     if name not in SPECIMENS:
-        raise InputError(f"Unknown column model '{name}': {nearest(name, SPECIMENS)}")
-    model, what = SPECIMENS[name], f"column model '{name}'"
-    for parameter, value in parameters.items():
-        if value < 0.0 or (value == 0.0 and parameter == "yield_displacement"):
-            raise InputError(f"Parameter '{parameter}' of {what} is {value}, but must be positive.")
-    rows = [registry.pack(model.params, {**parameters, "stiffness": k}, what) for k in stiffnesses]
-    return model.code, np.stack(rows), np.zeros((len(rows), MEMORY))
+        raise InputError(f"Unknown specimen model '{name}': {nearest(name, SPECIMENS)}")
+    model = SPECIMENS[name]
+    values = registry.pack(model.params, params, f"specimen model '{name}'")
+    named = model.params(*values.tolist())
+    for parameter, value in named._asdict().items():
+        rule = model.rules[parameter]
+        if not rule.admits(value):
+            raise InputError(
+                f"{parameter} of specimen model '{name}' is {value:g}, but must be {rule.allowed()}."
+            )
+    if fault := model.fault(named):
+        raise InputError(f"In specimen model '{name}', {fault}.")
+    return model.code, values, np.zeros(STATE_SIZE)
 
 
 @jit
-def step(code: int, p: Array, s: Array, i: int, deformation: float) -> float:
-    """Force (N) at a deformation (m) of the column described in row `i`, whose memory moves on."""
-    if code == 1:
-        return bilinear.step(p, s, i, deformation)
-    if code == 2:
-        return bouc_wen.step(p, s, i, deformation)
-    return linear.step(p, i, deformation)
+def step(kind: int, p: Array, s: Array, deformation: float) -> float:
+    """Force (N) of the model with code `kind` at a deformation (m); its memory `s` moves on."""
+    if kind == 1:
+        return bilinear.step(p, s, deformation)
+    if kind == 2:
+        return bouc_wen.step(p, s, deformation)
+    return linear.step(p, s, deformation)

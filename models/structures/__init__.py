@@ -1,1 +1,1 @@
-"""Numerical substructures."""
+"""Numerical models of buildings."""
