@@ -1,9 +1,9 @@
-"""A process's messages: codec on top of a transport, with rejected frames counted by reason."""
+"""A process's access to messages; over a transport by the codec, with rejected frames counted by reason."""
 
 from __future__ import annotations
 
 from collections import Counter
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from common import codec
 from common.messages import Command, Feedback, Finished, Message, Samples
@@ -20,8 +20,24 @@ class Received(NamedTuple):
     received_ns: int
 
 
-class Endpoint:
-    """Sends and receives messages of one session over a transport."""
+class Endpoint(Protocol):
+    """A process's access to the messages of a test."""
+
+    def enter(self, session: int) -> None:
+        """Take part in a session: what is sent from now on belongs to it."""
+
+    def send(self, message: Message) -> None:
+        """Hand a message to the link; never blocks."""
+
+    def receive(self, timeout: float = 0.0) -> Received | None:
+        """The next message, waiting at most `timeout` s for it; None where there is none."""
+
+    def close(self) -> None:
+        """Leave the link."""
+
+
+class FrameEndpoint:
+    """Sends and receives the messages of one session as frames over a transport."""
 
     def __init__(self, transport: Transport, plan_digest: str) -> None:
         self._transport = transport

@@ -8,11 +8,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import Any, NamedTuple, Protocol
 
-from common.errors import RigError, RthsError
-
-Result = TypeVar("Result")
+from common.errors import RigError
 
 
 class ColumnCommand(NamedTuple):
@@ -73,11 +71,17 @@ class GuardedRig:
 
     def arm(self) -> None:
         """Arm; raises RigError with the rig's own reason."""
-        self._call("arm", self._rig.arm)
+        try:
+            self._rig.arm()
+        except Exception as error:  # a plug-in may raise anything; the user gets a sentence
+            raise self._failure("arm", error) from error
 
     def read(self) -> Any:
         """The measurements as the NamedTuple; raises RigError where they are no finite numbers of the right count."""
-        values = self._call("read", self._rig.read)
+        try:
+            values = self._rig.read()
+        except Exception as error:  # a plug-in may raise anything; the user gets a sentence
+            raise self._failure("read", error) from error
         try:
             reading = self._measurement(*map(float, values))
         except (TypeError, ValueError):
@@ -86,17 +90,12 @@ class GuardedRig:
             raise RigError(f"{self._name}: read() returned {tuple(reading)}, which is not finite.")
         return reading
 
-    def _complaint(self, values: Any) -> str:
-        fields: tuple[str, ...] = self._measurement._fields  # type: ignore[attr-defined]
-        try:
-            count = len(list(map(float, values)))
-        except (TypeError, ValueError):
-            return f"{self._name}: read() returned {values!r}, not numbers."
-        return f"{self._name}: read() returned {count} numbers, not {len(fields)} ({', '.join(fields)})."
-
     def write(self, command: Any) -> None:
         """Apply a command; raises RigError where the rig fails."""
-        self._call("write", self._rig.write, command)
+        try:
+            self._rig.write(command)
+        except Exception as error:  # a plug-in may raise anything; the user gets a sentence
+            raise self._failure("write", error) from error
 
     def disarm(self) -> str:
         """Disarm; a rig that raises all the same is reported in the text returned, empty where all is well."""
@@ -106,12 +105,15 @@ class GuardedRig:
             return f"{self._name}: disarm() failed: {error}"
         return ""
 
-    def _call(self, what: str, function: Callable[..., Result], *arguments: Any) -> Result:
+    def _failure(self, what: str, error: Exception) -> RigError:
+        if isinstance(error, RigError):
+            return RigError(f"{self._name}: {error}")
+        return RigError(f"{self._name}: {what}() failed: {type(error).__name__}: {error}")
+
+    def _complaint(self, values: Any) -> str:
+        fields: tuple[str, ...] = self._measurement._fields  # type: ignore[attr-defined]
         try:
-            return function(*arguments)
-        except RigError as error:
-            raise RigError(f"{self._name}: {error}") from None
-        except RthsError:
-            raise
-        except Exception as error:  # a plug-in may raise anything; the user gets a sentence
-            raise RigError(f"{self._name}: {what}() failed: {type(error).__name__}: {error}") from error
+            count = len(list(map(float, values)))
+        except (TypeError, ValueError):
+            return f"{self._name}: read() returned {values!r}, not numbers."
+        return f"{self._name}: read() returned {count} numbers, not {len(fields)} ({', '.join(fields)})."

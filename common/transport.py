@@ -1,11 +1,8 @@
-"""How bytes get from one process to the others: the protocol, and a link in memory."""
+"""How frames get from one process to the others: channels, who hears whom, and the interface of a link."""
 
 from __future__ import annotations
 
-from collections import deque
 from typing import NamedTuple, Protocol
-
-from common.clock import Clock
 
 
 class Packet(NamedTuple):
@@ -43,42 +40,3 @@ class Transport(Protocol):
 
     def close(self) -> None:
         """Leave the link."""
-
-
-class MemoryHub:
-    """A link within one process: what one role sends is at once in the queues of those who hear it."""
-
-    def __init__(self, clock: Clock) -> None:
-        self._clock = clock
-        self._queues: dict[str, deque[Packet]] = {}
-
-    def join(self, role: str) -> MemoryLink:
-        """The access of one role."""
-        self._queues[role] = deque()
-        return MemoryLink(self, role, self._queues[role])
-
-    def deliver(self, role: str, channel: str, frame: bytes) -> None:
-        """Put a frame into the queue of every role that hears it."""
-        for hearer, queue in self._queues.items():
-            if (role, channel) in HEARD[hearer]:
-                queue.append(Packet(role, channel, frame, self._clock.now()))
-
-
-class MemoryLink:
-    """One role's access to a MemoryHub."""
-
-    def __init__(self, hub: MemoryHub, role: str, queue: deque[Packet]) -> None:
-        self._hub = hub
-        self._role = role
-        self._queue = queue
-
-    def send(self, channel: str, frame: bytes) -> None:
-        """Deliver a frame at once."""
-        self._hub.deliver(self._role, channel, frame)
-
-    def receive(self, timeout: float) -> Packet | None:  # noqa: ARG002 - time stands still in memory
-        """The next frame that is there already."""
-        return self._queue.popleft() if self._queue else None
-
-    def close(self) -> None:
-        """Nothing to leave."""

@@ -60,6 +60,10 @@ class Account:
         complete = answered is not None and answered.feedback.seq == answered.feedback.command_seq == tick
         missed = opened.sent_ns == 0 or not complete
         self.missed += missed
+        if answered is not None and complete:
+            self.round_trip = (answered.received_ns - opened.sent_ns) * 1e-9
+        if lab.recorder is None:
+            return
         segments, stamps = self._segments(opened, answered if complete else None)
         at = lab.tick_ns(tick)
         values = (
@@ -86,12 +90,11 @@ class Account:
             return (NAN, NAN, NAN, NAN), (0, 0, 0)
         feedback, received_ns = answered
         offset = self._offset.offset
-        self.round_trip = (received_ns - opened.sent_ns) * 1e-9
         segments = (
             (feedback.command_received_ns - offset - opened.sent_ns) * 1e-9,
             (feedback.sent_ns - feedback.command_received_ns) * 1e-9,
             (received_ns - feedback.sent_ns + offset) * 1e-9,
-            self.round_trip,
+            (received_ns - opened.sent_ns) * 1e-9,
         )
         return segments, (feedback.command_received_ns, feedback.sent_ns, received_ns)
 

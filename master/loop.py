@@ -228,7 +228,8 @@ class MasterLoop:
             return
         sent = 0 if held or violation else self._send(tick)
         self._account.open(tick, wake, sent)
-        self._sample(tick, measured, outputs, sent)
+        if lab.recorder is not None:
+            self._sample(tick, measured, outputs, sent)
         self.ticks = tick + 1
         self._drift = outputs.column_target / lab.plan.column.deformation_ratio
         if violation:

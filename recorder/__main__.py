@@ -10,7 +10,7 @@ from pathlib import Path
 from common import cli
 from common.clock import MonotonicClock
 from common.drive import Stopper
-from common.endpoint import Endpoint
+from common.endpoint import FrameEndpoint
 from common.laboratory import Setting
 
 WAIT_S = 0.02
@@ -40,7 +40,7 @@ def run(args: argparse.Namespace) -> int:
     recording = files.begin(path, plan, motion, substructure.ground_rows(plan, motion))
     link = ZenohLink("recorder", plan.test.name, connect=args.connect)
     try:
-        setting = Setting(plan, Endpoint(link, plan.digest()), MonotonicClock(), report)
+        setting = Setting(plan, FrameEndpoint(link, plan.digest()), MonotonicClock(), report)
         loop = RecorderLoop(setting, ThreadedSink(FileSink(recording, setting.clock)))
         while not loop.done:
             if (received := setting.endpoint.receive(WAIT_S)) is not None:

@@ -11,9 +11,9 @@ from common.endpoint import Endpoint
 from common.errors import RthsError
 from common.laboratory import Report, Setting, silent
 from common.links import link_model
+from common.memory_link import MemoryHub
 from common.plan import Plan
 from common.reality import Reality
-from common.transport import MemoryHub
 from master.assembly import build_loop as build_master
 from master.loop import MasterLoop
 from models import substructure
@@ -43,7 +43,7 @@ def assemble(plan: Plan, reality: Reality, output: Path | None, report: Report =
     clock = VirtualClock()
     hub = MemoryHub(clock)
     roles = ("master", "slave") if output is None else ("master", "slave", "recorder")
-    endpoints = {role: Endpoint(hub.join(role), plan.digest()) for role in roles}
+    endpoints: dict[str, Endpoint] = {role: hub.join(role) for role in roles}
     recorder = None
     if output is not None:
         motion = substructure.motion(plan)

@@ -8,7 +8,7 @@ import sys
 from common import cli
 from common.clock import MonotonicClock
 from common.drive import Stopper, drive
-from common.endpoint import Endpoint
+from common.endpoint import FrameEndpoint
 from common.laboratory import Setting
 from common.links import link_model
 
@@ -31,7 +31,7 @@ def run(args: argparse.Namespace) -> int:
     reality = cli.load_reality(args.reality, plan)
     link = ZenohLink("slave", plan.test.name, connect=args.connect)
     try:
-        setting = Setting(plan, Endpoint(link, plan.digest()), MonotonicClock(), cli.reporter(args.json))
+        setting = Setting(plan, FrameEndpoint(link, plan.digest()), MonotonicClock(), cli.reporter(args.json))
         loop = build_loop(setting, reality, link_model(reality))
         loop.lab.heard_ns = setting.clock.now()
         drive(loop, stopping)

@@ -185,6 +185,8 @@ class SlaveLoop:
         received_ns = self._received_ns.pop(command.seq, 0) if command.seq == tick else 0
         sent_ns = lab.clock.now()
         lab.endpoint.send(Feedback(lab.exchange.session, tick, command.seq, received_ns, sent_ns, *measured))
+        if lab.recorder is None:
+            return
         log_ns = lab.epoch_ns + tick * lab.interval_ns
         publish_ns = log_ns + sent_ns - self.tick_ns(tick)
         values = (

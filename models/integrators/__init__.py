@@ -1,4 +1,4 @@
-"""Explicit integration methods for `M·a + C·v + f(x) = p(t)` with measured forces: one file each, listed here.
+"""Explicit integration methods for `M·a + C·v + f(x) = p(t)` with measured forces, one file each.
 
 At tick k the state's row NEXT_DISPLACEMENT holds x_k, at which all restoring forces were evaluated or
 measured; `step` takes `g = p_k − f(x_k)` and gives v_k, a_k and x_{k+1}. For every method
@@ -85,7 +85,7 @@ class Method:
     interval: float  # s
 
     def start(self, x0: Array, v0: Array, g0: Array) -> Array:
-        """State (ROWS, n) before the first step for displacement m, velocity m/s and force N, (n,) each, at t_0.
+        """State (ROWS, n) before the first step for displacement m, velocity m/s and force N, each (n,).
 
         `g0` is `p(t_0) − f(x0)`, without damping. From rest under a load that does not begin at zero this
         keeps order 2, where a state of zeros keeps order 1.
@@ -136,7 +136,7 @@ def check_stability(integrator: Integrator, M: Array, K: Array, interval: float)
 
 @jit
 def step(kind: int, c: Array, s: Array, g: Array, interval: float) -> None:
-    """One tick of the method with code `kind`: `g` (n,) N, not changed, moves the state `s` on by the interval."""
+    """One tick of the method with code `kind`: `g` (n,) N, not changed, moves `s` on by the interval (s)."""
     if kind == 1:
         central_difference.step(c, s, g, interval)
     elif kind == 2:

@@ -41,7 +41,7 @@ FORCE, DAMPING, INVERSE_MASS, RATE = range(4)  # h·α₁·M⁻¹, that times C,
 
 
 def coefficients(M: Array, C: Array, K: Array, interval: float) -> Array:
-    """Coefficients (4, n, n) of `step` from matrices (n, n) in kg, N·s/m and N/m; K with all initial stiffness."""
+    """Coefficients (4, n, n) of `step` from matrices (n, n) in kg, N·s/m and N/m; K is the initial stiffness."""
     inverse = np.linalg.inv(M)
     force = interval * np.linalg.inv(M + 0.5 * interval * C + 0.25 * interval**2 * K)
     return stack(force, force @ C, inverse, inverse @ C)

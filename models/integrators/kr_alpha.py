@@ -18,7 +18,7 @@ The published velocity w_k is that of the time t_k − γ·h: right to first ord
 So w stays in the memory here, and the rows of the state hold `v_k = w_k + γ·(w_{k+1} − w_k)`, the next
 velocity carried on by γ·h in the same way, and the acceleration with which `M·a_k + C·v_k = g_k`.
 The displacements are the published ones. All that the next tick needs of b_{k−1} and r_{k−1} is the vector
-`q_k = ((1 − α_f)·M·(I − α₃)/(1 − α_f))⁻¹·(α_f·r_{k−1} − M·α₃·b_{k−1})`, kept in their place.
+`q_k = (M·(I − α₃))⁻¹·(α_f·r_{k−1} − M·α₃·b_{k−1})`, kept in their place.
 
 Not to be confused with the MKR-α method of the same authors (2019), which overshoots less at large ω·h,
 nor with HHT-α, which is implicit.
@@ -49,7 +49,7 @@ FORCE, DAMPING, REPEAT, CHANGE, INVERSE_MASS, RATE, GAMMA, RHO = range(8)
 
 
 def coefficients(M: Array, C: Array, K: Array, interval: float, rho_infinity: float = 0.5) -> Array:
-    """Coefficients (8, n, n) of `step` from matrices (n, n) in kg, N·s/m and N/m; K with all initial stiffness.
+    """Coefficients (8, n, n) of `step` from matrices (n, n) in kg, N·s/m and N/m; K is the initial stiffness.
 
     With `W = (1 − α_f)·(M·(I − α₃))⁻¹`: W, W·C, (I − α₃)⁻¹·α₃, h·α₁, M⁻¹, M⁻¹·C, and γ and ρ in every place.
     """

@@ -5,9 +5,14 @@ The rows from MEMORY on are each method's own.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from models.registry import Array
+
+Floats = NDArray[np.floating[Any]]
 
 DISPLACEMENT, VELOCITY, ACCELERATION = range(3)  # at the present tick t_k: m, m/s, m/s²
 NEXT_DISPLACEMENT = 3  # x_{k+1}, m, known before the force at it is measured
@@ -16,8 +21,8 @@ MEMORY = 5
 ROWS = 8
 
 
-def begin(x0: Array, v0: Array, a0: Array) -> Array:
-    """State before the first step, memory left at zero: motion (n,) of t_0 in both the present and next rows."""
+def begin(x0: Array, v0: Array, a0: Floats) -> Array:
+    """State before the first step: the motion (n,) of t_0 in present and next rows, memory left at zero."""
     s = np.zeros((ROWS, x0.size))
     s[[DISPLACEMENT, NEXT_DISPLACEMENT]] = x0
     s[[VELOCITY, NEXT_VELOCITY]] = v0
@@ -25,6 +30,6 @@ def begin(x0: Array, v0: Array, a0: Array) -> Array:
     return s
 
 
-def stack(*matrices: Array) -> Array:
+def stack(*matrices: Floats) -> Array:
     """Matrices (n, n) as the coefficients (m, n, n) of a kernel, C-contiguous."""
     return np.ascontiguousarray(np.stack(matrices), dtype=np.float64)

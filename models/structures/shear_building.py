@@ -65,7 +65,7 @@ def add_nodal(storey_force: float, i: int, out: Array) -> None:
 
 
 def modes(M: Array, C: Array, K: Array) -> Modes:
-    """Periods, damping ratios and shapes of matrices (n, n) in kg, N·s/m and N/m; a rigid mode has period inf.
+    """Periods, damping ratios and shapes of matrices (n, n) in kg, N·s/m and N/m; rigid modes last inf.
 
     The damping ratio is the share of C on the modal diagonal, `φᵀCφ/(2ω)`: exact where the modes decouple
     C, else the usual estimate (Chopra, section 12.4 and eq. 10.10.1). For a rigid mode it is nan.
