@@ -12,8 +12,8 @@ RUN set -eu; \
 
 FROM ${BASE_IMAGE}
 ENV PATH=/opt/venv/bin:$PATH PYTHONUNBUFFERED=1 XDG_CACHE_HOME=/var/cache/rths MPLCONFIGDIR=/tmp/matplotlib
-RUN useradd --uid 1000 --user-group --create-home rths; \
-    install -d -o rths -g rths /runs; \
+RUN useradd --uid 1000 --user-group --create-home rths && \
+    install -d -o rths -g rths /runs && \
     install -d -m 1777 /var/cache/rths
 COPY --from=packages /opt/venv /opt/venv
 WORKDIR /opt/rths

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -22,9 +23,13 @@ DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 def plan_arguments(parser: argparse.ArgumentParser, *, optional: bool = False) -> None:
     """PLAN and the options that change it."""
     if optional:
-        parser.add_argument("plan", nargs="?", metavar="PLAN", help="TOML file of the test (default: the default test)")
+        parser.add_argument(
+            "plan", nargs="?", metavar="PLAN", help="TOML file of the test (default: the default test)"
+        )
     else:
-        parser.add_argument("plan", metavar="PLAN", help="TOML file of the test; 'default' or 'paper' for those that ship")
+        parser.add_argument(
+            "plan", metavar="PLAN", help="TOML file of the test; 'default' or 'paper' for those that ship"
+        )
     parser.add_argument("--duration", type=float, metavar="S", help="length of the test in seconds")
     parser.add_argument("--scale", type=float, metavar="X", help="factor on the ground motion")
     parser.add_argument("--seed", type=int, metavar="N", help="seed of every random draw")
@@ -32,7 +37,9 @@ def plan_arguments(parser: argparse.ArgumentParser, *, optional: bool = False) -
 
 def reality_argument(parser: argparse.ArgumentParser) -> None:
     """The option that says what the laboratory really does."""
-    parser.add_argument("--reality", type=Path, metavar="FILE", help="what the laboratories really do (stays secret)")
+    parser.add_argument(
+        "--reality", type=Path, metavar="FILE", help="what the laboratories really do (stays secret)"
+    )
 
 
 def json_argument(parser: argparse.ArgumentParser, text: str) -> None:
@@ -42,7 +49,9 @@ def json_argument(parser: argparse.ArgumentParser, text: str) -> None:
 
 def load_plan(args: argparse.Namespace) -> Plan:
     """The plan that the command line asks for; raises PlanError."""
-    return plans.load(plan_path(args.plan)).with_test(duration=args.duration, scale=args.scale, seed=args.seed)
+    return plans.load(plan_path(args.plan)).with_test(
+        duration=args.duration, scale=args.scale, seed=args.seed
+    )
 
 
 def plan_path(name: str | None) -> Path:
@@ -92,6 +101,9 @@ def guarded(main: Callable[[], int]) -> int:
     except RthsError as error:
         sys.stderr.write(f"rths: {error}\n")
         return error.exit_code
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # the reader of a pipe has gone
+        return 0
     except KeyboardInterrupt:
         sys.stderr.write("rths: stopped by the user.\n")
         return 3

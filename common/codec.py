@@ -57,7 +57,9 @@ class _Shape:
 
     def _places(self, message: type[Any], kind: type, *, times: bool) -> tuple[int, ...]:
         names = enumerate(message._fields)
-        return tuple(place for place, name in names if self.types[place] is kind and name.endswith("_ns") is times)
+        return tuple(
+            place for place, name in names if self.types[place] is kind and name.endswith("_ns") is times
+        )
 
     def admits(self, fields: list[Any]) -> bool:
         """Whether fields of the right types have values that a message may have."""

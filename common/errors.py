@@ -40,8 +40,8 @@ class ProtocolError(RthsError):
 
 
 class LocalProtocolError(ProtocolError):
-    """This side tried what the protocol does not allow: a fault of this program."""
+    """A fault of this side: it tried what the protocol does not allow."""
 
 
 class RemoteProtocolError(ProtocolError):
-    """The other side sent what the protocol does not allow."""
+    """A fault of the other side: it sent what the protocol does not allow."""

@@ -80,13 +80,23 @@ class Laboratory:
 
     def tripped(self, lab: str, text: str, tick: int) -> None:
         """End the test because the other laboratory has stopped its rig."""
-        self.fail(Event.TRIP, InterlockError(f"The {lab} stopped the test: {text}"), code="remote_trip", tick=tick, remote=True)
+        self.fail(
+            Event.TRIP,
+            InterlockError(f"The {lab} stopped the test: {text}"),
+            code="remote_trip",
+            tick=tick,
+            remote=True,
+        )
 
     def listen_to_recorder(self, message: Message) -> None:
         """Take note of the recorder's state, and send again what it has missed."""
         if isinstance(message, Recorder):
             self.recorder = message
-        elif isinstance(message, Resend) and message.lab == self.name and self.exchange.belongs(message.session):
+        elif (
+            isinstance(message, Resend)
+            and message.lab == self.name
+            and self.exchange.belongs(message.session)
+        ):
             for piece in self.outlet.again(message):
                 self.endpoint.send(piece)
 

@@ -22,7 +22,7 @@ class LinkModel(Protocol):
 class PerfectLink:
     """No delay, no loss."""
 
-    def fate(self, direction: str, seq: int, t: float) -> float | None:  # noqa: ARG002
+    def fate(self, direction: str, seq: int, t: float) -> float | None:
         """No extra delay."""
         return 0.0
 

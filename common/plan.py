@@ -149,7 +149,7 @@ class Link:
     """The exchange between the laboratories."""
 
     connect_timeout: float = key(
-        "wait for the other laboratory", default=10.0, unit="s", above=0.0, most=3600.0
+        "wait for the other laboratory", default=30.0, unit="s", above=0.0, most=3600.0
     )
     loss_timeout: float = key(
         "silence after which a laboratory is lost", default=1.0, unit="s", above=0.0, most=60.0

@@ -21,13 +21,17 @@ def find(reference: str, base: Path, where: str) -> type[Any]:
     """
     place, separator, name = reference.rpartition(":")
     if not separator or not place or not name:
-        raise InputError(f"class in {where} is '{reference}', but must be 'file.py:Class' or 'package.module:Class'.")
+        raise InputError(
+            f"class in {where} is '{reference}', but must be 'file.py:Class' or 'package.module:Class'."
+        )
     try:
         module = _from_file(base / place) if place.endswith(".py") else importlib.import_module(place)
     except InputError:
         raise
     except Exception as error:  # a user's file may raise anything on import
-        raise InputError(f"Cannot load '{place}' named in {where}: {type(error).__name__}: {error}.") from error
+        raise InputError(
+            f"Cannot load '{place}' named in {where}: {type(error).__name__}: {error}."
+        ) from error
     found = getattr(module, name, None)
     if not isinstance(found, type):
         raise InputError(f"'{place}' named in {where} has no class '{name}'.")
@@ -36,7 +40,9 @@ def find(reference: str, base: Path, where: str) -> type[Any]:
 
 def _from_file(path: Path) -> ModuleType:
     if not path.is_file():
-        raise InputError(f"There is no file {path}: a plug-in's path starts from the folder of the plan or reality.")
+        raise InputError(
+            f"There is no file {path}: a plug-in's path starts from the folder of the plan or reality."
+        )
     name = f"rths_plugin_{path.stem}_{abs(hash(path.resolve()))}"
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:

@@ -18,7 +18,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     cli.plan_arguments(parser)
     cli.reality_argument(parser)
     parser.add_argument(
-        "--listen", default=cli.DEFAULT_ENDPOINT, metavar="ENDPOINT", help="where slave and recorder connect to"
+        "--listen",
+        default=cli.DEFAULT_ENDPOINT,
+        metavar="ENDPOINT",
+        help="where slave and recorder connect to",
     )
     cli.json_argument(parser, "report as JSON lines on standard output")
 

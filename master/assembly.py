@@ -28,7 +28,9 @@ def build_rig(reality: Reality) -> GuardedRig:
         return GuardedRig(ColumnLab(**arguments, **emulated), "laboratory A", ColumnMeasurement)
     kind = find(rig.class_, reality.base, "[master.rig]")
     return GuardedRig(
-        construct(kind, arguments | rig.options, "[master.rig]"), f"laboratory A ({kind.__name__})", ColumnMeasurement
+        construct(kind, arguments | rig.options, "[master.rig]"),
+        f"laboratory A ({kind.__name__})",
+        ColumnMeasurement,
     )
 
 
@@ -38,7 +40,12 @@ def true_ground(reality: Reality) -> Array:
 
 
 def build_loop(
-    setting: Setting, reality: Reality, link: LinkModel, *, session: int | None = None, epoch_ns: int | None = None
+    setting: Setting,
+    reality: Reality,
+    link: LinkModel,
+    *,
+    session: int | None = None,
+    epoch_ns: int | None = None,
 ) -> MasterLoop:
     """The master's loop, its kernels compiled; session and epoch are drawn and read where none are given."""
     ground = true_ground(reality)

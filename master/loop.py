@@ -51,7 +51,14 @@ class MasterLoop:
     """Laboratory A in a test."""
 
     def __init__(
-        self, setting: Setting, rig: GuardedRig, step: MasterStep, link: LinkModel, *, session: int, epoch_ns: int
+        self,
+        setting: Setting,
+        rig: GuardedRig,
+        step: MasterStep,
+        link: LinkModel,
+        *,
+        session: int,
+        epoch_ns: int,
     ) -> None:
         self.lab = Laboratory("master", setting)
         plan = setting.plan
@@ -138,7 +145,9 @@ class MasterLoop:
         recorder = self.lab.recorder
         if recorder is not None and recorder.plan != self._digest:
             self.lab.fail(
-                Event.REFUSE, InputError("The recorder was started with another plan: give all three the same."), code="refused"
+                Event.REFUSE,
+                InputError("The recorder was started with another plan: give all three the same."),
+                code="refused",
             )
             return False
         here = recorder is not None and recorder.session == self.lab.exchange.session
@@ -176,7 +185,7 @@ class MasterLoop:
         missing = "recorder" if self._slave_is_here else "slave"
         seconds = self.lab.plan.link.connect_timeout
         error = LostError(
-            f"No {missing} joined the test within {seconds:g} s: start it with the same plan and --connect to this machine."
+            f"No {missing} joined the test within {seconds:g} s: start it with the same plan and --connect."
         )
         self.lab.fail(Event.LOSE, error, code="nobody")
 
@@ -217,7 +226,9 @@ class MasterLoop:
         self._account.close(tick - 1, wake)
         try:
             measured = self._rig.read()
-            outputs = self._step(tick, measured.column_displacement, measured.column_force, self._used.damper_force)
+            outputs = self._step(
+                tick, measured.column_displacement, measured.column_force, self._used.damper_force
+            )
             violation = self._limits.violation(measured, outputs)
             if not (held or violation):
                 self._command = outputs.actuator_command
@@ -273,7 +284,10 @@ class MasterLoop:
             lab.lost("The slave", lab.plan.link.loss_timeout, tick)
         elif lab.plan.recording.required and lab.recorder is not None and lab.recorder.state == "failed":
             lab.fail(
-                Event.TRIP, InterlockError(f"The recording is lost: {lab.recorder.reason}"), code="recording_lost", tick=tick
+                Event.TRIP,
+                InterlockError(f"The recording is lost: {lab.recorder.reason}"),
+                code="recording_lost",
+                tick=tick,
             )
 
     # -- end --------------------------------------------------------------------------------------
@@ -339,4 +353,3 @@ class MasterLoop:
     def finish(self) -> None:
         """All ticks are done."""
         self.stop("completed")
-

@@ -34,7 +34,9 @@ class MasterStep:
         self._storeys = plan.storeys
         self._advance = substructure.advance
 
-    def __call__(self, tick: int, column_displacement: float, column_force: float, damper_force: float) -> Outputs:
+    def __call__(
+        self, tick: int, column_displacement: float, column_force: float, damper_force: float
+    ) -> Outputs:
         """One tick; displacement m, forces N, all as measured, the damper's at its own scale."""
         arrays = self._arrays
         self._advance(*arrays, tick, column_displacement, column_force, damper_force)
@@ -43,5 +45,7 @@ class MasterStep:
         if n == 1:
             return Outputs(*row)
         first = substructure.STOREYS
-        groups = [row[first + place * n : first + (place + 1) * n] for place in range(len(substructure.STOREY_ROWS))]
+        groups = [
+            row[first + place * n : first + (place + 1) * n] for place in range(len(substructure.STOREY_ROWS))
+        ]
         return Outputs(*row[:first], *groups)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from common.plan import Plan, resolve
 from models import compensators, integrators, specimens
 from models.compiled import jit
-from models.ground_motion import GroundMotion, ground_displacement, load, resample
+from models.ground_motion import GroundMotion, ground, load
 from models.integrators.state import ACCELERATION, DISPLACEMENT, NEXT_DISPLACEMENT, NEXT_VELOCITY, VELOCITY
 from models.registry import Array
 from models.structures import shear_building
@@ -51,8 +51,8 @@ class Substructure(NamedTuple):
     output: Array
 
 
-def build(plan: Plan, ground: Array) -> Substructure:
-    """The numerical side of a plan at rest; `ground` as `ground_rows` gives it.
+def build(plan: Plan, rows: Array) -> Substructure:
+    """The numerical side of a plan at rest; `rows` of the ground as `ground_rows` gives them.
 
     Raises:
         InputError: a model, method or parameter that the registries do not know.
@@ -83,7 +83,7 @@ def build(plan: Plan, ground: Array) -> Substructure:
         method.coefficients,
         np.stack([params for _, params, _ in packed]),
         compensator,
-        ground,
+        rows,
         integrators.rest(n),
         np.stack([memory for _, _, memory in packed]),
         np.zeros(compensators.STATE_SIZE),
@@ -101,8 +101,7 @@ def motion(plan: Plan) -> GroundMotion:
 def ground_rows(plan: Plan, record: GroundMotion) -> Array:
     """Scaled ground acceleration (m/s²) and displacement (m) at every tick and the test's end; (2, ticks + 1)."""
     interval = plan.test.interval
-    acceleration = resample(record.scaled(plan.ground_motion.scale), interval, plan.ticks * interval)
-    return np.stack([acceleration, ground_displacement(acceleration, interval)])
+    return ground(record.scaled(plan.ground_motion.scale), interval, plan.ticks * interval)
 
 
 @jit

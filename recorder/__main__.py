@@ -19,8 +19,16 @@ WAIT_S = 0.02
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the recorder."""
     cli.plan_arguments(parser)
-    parser.add_argument("--connect", default=cli.DEFAULT_ENDPOINT, metavar="ENDPOINT", help="where the master listens")
-    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="the recording (default: a name in the plan's folder)")
+    parser.add_argument(
+        "--connect", default=cli.DEFAULT_ENDPOINT, metavar="ENDPOINT", help="where the master listens"
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="FILE",
+        help="the recording (default: a name in the plan's folder)",
+    )
     cli.json_argument(parser, "report as JSON lines on standard output")
 
 

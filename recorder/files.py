@@ -29,7 +29,9 @@ def default_path(plan: Plan, now: str) -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"Cannot make the folder {folder} for recordings: {error.strerror}; give a file with -o.") from None
+        raise InputError(
+            f"Cannot make the folder {folder} for recordings: {error.strerror}; give a file with -o."
+        ) from None
     if not os.access(folder, os.W_OK):
         raise InputError(f"The folder {folder} for recordings is not writable: give a file with -o.")
     return folder / f"{plan.test.name}-{now}.mcap"

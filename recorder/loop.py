@@ -95,7 +95,11 @@ class RecorderLoop:
         """Take note of why the test ended: the first cause, or what led to it where that arrives later."""
         _, _, level, code, text, _ = values
         settled = self._outcome[0] not in ("", CONSEQUENCE)
-        if (level == "error" or code == "stop") and not settled and (code != CONSEQUENCE or not self._outcome[0]):
+        if (
+            (level == "error" or code == "stop")
+            and not settled
+            and (code != CONSEQUENCE or not self._outcome[0])
+        ):
             self._outcome = (code, text)
 
     # -- housekeeping -----------------------------------------------------------------------------
@@ -114,7 +118,9 @@ class RecorderLoop:
         state = "failed" if failure else "recording" if self._session else "ready"
         if failure and not self._said_failure:
             self._said_failure = True
-            self._report("event", {"lab": "recorder", "level": "error", "code": "recording_lost", "text": failure})
+            self._report(
+                "event", {"lab": "recorder", "level": "error", "code": "recording_lost", "text": failure}
+            )
         nexts = (self._inlets[lab].next for lab in LABS)
         self._endpoint.send(Recorder(self._session, state, self._digest, failure, *nexts))
 
@@ -137,7 +143,9 @@ class RecorderLoop:
             self.done = True
         elif not self._session and silent > self._plan.link.connect_timeout * 1e9:
             seconds = self._plan.link.connect_timeout
-            self.error = LostError(f"No master was heard within {seconds:g} s: check the address after --connect.")
+            self.error = LostError(
+                f"No master was heard within {seconds:g} s: check the address after --connect."
+            )
             self.done = True
         elif self._session and silent > SILENCE_NS:
             if not self._outcome[0]:

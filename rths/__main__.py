@@ -24,7 +24,12 @@ VERBS = {
     "export": "write a recording as CSV, Parquet or MAT",
 }
 
-MODULES = {"import": "rths.import_", "master": "master.__main__", "slave": "slave.__main__", "record": "recorder.__main__"}
+MODULES = {
+    "import": "rths.import_",
+    "master": "master.__main__",
+    "slave": "slave.__main__",
+    "record": "recorder.__main__",
+}
 
 
 def check_home() -> str:

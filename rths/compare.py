@@ -17,7 +17,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `compare`."""
     parser.add_argument("a", metavar="A", help="a recording, or a plan whose simulation is meant")
     parser.add_argument("b", metavar="B", help="the other one")
-    parser.add_argument("--tolerance", type=float, metavar="X", help="exit with 1 where an NRMSE exceeds this")
+    parser.add_argument(
+        "--tolerance", type=float, metavar="X", help="exit with 1 where an NRMSE exceeds this"
+    )
     cli.json_argument(parser, "write the comparison as JSON on standard output")
 
 

@@ -15,7 +15,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `export`."""
     parser.add_argument("file", type=Path, metavar="FILE", help="a recording (MCAP)")
     parser.add_argument(
-        "-o", "--output", type=Path, required=True, metavar="OUT", help="the file to write: .csv, .parquet or .mat"
+        "-o",
+        "--output",
+        type=Path,
+        required=True,
+        metavar="OUT",
+        help="the file to write: .csv, .parquet or .mat",
     )
 
 
@@ -45,7 +50,9 @@ def flat(recording: Run) -> dict[str, Any]:
         for name, column in values.items():
             if name == "seq":
                 continue
-            whole = np.full((ticks.size, *column.shape[1:]), np.nan if column.dtype.kind == "f" else 0, column.dtype)
+            whole = np.full(
+                (ticks.size, *column.shape[1:]), np.nan if column.dtype.kind == "f" else 0, column.dtype
+            )
             whole[places] = column
             columns |= spread(f"{topic}_{name}", whole)
     return columns

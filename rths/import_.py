@@ -47,8 +47,12 @@ class Mapping:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `import`."""
     parser.add_argument("data", type=Path, metavar="DATA", help="measurements: .csv, .parquet, .mat or .npz")
-    parser.add_argument("--map", type=Path, required=True, metavar="MAP", help="TOML file that says what is what")
-    parser.add_argument("-o", "--output", type=Path, required=True, metavar="FILE", help="the recording to write")
+    parser.add_argument(
+        "--map", type=Path, required=True, metavar="MAP", help="TOML file that says what is what"
+    )
+    parser.add_argument(
+        "-o", "--output", type=Path, required=True, metavar="FILE", help="the recording to write"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -79,14 +83,18 @@ def load_map(path: Path) -> Mapping:
         if name not in known:
             raise InputError(f"Unknown key '{name}' in {path}: {nearest(name, known)}")
     if ("time" in tables) == ("rate" in tables) or not isinstance(tables.get("rate", 1.0), int | float):
-        raise InputError(f'{path}: give either time = "name of the time column" or rate = samples per second.')
+        raise InputError(
+            f'{path}: give either time = "name of the time column" or rate = samples per second.'
+        )
     if not isinstance(tables.get("plan"), str) or not tables.get("signals"):
         raise InputError(f'{path}: give plan = "file.toml" and a table [signals].')
     plan = plans.load(path.parent / tables["plan"])
     sources = {name: source(path, name, entry) for name, entry in tables["signals"].items()}
     several = [name for name in sources if signals.signal(LAB_SIGNALS[name], name).kind is Kind.STOREYS]
     if plan.storeys > 1 and several:
-        raise InputError(f"{path}: '{several[0]}' has one value per storey here and cannot be given as one column.")
+        raise InputError(
+            f"{path}: '{several[0]}' has one value per storey here and cannot be given as one column."
+        )
     return Mapping(plan, sources, str(tables.get("time", "")), float(tables.get("rate", 0.0)))
 
 
@@ -122,7 +130,9 @@ def resampled(mapping: Mapping, columns: dict[str, Any], data: Path) -> tuple[An
         column = pick(columns, row.column, data)
         bad = np.flatnonzero(~np.isfinite(column))
         if bad.size:
-            raise InputError(f"{data}: column '{row.column}' has no number in row {bad[0] + 1}: fill or cut the gap.")
+            raise InputError(
+                f"{data}: column '{row.column}' has no number in row {bad[0] + 1}: fill or cut the gap."
+            )
         values[name] = np.interp(t, theirs - theirs[0], row.scale * column + row.offset)
     return t, values
 
@@ -154,7 +164,9 @@ def write(path: Path, mapping: Mapping, t: Any, values: dict[str, Any], data: st
 
     topics: dict[str, tuple[Signal, ...]] = {}
     for topic in ("master", "slave"):
-        rows = tuple(row for row in signals.TOPICS[topic] if row.name in values and LAB_SIGNALS[row.name] == topic)
+        rows = tuple(
+            row for row in signals.TOPICS[topic] if row.name in values and LAB_SIGNALS[row.name] == topic
+        )
         if rows:
             topics[topic] = (signals.SEQ, signals.TIME, *rows)
     plan = mapping.plan.with_test(duration=t.size * mapping.plan.test.interval)

@@ -34,7 +34,11 @@ def run(args: argparse.Namespace) -> int:
 def write_report(summary: dict[str, Any]) -> None:
     """The report as text."""
     say = sys.stdout.write
-    say(f"\n{summary['file']}: test '{summary['test']}'" + ("" if summary["finished"] else ", cut off before its end") + "\n")
+    say(
+        f"\n{summary['file']}: test '{summary['test']}'"
+        + ("" if summary["finished"] else ", cut off before its end")
+        + "\n"
+    )
     motion = summary["ground_motion"]
     if motion:
         say(f"ground motion: {motion['record']}, scaled by {motion['scale']}\n")
@@ -47,7 +51,9 @@ def write_report(summary: dict[str, Any]) -> None:
     outcome = summary["recorder"]
     if outcome:
         say(f"outcome: {outcome.get('cause') or outcome.get('outcome', 'unknown')}\n")
-    say(f"open it: rths plot {summary['file']}, or any MCAP viewer (Foxglove, Lichtblick, PlotJuggler, Rerun)\n")
+    say(
+        f"open it: rths plot {summary['file']}, or any MCAP viewer (Foxglove, Lichtblick, PlotJuggler, Rerun)\n"
+    )
 
 
 def write_completeness(summary: dict[str, Any]) -> None:
@@ -65,7 +71,11 @@ def write_peaks(peaks: dict[str, dict[str, Any]]) -> None:
     """Largest magnitudes."""
     rows = [["signal", "peak", "at"]]
     rows += [
-        [name, quantity(facts["peak"], facts["unit"]), f"{facts['t']:.3f} s" if facts["t"] is not None else ""]
+        [
+            name,
+            quantity(facts["peak"], facts["unit"]),
+            f"{facts['t']:.3f} s" if facts["t"] is not None else "",
+        ]
         for name, facts in peaks.items()
     ]
     sys.stdout.write("\n")
@@ -79,7 +89,9 @@ def write_latency(summary: dict[str, Any]) -> None:
         return
     names = list(next(iter(segments.values())))
     rows = [["latency, µs", *names]]
-    rows += [[segment, *(f"{facts[name] * 1e6:.0f}" for name in names)] for segment, facts in segments.items()]
+    rows += [
+        [segment, *(f"{facts[name] * 1e6:.0f}" for name in names)] for segment, facts in segments.items()
+    ]
     sys.stdout.write("\n")
     table(rows)
     sys.stdout.write(f"late ticks: {summary['late_ticks']}\n")

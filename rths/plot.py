@@ -19,8 +19,12 @@ FORMATS = ("png", "svg", "pdf")
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `plot`."""
     parser.add_argument("file", type=Path, metavar="FILE", help="a recording (MCAP)")
-    parser.add_argument("-o", "--output", type=Path, metavar="FOLDER", help="where to (default: beside the recording)")
-    parser.add_argument("--format", choices=FORMATS, default="png", help="format of the pictures (default: png)")
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="FOLDER", help="where to (default: beside the recording)"
+    )
+    parser.add_argument(
+        "--format", choices=FORMATS, default="png", help="format of the pictures (default: png)"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -32,8 +36,12 @@ def run(args: argparse.Namespace) -> int:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"Cannot make the folder {folder}: {error.strerror}; give another with -o.") from None
-    drawn = [name for name, draw in PICTURES.items() if picture(recording, draw, folder / f"{name}.{args.format}")]
+        raise InputError(
+            f"Cannot make the folder {folder}: {error.strerror}; give another with -o."
+        ) from None
+    drawn = [
+        name for name, draw in PICTURES.items() if picture(recording, draw, folder / f"{name}.{args.format}")
+    ]
     if not drawn:
         raise InputError(f"{args.file} has no signals for any picture: see rths inspect {args.file}.")
     for name in drawn:
@@ -86,7 +94,9 @@ def histories(recording: Run, canvas: Any) -> bool:
 def time_of(recording: Run, name: str) -> Any:
     """Test time of a signal's messages."""
     for topic in ("slave", "master"):
-        if name in recording.columns.get(topic, {}) and recording.columns[topic][name] is recording.signal(name):
+        if name in recording.columns.get(topic, {}) and recording.columns[topic][name] is recording.signal(
+            name
+        ):
             return recording.columns[topic]["t"]
     return recording.columns["master"]["t"]
 
@@ -97,7 +107,9 @@ def hysteresis(recording: Run, canvas: Any) -> bool:
         ("column_displacement", 1e3, "column deformation, mm", "column_force", 1e-3, "column force, kN"),
         ("damper_stroke", 1e3, "damper stroke, mm", "damper_force", 1.0, "damper force, N"),
     ]
-    present = [row for row in loops if recording.signal(row[0]) is not None and recording.signal(row[3]) is not None]
+    present = [
+        row for row in loops if recording.signal(row[0]) is not None and recording.signal(row[3]) is not None
+    ]
     if not present:
         return False
     axes = canvas.subplots(1, len(present), squeeze=False)[0]

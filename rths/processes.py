@@ -88,4 +88,3 @@ class Processes:
             if process.poll() is None:
                 process.kill()
             process.wait()
-

@@ -76,7 +76,10 @@ def replay_master(recording: Run) -> dict[str, Match]:
         if seq != tick:
             break
         outputs = step(
-            tick, columns["column_displacement"][tick], columns["column_force"][tick], columns["damper_force_used"][tick]
+            tick,
+            columns["column_displacement"][tick],
+            columns["column_force"][tick],
+            columns["damper_force_used"][tick],
         )._asdict()
         if tick in held:
             outputs |= command
@@ -91,7 +94,9 @@ def held_ticks(recording: Run) -> set[int]:
     if not recording.has("latency"):
         return set()
     latency = recording.columns["latency"]
-    return {int(seq) for seq, sent in zip(latency["seq"], latency["command_sent_ns"], strict=True) if sent == 0}
+    return {
+        int(seq) for seq, sent in zip(latency["seq"], latency["command_sent_ns"], strict=True) if sent == 0
+    }
 
 
 def ground_of(recording: Run) -> Any:
@@ -113,7 +118,9 @@ def replay_slave(recording: Run) -> dict[str, Match]:
     master = {name: values.tolist() for name, values in recording.columns["master"].items()}
     sent = {seq: place for place, seq in enumerate(master["seq"])}
     read = {seq: place for place, seq in enumerate(slave["seq"])}
-    matches = {name: Match() for name in ("table_command", "table_target", "damper_command", "damper_force_used")}
+    matches = {
+        name: Match() for name in ("table_command", "table_target", "damper_command", "damper_force_used")
+    }
     for place, t in enumerate(slave["t"]):
         matches["table_command"].take(t, slave["table_target"][place], slave["table_command"][place])
         if (source := sent.get(slave["command_seq"][place])) is not None:
@@ -121,8 +128,13 @@ def replay_slave(recording: Run) -> dict[str, Match]:
                 matches[name].take(t, master[name][source], slave[name][place])
     for place, t in enumerate(master["t"]):
         if (source := read.get(master["damper_force_seq"][place])) is not None:
-            matches["damper_force_used"].take(t, slave["damper_force"][source], master["damper_force_used"][place])
-    return {f"slave/{name}" if name != "damper_force_used" else f"master/{name}": match for name, match in matches.items()}
+            matches["damper_force_used"].take(
+                t, slave["damper_force"][source], master["damper_force_used"][place]
+            )
+    return {
+        f"slave/{name}" if name != "damper_force_used" else f"master/{name}": match
+        for name, match in matches.items()
+    }
 
 
 def show(matches: dict[str, Match], same: bool) -> None:
@@ -132,6 +144,8 @@ def show(matches: dict[str, Match], same: bool) -> None:
     rows = [["signal", "ticks", "differing", "first at", "largest"]]
     for name, match in matches.items():
         first = "" if match.first is None else f"{match.first:.3f} s"
-        rows.append([name, str(match.compared), str(match.differing), first, f"{match.largest:.3g}" if first else ""])
+        rows.append(
+            [name, str(match.compared), str(match.differing), first, f"{match.largest:.3g}" if first else ""]
+        )
     table(rows)
     sys.stdout.write("matches to the last bit\n" if same else "does not match\n")

@@ -27,8 +27,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     cli.reality_argument(parser)
     clock = parser.add_mutually_exclusive_group()
     clock.add_argument("--real-time", action="store_true", help="three processes, wall clock (default)")
-    clock.add_argument("--virtual", action="store_true", help="one process, virtual clock, as fast as it goes")
-    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="the recording (default: runs/<test>-<time>.mcap)")
+    clock.add_argument(
+        "--virtual", action="store_true", help="one process, virtual clock, as fast as it goes"
+    )
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help="the recording (default: runs/<test>-<time>.mcap)"
+    )
     cli.json_argument(parser, "write the summary as JSON on standard output")
 
 
@@ -39,7 +43,11 @@ def run(args: argparse.Namespace) -> int:
     output = args.output or default_path(plan)
     check_writable(output)
     stopping = Stopper()
-    error = in_virtual_time(plan, reality, output, stopping) if args.virtual else in_real_time(args, plan, output, stopping)
+    error = (
+        in_virtual_time(plan, reality, output, stopping)
+        if args.virtual
+        else in_real_time(args, plan, output, stopping)
+    )
     if output.exists() and output.stat().st_size:
         show(output, args.json)
     if error is not None:
@@ -58,7 +66,9 @@ def check_writable(path: Path) -> None:
     """Raise InputError where a recording cannot be written there."""
     folder = path.parent
     if not folder.is_dir():
-        raise InputError(f"There is no folder {folder} for the recording: make it, or give another file with -o.")
+        raise InputError(
+            f"There is no folder {folder} for the recording: make it, or give another file with -o."
+        )
     if not os.access(folder, os.W_OK) or path.is_dir() or (path.exists() and not os.access(path, os.W_OK)):
         raise InputError(f"Cannot write the recording {path}: give a writable place with -o.")
 
@@ -88,6 +98,7 @@ def in_real_time(args: argparse.Namespace, plan: Plan, output: Path, stopping: S
     processes = Processes()
     progress = Progress(plan.test.duration)
     endpoint = listenable()
+    warm_up(progress)
     progress.say(f"{plan.test.name}: {plan.test.duration:g} s, starting master, slave and recorder")
     try:
         start_all(processes, args, endpoint, output)
@@ -96,6 +107,17 @@ def in_real_time(args: argparse.Namespace, plan: Plan, output: Path, stopping: S
         processes.kill()
         progress.end()
     return verdict(processes)
+
+
+def warm_up(progress: Progress) -> None:
+    """Compile the kernels before the processes start, where this machine has not done so yet."""
+    from models import cache
+
+    if not cache.warm():
+        progress.say("compiling the kernels, once on this machine (about half a minute)")
+        from models.warm import compile_all
+
+        compile_all()
 
 
 def start_all(processes: Any, args: argparse.Namespace, endpoint: str, output: Path) -> None:
@@ -138,7 +160,9 @@ def verdict(processes: Any) -> RthsError | None:
                 return ERRORS.get(code, LostError)(text or f"The {name} ended with exit code {code}.")
     for name, code in codes.items():
         if code:
-            return LostError(f"The {name} was killed (signal {-code}); the recording holds what came until then.")
+            return LostError(
+                f"The {name} was killed (signal {-code}); the recording holds what came until then."
+            )
     return None
 
 

@@ -19,11 +19,15 @@ if TYPE_CHECKING:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `simulate`."""
     cli.plan_arguments(parser)
-    parser.add_argument("--ideal", action="store_true", help="transfer systems that follow at once, no compensation")
+    parser.add_argument(
+        "--ideal", action="store_true", help="transfer systems that follow at once, no compensation"
+    )
     parser.add_argument("--uncompensated", action="store_true", help="the actuator without compensation")
     parser.add_argument("--no-amd", action="store_true", help="the building without the damper")
     parser.add_argument("--noise", action="store_true", help="with the sensors' noise, from the plan's seed")
-    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="write the simulation as a recording")
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help="write the simulation as a recording"
+    )
     cli.json_argument(parser, "write the summary as JSON on standard output")
 
 
@@ -89,7 +93,10 @@ def beyond(plan: Plan, columns: dict[str, Any], ticks: int) -> str:
         over = np.flatnonzero(~(values <= most))
         if over.size and over[0] < first[0]:
             t = over[0] * plan.test.interval
-            first = (int(over[0]), f"{name} is beyond its limit of {most:g} from t = {t:.3f} s on: the loop is unstable.")
+            first = (
+                int(over[0]),
+                f"{name} is beyond its limit of {most:g} from t = {t:.3f} s on: the loop is unstable.",
+            )
     if not first[1] and ticks < plan.ticks:
         return f"the loop diverges: no finite number after t = {ticks * plan.test.interval:.3f} s."
     return first[1]
@@ -99,7 +106,9 @@ def show(plan: Plan, summary: dict[str, Any]) -> None:
     """The summary as text."""
     from rths.terminal import quantity, table
 
-    sys.stdout.write(f"simulation of '{plan.test.name}', {summary['ticks']} ticks of {plan.test.interval:g} s\n")
+    sys.stdout.write(
+        f"simulation of '{plan.test.name}', {summary['ticks']} ticks of {plan.test.interval:g} s\n"
+    )
     sys.stdout.write(f"ground motion: {summary['ground_motion']}, scaled by {plan.ground_motion.scale:g}\n\n")
     rows = [["signal", "peak"]]
     rows += [[name, quantity(facts["peak"], facts["unit"])] for name, facts in summary["peaks"].items()]

@@ -12,7 +12,14 @@ from common.recording.reader import Run
 from common.signals import Kind
 
 PERCENTILES = (50, 90, 99, 99.9)
-SEGMENTS = ("wake_lateness", "compute_time", "command_one_way", "slave_time", "feedback_one_way", "round_trip")
+SEGMENTS = (
+    "wake_lateness",
+    "compute_time",
+    "command_one_way",
+    "slave_time",
+    "feedback_one_way",
+    "round_trip",
+)
 
 
 def plan_of(run: Run) -> Plan | None:
@@ -31,7 +38,7 @@ def summarize(run: Run) -> dict[str, Any]:
         "ground_motion": run.metadata.get("ground_motion", {}),
         "ticks_expected": plan.ticks if plan else None,
         "topics": {topic: completeness(run, topic, plan) for topic in run.columns},
-        "recorder": {name: value for name, value in run.metadata.get("summary", {}).items()},
+        "recorder": dict(run.metadata.get("summary", {})),
         "peaks": peaks(run),
         "latency": latency(run),
         "late_ticks": int(np.sum(run.columns["latency"]["deadline_missed"])) if run.has("latency") else None,
@@ -61,7 +68,12 @@ def peaks(run: Run) -> dict[str, dict[str, Any]]:
         t = run.columns.get(topic, {}).get("t")
         for row in signals.TOPICS[topic]:
             values = run.columns.get(topic, {}).get(row.name)
-            if row.kind not in (Kind.NUMBER, Kind.STOREYS) or values is None or not values.size or row.name == "t":
+            if (
+                row.kind not in (Kind.NUMBER, Kind.STOREYS)
+                or values is None
+                or not values.size
+                or row.name == "t"
+            ):
                 continue
             magnitude = np.abs(values).reshape(len(values), -1).max(axis=1)
             place = int(np.argmax(magnitude))

@@ -63,7 +63,10 @@ def _read_mat(path: Path) -> Columns:
     return {
         name: np.asarray(value, dtype=np.float64)
         for name, value in items.items()
-        if not name.startswith("__") and isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype.kind in "iuf"
+        if not name.startswith("__")
+        and isinstance(value, np.ndarray)
+        and value.ndim == 1
+        and value.dtype.kind in "iuf"
     }
 
 
@@ -85,7 +88,9 @@ def write(path: Path, columns: dict[str, NDArray[Any]]) -> None:
         else:
             _write_arrow(path, suffix, columns)
     except OSError as error:
-        raise InputError(f"Cannot write {path}: {error.strerror or error}; give a writable place with -o.") from None
+        raise InputError(
+            f"Cannot write {path}: {error.strerror or error}; give a writable place with -o."
+        ) from None
 
 
 def _write_arrow(path: Path, suffix: str, columns: dict[str, NDArray[Any]]) -> None:

@@ -13,7 +13,10 @@ def table(rows: Sequence[Sequence[str]], stream: TextIO | None = None) -> None:
     """Write rows in aligned columns, the first column to the left, the others to the right."""
     widths = [max(len(row[place]) for row in rows) for place in range(len(rows[0]))]
     for row in rows:
-        cells = [row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True))]
+        cells = [
+            row[0].ljust(widths[0]),
+            *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True)),
+        ]
         (stream or sys.stdout).write("  ".join(cells).rstrip() + "\n")
 
 

@@ -48,9 +48,15 @@ def assemble(plan: Plan, reality: Reality, output: Path | None, report: Report =
     if output is not None:
         motion = substructure.motion(plan)
         recording = files.begin(output, plan, motion, substructure.ground_rows(plan, motion))
-        recorder = RecorderLoop(Setting(plan, endpoints["recorder"], clock, report), FileSink(recording, clock))
+        recorder = RecorderLoop(
+            Setting(plan, endpoints["recorder"], clock, report), FileSink(recording, clock)
+        )
     master = build_master(
-        Setting(plan, endpoints["master"], clock, report), reality, link_model(reality), session=SESSION, epoch_ns=0
+        Setting(plan, endpoints["master"], clock, report),
+        reality,
+        link_model(reality),
+        session=SESSION,
+        epoch_ns=0,
     )
     slave = build_slave(Setting(plan, endpoints["slave"], clock, report), reality, link_model(reality))
     return Bench(clock, master, slave, recorder, endpoints)

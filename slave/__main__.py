@@ -17,7 +17,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the slave."""
     cli.plan_arguments(parser)
     cli.reality_argument(parser)
-    parser.add_argument("--connect", default=cli.DEFAULT_ENDPOINT, metavar="ENDPOINT", help="where the master listens")
+    parser.add_argument(
+        "--connect", default=cli.DEFAULT_ENDPOINT, metavar="ENDPOINT", help="where the master listens"
+    )
     cli.json_argument(parser, "report as JSON lines on standard output")
 
 

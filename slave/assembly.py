@@ -22,7 +22,9 @@ def build_rig(reality: Reality) -> GuardedRig:
         return GuardedRig(TableLab(**arguments, **emulated), "laboratory B", TableMeasurement)
     kind = find(rig.class_, reality.base, "[slave.rig]")
     return GuardedRig(
-        construct(kind, arguments | rig.options, "[slave.rig]"), f"laboratory B ({kind.__name__})", TableMeasurement
+        construct(kind, arguments | rig.options, "[slave.rig]"),
+        f"laboratory B ({kind.__name__})",
+        TableMeasurement,
     )
 
 

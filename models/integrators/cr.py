@@ -4,7 +4,7 @@
     M·b_k + C·w_k = g_k,    α₁ = α₂ = 4·(4M + 2h·C + h²·K)⁻¹·M
 
 C. Chen and J. M. Ricles, Development of direct integration algorithms for structural dynamics using
-discrete control theory, J. Eng. Mech. ASCE 134 (2008), 676-683, eqs. (2), (24). Its poles are those of
+discrete control theory, J. Eng. Mech. ASCE 134 (2008), 676-683. Its poles are those of
 Newmark's average acceleration: order 2, no numerical damping, stable for any ω·h as long as no stiffness
 exceeds the K of the coefficients.
 
@@ -13,8 +13,7 @@ first order only where it is read at t_{k+1}. So w stays in the memory here, and
 `v_k = (w_k + w_{k+1})/2`, the next velocity carried on by another half step, and the acceleration with
 which `M·a_k + C·v_k = g_k`. The displacements are the published ones.
 
-Not to be confused with Chang's explicit methods, whose velocity needs the force at t_{k+1}, nor with
-the semi-explicit ones, which treat only the displacement explicitly.
+Not to be confused with Chang's methods, which are explicit in the displacement only.
 """
 
 from __future__ import annotations
@@ -41,7 +40,7 @@ FORCE, DAMPING, INVERSE_MASS, RATE = range(4)  # h·α₁·M⁻¹, that times C,
 
 
 def coefficients(M: Array, C: Array, K: Array, interval: float) -> Array:
-    """Coefficients (4, n, n) of `step` from matrices (n, n) in kg, N·s/m and N/m; K is the initial stiffness."""
+    """Coefficients (4, n, n) of `step` from matrices (n, n) in kg, N·s/m, N/m; K is the initial stiffness."""
     inverse = np.linalg.inv(M)
     force = interval * np.linalg.inv(M + 0.5 * interval * C + 0.25 * interval**2 * K)
     return stack(force, force @ C, inverse, inverse @ C)

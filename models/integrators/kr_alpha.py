@@ -6,12 +6,12 @@
 
 C. Kolay and J. M. Ricles, Development of a family of unconditionally stable explicit direct integration
 algorithms with controllable numerical energy dissipation, Earthquake Eng. Struct. Dyn. 43 (2014), 1361-1380,
-eqs. (2), (4), (20) and (28), with the spectral radius ρ at infinite frequency as the one parameter:
+with the spectral radius ρ at infinite frequency as the one parameter:
 
     α_m = (2ρ − 1)/(ρ + 1),  α_f = ρ/(ρ + 1),  γ = 1/2 − α_m + α_f,  β = (1/2 + γ)²/4
 
 Its poles are those of the generalised-α method of Chung and Hulbert (1993): order 2; ρ = 1 damps nothing
-and gives the displacements of CR; ρ = 0 removes the highest frequencies in one step. Stable for any ω·h as
+and gives the displacements of CR; ρ = 0 removes the highest frequencies within three steps. Stable for any ω·h as
 long as no stiffness exceeds the K of the coefficients.
 
 The published velocity w_k is that of the time t_k − γ·h: right to first order only where it is read at t_k.

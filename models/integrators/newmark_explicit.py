@@ -4,8 +4,7 @@
     v_k = v_{k−1} + h/2·(a_{k−1} + a_k)
     (M + h/2·C)·a_k = g_k − C·(v_{k−1} + h/2·a_{k−1})
 
-N. M. Newmark, A method of computation for structural dynamics, J. Eng. Mech. Div. ASCE 85 (1959), 67-94;
-in hybrid tests: M. Nakashima, H. Kato, E. Takaoka, Earthquake Eng. Struct. Dyn. 21 (1992), 79-92.
+N. M. Newmark, A method of computation for structural dynamics, J. Eng. Mech. Div. ASCE 85 (1959), 67-94.
 Order 2; stable up to ω·h = 2 for the highest mode, whatever its damping; no numerical damping.
 
 Not to be confused with Newmark's average acceleration (β = 1/4), which is implicit and always stable.

@@ -5,7 +5,7 @@ The force is that of a spring `α·k` beside a spring `(1 − α)·k` in series 
     f = α·k·δ + (1 − α)·k·z,    z = z₀ + Δδ clipped to ±δ_y
 
 Return mapping in one dimension, exact for any monotonic increment: Simo and Hughes, Computational
-Inelasticity (1998), box 1.5. The slider's elastic range is 2·δ_y wide and moves with the hardening line
+Inelasticity (1998), chapter 1. The slider's elastic range is 2·δ_y wide and moves with the hardening line
 (Masing); a cycle of amplitude X > δ_y dissipates `4·(1 − α)·k·δ_y·(X − δ_y)`.
 
 Not to be confused with isotropic hardening, where the elastic range grows, nor with Clough's or Takeda's

@@ -3,7 +3,7 @@
     f = α·k·δ + (1 − α)·k·δ_y·z,    dz/dδ = (1 − |z|ⁿ·(γ + β·sgn(z·dδ))) / δ_y
 
 Y. K. Wen, Method for random vibration of hysteretic systems, J. Eng. Mech. Div. ASCE 102 (1976), 249-263,
-eqs. (2) and (3), with A = 1 and z made dimensionless by the yield displacement. The bound is
+with A = 1 and z made dimensionless by the yield displacement. The bound is
 `|z| ≤ (β + γ)^(−1/n)`; with β + γ = 1 the force of the hysteretic part is bounded by `(1 − α)·k·δ_y`.
 
 The equation is autonomous in δ while δ moves one way, so it is integrated over the increment itself, by

@@ -1,7 +1,7 @@
 """Shear building: rigid floors, one horizontal displacement each, storeys as springs and dashpots between.
 
 Floor 0 is the lowest that moves; storey i stands below floor i. A. K. Chopra, Dynamics of Structures
-(4th ed. 2012), sections 9.1 and 10.
+(4th ed. 2012), chapters 9 and 10.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def modes(M: Array, C: Array, K: Array) -> Modes:
     """Periods, damping ratios and shapes of matrices (n, n) in kg, N·s/m and N/m; rigid modes last inf.
 
     The damping ratio is the share of C on the modal diagonal, `φᵀCφ/(2ω)`: exact where the modes decouple
-    C, else the usual estimate (Chopra, section 12.4 and eq. 10.10.1). For a rigid mode it is nan.
+    C, else the usual estimate. For a rigid mode it is nan.
     """
     root = np.linalg.inv(np.linalg.cholesky(M))
     eigenvalues, vectors = np.linalg.eigh(root @ K @ root.T)

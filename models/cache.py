@@ -1,0 +1,44 @@
+"""Where compiled kernels are kept between processes.
+
+Numba's on-disk cache looks at a function's own file only, so a kernel whose callee changed would be
+served stale. The folder is therefore named after the content of every file of `models`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+import tempfile
+from functools import cache
+from pathlib import Path
+
+READY = "ready"
+
+
+def fingerprint(root: Path) -> str:
+    """Sixteen hex digits that change with the name or content of any Python file below `root`."""
+    digest = hashlib.blake2b(sys.version.encode(), digest_size=8)
+    for path in sorted(root.rglob("*.py")):
+        digest.update(path.relative_to(root).as_posix().encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+@cache
+def folder() -> Path:
+    """Folder for compiled kernels: in the user's cache, or in a temporary folder where that is not writable."""
+    name = fingerprint(Path(__file__).parent)
+    base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    chosen = base / "rths" / "kernels" / name
+    try:
+        chosen.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        chosen = Path(tempfile.gettempdir()) / f"rths-kernels-{os.getuid()}-{name}"
+        chosen.mkdir(mode=0o700, exist_ok=True)
+    return chosen
+
+
+def warm() -> bool:
+    """Whether the kernels of this version have been compiled on this machine."""
+    return (folder() / READY).exists()

@@ -1,0 +1,28 @@
+"""`python -m models.warm`: compile every kernel once, so that no test has to wait for it."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+
+from common.plan import Plan
+from models import cache, substructure
+from models.closed_loop import simulate
+from models.labs import column_lab, table_lab
+
+
+def compile_all() -> None:
+    """Compile what the loops and the simulation call, and note that it is done."""
+    plan = Plan().with_test(duration=0.01)
+    ground = np.zeros((2, plan.ticks + 1))
+    simulate(plan, ground)
+    substructure.advance(*substructure.build(plan, ground), 0, 0.0, 0.0, 0.0)
+    column_lab.advance(*column_lab.build(plan.test.interval, plan.actuator, plan.column), 0.0)
+    table_lab.advance(*table_lab.build(plan.test.interval, plan.table, plan.damper), 0.0, 0.0)
+    (cache.folder() / cache.READY).touch()
+
+
+if __name__ == "__main__":
+    compile_all()
+    sys.stderr.write(f"kernels compiled into {cache.folder()}\n")

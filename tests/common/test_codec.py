@@ -1,0 +1,121 @@
+from __future__ import annotations
+
+import math
+from typing import Any, get_type_hints
+
+import msgpack
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from common import codec
+from common.codec import MESSAGES, RejectedFrame, decode, encode, session_key
+from common.messages import Command, Feedback, Message, Register
+
+KEY = session_key(7, "plan")
+
+FIELDS = {
+    int: st.integers(-1, 2**62 - 1),
+    float: st.floats(-1e300, 1e300),
+    str: st.text(max_size=50),
+    bytes: st.binary(max_size=200),
+}
+
+
+def messages_of(kind: type[Any]) -> st.SearchStrategy[Message]:
+    hints = get_type_hints(kind)
+    return st.builds(kind, **{name: FIELDS[hints[name]] for name in kind._fields})
+
+
+@pytest.mark.parametrize("kind", MESSAGES, ids=lambda kind: kind.__name__)
+@given(data=st.data())
+def test_every_message_survives_the_wire(kind: type[Any], data: st.DataObject) -> None:
+    message = data.draw(messages_of(kind))
+    returned = decode(encode(message, KEY), KEY)
+    assert type(returned) is kind
+    assert returned == message
+
+
+COMMAND = Command(7, 3, 10, 0, 0.001, 12.5)
+
+
+def framed(content: object, key: bytes = KEY) -> bytes:
+    payload = msgpack.packb(content)
+    return payload + codec._check(key, payload)
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        ([codec.KINDS[Command], 7, 3, 10, 0, math.nan, 0.0], "value"),
+        ([codec.KINDS[Command], 7, 3, 10, 0, math.inf, 0.0], "value"),
+        ([codec.KINDS[Command], 7, 3, 10, 0, 1, 0.0], "value"),
+        ([codec.KINDS[Command], 7, True, 10, 0, 1.0, 0.0], "value"),
+        ([codec.KINDS[Command], 7, -2, 10, 0, 1.0, 0.0], "value"),
+        ([codec.KINDS[Command], 2**64 - 1, 3, 10, 0, 1.0, 0.0], "value"),
+        ([codec.KINDS[Command], "7", 3, 10, 0, 1.0, 0.0], "value"),
+        ([codec.KINDS[Command], 7, 3, 10, 0, 1.0], "fields"),
+        ([codec.KINDS[Command], 7, 3, 10, 0, 1.0, 0.0, 0.0], "fields"),
+        ([len(MESSAGES), 7], "kind"),
+        ([-1, 7], "kind"),
+        (["0", 7], "kind"),
+        ({"a": 1}, "format"),
+        ([], "format"),
+        (None, "format"),
+    ],
+)
+def test_what_is_no_message_is_rejected_with_its_reason(content: object, reason: str) -> None:
+    with pytest.raises(RejectedFrame) as rejection:
+        decode(framed(content), KEY)
+    assert rejection.value.reason.value == reason
+
+
+def test_two_messages_in_one_frame_are_rejected() -> None:
+    payload = msgpack.packb((codec.KINDS[Command], *COMMAND)) * 2
+    with pytest.raises(RejectedFrame) as rejection:
+        decode(payload + codec._check(KEY, payload), KEY)
+    assert rejection.value.reason.value == "format"
+
+
+@given(place=st.integers(0, 10_000), bit=st.integers(0, 7))
+def test_any_flipped_bit_is_noticed(place: int, bit: int) -> None:
+    frame = bytearray(encode(COMMAND, KEY))
+    frame[place % len(frame)] ^= 1 << bit
+    with pytest.raises(RejectedFrame) as rejection:
+        decode(bytes(frame), KEY)
+    assert rejection.value.reason.value == "check"
+
+
+@given(st.binary(max_size=300))
+def test_noise_is_rejected(noise: bytes) -> None:
+    with pytest.raises(RejectedFrame):
+        decode(noise, KEY)
+
+
+@given(st.binary(max_size=300))
+def test_noise_with_a_valid_check_is_rejected_or_a_message(noise: bytes) -> None:
+    try:
+        message = decode(noise + codec._check(KEY, noise), KEY)
+    except RejectedFrame as rejection:
+        assert rejection.reason.value in ("length", "format", "kind", "fields", "value")
+    else:
+        assert type(message) in MESSAGES
+
+
+def test_another_session_or_plan_has_another_key() -> None:
+    frame = encode(COMMAND, KEY)
+    for other in (session_key(8, "plan"), session_key(7, "other"), session_key(0, "plan")):
+        with pytest.raises(RejectedFrame) as rejection:
+            decode(frame, other)
+        assert rejection.value.reason.value == "check"
+
+
+def test_before_a_session_all_understand_each_other() -> None:
+    register = Register(7, 1, "plan")
+    assert decode(encode(register, session_key(0, "a")), session_key(0, "b")) == register
+
+
+def test_a_frame_each_way_stays_small() -> None:
+    feedback = Feedback(2**62, 10**6, 10**6, 2**60, 2**60, 0.1, 0.2, 0.3, 0.4)
+    assert len(encode(feedback, KEY)) < 128
+    assert len(encode(COMMAND._replace(session=2**62), KEY)) < 128

@@ -1,0 +1,76 @@
+from __future__ import annotations
+
+from typing import Any
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from common.messages import Resend, Samples
+from common.outlet import PIECE, Inlet, Outlet
+
+
+def filled(count: int) -> tuple[Outlet, list[Samples]]:
+    outlet = Outlet(1, "master")
+    pieces: list[Any] = []
+    for number in range(count):
+        outlet.add("master", number, number, (number, 0.5))
+        pieces += outlet.pieces()
+    pieces += outlet.pieces(everything=True)
+    return outlet, pieces
+
+
+def numbers(items: list[list[Any]]) -> list[int]:
+    return [item[3] for item in items]
+
+
+@given(st.integers(0, 200), st.randoms(use_true_random=False), st.floats(0.0, 0.9))
+def test_whatever_is_lost_swapped_or_repeated_the_stream_comes_whole_and_in_order(
+    count: int, random: Any, loss: float
+) -> None:
+    outlet, pieces = filled(count)
+    inlet, got = Inlet(), []
+    arriving = [piece for piece in pieces if random.random() >= loss]
+    random.shuffle(arriving)
+    for piece in arriving + arriving[:2]:
+        got += inlet.take(piece)
+    inlet.total = outlet.finished().total
+    for _ in range(1000):
+        if (hole := inlet.missing()) is None:
+            break
+        for again in outlet.again(Resend(1, "master", *hole)):
+            assert isinstance(again, Samples)
+            got += inlet.take(again)
+    assert numbers(got) == list(range(count))
+    assert inlet.complete
+    assert inlet.lost == 0
+
+
+def test_pieces_leave_when_they_are_full() -> None:
+    outlet = Outlet(1, "slave")
+    for number in range(PIECE - 1):
+        outlet.add("slave", 0, 0, (number,))
+    assert outlet.pieces() == []
+    outlet.add("slave", 0, 0, (PIECE - 1,))
+    assert len(outlet.pieces()) == 1
+
+
+def test_a_hole_that_nobody_can_fill_is_counted() -> None:
+    outlet, pieces = filled(3 * PIECE)
+    inlet = Inlet()
+    got = inlet.take(pieces[0]) + inlet.take(pieces[2])
+    assert inlet.missing() == (PIECE, 2 * PIECE - 1)
+    got += inlet.give_up()
+    inlet.total = outlet.total
+    assert inlet.lost == PIECE
+    assert numbers(got) == [*range(PIECE), *range(2 * PIECE, 3 * PIECE)]
+    assert inlet.complete
+
+
+def test_a_missing_end_is_noticed_once_the_length_is_known() -> None:
+    outlet, pieces = filled(2 * PIECE)
+    inlet = Inlet()
+    inlet.take(pieces[0])
+    assert inlet.missing() is None
+    inlet.total = outlet.total
+    assert inlet.missing() == (PIECE, 2 * PIECE - 1)
+    assert not inlet.complete

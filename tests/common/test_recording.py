@@ -1,0 +1,167 @@
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mcap.reader import make_reader
+
+from common import signals
+from common.errors import InputError
+from common.recording.reader import read
+from common.recording.writer import Recording
+from common.signals import TOPICS, Kind
+
+VALUES: dict[Kind, Any] = {
+    Kind.NUMBER: 0.1,
+    Kind.STOREYS: 0.2,
+    Kind.COUNT: 3,
+    Kind.INDEX: -1,
+    Kind.STAMP: 2**60,
+    Kind.FLAG: True,
+    Kind.TEXT: "text",
+    Kind.VALUES: {"a": 1.5},
+}
+
+
+def example(topic: str, seq: int, storeys: int = 1) -> tuple[Any, ...]:
+    row = []
+    for signal in TOPICS[topic]:
+        value = VALUES[signal.kind]
+        if signal.kind is Kind.STOREYS and storeys > 1:
+            value = [0.1 * storey for storey in range(storeys)]
+        row.append(seq if signal.name == "seq" else value)
+    return tuple(row)
+
+
+def write(path: Path, ticks: int, storeys: int = 1, *, close: bool = True) -> Recording:
+    recording = Recording(path, "trial", storeys, TOPICS)
+    recording.metadata("plan", {"toml": "x"})
+    recording.attach("data", b"123", "application/octet-stream")
+    recording.flush()
+    for seq in range(ticks):
+        for topic in ("master", "slave", "latency"):
+            recording.add(topic, seq * 2_000_000, seq * 2_000_000 + 5, example(topic, seq, storeys))
+    recording.add("event", 0, 0, example("event", 0))
+    if close:
+        recording.close({"outcome": "completed"})
+    return recording
+
+
+@pytest.mark.parametrize("storeys", [1, 3])
+def test_what_is_written_is_read_back(tmp_path: Path, storeys: int) -> None:
+    path = tmp_path / "a.mcap"
+    write(path, 100, storeys)
+    run = read(path)
+    assert run.finished
+    assert run.test == "trial"
+    for topic in ("master", "slave", "latency"):
+        assert run.sequences[topic].tolist() == list(range(100))
+        assert run.log_ns[topic].tolist() == [seq * 2_000_000 for seq in range(100)]
+        for signal, value in zip(TOPICS[topic], example(topic, 99, storeys), strict=True):
+            assert np.array_equal(run.columns[topic][signal.name][99], value), signal.name
+            assert run.units[topic][signal.name] == signal.unit
+    assert run.events == [
+        {"t": 0.1, "lab": "text", "level": "text", "code": "text", "text": "text", "values": {"a": 1.5}}
+    ]
+    assert run.metadata["plan"] == {"toml": "x"}
+    assert run.metadata["summary"] == {"outcome": "completed"}
+    assert run.attachments["data"] == b"123"
+
+
+def test_the_public_reader_decodes_every_field_with_the_schema_in_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    write(path, 3, storeys=2)
+    classes: dict[int, Any] = {}
+    with path.open("rb") as stream:
+        messages = list(make_reader(stream).iter_messages())
+    assert len(messages) == 10
+    for schema, channel, message in messages:
+        assert schema is not None
+        if schema.id not in classes:
+            pool = descriptor_pool.DescriptorPool()
+            for file in descriptor_pb2.FileDescriptorSet.FromString(schema.data).file:
+                pool.Add(file)
+            classes[schema.id] = message_factory.GetMessageClass(pool.FindMessageTypeByName(schema.name))
+        topic = channel.topic.removeprefix("rths/trial/")
+        decoded = classes[schema.id].FromString(message.data)
+        for signal, value in zip(TOPICS[topic], example(topic, message.sequence, 2), strict=True):
+            got = getattr(decoded, signal.name)
+            assert (dict(got) if signal.kind is Kind.VALUES else list(got) if isinstance(value, list) else got) == value
+        assert channel.message_encoding == schema.encoding == "protobuf"
+        assert message.log_time <= message.publish_time
+
+
+@settings(max_examples=25, deadline=None)
+@given(share=st.floats(0.0, 1.0))
+def test_a_file_cut_anywhere_is_read_up_to_there_or_refused(tmp_path_factory: Any, share: float) -> None:
+    path = tmp_path_factory.mktemp("cut") / "a.mcap"
+    write(path, 2000)
+    data = path.read_bytes()
+    path.write_bytes(data[: int(share * len(data))])
+    try:
+        run = read(path)
+    except InputError as error:
+        assert "\n" not in str(error)
+        return
+    sequence = run.sequences["master"]
+    assert sequence.tolist() == list(range(sequence.size))
+    assert run.finished is (share == 1.0)
+
+
+def test_a_recording_that_was_not_closed_holds_all_that_was_flushed(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    recording = write(path, 50, close=False)
+    recording.flush()
+    run = read(path)
+    assert not run.finished
+    assert run.ticks("slave") == 50
+    assert run.metadata["plan"] == {"toml": "x"}
+    recording.abandon()
+
+
+def test_schemas_and_plan_are_there_before_the_first_sample(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    recording = Recording(path, "trial", 1, TOPICS)
+    recording.metadata("plan", {"toml": "x"})
+    recording.flush()
+    assert read(path).metadata["plan"] == {"toml": "x"}
+    recording.abandon()
+
+
+def test_what_is_no_recording_is_refused_with_a_sentence(tmp_path: Path) -> None:
+    (tmp_path / "text.mcap").write_text("hello " * 100)
+    with pytest.raises(InputError, match="not a readable MCAP"):
+        read(tmp_path / "text.mcap")
+    with pytest.raises(InputError, match="No such file"):
+        read(tmp_path / "missing.mcap")
+    with pytest.raises(InputError, match=r"Cannot write the recording .*No such file"):
+        Recording(tmp_path / "no" / "a.mcap", "trial", 1, TOPICS)
+
+
+def test_the_table_of_signals_is_the_contracts() -> None:
+    contract = {
+        "master": "seq t ground_acceleration displacement velocity acceleration absolute_acceleration column_target "
+        "actuator_command column_displacement column_force numerical_force damper_force_used damper_force_seq "
+        "damper_force_age table_target damper_command",
+        "slave": "seq t command_seq table_target damper_command table_command table_displacement table_acceleration "
+        "damper_stroke damper_force",
+        "latency": "seq wake_lateness compute_time command_one_way slave_time feedback_one_way round_trip "
+        "clock_offset clock_offset_bound deadline_missed",
+        "event": "t lab level code text values",
+    }
+    for topic, names in contract.items():
+        assert [row.name for row in TOPICS[topic]][: len(names.split())] == names.split()
+
+
+def test_a_signal_is_found_by_name() -> None:
+    assert signals.topic_of("damper_stroke") == "slave"
+    assert signals.signal("master", "column_force").unit == "N"
+    with pytest.raises(KeyError):
+        signals.topic_of("nonsense")
+    with pytest.raises(KeyError):
+        signals.signal("slave", "column_force")
