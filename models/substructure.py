@@ -84,7 +84,7 @@ def build(plan: Plan, rows: Array) -> Substructure:
         np.stack([params for _, params, _ in packed]),
         compensator,
         rows,
-        integrators.rest(n),
+        method.start(np.zeros(n), np.zeros(n), -mass * rows[0, 0]),
         np.stack([memory for _, _, memory in packed]),
         np.zeros(compensators.STATE_SIZE),
         np.zeros(1),

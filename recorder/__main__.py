@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 from common import cli
-from common.clock import MonotonicClock
+from common.clock import MonotonicClock, unix_ns
 from common.drive import Stopper
 from common.endpoint import FrameEndpoint
 from common.laboratory import Setting
@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
     plan = cli.load_plan(args)
     motion = substructure.motion(plan)
     path = args.output or files.default_path(plan, time.strftime("%Y%m%d-%H%M%S"))
-    recording = files.begin(path, plan, motion, substructure.ground_rows(plan, motion))
+    recording = files.begin(path, plan, motion, substructure.ground_rows(plan, motion), unix_ns())
     link = ZenohLink("recorder", plan.test.name, connect=args.connect)
     try:
         setting = Setting(plan, FrameEndpoint(link, plan.digest()), MonotonicClock(), report)

@@ -37,14 +37,18 @@ def default_path(plan: Plan, now: str) -> Path:
     return folder / f"{plan.test.name}-{now}.mcap"
 
 
-def begin(path: Path, plan: Plan, record: GroundMotion, ground: Array) -> Recording:
-    """A recording with schemas, plan, versions, host and ground motion written and flushed."""
+def begin(path: Path, plan: Plan, record: GroundMotion, ground: Array, at_ns: int = 0) -> Recording:
+    """A recording with schemas, plan, versions, host, ground motion and a first event at `at_ns` (Unix), flushed.
+
+    The schemas reach the file with the first message only, so that event must not wait.
+    """
     recording = Recording(path, plan.test.name, plan.storeys, TOPICS)
     recording.metadata("plan", {"toml": plan.toml(), "digest": plan.digest()})
     recording.metadata("versions", {name: metadata.version(name) for name in PACKAGES})
     recording.metadata("host", host())
     recording.metadata(GROUND, {"record": record.describe(), "scale": repr(plan.ground_motion.scale)})
     recording.attach(GROUND, ground.astype("<f8").tobytes(), "application/octet-stream")
+    recording.add("event", at_ns, at_ns, (0.0, "recorder", "info", "begin", "recording begun", {}))
     recording.flush()
     return recording
 

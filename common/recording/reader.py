@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -112,7 +113,7 @@ def _up_to_damage(stream: io.BufferedReader, run: Run) -> Iterator[Any]:
             inner = breakup_chunk(record, validate_crc=True) if isinstance(record, Chunk) else [record]
         except StopIteration:
             return
-        except (McapError, ValueError, zstandard.ZstdError):
+        except (McapError, ValueError, struct.error, zstandard.ZstdError):
             if first:
                 raise
             return

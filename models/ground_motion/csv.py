@@ -34,7 +34,7 @@ def read_csv(path: Path) -> GroundMotion:
     factor = unit(source, rows)
     data = np.array([[number(cell, source.at(index)) for cell in row] for index, row in rows[1:]])
     if len(data) < 2:
-        raise InputError(f"{path} holds {len(data)} samples, but a ground motion needs at least 2.")
+        raise InputError(f"{path} holds fewer than two samples: get the whole file.")
     interval = even_interval(data[:, 0], [source.at(index) for index, _ in rows[1:]])
     return GroundMotion(path.stem, source.version, interval, factor * data[:, 1])
 
@@ -78,13 +78,15 @@ def unit(source: Source, rows: list[Row]) -> float:
 def even_interval(time: NDArray[np.float64], places: list[str]) -> float:
     """Interval (s) of times (n,) in s; raises InputError at the first that does not fit in."""
     steps = np.diff(time)
+    back = np.flatnonzero(steps <= 0.0)
+    if back.size:
+        place = places[back[0] + 1]
+        raise InputError(f"The time at {place} does not increase: sort the lines and drop repeated ones.")
     usual = float(np.median(steps))
-    for step, place in zip(steps, places[1:], strict=True):
-        if step <= 0.0:
-            raise InputError(f"The time at {place} does not increase: sort the lines and drop repeated ones.")
-        if abs(step - usual) > UNEVEN * usual:
-            raise InputError(
-                f"The time at {place} comes {step:g} s after the line before, elsewhere it is {usual:g} s:"
-                " resample the record at equal intervals, and write the time with enough digits."
-            )
+    odd = np.flatnonzero(np.abs(steps - usual) > UNEVEN * usual)
+    if odd.size:
+        raise InputError(
+            f"The time at {places[odd[0] + 1]} comes {steps[odd[0]]:g} s after the line before, elsewhere it is"
+            f" {usual:g} s: resample the record at equal intervals, and write the time with enough digits."
+        )
     return round(float(time[-1] - time[0]) / steps.size, 12)

@@ -35,8 +35,8 @@ def read_knet(path: Path) -> GroundMotion:
     """A motion from 17 header lines and integer counts, with the mean of the whole record removed.
 
     The counts carry the sensor's offset. NIED takes off the mean of the whole record where it gives
-    `Max. Acc.`, and so does this reader: a mean of the part before the event would need its length,
-    which the format does not tell.
+    `Max. Acc.`, and so does this reader: a mean of the part before the event would need the
+    arrival of the first wave, which the format does not tell.
 
     Raises:
         InputError: a header line is missing or impossible, a value is not a finite number, or the number

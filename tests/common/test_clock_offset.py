@@ -19,7 +19,9 @@ def exchanges(offset: int, forward: list[int], back: list[int], drift_ppm: float
     return estimate
 
 
-@given(st.integers(-(10**12), 10**12), st.lists(st.tuples(st.integers(1, MS), st.integers(1, MS)), min_size=1))
+@given(
+    st.integers(-(10**12), 10**12), st.lists(st.tuples(st.integers(1, MS), st.integers(1, MS)), min_size=1)
+)
 def test_the_error_never_exceeds_the_bound(offset: int, delays: list[tuple[int, int]]) -> None:
     estimate = exchanges(offset, [there for there, _ in delays], [here for _, here in delays])
     assert abs(estimate.offset - offset) <= estimate.bound + 1

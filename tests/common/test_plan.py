@@ -40,21 +40,39 @@ def test_the_default_test_is_the_contracts(default_plan: Plan) -> None:
 WRONG = {
     "unknown table": ("[colum]\n", r"Unknown table \[colum\]: did you mean column"),
     "unknown key": ("[column]\nstifness = 1.0\n", None),
-    "unknown key of a closed table": ("[actuator]\ndelai = 0.1\n", "Unknown key 'delai' in .actuator.: did you mean delay"),
+    "unknown key of a closed table": (
+        "[actuator]\ndelai = 0.1\n",
+        "Unknown key 'delai' in .actuator.: did you mean delay",
+    ),
     "text for a number": ("[test]\nduration = '3'\n", r"duration in \[test\] must be a number, not '3'"),
     "number for a truth": ("[control]\namd = 1\n", r"amd in \[control\] must be true or false, not 1"),
     "number for a text": ("[test]\nname = 3\n", r"name in \[test\] must be a text in quotes, not 3"),
-    "broken number for a count": ("[column]\nstorey = 1.5\n", r"storey in \[column\] must be a whole number, not 1.5"),
+    "broken number for a count": (
+        "[column]\nstorey = 1.5\n",
+        r"storey in \[column\] must be a whole number, not 1.5",
+    ),
     "truth for a number": ("[test]\nduration = true\n", "must be a number, not True"),
     "below the range": ("[test]\nduration = -1.0\n", r"duration in \[test\] is -1.0, but must be above 0"),
-    "not a number": ("[ground_motion]\nscale = nan\n", r"scale in \[ground_motion\] is nan, but must be finite"),
+    "not a number": (
+        "[ground_motion]\nscale = nan\n",
+        r"scale in \[ground_motion\] is nan, but must be finite",
+    ),
     "infinite": ("[ground_motion]\nscale = inf\n", "must be finite"),
     "name with a slash": ("[test]\nname = 'a/b'\n", "must be text that matches"),
     "value for a table": ("column = 3\n", r"\[column\] must be a table, not 3"),
     "lengths that differ": ("[structure]\nmass = [1.0, 2.0]\n", "has 2 masses but 1 values of stiffness"),
-    "storey that is not there": ("[column]\nstorey = 2\n", r"storey in \[column\] is 2, but the structure has 1"),
-    "floor that is not there": ("[damper]\nfloor = 2\n", r"floor in \[damper\] is 2, but the structure has 1"),
-    "more columns than there are": ("[column]\nrepresents = 5\n", "represents in .column. is 5, but the storey has 4"),
+    "storey that is not there": (
+        "[column]\nstorey = 2\n",
+        r"storey in \[column\] is 2, but the structure has 1",
+    ),
+    "floor that is not there": (
+        "[damper]\nfloor = 2\n",
+        r"floor in \[damper\] is 2, but the structure has 1",
+    ),
+    "more columns than there are": (
+        "[column]\nrepresents = 5\n",
+        "represents in .column. is 5, but the storey has 4",
+    ),
     "tolerance of nothing": ("[tolerances]\n'column.stifness' = 0.1\n", "did you mean column.stiffness"),
     "tolerance beyond all": ("[tolerances]\n'column.stiffness' = 1.1\n", "must be at least 0 and at most 1"),
     "shorter than an interval": ("[test]\nduration = 0.0001\n", "shorter than one interval"),
@@ -88,7 +106,9 @@ def test_a_plan_that_cannot_be_read_is_named(tmp_path: Path) -> None:
     mass=st.lists(st.floats(1.0, 1e9), min_size=1, max_size=5),
     frequency=st.one_of(st.just(math.inf), st.floats(0.1, 1e3)),
 )
-def test_a_plan_survives_its_own_text(duration: float, scale: float, mass: list[float], frequency: float) -> None:
+def test_a_plan_survives_its_own_text(
+    duration: float, scale: float, mass: list[float], frequency: float
+) -> None:
     n = len(mass)
     tables = {
         "test": {"duration": duration},

@@ -91,7 +91,9 @@ def test_the_public_reader_decodes_every_field_with_the_schema_in_the_file(tmp_p
         decoded = classes[schema.id].FromString(message.data)
         for signal, value in zip(TOPICS[topic], example(topic, message.sequence, 2), strict=True):
             got = getattr(decoded, signal.name)
-            assert (dict(got) if signal.kind is Kind.VALUES else list(got) if isinstance(value, list) else got) == value
+            assert (
+                dict(got) if signal.kind is Kind.VALUES else list(got) if isinstance(value, list) else got
+            ) == value
         assert channel.message_encoding == schema.encoding == "protobuf"
         assert message.log_time <= message.publish_time
 
@@ -128,8 +130,11 @@ def test_schemas_and_plan_are_there_before_the_first_sample(tmp_path: Path) -> N
     path = tmp_path / "a.mcap"
     recording = Recording(path, "trial", 1, TOPICS)
     recording.metadata("plan", {"toml": "x"})
+    recording.add("event", 0, 0, example("event", 0))
     recording.flush()
-    assert read(path).metadata["plan"] == {"toml": "x"}
+    run = read(path)
+    assert run.metadata["plan"] == {"toml": "x"}
+    assert set(run.columns) == {"master", "slave", "latency"}
     recording.abandon()
 
 

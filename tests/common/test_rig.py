@@ -67,7 +67,11 @@ def test_a_wrong_reading_is_a_sentence_that_names_the_rig(reading: Any, sentence
 
 def test_whatever_a_rig_raises_is_a_sentence_that_names_it() -> None:
     rig = guarded(error=ZeroDivisionError("division by zero"))
-    for call, word in ((rig.arm, "arm"), (rig.read, "read"), (lambda: rig.write(ColumnCommand(0.0)), "write")):
+    for call, word in (
+        (rig.arm, "arm"),
+        (rig.read, "read"),
+        (lambda: rig.write(ColumnCommand(0.0)), "write"),
+    ):
         with pytest.raises(RigError, match=rf"laboratory A \(Fake\): {word}\(\) failed: ZeroDivisionError"):
             call()
     assert rig.disarm() == "laboratory A (Fake): disarm() failed: division by zero"
