@@ -9,7 +9,7 @@ from common.clock import Clock
 from common.endpoint import Endpoint
 from common.errors import InterlockError, LostError, RthsError
 from common.exchange import Event, Exchange, State
-from common.messages import Message, Recorder, Resend
+from common.messages import Message, Recorder, Resend, Trip
 from common.outlet import Outlet
 from common.plan import Plan
 
@@ -73,6 +73,13 @@ class Laboratory:
         self.exchange.happen(event, remote=remote, cause=str(error))
         self.error = error
         self.note(code, str(error), level="error", tick=tick)
+        if event is not Event.REFUSE and not remote:
+            self.say_why()
+
+    def say_why(self) -> None:
+        """Tell the other laboratory that this one has stopped, and why."""
+        if self.exchange.session:
+            self.endpoint.send(Trip(self.exchange.session, self.name, self.exchange.state.value, self.exchange.cause))
 
     def lost(self, who: str, seconds: float, tick: int = 0) -> None:
         """End the test because someone has been silent for too long."""

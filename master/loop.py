@@ -314,7 +314,7 @@ class MasterLoop:
         if lab.exchange.state is State.STOPPING:
             lab.endpoint.send(Stop(session, self.ticks, lab.exchange.cause))
         elif lab.error is not None:
-            lab.endpoint.send(Trip(session, "master", "stopped", str(lab.error)))
+            lab.say_why()
         lab.send_samples(everything=True)
         lab.endpoint.send(lab.outlet.finished())
 

@@ -33,7 +33,7 @@ class RecorderLoop:
         self._sink = sink
         self._digest = setting.plan.digest()
         self._inlets = {lab: Inlet() for lab in LABS}
-        self._hole_since: dict[str, int] = {}
+        self._holes: dict[str, tuple[int, int]] = {}  # first missing item, and since when it is missed
         self._session = 0
         self._said_ns = -REPEAT_NS
         self._heard_ns = setting.clock.now()
@@ -128,11 +128,13 @@ class RecorderLoop:
         for lab, inlet in self._inlets.items():
             hole = inlet.missing()
             if hole is None:
-                self._hole_since.pop(lab, None)
+                self._holes.pop(lab, None)
                 continue
-            since = self._hole_since.setdefault(lab, now)
-            if now - since > PATIENCE_NS:
-                self._hole_since.pop(lab)
+            first, since = self._holes.setdefault(lab, (hole[0], now))
+            if first != hole[0]:
+                self._holes[lab] = (hole[0], now)
+            if first == hole[0] and now - since > PATIENCE_NS:
+                self._holes.pop(lab)
                 self._write(inlet.give_up())
             else:
                 self._endpoint.send(Resend(self._session, lab, *hole))

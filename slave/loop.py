@@ -225,8 +225,8 @@ class SlaveLoop:
             lab.exchange.happen(Event.FINISH)
         if lab.exchange.state is State.DONE:
             lab.endpoint.send(Stopped(session, self.ticks))
-        elif lab.error is not None and session:
-            lab.endpoint.send(Trip(session, "slave", "stopped", str(lab.error)))
+        elif lab.error is not None:
+            lab.say_why()
         lab.send_samples(everything=True)
         lab.endpoint.send(lab.outlet.finished())
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import json
 import os
@@ -46,7 +47,8 @@ class Spool:
             while written < len(self._held):
                 written += self._stream.write(self._held[written:])
         except OSError:
-            self._stream.truncate(self._drained)
+            with contextlib.suppress(OSError):  # a device cannot be cut
+                self._stream.truncate(self._drained)
             raise
         self._drained += written
         self._held.clear()

@@ -71,7 +71,7 @@ def test_the_integration_is_exact_for_straight_lines(values: Array) -> None:
 
 def test_the_displacement_meets_the_closed_form_of_a_wave_train() -> None:
     amplitude, omega, length = 0.05, 2.0 * np.pi * 1.5, 20.0  # m, rad/s, s
-    t: Array = INTERVAL * np.arange(round(length / INTERVAL) + 1)
+    t = np.linspace(0.0, length, round(length / INTERVAL) + 1)
     slow = np.pi / length
     window, slope, bend = (
         np.sin(slow * t) ** 2,

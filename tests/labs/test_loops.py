@@ -1,0 +1,332 @@
+"""Both loops, the exchange and the recorder together over a link in memory, in virtual time."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from common import reality
+from common.errors import InputError, InterlockError, LostError, RigError
+from common.exchange import State
+from common.messages import Command, Feedback, Register, Trip
+from common.plan import PROTOCOL_VERSION, Plan, Rig, from_tables
+from common.reality import Reality
+from common.recording.reader import Run, read
+from models import substructure
+from models.closed_loop import rows, simulate
+from common.signals import TOPICS
+from rths import virtual
+from rths.virtual import Bench
+from tests.helpers import with_table, without_recorder
+
+
+def run(plan: Plan, path: Path, real: Reality | None = None) -> tuple[Run, Any, Bench]:
+    bench = virtual.assemble(plan, real or reality.as_planned(plan), path)
+    error = virtual.run(bench, lambda: "")
+    return read(path), error, bench
+
+
+@pytest.fixture(scope="module")
+def recording(virtual_recording: Path) -> Run:
+    return read(virtual_recording)
+
+
+def test_the_loops_equal_the_compiled_rollout(short_plan: Plan, recording: Run) -> None:
+    ground = substructure.ground_rows(short_plan, substructure.motion(short_plan))
+    expected: dict[str, list[Any]] = {"master": [], "slave": []}
+    for topic, values in rows(short_plan, simulate(short_plan, ground, seed=short_plan.test.seed)):
+        expected[topic].append(values)
+    for topic, table in expected.items():
+        for place, signal in enumerate(TOPICS[topic]):
+            column = np.array([values[place] for values in table])
+            assert np.array_equal(recording.columns[topic][signal.name], column), f"{topic}/{signal.name}"
+
+
+def test_the_same_inputs_give_the_same_bits(short_plan: Plan, recording: Run, tmp_path: Path) -> None:
+    again, error, _ = run(short_plan, tmp_path / "again.mcap")
+    assert error is None
+    for topic, columns in recording.columns.items():
+        for name, values in columns.items():
+            assert values.tobytes() == again.columns[topic][name].tobytes(), f"{topic}/{name}"
+
+
+def test_another_seed_gives_other_noise(short_plan: Plan, recording: Run, tmp_path: Path) -> None:
+    other, _, _ = run(short_plan.with_test(seed=2), tmp_path / "other.mcap")
+    assert not np.array_equal(
+        other.columns["master"]["column_force"], recording.columns["master"]["column_force"]
+    )
+
+
+def test_every_tick_is_recorded_by_both_and_the_summary_says_so(short_plan: Plan, recording: Run) -> None:
+    for topic in ("master", "slave", "latency"):
+        assert recording.sequences[topic].tolist() == list(range(short_plan.ticks))
+    summary = recording.metadata["summary"]
+    assert summary["ticks_expected"] == summary["master_recorded"] == summary["slave_recorded"] == "2000"
+    assert summary["items_lost"] == summary["items_dropped"] == summary["deadline_misses"] == "0"
+    assert summary["cause"] == "completed"
+    assert recording.columns["master"]["damper_force_seq"].tolist() == list(range(-1, short_plan.ticks - 1))
+
+
+def test_both_ends_of_the_link_are_recorded(recording: Run) -> None:
+    for name in ("table_target", "damper_command"):
+        assert np.array_equal(recording.columns["master"][name], recording.columns["slave"][name])
+
+
+def test_a_test_of_three_storeys_is_recorded_storey_by_storey(short_plan: Plan, tmp_path: Path) -> None:
+    plan = with_table(short_plan, "structure", mass=[1.6e5] * 3, stiffness=[9e7] * 3, damping=[4e5] * 3)
+    plan = with_table(with_table(plan, "column", stiffness=45e6), "damper", floor=3)
+    found, error, _ = run(plan, tmp_path / "three.mcap")
+    assert error is None
+    assert found.columns["master"]["displacement"].shape == (plan.ticks, 3)
+
+
+class BrokenLab:
+    """Laboratory A that fails at a given tick in a given way."""
+
+    def __init__(self, interval: float, seed: int, at: int = 300, how: str = "raise") -> None:
+        self.tick, self.at, self.how = 0, at, how
+        self.disarmed = 0
+
+    def arm(self) -> None:
+        if self.how == "arm":
+            raise RigError("the pump is off")
+
+    def read(self) -> Any:
+        self.tick += 1
+        if self.tick <= self.at:
+            return 0.0, 0.0
+        return {"raise": self._raise, "nan": self._nan, "shape": self._shape, "force": self._force}[
+            self.how
+        ]()
+
+    def _raise(self) -> Any:
+        raise OSError("no answer from the amplifier")
+
+    def _nan(self) -> Any:
+        return 0.0, float("nan")
+
+    def _shape(self) -> Any:
+        return 0.0, 0.0, 0.0
+
+    def _force(self) -> Any:
+        return 0.0, 9e9
+
+    def write(self, command: Any) -> None:
+        pass
+
+    def disarm(self) -> None:
+        self.disarmed += 1
+
+
+def broken(plan: Plan, how: str) -> Reality:
+    planned = reality.as_planned(plan)
+    return dataclasses.replace(planned, master=Rig(f"{__name__}:BrokenLab", {"how": how}))
+
+
+@pytest.mark.parametrize(
+    ("how", "kind", "sentence"),
+    [
+        ("raise", RigError, "read() failed: OSError: no answer from the amplifier"),
+        ("nan", RigError, "read() returned (0.0, nan), which is not finite"),
+        ("shape", RigError, "read() returned 3 numbers, not 2"),
+        ("force", InterlockError, "column_force is 9e+09, beyond its limit of 400000"),
+        ("arm", RigError, "the pump is off"),
+    ],
+)
+def test_a_rig_that_fails_stops_the_test_with_a_sentence(
+    short_plan: Plan, tmp_path: Path, how: str, kind: type[Exception], sentence: str, monkeypatch: Any
+) -> None:
+    monkeypatch.setattr("master.assembly.find", lambda *_: BrokenLab)
+    found, error, bench = run(short_plan, tmp_path / "broken.mcap", broken(short_plan, how))
+    assert isinstance(error, kind)
+    assert sentence in str(error)
+    if kind is RigError:
+        assert "laboratory A (BrokenLab)" in str(error)
+    assert error.exit_code == 3
+    assert bench.master.lab.exchange.state is bench.slave.lab.exchange.state is State.TRIPPED
+    ticks = 0 if how == "arm" else 301 if how == "force" else 300
+    assert found.ticks("master") == ticks
+    assert sentence in found.metadata["summary"]["cause"]
+    assert any(sentence in event["text"] for event in found.events)
+
+
+def test_a_slaves_rig_that_fails_stops_the_master_too(
+    short_plan: Plan, tmp_path: Path, monkeypatch: Any
+) -> None:
+    monkeypatch.setattr("slave.assembly.find", lambda *_: BrokenLab)
+    real = dataclasses.replace(
+        reality.as_planned(short_plan), slave=Rig("x:BrokenLab", {"how": "raise", "at": 0})
+    )
+    found, error, bench = run(short_plan, tmp_path / "broken.mcap", real)
+    assert isinstance(error, InterlockError)
+    assert "laboratory B (BrokenLab)" in str(error)
+    assert bench.slave.lab.exchange.state is State.TRIPPED
+    assert "laboratory B (BrokenLab)" in found.metadata["summary"]["cause"]
+
+
+def test_an_unstable_test_is_stopped_by_a_limit(default_plan: Plan, tmp_path: Path) -> None:
+    plan = with_table(default_plan, "control", amd=False)
+    tables = plan.tables() | {"compensator": {"kind": "none"}}
+    found, error, _ = run(from_tables(tables, plan.base), tmp_path / "unstable.mcap")
+    assert isinstance(error, InterlockError)
+    assert "beyond its limit" in str(error)
+    assert 0 < found.ticks("master") < plan.ticks
+    assert found.finished
+
+
+def test_another_plan_or_protocol_is_refused_before_anything_moves(short_plan: Plan) -> None:
+    for request in (
+        Register(5, PROTOCOL_VERSION, short_plan.with_test(scale=0.2).digest()),
+        Register(5, PROTOCOL_VERSION + 1, short_plan.digest()),
+    ):
+        bench = virtual.assemble(without_recorder(short_plan), reality.as_planned(short_plan), None)
+        bench.slave.take(request, 0)
+        assert bench.slave.lab.exchange.state is State.REFUSED
+        assert isinstance(bench.slave.lab.error, InputError)
+        heard = bench.endpoints["master"].receive()
+        assert heard is not None
+        assert "refuse" in type(heard.message).__name__.lower()
+
+
+def test_a_slave_has_one_master(short_plan: Plan) -> None:
+    plan = without_recorder(short_plan)
+    bench = virtual.assemble(plan, reality.as_planned(plan), None)
+    bench.slave.take(Register(5, PROTOCOL_VERSION, plan.digest()), 0)
+    bench.slave.take(Register(6, PROTOCOL_VERSION, plan.digest()), 0)
+    assert bench.slave.lab.exchange.session == 5
+    bench.slave.take(Command(6, 0, 0, 0, 1.0, 1.0), 0)
+    bench.slave.take(Trip(6, "master", "x", "y"), 0)
+    assert not bench.slave.heard(0)
+    assert bench.slave.lab.exchange.state is State.REGISTERED
+
+
+def test_nobody_there_is_said_in_the_time_the_plan_allows(short_plan: Plan) -> None:
+    plan = with_table(without_recorder(short_plan), "link", connect_timeout=2.0)
+    bench = virtual.assemble(plan, reality.as_planned(plan), None)
+    while not bench.master.lab.exchange.ended:
+        bench.clock.time += 1_000_000
+        bench.master.poll()
+    assert bench.clock.time == pytest.approx(2.0e9, abs=2e6)
+    assert isinstance(bench.master.lab.error, LostError)
+    assert str(bench.master.lab.error).startswith("No slave joined the test within 2 s")
+
+
+def test_a_missing_recorder_is_said(short_plan: Plan) -> None:
+    plan = with_table(short_plan, "link", connect_timeout=2.0)
+    bench = virtual.assemble(plan, reality.as_planned(plan), None)
+    error = virtual.run(bench, lambda: "")
+    assert isinstance(error, LostError)
+    assert str(error).startswith("No recorder joined the test")
+    assert bench.master.ticks == 0
+
+
+def running(plan: Plan, ticks: int) -> Bench:
+    """A test in memory after some ticks."""
+    bench = virtual.assemble(plan, reality.as_planned(plan), None)
+    while not bench.master.lab.running:
+        bench.clock.time += 1_000_000
+        virtual._exchange(bench, poll=True)
+    for tick in range(ticks):
+        virtual._tick(bench, tick)
+    return bench
+
+
+@pytest.fixture
+def bench(short_plan: Plan) -> Bench:
+    return running(without_recorder(short_plan), 100)
+
+
+def test_a_silent_slave_is_lost_and_nothing_more_moves(bench: Bench) -> None:
+    for tick in range(100, 100 + 501):
+        bench.clock.sleep_until(bench.master.lab.tick_ns(tick))
+        bench.master.tick(tick)
+        if bench.master.lab.exchange.ended:
+            break
+    assert bench.master.lab.exchange.state is State.LOST
+    assert isinstance(bench.master.lab.error, LostError)
+    assert tick == pytest.approx(100 + 500, abs=2)
+
+
+def test_a_slave_without_commands_keeps_the_last_one_and_goes_on_measuring(bench: Bench) -> None:
+    before = bench.slave._command
+    for tick in range(100, 110):
+        bench.clock.sleep_until(bench.slave.tick_ns(tick))
+        bench.slave.tick(tick)
+    answers = []
+    while (heard := bench.endpoints["master"].receive()) is not None:
+        answers.append(heard.message)
+    feedback = [answer for answer in answers if isinstance(answer, Feedback) and answer.seq >= 100]
+    assert [answer.seq for answer in feedback] == list(range(100, 110))
+    assert {answer.command_seq for answer in feedback} == {before.seq}
+
+
+def test_a_tick_that_comes_a_whole_interval_late_moves_nothing_and_sends_nothing(bench: Bench) -> None:
+    command = bench.master._command
+    while bench.endpoints["slave"].receive() is not None:
+        pass
+    bench.clock.sleep_until(bench.master.lab.tick_ns(103) + 1)
+    for tick in (100, 101, 102):
+        bench.master.tick(tick)
+        assert bench.master._command == command
+    assert bench.endpoints["slave"].receive() is None
+    bench.master.tick(103)
+    assert bench.master._command != command
+    heard = bench.endpoints["slave"].receive()
+    assert heard is not None
+    assert isinstance(heard.message, Command)
+    assert heard.message.seq == 103
+
+
+def test_repeated_and_outdated_feedback_is_not_used(bench: Bench) -> None:
+    session = bench.master.lab.exchange.session
+    used = bench.master._used
+    for seq in (used.seq, used.seq - 5):
+        bench.master.take(Feedback(session, seq, seq, 0, 0, 0.0, 0.0, 0.0, 999.0), 0)
+    bench.clock.sleep_until(bench.master.lab.tick_ns(100))
+    bench.master.tick(100)
+    assert bench.master._used.damper_force != 999.0
+
+
+def test_feedback_of_another_session_is_not_used(bench: Bench) -> None:
+    bench.master.take(Feedback(12345, 99, 99, 0, 0, 0.0, 0.0, 0.0, 999.0), 0)
+    bench.clock.sleep_until(bench.master.lab.tick_ns(100))
+    bench.master.tick(100)
+    assert bench.master._used.damper_force != 999.0
+
+
+class SlowLink:
+    """Every third feedback three milliseconds late."""
+
+    def __init__(self, seed: int) -> None:
+        self.seed = seed
+
+    def fate(self, direction: str, seq: int, t: float) -> float | None:
+        return 0.003 if direction == "feedback" and seq % 3 == 0 else None if seq % 50 == 7 else 0.0
+
+
+def test_a_link_plug_in_delays_and_loses_messages(short_plan: Plan, tmp_path: Path, monkeypatch: Any) -> None:
+    monkeypatch.setattr("common.links.find", lambda *_: SlowLink)
+    real = dataclasses.replace(reality.as_planned(short_plan), link=Rig("x:SlowLink"))
+    found, error, _ = run(short_plan, tmp_path / "slow.mcap", real)
+    assert error is None
+    used = found.columns["master"]["damper_force_seq"]
+    # the feedback of tick 30 (a multiple of three) would be used at 31, comes at 33, when 32 is there: never used
+    assert used[30:36].tolist() == [29, 29, 31, 32, 32, 34]
+    assert found.columns["slave"]["command_seq"][55:59].tolist() == [55, 56, 56, 58]
+    ages = found.columns["master"]["damper_force_age"]
+    assert np.allclose(ages[30:36], [0.002, 0.004, 0.002, 0.002, 0.004, 0.002])
+
+
+def test_early_stop_by_the_user_is_orderly(short_plan: Plan, tmp_path: Path) -> None:
+    path = tmp_path / "stopped.mcap"
+    bench = virtual.assemble(short_plan, reality.as_planned(short_plan), path)
+    error = virtual.run(bench, lambda: "stopped by the user." if bench.master.ticks == 700 else "")
+    found = read(path)
+    assert error is None
+    assert bench.master.lab.exchange.state is bench.slave.lab.exchange.state is State.DONE
+    assert found.ticks("master") == found.ticks("slave") == 700
+    assert found.metadata["summary"]["cause"] == "stopped by the user."

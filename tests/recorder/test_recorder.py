@@ -1,0 +1,168 @@
+"""The recorder against slow, full and failing disks, and against lost messages."""
+
+from __future__ import annotations
+
+import errno
+import threading
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from common import reality
+from common.clock import MonotonicClock, VirtualClock
+from common.errors import InputError, InterlockError
+from common.memory_link import MemoryEndpoint
+from common.messages import Samples
+from common.plan import Plan
+from common.recording.reader import read
+from common.recording.writer import Recording
+from common.signals import TOPICS
+from recorder.files import default_path
+from recorder.sink import FileSink, ThreadedSink
+from rths import virtual
+from tests.helpers import with_table
+
+ITEM = ["slave", 0, 0, 0, 0.0, -1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+
+
+def recording(tmp_path: Path) -> Recording:
+    found = Recording(tmp_path / "a.mcap", "trial", 1, TOPICS)
+    found.add("event", 0, 0, (0.0, "recorder", "info", "begin", "begun", {}))
+    found.flush()
+    return found
+
+
+class FullDisk:
+    """Stands in for a file on a disk that takes only so many bytes, as `write` to a full one does."""
+
+    def __init__(self, path: Path, room: int) -> None:
+        self._file = path.open("r+b", buffering=0)
+        self._file.seek(0, 2)
+        self._room = room
+
+    def write(self, data: bytes) -> int:
+        if not self._room:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        taken = min(len(data), self._room)
+        self._room -= taken
+        return self._file.write(data[:taken])
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._file, name)
+
+
+def test_a_full_disk_leaves_what_was_written_readable_and_is_said(tmp_path: Path) -> None:
+    clock = VirtualClock()
+    file = recording(tmp_path)
+    file._stream.close()
+    file._spool._stream = file._stream = FullDisk(tmp_path / "a.mcap", 3_000)  # type: ignore[assignment]
+    sink = FileSink(file, clock)
+    for seq in range(500):
+        clock.time += 20_000_000
+        sink.put([[*ITEM[:3], seq, *ITEM[4:]]])
+    assert "No space left on device" in sink.failure
+    sink.close({})
+    run = read(tmp_path / "a.mcap")
+    count = run.ticks("slave")
+    assert 0 < count < 500
+    assert run.sequences["slave"].tolist() == list(range(count))
+    assert sink.dropped > 0
+    assert not run.finished
+
+
+def test_a_full_disk_stops_the_test_in_order(short_plan: Plan, tmp_path: Path, monkeypatch: Any) -> None:
+    flush, calls = Recording.flush, []
+
+    def failing(self: Recording) -> None:
+        calls.append(None)
+        if len(calls) > 12:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        flush(self)
+
+    monkeypatch.setattr(Recording, "flush", failing)
+    bench = virtual.assemble(short_plan, reality.as_planned(short_plan), tmp_path / "a.mcap")
+    error = virtual.run(bench, lambda: "")
+    assert isinstance(error, InterlockError)
+    assert "recording is lost: the disk does not take it (No space left on device)" in str(error)
+    assert 0 < bench.master.ticks < short_plan.ticks
+    assert read(tmp_path / "a.mcap").ticks("master") > 0
+
+
+def test_a_disk_that_is_full_from_the_start_is_no_traceback(short_plan: Plan) -> None:
+    if not Path("/dev/full").exists():
+        pytest.skip("no /dev/full here")
+    full = Recording(Path("/dev/full"), "trial", 1, TOPICS)
+    with pytest.raises(OSError, match="No space left"):
+        full.flush()
+    full.abandon()
+
+
+def test_a_slow_disk_costs_drops_never_time(tmp_path: Path) -> None:
+    gate = threading.Event()
+    sink = FileSink(recording(tmp_path), MonotonicClock())
+    write = sink.put
+
+    def slow(items: list[Any]) -> None:
+        gate.wait()
+        write(items)
+
+    sink.put = slow  # type: ignore[method-assign]
+    threaded = ThreadedSink(sink, capacity=200)
+    for seq in range(300):
+        threaded.put([[*ITEM[:3], seq, *ITEM[4:]]])
+    assert threaded.dropped > 200
+    assert "too slow" in threaded.failure
+    gate.set()
+    threaded.close({})
+    assert read(tmp_path / "a.mcap").ticks("slave") == 300 - threaded.dropped
+
+
+def test_samples_that_the_link_loses_are_asked_for_again(
+    short_plan: Plan, tmp_path: Path, monkeypatch: Any
+) -> None:
+    deliver, lost = MemoryEndpoint.send, []
+
+    def leaky(self: MemoryEndpoint, message: Any) -> None:
+        if isinstance(message, Samples) and message.first % 70 == 30 and message.first not in lost:
+            lost.append(message.first)
+            return
+        deliver(self, message)
+
+    monkeypatch.setattr(MemoryEndpoint, "send", leaky)
+    bench = virtual.assemble(short_plan, reality.as_planned(short_plan), tmp_path / "a.mcap")
+    assert virtual.run(bench, lambda: "") is None
+    run = read(tmp_path / "a.mcap")
+    assert len(lost) > 50
+    for topic in ("master", "slave", "latency"):
+        assert run.sequences[topic].tolist() == list(range(short_plan.ticks))
+    assert run.metadata["summary"]["items_lost"] == "0"
+
+
+def test_what_can_not_be_had_again_is_counted_and_said(
+    short_plan: Plan, tmp_path: Path, monkeypatch: Any
+) -> None:
+    deliver = MemoryEndpoint.send
+
+    def leaky(self: MemoryEndpoint, message: Any) -> None:
+        if not (isinstance(message, Samples) and message.lab == "slave" and message.first == 500):
+            deliver(self, message)
+
+    monkeypatch.setattr(MemoryEndpoint, "send", leaky)
+    bench = virtual.assemble(short_plan, reality.as_planned(short_plan), tmp_path / "a.mcap")
+    virtual.run(bench, lambda: "")
+    run = read(tmp_path / "a.mcap")
+    summary = run.metadata["summary"]
+    assert summary["items_lost"] == "10"
+    assert summary["slave_gaps"] == "10"
+    assert run.ticks("slave") == short_plan.ticks - 10
+
+
+def test_the_default_name_is_in_the_plans_folder(short_plan: Plan, tmp_path: Path) -> None:
+    plan = with_table(short_plan, "recording", folder=str(tmp_path / "new" / "folder"))
+    assert (
+        default_path(plan, "20260101-120000") == tmp_path / "new" / "folder" / "default-20260101-120000.mcap"
+    )
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="Cannot make the folder"):
+        default_path(with_table(short_plan, "recording", folder=str(tmp_path / "file" / "x")), "now")
