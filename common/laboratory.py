@@ -79,7 +79,9 @@ class Laboratory:
     def say_why(self) -> None:
         """Tell the other laboratory that this one has stopped, and why."""
         if self.exchange.session:
-            self.endpoint.send(Trip(self.exchange.session, self.name, self.exchange.state.value, self.exchange.cause))
+            self.endpoint.send(
+                Trip(self.exchange.session, self.name, self.exchange.state.value, self.exchange.cause)
+            )
 
     def lost(self, who: str, seconds: float, tick: int = 0) -> None:
         """End the test because someone has been silent for too long."""

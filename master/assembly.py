@@ -34,6 +34,15 @@ def build_rig(reality: Reality) -> GuardedRig:
     )
 
 
+def check(reality: Reality) -> None:
+    """Raise InputError where the laboratory could not be built; nothing of it is constructed or moved."""
+    plan = reality.plan
+    MasterStep(plan, true_ground(reality))
+    column_lab.build(plan.test.interval, plan.actuator, plan.column)
+    if reality.master.class_:
+        find(reality.master.class_, reality.base, "[master.rig]")
+
+
 def true_ground(reality: Reality) -> Array:
     """Ground motion that really comes, as the master's kernel takes it."""
     return substructure.ground_rows(reality.plan, substructure.motion(reality.plan))

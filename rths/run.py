@@ -46,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
     error = (
         in_virtual_time(plan, reality, output, stopping)
         if args.virtual
-        else in_real_time(args, plan, output, stopping)
+        else in_real_time(args, plan, reality, output, stopping)
     )
     if output.exists() and output.stat().st_size:
         show(output, args.json)
@@ -95,6 +95,7 @@ def in_real_time(args: argparse.Namespace, plan: Plan, output: Path, stopping: S
     from common.zenoh_link import listenable
     from rths.processes import Processes
 
+    check(reality)
     processes = Processes()
     progress = Progress(plan.test.duration)
     endpoint = listenable()
@@ -107,6 +108,17 @@ def in_real_time(args: argparse.Namespace, plan: Plan, output: Path, stopping: S
         processes.kill()
         progress.end()
     return verdict(processes)
+
+
+def check(reality: Reality) -> None:
+    """Raise InputError where a laboratory could not be built, before any process starts."""
+    import master.assembly
+    import slave.assembly
+    from common.links import link_model
+
+    master.assembly.check(reality)
+    slave.assembly.check(reality)
+    link_model(reality)
 
 
 def warm_up(progress: Progress) -> None:

@@ -44,13 +44,6 @@ def assemble(plan: Plan, reality: Reality, output: Path | None, report: Report =
     hub = MemoryHub(clock)
     roles = ("master", "slave") if output is None else ("master", "slave", "recorder")
     endpoints: dict[str, Endpoint] = {role: hub.join(role) for role in roles}
-    recorder = None
-    if output is not None:
-        motion = substructure.motion(plan)
-        recording = files.begin(output, plan, motion, substructure.ground_rows(plan, motion))
-        recorder = RecorderLoop(
-            Setting(plan, endpoints["recorder"], clock, report), FileSink(recording, clock)
-        )
     master = build_master(
         Setting(plan, endpoints["master"], clock, report),
         reality,
@@ -59,6 +52,13 @@ def assemble(plan: Plan, reality: Reality, output: Path | None, report: Report =
         epoch_ns=0,
     )
     slave = build_slave(Setting(plan, endpoints["slave"], clock, report), reality, link_model(reality))
+    recorder = None
+    if output is not None:
+        motion = substructure.motion(plan)
+        recording = files.begin(output, plan, motion, substructure.ground_rows(plan, motion))
+        recorder = RecorderLoop(
+            Setting(plan, endpoints["recorder"], clock, report), FileSink(recording, clock)
+        )
     return Bench(clock, master, slave, recorder, endpoints)
 
 

@@ -28,6 +28,13 @@ def build_rig(reality: Reality) -> GuardedRig:
     )
 
 
+def check(reality: Reality) -> None:
+    """Raise InputError where the laboratory could not be built; nothing of it is constructed or moved."""
+    table_lab.build(reality.plan.test.interval, reality.plan.table, reality.plan.damper)
+    if reality.slave.class_:
+        find(reality.slave.class_, reality.base, "[slave.rig]")
+
+
 def build_loop(setting: Setting, reality: Reality, link: LinkModel) -> SlaveLoop:
     """The slave's loop, its kernels compiled."""
     plan = reality.plan
