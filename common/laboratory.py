@@ -48,6 +48,7 @@ class Laboratory:
         self.error: RthsError | None = None
         self.heard_ns = setting.clock.now()
         self.recorder: Recorder | None = None
+        self.recorder_heard_ns = setting.clock.now()
 
     def enter(self, session: int) -> None:
         """Take part in a session."""
@@ -101,6 +102,7 @@ class Laboratory:
         """Take note of the recorder's state, and send again what it has missed."""
         if isinstance(message, Recorder):
             self.recorder = message
+            self.recorder_heard_ns = self.clock.now()
         elif (
             isinstance(message, Resend)
             and message.lab == self.name

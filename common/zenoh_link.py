@@ -8,16 +8,20 @@ network is congested: a late frame is worth nothing, and a blocked loop would be
 from __future__ import annotations
 
 import json
+import re
 import socket
 import time
+from collections.abc import Callable
 from queue import Empty, SimpleQueue
 
 import zenoh
 
-from common.errors import InputError, LostError
+from common.errors import InputError, InterlockError, LostError
 from common.transport import CONTROL, HEARD, SAMPLES, TICK, Packet
 
 LEASE_MS = 1000
+ATTEMPT_MS = 500  # opening a session cannot be interrupted, so it is tried again and again for this long
+ENDPOINT = re.compile(r"(tcp|tls|udp|quic)/.+:\d+")
 PREFIX = "rths"
 
 
@@ -28,8 +32,8 @@ def configuration(role: str, listen: str, connect: str) -> zenoh.Config:
         "mode": "router" if role == "master" else "client",
         "listen/endpoints": [listen] if listen else [],
         "connect/endpoints": [connect] if connect else [],
-        "connect/timeout_ms": -1,
-        "connect/exit_on_failure": False,
+        "connect/timeout_ms": ATTEMPT_MS,
+        "connect/exit_on_failure": True,
         "connect/retry": {"period_init_ms": 20, "period_max_ms": 20, "period_increase_factor": 1},
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,
@@ -42,16 +46,53 @@ def configuration(role: str, listen: str, connect: str) -> zenoh.Config:
     return config
 
 
+def checked(endpoint: str) -> str:
+    """The endpoint itself; raises InputError where it is none."""
+    if endpoint and not ENDPOINT.fullmatch(endpoint):
+        raise InputError(f"'{endpoint}' is no endpoint: write it as tcp/HOST:PORT.")
+    return endpoint
+
+
+def reach(config: zenoh.Config, connect: str, seconds: float, stopping: Callable[[], str]) -> zenoh.Session:
+    """A session that has reached the master, tried for `seconds`.
+
+    Raises:
+        LostError: nobody listens there.
+        InterlockError: somebody wants to stop.
+    """
+    deadline = time.monotonic() + seconds
+    while True:
+        if reason := stopping():
+            raise InterlockError(reason)
+        try:
+            return zenoh.open(config)
+        except zenoh.ZError:
+            if time.monotonic() > deadline:
+                raise LostError(
+                    f"No master was reached at {connect} within {seconds:g} s: check the address and that it runs."
+                ) from None
+
+
 class ZenohLink:
     """One role's access to the link of a test; `listen` and `connect` are zenoh endpoints (tcp/host:port)."""
 
-    def __init__(self, role: str, test: str, *, listen: str = "", connect: str = "") -> None:
+    def __init__(
+        self,
+        role: str,
+        test: str,
+        *,
+        listen: str = "",
+        connect: str = "",
+        patience: float = 0.0,
+        stopping: Callable[[], str] = str,
+    ) -> None:
         zenoh.init_log_from_env_or("off")
         self._packets: SimpleQueue[Packet] = SimpleQueue()
-        try:
-            self._session = zenoh.open(configuration(role, listen, connect))
-        except zenoh.ZError as error:
-            raise self._refusal(listen, connect, error) from None
+        config = configuration(role, checked(listen), checked(connect))
+        if listen:
+            self._session = self._listening(config, listen)
+        else:
+            self._session = reach(config, connect, patience, stopping)
         self._publishers = {
             channel: self._session.declare_publisher(
                 f"{PREFIX}/{test}/{role}/{channel}",
@@ -68,13 +109,14 @@ class ZenohLink:
         ]
 
     @staticmethod
-    def _refusal(listen: str, connect: str, error: Exception) -> Exception:
-        if listen:
-            return InputError(
+    def _listening(config: zenoh.Config, listen: str) -> zenoh.Session:
+        try:
+            return zenoh.open(config)
+        except zenoh.ZError:
+            raise InputError(
                 f"Cannot listen on {listen}: the port is in use or the address is not this machine's; "
-                f"choose another with --listen."
-            )
-        return LostError(f"Cannot open the link to {connect}: {error}")
+                "choose another with --listen."
+            ) from None
 
     def _hear(self, role: str, channel: str):  # type: ignore[no-untyped-def]
         put = self._packets.put

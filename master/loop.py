@@ -278,17 +278,16 @@ class MasterLoop:
         lab.outlet.add("master", log_ns, publish_ns, values)
 
     def _watch(self, tick: int) -> None:
-        lab = self.lab
+        """End the test where the slave or the recorder is gone or cannot go on."""
+        lab, recording = self.lab, self.lab.plan.recording
         now = lab.clock.now()
         if now - max(lab.heard_ns, lab.start_ns) > lab.plan.link.loss_timeout * 1e9:
             lab.lost("The slave", lab.plan.link.loss_timeout, tick)
-        elif lab.plan.recording.required and lab.recorder is not None and lab.recorder.state == "failed":
-            lab.fail(
-                Event.TRIP,
-                InterlockError(f"The recording is lost: {lab.recorder.reason}"),
-                code="recording_lost",
-                tick=tick,
-            )
+        elif recording.required and lab.recorder is not None and lab.recorder.state == "failed":
+            error = InterlockError(f"The recording is lost: {lab.recorder.reason}")
+            lab.fail(Event.TRIP, error, code="recording_lost", tick=tick)
+        elif recording.required and now - lab.recorder_heard_ns > recording.patience * 1e9:
+            lab.lost("The recorder", recording.patience, tick)
 
     # -- end --------------------------------------------------------------------------------------
 

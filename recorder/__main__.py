@@ -46,7 +46,8 @@ def run(args: argparse.Namespace) -> int:
     motion = substructure.motion(plan)
     path = args.output or files.default_path(plan, time.strftime("%Y%m%d-%H%M%S"))
     recording = files.begin(path, plan, motion, substructure.ground_rows(plan, motion), unix_ns())
-    link = ZenohLink("recorder", plan.test.name, connect=args.connect)
+    patience = plan.link.connect_timeout
+    link = ZenohLink("recorder", plan.test.name, connect=args.connect, patience=patience, stopping=stopping)
     try:
         setting = Setting(plan, FrameEndpoint(link, plan.digest()), MonotonicClock(), report)
         loop = RecorderLoop(setting, ThreadedSink(FileSink(recording, setting.clock)))

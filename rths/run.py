@@ -90,7 +90,9 @@ def virtual_report(kind: str, data: Any) -> None:
         cli.text_report(kind, data)
 
 
-def in_real_time(args: argparse.Namespace, plan: Plan, output: Path, stopping: Stopper) -> RthsError | None:
+def in_real_time(
+    args: argparse.Namespace, plan: Plan, reality: Reality, output: Path, stopping: Stopper
+) -> RthsError | None:
     """The test in three processes; the error that ended it."""
     from common.zenoh_link import listenable
     from rths.processes import Processes

@@ -31,7 +31,8 @@ def run(args: argparse.Namespace) -> int:
     stopping = Stopper()
     plan = cli.load_plan(args)
     reality = cli.load_reality(args.reality, plan)
-    link = ZenohLink("slave", plan.test.name, connect=args.connect)
+    patience = plan.link.connect_timeout
+    link = ZenohLink("slave", plan.test.name, connect=args.connect, patience=patience, stopping=stopping)
     try:
         setting = Setting(plan, FrameEndpoint(link, plan.digest()), MonotonicClock(), cli.reporter(args.json))
         loop = build_loop(setting, reality, link_model(reality))

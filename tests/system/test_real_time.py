@@ -1,0 +1,257 @@
+"""The whole system on real processes, sockets, signals and files."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from common.plan import Plan
+from common.recording.reader import Run, read
+from tests.helpers import ROOT
+
+RTHS = [sys.executable, "-m", "rths"]
+TIMES = ("wake_lateness", "compute_time", "clock_offset", "clock_offset_bound")
+
+
+def environment() -> dict[str, str]:
+    return {**os.environ, "PYTHONPATH": str(ROOT)}
+
+
+def start(*words: str | Path, module: str = "rths", **options: Any) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-m", module, *map(str, words)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment(),
+        **options,
+    )
+
+
+def finish(process: subprocess.Popen[str], seconds: float = 60.0) -> tuple[int, str, str]:
+    out, err = process.communicate(timeout=seconds)
+    return process.returncode, out, err
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+def plan_file(folder: Path, **link: float) -> Path:
+    path = folder / "plan.toml"
+    keys = "\n".join(f"{name} = {value}" for name, value in link.items())
+    path.write_text(f"[test]\nname = 'trial'\nduration = 4.0\n[recording]\npatience = 1.0\n[link]\n{keys}\n")
+    return path
+
+
+@pytest.fixture(scope="module")
+def real_run(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], Run]:
+    """Four seconds of the default test in real time: its summary and its recording."""
+    path = tmp_path_factory.mktemp("real") / "real.mcap"
+    code, out, err = finish(start("run", "--duration", "4", "-o", path, "--json"))
+    assert code == 0, err
+    return json.loads(out), read(path)
+
+
+def test_every_tick_of_a_real_test_is_recorded(
+    short_plan: Plan, real_run: tuple[dict[str, Any], Run]
+) -> None:
+    summary, recording = real_run
+    assert recording.finished
+    for topic in ("master", "slave", "latency"):
+        assert recording.sequences[topic].tolist() == list(range(short_plan.ticks))
+        assert summary["topics"][topic]["missing"] == 0
+    assert summary["recorder"]["cause"] == "completed"
+    assert np.all(np.diff(recording.log_ns["master"]) == 2_000_000)
+    assert np.array_equal(recording.log_ns["master"], recording.log_ns["slave"])
+    assert abs(recording.log_ns["master"][0] * 1e-9 - time.time()) < 3600.0
+
+
+def test_real_time_equals_virtual_time_to_the_last_bit_until_a_message_is_late(
+    real_run: tuple[dict[str, Any], Run], virtual_recording: Path
+) -> None:
+    _, real = real_run
+    virtual = read(virtual_recording)
+    late = np.flatnonzero(real.columns["latency"]["deadline_missed"])
+    ticks = int(late[0]) if late.size else real.ticks("master")
+    if ticks < 100:
+        pytest.skip(f"the machine was late at tick {ticks} already: nothing to compare")
+    for topic in ("master", "slave"):
+        for name, values in virtual.columns[topic].items():
+            assert np.array_equal(real.columns[topic][name][:ticks], values[:ticks]), f"{topic}/{name}"
+
+
+def test_a_real_test_replays_to_the_last_bit_late_messages_or_not(
+    real_run: tuple[dict[str, Any], Run],
+) -> None:
+    code, out, err = finish(start("replay", real_run[1].path))
+    assert code == 0, out + err
+
+
+def test_the_accounts_of_latency_add_up(real_run: tuple[dict[str, Any], Run]) -> None:
+    columns = real_run[1].columns["latency"]
+    good = columns["deadline_missed"] == 0
+    assert np.count_nonzero(good) > 0.5 * good.size
+    parts = columns["command_one_way"] + columns["slave_time"] + columns["feedback_one_way"]
+    assert np.allclose(parts[good], columns["round_trip"][good], atol=1e-9)
+    assert np.all(columns["command_one_way"][good] > -columns["clock_offset_bound"][good])
+    assert np.all(columns["feedback_one_way"][good] > -columns["clock_offset_bound"][good])
+    assert np.all(
+        np.abs(columns["clock_offset"]) <= columns["clock_offset_bound"] + 1e-6
+    )  # one machine, one clock
+    assert np.all(columns["wake_lateness"] > -1e-9)
+    stamps = ("tick_ns", "wake_ns", "command_sent_ns", "feedback_received_ns")
+    ordered = np.stack([columns[name][good] for name in stamps])
+    assert np.all(np.diff(ordered, axis=0) >= 0)
+
+
+def test_ctrl_c_stops_in_order_and_keeps_the_recording(tmp_path: Path) -> None:
+    path = tmp_path / "stopped.mcap"
+    process = start("run", "--duration", "60", "-o", path)
+    wait_for_ticks(path)
+    process.send_signal(signal.SIGINT)
+    code, out, err = finish(process, 20.0)
+    assert code == 3, err
+    assert "stopped by the user" in err
+    assert "Traceback" not in out + err
+    recording = read(path)
+    assert recording.finished
+    assert 0 < recording.ticks("master") < 30_000
+    assert recording.ticks("slave") == pytest.approx(recording.ticks("master"), abs=5)
+    assert "stopped by the user" in recording.metadata["summary"]["cause"]
+
+
+def wait_for_ticks(path: Path, ticks: int = 200, seconds: float = 30.0) -> None:
+    """Until a recording that is being written holds some ticks."""
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        if path.exists() and path.stat().st_size > 10_000:
+            try:
+                if read(path).ticks("master") >= ticks:
+                    return
+            except Exception:  # noqa: BLE001 - the file is being written
+                continue
+        time.sleep(0.1)
+    raise AssertionError(f"no {ticks} ticks in {path} after {seconds} s")
+
+
+@pytest.fixture
+def three(tmp_path: Path) -> Iterator[dict[str, subprocess.Popen[str]]]:
+    """Master, slave and recorder, each started by hand, as on three machines."""
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    plan = plan_file(tmp_path, loss_timeout=0.5)
+    words = [plan, "--duration", "60"]
+    processes = {
+        "slave": start(*words, "--connect", endpoint, module="slave"),
+        "recorder": start(*words, "--connect", endpoint, "-o", tmp_path / "a.mcap", module="recorder"),
+        "master": start(*words, "--listen", endpoint, module="master"),
+    }
+    yield processes
+    for process in processes.values():
+        process.kill()
+        process.communicate()
+
+
+def test_a_killed_slave_ends_the_test_with_exit_code_4(three: dict[str, Any], tmp_path: Path) -> None:
+    wait_for_ticks(tmp_path / "a.mcap")
+    three["slave"].kill()
+    code, _, err = finish(three["master"], 20.0)
+    assert code == 4
+    assert "The slave has been silent for 0.5 s." in err
+    assert finish(three["recorder"], 20.0)[0] in (0, 4)
+    assert read(tmp_path / "a.mcap").finished
+
+
+def test_a_killed_master_ends_the_slave_with_exit_code_4(three: dict[str, Any], tmp_path: Path) -> None:
+    wait_for_ticks(tmp_path / "a.mcap")
+    three["master"].kill()
+    code, _, err = finish(three["slave"], 20.0)
+    assert code == 4
+    assert "The master has been silent for 0.5 s." in err
+    code, _, _ = finish(three["recorder"], 20.0)
+    assert code == 4
+    assert read(tmp_path / "a.mcap").ticks("slave") > 0
+
+
+def test_a_killed_recorder_loses_a_second_at_most(three: dict[str, Any], tmp_path: Path) -> None:
+    wait_for_ticks(tmp_path / "a.mcap", 1500)
+    three["recorder"].kill()
+    killed = time.time()
+    three["recorder"].communicate()
+    recording = read(tmp_path / "a.mcap")
+    assert not recording.finished
+    assert recording.metadata["plan"]["toml"]
+    assert killed - recording.log_ns["master"][-1] * 1e-9 < 1.0
+    assert recording.sequences["master"].tolist() == list(range(recording.ticks("master")))
+    code, _, err = finish(three["master"], 20.0)
+    assert code == 4
+    assert "recorder" in err
+
+
+def test_plans_that_differ_are_refused_with_exit_code_2(tmp_path: Path) -> None:
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    plan = plan_file(tmp_path)
+    slave = start(plan, "--scale", "0.2", "--connect", endpoint, module="slave")
+    recorder = start(plan, "--connect", endpoint, "-o", tmp_path / "a.mcap", module="recorder")
+    master = start(plan, "--listen", endpoint, module="master")
+    results = {name: finish(process) for name, process in (("slave", slave), ("master", master))}
+    recorder.terminate()
+    recorder.communicate()
+    for name, (code, _, err) in results.items():
+        assert code == 2, name
+        assert "plans differ" in err
+        assert "Traceback" not in err
+
+
+def test_nobody_there_is_exit_code_4_in_the_time_the_plan_allows(tmp_path: Path) -> None:
+    plan = plan_file(tmp_path, connect_timeout=1.0)
+    began = time.monotonic()
+    master = start(plan, "--listen", f"tcp/127.0.0.1:{free_port()}", module="master")
+    slave = start(plan, "--connect", f"tcp/127.0.0.1:{free_port()}", module="slave")
+    for process, sentence in ((master, "No slave joined"), (slave, "No master was reached")):
+        code, _, err = finish(process, 20.0)
+        assert code == 4
+        assert sentence in err
+        assert "Traceback" not in err
+    assert time.monotonic() - began < 15.0
+
+
+def test_a_port_in_use_is_exit_code_2(tmp_path: Path) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        endpoint = f"tcp/127.0.0.1:{taken.getsockname()[1]}"
+        code, _, err = finish(start(plan_file(tmp_path), "--listen", endpoint, module="master"))
+    assert code == 2
+    assert f"Cannot listen on {endpoint}" in err
+    assert "Traceback" not in err
+
+
+def test_an_endpoint_that_is_none_is_exit_code_2(tmp_path: Path) -> None:
+    for module, option in (("master", "--listen"), ("slave", "--connect")):
+        code, _, err = finish(start(plan_file(tmp_path), option, "nonsense", module=module))
+        assert code == 2, err
+        assert "nonsense" in err
+        assert "Traceback" not in err
+
+
+def test_a_folder_without_permission_is_exit_code_2(tmp_path: Path) -> None:
+    (tmp_path / "runs").write_text("a file where the folder should be")
+    code, _, err = finish(start("run", "--duration", "1", cwd=tmp_path))
+    assert code == 2
+    assert "Cannot make the folder runs" in err
+    assert "Traceback" not in err
