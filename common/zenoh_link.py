@@ -7,6 +7,7 @@ network is congested: a late frame is worth nothing, and a blocked loop would be
 
 from __future__ import annotations
 
+import contextlib
 import json
 import re
 import socket
@@ -140,7 +141,8 @@ class ZenohLink:
 
     def close(self) -> None:
         """Leave the link; without it, zenoh's threads would keep the process alive."""
-        self._session.close()  # type: ignore[no-untyped-call]
+        with contextlib.suppress(zenoh.ZError):  # a peer that is gone cannot be said goodbye to
+            self._session.close()  # type: ignore[no-untyped-call]
 
 
 def listenable() -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-import time
 from pathlib import Path
 
 from common import cli
@@ -44,11 +43,12 @@ def run(args: argparse.Namespace) -> int:
     report = cli.reporter(args.json)
     plan = cli.load_plan(args)
     motion = substructure.motion(plan)
-    path = args.output or files.default_path(plan, time.strftime("%Y%m%d-%H%M%S"))
-    recording = files.begin(path, plan, motion, substructure.ground_rows(plan, motion), unix_ns())
+    ground = substructure.ground_rows(plan, motion)
+    path = files.choose_path(args.output, plan)
     patience = plan.link.connect_timeout
     link = ZenohLink("recorder", plan.test.name, connect=args.connect, patience=patience, stopping=stopping)
     try:
+        recording = files.begin(path, plan, motion, ground, unix_ns())
         setting = Setting(plan, FrameEndpoint(link, plan.digest()), MonotonicClock(), report)
         loop = RecorderLoop(setting, ThreadedSink(FileSink(recording, setting.clock)))
         while not loop.done:

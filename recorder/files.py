@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import time
 from importlib import metadata
 from pathlib import Path
 
@@ -19,12 +20,14 @@ from models.registry import Array
 PACKAGES = ("rths", "eclipse-zenoh", "mcap", "msgpack", "numba", "numpy", "protobuf", "scipy")
 
 
-def default_path(plan: Plan, now: str) -> Path:
-    """Where a recording goes when nobody says: `<folder>/<test>-<time>.mcap`; the folder is made.
+def choose_path(given: Path | None, plan: Plan) -> Path:
+    """Where a recording goes: the file given, or `<folder>/<test>-<time>.mcap` in a folder that is made.
 
     Raises:
-        InputError: the folder cannot be made or written to.
+        InputError: nothing can be written there.
     """
+    if given is not None:
+        return checked(given)
     folder = Path(plan.recording.folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -32,9 +35,19 @@ def default_path(plan: Plan, now: str) -> Path:
         raise InputError(
             f"Cannot make the folder {folder} for recordings: {error.strerror}; give a file with -o."
         ) from None
-    if not os.access(folder, os.W_OK):
-        raise InputError(f"The folder {folder} for recordings is not writable: give a file with -o.")
-    return folder / f"{plan.test.name}-{now}.mcap"
+    return checked(folder / f"{plan.test.name}-{time.strftime('%Y%m%d-%H%M%S')}.mcap")
+
+
+def checked(path: Path) -> Path:
+    """The path itself; raises InputError where a recording cannot be written there."""
+    folder = path.parent
+    if not folder.is_dir():
+        raise InputError(
+            f"There is no folder {folder} for the recording: make it, or give another file with -o."
+        )
+    if not os.access(folder, os.W_OK) or path.is_dir() or (path.exists() and not os.access(path, os.W_OK)):
+        raise InputError(f"Cannot write the recording {path}: give a writable place with -o.")
+    return path
 
 
 def begin(path: Path, plan: Plan, record: GroundMotion, ground: Array, at_ns: int = 0) -> Recording:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import sys
 import time
 from pathlib import Path
@@ -38,10 +37,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run a test; its exit code."""
+    from recorder.files import choose_path
+
     plan = cli.load_plan(args)
     reality = cli.load_reality(args.reality, plan)
-    output = args.output or default_path(plan)
-    check_writable(output)
+    output = choose_path(args.output, plan)
     stopping = Stopper()
     error = (
         in_virtual_time(plan, reality, output, stopping)
@@ -53,24 +53,6 @@ def run(args: argparse.Namespace) -> int:
     if error is not None:
         raise error
     return 0
-
-
-def default_path(plan: Plan) -> Path:
-    """Where the recording goes when nobody says."""
-    from recorder.files import default_path as path
-
-    return path(plan, time.strftime("%Y%m%d-%H%M%S"))
-
-
-def check_writable(path: Path) -> None:
-    """Raise InputError where a recording cannot be written there."""
-    folder = path.parent
-    if not folder.is_dir():
-        raise InputError(
-            f"There is no folder {folder} for the recording: make it, or give another file with -o."
-        )
-    if not os.access(folder, os.W_OK) or path.is_dir() or (path.exists() and not os.access(path, os.W_OK)):
-        raise InputError(f"Cannot write the recording {path}: give a writable place with -o.")
 
 
 def in_virtual_time(plan: Plan, reality: Reality, output: Path, stopping: Stopper) -> RthsError | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import re
 import threading
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ from common.plan import Plan
 from common.recording.reader import read
 from common.recording.writer import Recording
 from common.signals import TOPICS
-from recorder.files import default_path
+from recorder.files import choose_path
 from recorder.sink import FileSink, ThreadedSink
 from rths import virtual
 from tests.helpers import with_table
@@ -160,9 +161,9 @@ def test_what_can_not_be_had_again_is_counted_and_said(
 
 def test_the_default_name_is_in_the_plans_folder(short_plan: Plan, tmp_path: Path) -> None:
     plan = with_table(short_plan, "recording", folder=str(tmp_path / "new" / "folder"))
-    assert (
-        default_path(plan, "20260101-120000") == tmp_path / "new" / "folder" / "default-20260101-120000.mcap"
-    )
+    path = choose_path(None, plan)
+    assert path.parent == tmp_path / "new" / "folder"
+    assert re.fullmatch(r"default-\d{8}-\d{6}\.mcap", path.name)
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="Cannot make the folder"):
-        default_path(with_table(short_plan, "recording", folder=str(tmp_path / "file" / "x")), "now")
+        choose_path(None, with_table(short_plan, "recording", folder=str(tmp_path / "file" / "x")))

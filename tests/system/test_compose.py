@@ -1,0 +1,26 @@
+"""The services of docker-compose.yml, where there is an engine."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+
+import pytest
+
+from tests.helpers import ROOT
+
+SKIPPED = 77
+
+
+def test_the_services_leave_a_whole_recording() -> None:
+    if (
+        shutil.which("docker") is None
+        or subprocess.run(["docker", "info"], capture_output=True).returncode != 0
+    ):
+        pytest.skip("no container engine runs here: see tests/system/compose_check.sh --start-engine")
+    check = subprocess.run(
+        [ROOT / "tests" / "system" / "compose_check.sh"], capture_output=True, text=True, timeout=900
+    )
+    if check.returncode == SKIPPED:
+        pytest.skip(check.stdout.strip().splitlines()[-1])
+    assert check.returncode == 0, check.stdout + check.stderr

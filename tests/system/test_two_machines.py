@@ -1,0 +1,104 @@
+"""Master and slave in two network namespaces joined by a virtual cable, as on two machines."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from common.recording.reader import read
+from tests.helpers import ROOT
+
+ADDRESS_A, ADDRESS_B = "10.83.0.1", "10.83.0.2"
+
+
+def ip(*words: str) -> None:
+    subprocess.run(["ip", *words], check=True, capture_output=True, text=True)
+
+
+@pytest.fixture
+def machines() -> Iterator[tuple[str, str]]:
+    """Two namespaces, `ADDRESS_A` in the first and `ADDRESS_B` in the second."""
+    if shutil.which("ip") is None:
+        pytest.skip("there is no ip command: install iproute2")
+    names = (f"rths-a-{os.getpid()}", f"rths-b-{os.getpid()}")
+    try:
+        for name in names:
+            ip("netns", "add", name)
+    except subprocess.CalledProcessError as error:
+        pytest.skip(f"network namespaces are not allowed here: {error.stderr.strip()}")
+    try:
+        cables = (f"rva{os.getpid()}", f"rvb{os.getpid()}")
+        ip("link", "add", cables[0], "type", "veth", "peer", "name", cables[1])
+        for name, cable, address in zip(names, cables, (ADDRESS_A, ADDRESS_B), strict=True):
+            ip("link", "set", cable, "netns", name)
+            ip("-n", name, "addr", "add", f"{address}/24", "dev", cable)
+            ip("-n", name, "link", "set", cable, "up")
+            ip("-n", name, "link", "set", "lo", "up")
+        yield names
+    finally:
+        for name in names:
+            subprocess.run(["ip", "netns", "delete", name], check=False, capture_output=True)
+
+
+def start(machine: str, *words: str | Path) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        ["ip", "netns", "exec", machine, sys.executable, "-m", "rths", *map(str, words)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+
+
+def test_a_test_on_two_machines_is_recorded_whole(machines: tuple[str, str], tmp_path: Path) -> None:
+    first, second = machines
+    path = tmp_path / "two.mcap"
+    words = ("default", "--duration", "4")
+    endpoint = f"tcp/{ADDRESS_A}:7447"
+    processes = {
+        "slave": start(second, "slave", *words, "--connect", endpoint),
+        "recorder": start(second, "record", *words, "--connect", endpoint, "-o", path),
+        "master": start(first, "master", *words, "--listen", "tcp/0.0.0.0:7447"),
+    }
+    try:
+        for name, process in processes.items():
+            _, err = process.communicate(timeout=90)
+            assert process.returncode == 0, f"{name}: {err}"
+    finally:
+        for process in processes.values():
+            process.kill()
+            process.communicate()
+    recording = read(path)
+    assert recording.finished
+    for topic in ("master", "slave", "latency"):
+        assert recording.sequences[topic].tolist() == list(range(2000))
+
+
+def test_a_cable_that_is_pulled_ends_both_with_exit_code_4(machines: tuple[str, str], tmp_path: Path) -> None:
+    first, second = machines
+    plan = tmp_path / "plan.toml"
+    plan.write_text(
+        "[test]\nname = 'cable'\nduration = 60.0\n[link]\nloss_timeout = 0.3\n[recording]\nrequired = false\n"
+    )
+    slave = start(second, "slave", plan, "--connect", f"tcp/{ADDRESS_A}:7447")
+    master = start(first, "master", plan, "--listen", "tcp/0.0.0.0:7447")
+    try:
+        for line in iter(master.stderr.readline, ""):  # type: ignore[union-attr]
+            if "t    0." in line:
+                break
+        ip("-n", second, "link", "set", f"rvb{os.getpid()}", "down")
+        for process, who in ((master, "The slave"), (slave, "The master")):
+            _, err = process.communicate(timeout=30)
+            assert process.returncode == 4, err
+            assert f"{who} has been silent for 0.3 s." in err
+            assert "Traceback" not in err
+    finally:
+        for process in (master, slave):
+            process.kill()
+            process.communicate()
