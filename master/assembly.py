@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import secrets
+from typing import Any
 
 from common import schema
 from common.clock import unix_ns
@@ -22,10 +23,13 @@ from models.registry import Array
 def build_rig(reality: Reality) -> GuardedRig:
     """Laboratory A as the plan and the reality have it; raises InputError where it cannot be constructed."""
     plan, rig = reality.plan, reality.master
-    arguments = {"interval": plan.test.interval, "seed": noise.lab_seed(reality.seed, noise.LAB_A)}
+    arguments: dict[str, Any] = {
+        "interval": plan.test.interval,
+        "seed": noise.lab_seed(reality.seed, noise.LAB_A),
+    }
     if not rig.class_:
-        emulated = {name: schema.plain(getattr(plan, name)) for name in ("actuator", "column", "sensors")}
-        return GuardedRig(ColumnLab(**arguments, **emulated), "laboratory A", ColumnMeasurement)
+        arguments |= {name: schema.plain(getattr(plan, name)) for name in ("actuator", "column", "sensors")}
+        return GuardedRig(ColumnLab(**arguments), "laboratory A", ColumnMeasurement)
     kind = find(rig.class_, reality.base, "[master.rig]")
     return GuardedRig(
         construct(kind, arguments | rig.options, "[master.rig]"),

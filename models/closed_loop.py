@@ -168,8 +168,8 @@ def roll(
 def signals(plan: Plan, rollout: Rollout) -> dict[str, Array]:
     """The rollout's signals by name, as a recording names them; (ticks,) or (ticks, storeys) each."""
     n, rows = plan.storeys, slice(0, rollout.ticks)
-    result = {
-        "t": np.arange(rollout.ticks) * plan.test.interval,
+    result: dict[str, Array] = {
+        "t": np.arange(rollout.ticks, dtype=np.float64) * plan.test.interval,
         "ground_acceleration": rollout.outputs[rows, substructure.GROUND_ACCELERATION],
         "column_target": rollout.outputs[rows, COLUMN_TARGET],
         "actuator_command": rollout.outputs[rows, ACTUATOR_COMMAND],

@@ -11,7 +11,7 @@ from models.cache import folder
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
-numba.config.CACHE_DIR = str(folder())
+numba.config.CACHE_DIR = str(folder())  # type: ignore[attr-defined]
 
 
 def jit(function: Function) -> Function:

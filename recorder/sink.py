@@ -19,8 +19,13 @@ Item = list[Any]
 class Sink(Protocol):
     """Takes items for the file."""
 
-    failure: str  # why nothing can be written any more, empty while it can
-    dropped: int  # items that were not written
+    @property
+    def failure(self) -> str:
+        """Why nothing can be written any more, empty while it can."""
+
+    @property
+    def dropped(self) -> int:
+        """Items that were not written."""
 
     def put(self, items: list[Item]) -> None:
         """Take items; never waits for the disk in real time."""

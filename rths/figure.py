@@ -11,11 +11,12 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 def figure(width: float = 7.0, height: float = 6.0) -> Any:
     """An empty figure of `width` by `height` inches."""
     import matplotlib as mpl
+    from cycler import cycler
 
     mpl.use("Agg")
     mpl.rcParams.update(
         {
-            "axes.prop_cycle": mpl.cycler(color=COLOURS),
+            "axes.prop_cycle": cycler(color=COLOURS),
             "axes.grid": True,
             "grid.alpha": 0.3,
             "axes.spines.top": False,

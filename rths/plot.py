@@ -85,10 +85,15 @@ def histories(recording: Run, canvas: Any) -> bool:
         return False
     axes = canvas.subplots(len(present), 1, sharex=True, squeeze=False)[:, 0]
     for axis, (name, factor, label) in zip(axes, present, strict=True):
-        axis.plot(time_of(recording, name), factor * recording.signal(name), linewidth=0.7)
+        axis.plot(time_of(recording, name), factor * values(recording, name), linewidth=0.7)
         axis.set_ylabel(label)
     axes[-1].set_xlabel("time, s")
     return True
+
+
+def values(recording: Run, name: str) -> Any:
+    """A signal that is known to be there."""
+    return recording.signal(name)
 
 
 def time_of(recording: Run, name: str) -> Any:
@@ -114,7 +119,7 @@ def hysteresis(recording: Run, canvas: Any) -> bool:
         return False
     axes = canvas.subplots(1, len(present), squeeze=False)[0]
     for axis, (x, x_factor, x_label, y, y_factor, y_label) in zip(axes, present, strict=True):
-        axis.plot(x_factor * recording.signal(x), y_factor * recording.signal(y), linewidth=0.5)
+        axis.plot(x_factor * values(recording, x), y_factor * values(recording, y), linewidth=0.5)
         axis.set_xlabel(x_label)
         axis.set_ylabel(y_label)
     return True
@@ -155,18 +160,18 @@ def latency(recording: Run, canvas: Any) -> bool:
     from rths.summary import SEGMENTS
 
     columns = recording.columns.get("latency", {})
-    values = {name: columns[name][np.isfinite(columns[name])] * 1e6 for name in SEGMENTS if name in columns}
-    values = {name: column for name, column in values.items() if column.size and column.max() > 0.0}
-    if not values:
+    measured = {name: columns[name][np.isfinite(columns[name])] * 1e6 for name in SEGMENTS if name in columns}
+    measured = {name: column for name, column in measured.items() if column.size and column.max() > 0.0}
+    if not measured:
         return False
     upper, lower = canvas.subplots(2, 1)
-    for name, column in values.items():
+    for name, column in measured.items():
         ordered = np.sort(np.maximum(column, 1.0))
         upper.plot(ordered, 1.0 - np.arange(ordered.size) / ordered.size, label=name.replace("_", " "))
     upper.set(xscale="log", yscale="log", xlabel="time, µs", ylabel="share of ticks above")
     upper.legend(loc="lower left")
     seq = columns["seq"][np.isfinite(columns["round_trip"])]
-    lower.plot(seq, values["round_trip"], ".", markersize=1)
+    lower.plot(seq, measured["round_trip"], ".", markersize=1)
     lower.set(yscale="log", xlabel="tick", ylabel="round trip, µs")
     return True
 

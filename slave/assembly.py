@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from common import schema
 from common.laboratory import Setting
 from common.mailbox import LinkModel
@@ -16,10 +18,13 @@ from slave.rig import TableLab
 def build_rig(reality: Reality) -> GuardedRig:
     """Laboratory B as the plan and the reality have it; raises InputError where it cannot be constructed."""
     plan, rig = reality.plan, reality.slave
-    arguments = {"interval": plan.test.interval, "seed": noise.lab_seed(reality.seed, noise.LAB_B)}
+    arguments: dict[str, Any] = {
+        "interval": plan.test.interval,
+        "seed": noise.lab_seed(reality.seed, noise.LAB_B),
+    }
     if not rig.class_:
-        emulated = {name: schema.plain(getattr(plan, name)) for name in ("table", "damper", "sensors")}
-        return GuardedRig(TableLab(**arguments, **emulated), "laboratory B", TableMeasurement)
+        arguments |= {name: schema.plain(getattr(plan, name)) for name in ("table", "damper", "sensors")}
+        return GuardedRig(TableLab(**arguments), "laboratory B", TableMeasurement)
     kind = find(rig.class_, reality.base, "[slave.rig]")
     return GuardedRig(
         construct(kind, arguments | rig.options, "[slave.rig]"),

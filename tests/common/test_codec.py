@@ -40,7 +40,7 @@ COMMAND = Command(7, 3, 10, 0, 0.001, 12.5)
 
 
 def framed(content: object, key: bytes = KEY) -> bytes:
-    payload = msgpack.packb(content)
+    payload: bytes = msgpack.packb(content)
     return payload + codec._check(key, payload)
 
 

@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 
 from common import reality
-from common.errors import InputError, InterlockError, LostError, RigError
+from common.errors import InputError, InterlockError, LostError, RigError, RthsError
 from common.exchange import State
 from common.messages import Command, Feedback, Register, Trip
 from common.plan import PROTOCOL_VERSION, Plan, Rig, from_tables
 from common.reality import Reality
 from common.recording.reader import Run, read
+from common.signals import TOPICS
 from models import substructure
 from models.closed_loop import rows, simulate
-from common.signals import TOPICS
 from rths import virtual
 from rths.virtual import Bench
 from tests.helpers import with_table, without_recorder
@@ -143,6 +143,7 @@ def test_a_rig_that_fails_stops_the_test_with_a_sentence(
     monkeypatch.setattr("master.assembly.find", lambda *_: BrokenLab)
     found, error, bench = run(short_plan, tmp_path / "broken.mcap", broken(short_plan, how))
     assert isinstance(error, kind)
+    assert isinstance(error, RthsError)
     assert sentence in str(error)
     if kind is RigError:
         assert "laboratory A (BrokenLab)" in str(error)

@@ -73,7 +73,8 @@ def test_a_full_disk_leaves_what_was_written_readable_and_is_said(tmp_path: Path
 
 
 def test_a_full_disk_stops_the_test_in_order(short_plan: Plan, tmp_path: Path, monkeypatch: Any) -> None:
-    flush, calls = Recording.flush, []
+    flush = Recording.flush
+    calls: list[None] = []
 
     def failing(self: Recording) -> None:
         calls.append(None)

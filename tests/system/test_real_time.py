@@ -143,7 +143,7 @@ def wait_for_ticks(path: Path, ticks: int = 200, seconds: float = 30.0) -> None:
             try:
                 if read(path).ticks("master") >= ticks:
                     return
-            except Exception:  # noqa: BLE001 - the file is being written
+            except Exception:
                 continue
         time.sleep(0.1)
     raise AssertionError(f"no {ticks} ticks in {path} after {seconds} s")
@@ -154,7 +154,7 @@ def three(tmp_path: Path) -> Iterator[dict[str, subprocess.Popen[str]]]:
     """Master, slave and recorder, each started by hand, as on three machines."""
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     plan = plan_file(tmp_path, loss_timeout=0.5)
-    words = [plan, "--duration", "60"]
+    words: list[str | Path] = [plan, "--duration", "60"]
     processes = {
         "slave": start(*words, "--connect", endpoint, module="slave"),
         "recorder": start(*words, "--connect", endpoint, "-o", tmp_path / "a.mcap", module="recorder"),
