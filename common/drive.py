@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import gc
 import signal
 import sys
@@ -12,6 +13,7 @@ from typing import Protocol
 from common.laboratory import Laboratory
 from common.messages import Message
 
+PR_SET_TIMERSLACK = 29
 IDLE_NS = 5_000_000  # how often the handshake looks after itself
 LEAVE_NS = 5_000_000_000  # how long the last words may take
 PROGRESS_NS = 200_000_000
@@ -133,8 +135,14 @@ def depart(loop: Loop) -> None:
 
 
 def calm() -> None:
-    """Keep the interpreter from pausing the loop: no garbage collection, quick hand-over between threads."""
+    """Keep interpreter and kernel from delaying the loop.
+
+    No garbage collection, a quick hand-over between threads, and on Linux wake-ups that are not put off
+    to be bundled (timer slack 50 µs by default).
+    """
     sys.setswitchinterval(1e-4)
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(PR_SET_TIMERSLACK, 1, 0, 0, 0)
     gc.collect()
     gc.freeze()
     gc.disable()

@@ -74,11 +74,11 @@ def histories(recording: Run, canvas: Any) -> bool:
     """Time histories: ground, drift, forces, damper."""
     rows = [
         ("ground_acceleration", 1.0, "ground\nm/s²"),
-        ("column_displacement", 1e3, "column\ndeformation, mm"),
-        ("column_force", 1e-3, "column\nforce, kN"),
-        ("absolute_acceleration", 1.0, "floor\nacceleration, m/s²"),
-        ("damper_stroke", 1e3, "damper\nstroke, mm"),
-        ("damper_force", 1.0, "damper\nforce, N"),
+        ("column_displacement", 1e3, "column\nmm"),
+        ("column_force", 1e-3, "column\nkN"),
+        ("absolute_acceleration", 1.0, "floor\nm/s²"),
+        ("damper_stroke", 1e3, "damper\nmm"),
+        ("damper_force", 1.0, "damper\nN"),
     ]
     present = [(name, factor, label) for name, factor, label in rows if recording.signal(name) is not None]
     if not present:

@@ -112,7 +112,8 @@ def test_a_file_cut_anywhere_is_read_up_to_there_or_refused(tmp_path_factory: An
         return
     sequence = run.sequences["master"]
     assert sequence.tolist() == list(range(sequence.size))
-    assert run.finished is (share == 1.0)
+    assert not run.finished or sequence.size == 2000
+    assert run.finished or share < 1.0
 
 
 def test_a_recording_that_was_not_closed_holds_all_that_was_flushed(tmp_path: Path) -> None:
