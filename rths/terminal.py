@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, TextIO
 
 BAR = 24
+LINE_EVERY = 5.0  # s of test, where there is no terminal
 
 
 def table(rows: Sequence[Sequence[str]], stream: TextIO | None = None) -> None:
@@ -21,7 +22,7 @@ def table(rows: Sequence[Sequence[str]], stream: TextIO | None = None) -> None:
 
 
 class Progress:
-    """Progress of a test on standard error: a bar on a terminal, plain lines once a second elsewhere."""
+    """Progress of a test on standard error: a bar on a terminal, plain lines now and then elsewhere."""
 
     def __init__(self, duration: float) -> None:
         self._duration = duration
@@ -35,12 +36,12 @@ class Progress:
         t = float(data["t"])
         if not self._live and t < self._next:
             return
-        self._next = t + 1.0
+        self._next = t + LINE_EVERY
         facts = f"t {t:6.2f}/{self._duration:g} s"
         if "drift" in data:
             facts += f"  drift {data['drift'] * 1e3:+7.3f} mm"
         if "round_trip" in data:
-            facts += f"  round trip {data['round_trip'] * 1e6:4.0f} µs  late {data['missed']:.0f}"
+            facts += f"  round trip {microseconds(data['round_trip'])} µs  late {data['missed']:.0f}"
         if self._live:
             filled = round(BAR * min(t / self._duration, 1.0))
             self._stream.write(f"\r[{'█' * filled}{'·' * (BAR - filled)}] {facts} ")
@@ -60,6 +61,11 @@ class Progress:
         if self._open:
             self._stream.write("\n")
             self._open = False
+
+
+def microseconds(seconds: float) -> str:
+    """A time in µs, a dash where it is not known yet."""
+    return "   –" if seconds != seconds else f"{seconds * 1e6:4.0f}"  # noqa: PLR0124 - NaN is not itself
 
 
 def quantity(value: float, unit: str) -> str:
