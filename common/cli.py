@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import os
 import sys
@@ -67,9 +68,10 @@ def load_reality(path: Path | None, plan: Plan) -> Reality:
 
 
 def json_report(kind: str, data: Mapping[str, Any]) -> None:
-    """One JSON object per line on standard output."""
-    sys.stdout.write(json.dumps({"kind": kind, **data}) + "\n")
-    sys.stdout.flush()
+    """One JSON object per line on standard output, as long as anybody reads it: a test goes on without."""
+    with contextlib.suppress(BrokenPipeError):
+        sys.stdout.write(json.dumps({"kind": kind, **data}) + "\n")
+        sys.stdout.flush()
 
 
 def text_report(kind: str, data: Mapping[str, Any]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import json
 import os
 import signal
@@ -14,6 +15,15 @@ from queue import Empty, SimpleQueue
 from typing import Any, NamedTuple
 
 ROOT = Path(__file__).resolve().parent.parent
+
+
+LEADER = "master"  # the process that ends the test for all
+PR_SET_PDEATHSIG = 1
+
+
+def end_with_parent() -> None:
+    """Have the kernel interrupt this process when the one that started it is killed."""
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGINT, 0, 0, 0)
 
 
 class Said(NamedTuple):
@@ -42,6 +52,7 @@ class Processes:
             text=True,
             start_new_session=True,
             env={**os.environ, "PYTHONPATH": str(ROOT)},
+            preexec_fn=end_with_parent if name == LEADER and sys.platform == "linux" else None,  # noqa: PLW1509
         )
         self._running[name] = process
         for read in (self._listen, self._keep):

@@ -135,6 +135,20 @@ def test_ctrl_c_stops_in_order_and_keeps_the_recording(tmp_path: Path) -> None:
     assert "stopped by the user" in recording.metadata["summary"]["cause"]
 
 
+def test_a_killed_front_door_ends_the_test_in_order(tmp_path: Path) -> None:
+    path = tmp_path / "orphan.mcap"
+    process = start("run", "--duration", "60", "-o", path)
+    wait_for_ticks(path)
+    process.kill()
+    process.communicate()
+    deadline = time.monotonic() + 15.0
+    while not read(path).finished and time.monotonic() < deadline:
+        time.sleep(0.2)
+    recording = read(path)
+    assert recording.finished
+    assert "stopped by the user" in recording.metadata["summary"]["cause"]
+
+
 def wait_for_ticks(path: Path, ticks: int = 200, seconds: float = 30.0) -> None:
     """Until a recording that is being written holds some ticks."""
     deadline = time.monotonic() + seconds

@@ -1,0 +1,78 @@
+"""The house's own rules, as far as a test can hold them."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from importlib import metadata
+from pathlib import Path
+
+from rths.__main__ import VERBS, check_home
+from tests.helpers import ROOT
+
+README = (ROOT / "README.md").read_text()
+
+
+def tracked() -> list[Path]:
+    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True)
+    return [ROOT / name for name in listed.stdout.split("\n") if name and (ROOT / name).is_file()]
+
+
+def test_the_readme_names_commands_and_files_that_exist() -> None:
+    verbs = set(re.findall(r"`?rths ([a-z]+)\b(?!/)", README)) - {"and"}
+    assert verbs <= set(VERBS), verbs - set(VERBS)
+    assert {verb for verb in VERBS if f"rths {verb}" in README} == set(VERBS)
+    for link in re.findall(r"\]\(([^)]+)\)", README):
+        assert (ROOT / link).exists(), link
+    for folder in re.findall(r"^\| `(.+?)/`", README, flags=re.MULTILINE):
+        assert (ROOT / folder).is_dir(), folder
+
+
+def test_the_readmes_first_screen_is_the_two_commands_and_the_output_of_the_first() -> None:
+    head = README[: README.index("## The loop")]
+    assert "make run" in head
+    assert "make test" in head
+    assert "master      20000     20000        0   none" in head
+    assert "outcome: completed" in head
+
+
+def test_no_public_text_names_a_registry_or_a_path_of_a_machine() -> None:
+    registries = re.compile(
+        "|".join(["pypi" + r"\.org", "files" + r"\.pythonhosted", "npmjs" + r"\.", "/" + "work/main"])
+    )
+    for path in tracked():
+        if path.suffix not in (".mcap", ".AT2", ".png"):
+            found = registries.search(path.read_text(encoding="utf-8"))
+            assert found is None, f"{path}: {found}"
+
+
+def test_the_lock_pins_every_dependency_with_a_hash() -> None:
+    lock = (ROOT / "requirements.lock").read_text()
+    for requirement in metadata.requires("rths") or []:
+        name = re.split(r"[<>=; \[]", requirement)[0].lower()
+        assert re.search(rf"^{re.escape(name)}==", lock, flags=re.MULTILINE), name
+    assert lock.count("--hash=sha256:") > lock.count("==")
+
+
+def test_the_front_door_is_at_home() -> None:
+    assert check_home() == ""
+
+
+def test_another_common_in_the_way_is_said_in_one_sentence(tmp_path: Path) -> None:
+    (tmp_path / "common").mkdir()
+    for file in (ROOT / "common").glob("*.py"):
+        (tmp_path / "common" / file.name).write_text(file.read_text())
+    found = subprocess.run(
+        [
+            sys.executable,
+            "-c",
+            "import sys; from rths.__main__ import main; sys.argv = ['rths', 'inspect']; sys.exit(main())",
+        ],
+        cwd=tmp_path,
+        env={"PYTHONPATH": f"{tmp_path}:{ROOT}", "PATH": "/usr/bin:/bin"},
+        capture_output=True,
+        text=True,
+    )
+    assert found.returncode == 2
+    assert found.stderr.startswith("rths: another package named 'common'")
