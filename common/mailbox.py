@@ -52,6 +52,9 @@ class Mailbox(Generic[Frame]):
         """The newest message that is there at this tick; None where there is none newer than the last."""
         if not self._waiting:
             return None
+        if len(self._waiting) == 1 and self._waiting[0][0] <= tick and self._waiting[0][1] > self._taken:
+            _, self._taken, frame = self._waiting.pop()
+            return frame
         newest: tuple[int, int, Frame] | None = None
         for entry in self._waiting:
             if entry[0] <= tick and entry[1] > (newest[1] if newest else self._taken):

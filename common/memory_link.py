@@ -11,24 +11,20 @@ from common.transport import CONTROL, HEARD
 
 
 class MemoryHub:
-    """What one role sends is at once in the queues of those who hear it."""
+    """What one role sends is at once in the queues of those who hear it; all must join before the first message."""
 
     def __init__(self, clock: Clock) -> None:
-        self._clock = clock
+        self.clock = clock
         self._queues: dict[str, deque[Received]] = {}
-        self._hearers: dict[tuple[str, str], list[deque[Received]]] = {}
 
     def join(self, role: str) -> MemoryEndpoint:
         """The access of one role."""
-        queue = self._queues.setdefault(role, deque())
-        for route in HEARD[role]:
-            self._hearers.setdefault(route, []).append(queue)
-        return MemoryEndpoint(self, role, queue)
+        return MemoryEndpoint(self, role, self._queues.setdefault(role, deque()))
 
-    def deliver(self, role: str, message: Message) -> None:
-        """Put a message into the queue of every role that hears it."""
-        for queue in self._hearers.get((role, CHANNELS.get(type(message), CONTROL)), ()):
-            queue.append(Received(message, role, self._clock.now()))
+    def hearers(self, role: str, kind: type) -> list[deque[Received]]:
+        """The queues of those who hear a role's messages of a kind."""
+        route = (role, CHANNELS.get(kind, CONTROL))
+        return [queue for hearer, queue in self._queues.items() if route in HEARD[hearer]]
 
 
 class MemoryEndpoint:
@@ -38,13 +34,19 @@ class MemoryEndpoint:
         self._hub = hub
         self._role = role
         self._queue = queue
+        self._hearers: dict[type, list[deque[Received]]] = {}
 
     def enter(self, session: int) -> None:
         """Memory needs no key."""
 
     def send(self, message: Message) -> None:
-        """Deliver a message at once."""
-        self._hub.deliver(self._role, message)
+        """Put a message into the queue of every role that hears it."""
+        kind = type(message)
+        if kind not in self._hearers:
+            self._hearers[kind] = self._hub.hearers(self._role, kind)
+        received = Received(message, self._role, self._hub.clock.now())
+        for queue in self._hearers[kind]:
+            queue.append(received)
 
     def receive(self, timeout: float = 0.0) -> Received | None:
         """The next message that is there already."""

@@ -20,13 +20,6 @@ class Opened(NamedTuple):
     sent_ns: int
 
 
-class Answered(NamedTuple):
-    """The feedback to a tick, and when it came."""
-
-    feedback: Feedback
-    received_ns: int
-
-
 class Account:
     """Latency of the ticks; a tick's row is written when the next tick begins."""
 
@@ -34,7 +27,8 @@ class Account:
         self._lab = lab
         self._offset = offset
         self._opened: Opened | None = None
-        self._answered: Answered | None = None
+        self._feedback: Feedback | None = None
+        self._received_ns = 0
         self.sync_sent_ns = 0
         self.first_offset = 0
         self.missed = 0
@@ -46,25 +40,26 @@ class Account:
 
     def answer(self, feedback: Feedback, received_ns: int) -> None:
         """A feedback came."""
-        self._answered = Answered(feedback, received_ns)
+        self._feedback, self._received_ns = feedback, received_ns
         opened = self._opened
         if opened is not None and opened.tick == feedback.seq == feedback.command_seq:
             self._offset.add(opened.sent_ns, feedback.command_received_ns, feedback.sent_ns, received_ns)
 
     def close(self, tick: int, used_ns: int) -> None:
         """The next tick begins: write the row of `tick`."""
-        opened, answered = self._opened, self._answered
+        opened, feedback = self._opened, self._feedback
         if opened is None or opened.tick != tick:
             return
         lab = self._lab
-        complete = answered is not None and answered.feedback.seq == answered.feedback.command_seq == tick
-        missed = opened.sent_ns == 0 or not complete
+        if feedback is not None and not feedback.seq == feedback.command_seq == tick:
+            feedback = None
+        missed = opened.sent_ns == 0 or feedback is None
         self.missed += missed
-        if answered is not None and complete:
-            self.round_trip = (answered.received_ns - opened.sent_ns) * 1e-9
+        if feedback is not None:
+            self.round_trip = (self._received_ns - opened.sent_ns) * 1e-9
         if lab.recorder is None:
             return
-        segments, stamps = self._segments(opened, answered if complete else None)
+        segments, stamps = self._segments(opened, feedback)
         at = lab.tick_ns(tick)
         values = (
             tick,
@@ -84,11 +79,11 @@ class Account:
         lab.outlet.add("latency", log_ns, lab.epoch_ns + used_ns - lab.start_ns, values)
 
     def _segments(
-        self, opened: Opened, answered: Answered | None
+        self, opened: Opened, feedback: Feedback | None
     ) -> tuple[tuple[float, float, float, float], tuple[int, int, int]]:
-        if answered is None:
+        if feedback is None:
             return (NAN, NAN, NAN, NAN), (0, 0, 0)
-        feedback, received_ns = answered
+        received_ns = self._received_ns
         offset = self._offset.offset
         segments = (
             (feedback.command_received_ns - offset - opened.sent_ns) * 1e-9,

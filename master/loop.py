@@ -6,8 +6,6 @@ in real time, and virtual time calls the same two.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 from common.clock_offset import ClockOffset
 from common.errors import InputError, InterlockError, LostError, RigError
 from common.exchange import Event, State
@@ -40,11 +38,7 @@ SYNC_EXCHANGES = 200
 LEAD_NS = 250_000_000  # from the agreement on the start to the start
 
 
-class Used(NamedTuple):
-    """The feedback in use."""
-
-    seq: int
-    damper_force: float
+NO_FEEDBACK = Feedback(0, -1, -1, 0, 0, 0.0, 0.0, 0.0, 0.0)
 
 
 class MasterLoop:
@@ -68,7 +62,7 @@ class MasterLoop:
         self._feedback: Mailbox[Feedback] = Mailbox(link, "feedback", plan.test.interval, nominal=1)
         self._offset = ClockOffset()
         self._account = Account(self.lab, self._offset)
-        self._used = Used(-1, 0.0)
+        self._used = NO_FEEDBACK
         self._command = 0.0
         self._drift = 0.0
         self._sent = (0.0, 0.0)
@@ -220,9 +214,10 @@ class MasterLoop:
         wake = lab.clock.now()
         if lab.exchange.state is State.SCHEDULED:
             lab.exchange.happen(Event.RUN)
+            lab.heard_ns = wake
         held = wake >= lab.tick_ns(tick + 1)
         if (feedback := self._feedback.take(tick)) is not None:
-            self._used = Used(feedback.seq, feedback.damper_force)
+            self._used = feedback
         self._account.close(tick - 1, wake)
         try:
             measured = self._rig.read()
@@ -245,7 +240,7 @@ class MasterLoop:
         self._drift = outputs.column_target / lab.plan.column.deformation_ratio
         if violation:
             self._trip(InterlockError(violation), "limit", tick)
-        self._watch(tick)
+        self._watch(tick, wake)
 
     def _send(self, tick: int) -> int:
         shift = self._offset.offset - self._account.first_offset
@@ -277,11 +272,10 @@ class MasterLoop:
         )
         lab.outlet.add("master", log_ns, publish_ns, values)
 
-    def _watch(self, tick: int) -> None:
+    def _watch(self, tick: int, now: int) -> None:
         """End the test where the slave or the recorder is gone or cannot go on."""
         lab, recording = self.lab, self.lab.plan.recording
-        now = lab.clock.now()
-        if now - max(lab.heard_ns, lab.start_ns) > lab.plan.link.loss_timeout * 1e9:
+        if now - lab.heard_ns > lab.plan.link.loss_timeout * 1e9:
             lab.lost("The slave", lab.plan.link.loss_timeout, tick)
         elif recording.required and lab.recorder is not None and lab.recorder.state == "failed":
             error = InterlockError(f"The recording is lost: {lab.recorder.reason}")

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from common import cli
-from common.drive import Stopper
+from common.drive import Stopper, calm
 from common.errors import InputError, InterlockError, LostError, RthsError
 from common.plan import Plan
 from common.reality import Reality
@@ -59,8 +59,10 @@ def in_virtual_time(plan: Plan, reality: Reality, output: Path, stopping: Stoppe
     """The test in this process; the error that ended it."""
     from rths import virtual
 
+    bench = virtual.assemble(plan, reality, output, virtual_report)
+    calm()
     started = time.monotonic()
-    error = virtual.run(virtual.assemble(plan, reality, output, virtual_report), stopping)
+    error = virtual.run(bench, stopping)
     seconds = time.monotonic() - started
     sys.stderr.write(f"{plan.test.duration:g} s of test in {seconds:.1f} s of computing\n")
     return error

@@ -92,9 +92,10 @@ def _tick(bench: Bench, tick: int) -> None:
     _drain(bench, "slave", slave)
     if slave.lab.running:
         slave.tick(tick)
-    master.lab.send_samples()
-    slave.lab.send_samples()
-    _record(bench)
+    if bench.recorder is not None:
+        master.lab.send_samples()
+        slave.lab.send_samples()
+        _record(bench)
 
 
 def _exchange(bench: Bench, *, poll: bool) -> None:

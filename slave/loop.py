@@ -160,10 +160,11 @@ class SlaveLoop:
 
     def tick(self, tick: int) -> None:
         """One control interval (contract, section 3); a tick that comes a whole interval late keeps its command."""
-        lab = self.lab
+        lab, now = self.lab, self.lab.clock.now()
         if lab.exchange.state is State.SCHEDULED:
             lab.exchange.happen(Event.RUN)
-        held = lab.clock.now() >= self.tick_ns(tick + 1)
+            lab.heard_ns = now
+        held = now >= self.tick_ns(tick + 1)
         if not held and (command := self._commands.take(tick)) is not None:
             self._command = command
         command = self._command
@@ -179,7 +180,7 @@ class SlaveLoop:
         self.ticks = tick + 1
         if violation:
             lab.fail(Event.TRIP, InterlockError(violation), code="limit", tick=tick)
-        elif lab.clock.now() - max(lab.heard_ns, lab.start_ns) > lab.plan.link.loss_timeout * 1e9:
+        elif now - lab.heard_ns > lab.plan.link.loss_timeout * 1e9:
             lab.lost("The master", lab.plan.link.loss_timeout, tick)
 
     def _answer(self, tick: int, measured: TableMeasurement) -> None:
@@ -187,8 +188,11 @@ class SlaveLoop:
         received_ns = self._received_ns.pop(command.seq, 0) if command.seq == tick else 0
         sent_ns = lab.clock.now()
         lab.endpoint.send(Feedback(lab.exchange.session, tick, command.seq, received_ns, sent_ns, *measured))
-        if lab.recorder is None:
-            return
+        if lab.recorder is not None:
+            self._sample(tick, measured, sent_ns)
+
+    def _sample(self, tick: int, measured: TableMeasurement, sent_ns: int) -> None:
+        lab, command = self.lab, self._command
         log_ns = lab.epoch_ns + tick * lab.interval_ns
         publish_ns = log_ns + sent_ns - self.tick_ns(tick)
         values = (
