@@ -72,7 +72,7 @@ def peaks(run: Run) -> dict[str, dict[str, Any]]:
                 row.kind not in (Kind.NUMBER, Kind.STOREYS)
                 or values is None
                 or not values.size
-                or row.name == "t"
+                or row.unit == "s"
             ):
                 continue
             magnitude = np.abs(values).reshape(len(values), -1).max(axis=1)
