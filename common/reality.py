@@ -29,6 +29,7 @@ class Reality:
     slave: Rig
     link: Rig = field(default_factory=Rig)
     base: Path = Path()
+    hidden: frozenset[str] = frozenset()  # laboratories whose rig no recording may name
 
 
 def as_planned(plan: Plan) -> Reality:
@@ -72,6 +73,7 @@ def from_reality(tables: dict[str, Any], plan: Plan, base: Path) -> Reality:
         slave=rig(tables, "slave", plan.slave.rig, plan.base, base),
         link=rig({"link": {"rig": tables.get("link", {})}}, "link", Rig(), plan.base, base),
         base=base,
+        hidden=frozenset(lab for lab in ("master", "slave") if "rig" in tables.get(lab, {})),
     )
 
 

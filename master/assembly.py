@@ -31,11 +31,8 @@ def build_rig(reality: Reality) -> GuardedRig:
         arguments |= {name: schema.plain(getattr(plan, name)) for name in ("actuator", "column", "sensors")}
         return GuardedRig(ColumnLab(**arguments), "laboratory A", ColumnMeasurement)
     kind = find(rig.class_, reality.base, "[master.rig]")
-    return GuardedRig(
-        construct(kind, arguments | rig.options, "[master.rig]"),
-        f"laboratory A ({kind.__name__})",
-        ColumnMeasurement,
-    )
+    name = "laboratory A" if "master" in reality.hidden else f"laboratory A ({kind.__name__})"
+    return GuardedRig(construct(kind, arguments | rig.options, "[master.rig]"), name, ColumnMeasurement)
 
 
 def check(reality: Reality) -> None:

@@ -26,11 +26,8 @@ def build_rig(reality: Reality) -> GuardedRig:
         arguments |= {name: schema.plain(getattr(plan, name)) for name in ("table", "damper", "sensors")}
         return GuardedRig(TableLab(**arguments), "laboratory B", TableMeasurement)
     kind = find(rig.class_, reality.base, "[slave.rig]")
-    return GuardedRig(
-        construct(kind, arguments | rig.options, "[slave.rig]"),
-        f"laboratory B ({kind.__name__})",
-        TableMeasurement,
-    )
+    name = "laboratory B" if "slave" in reality.hidden else f"laboratory B ({kind.__name__})"
+    return GuardedRig(construct(kind, arguments | rig.options, "[slave.rig]"), name, TableMeasurement)
 
 
 def check(reality: Reality) -> None:

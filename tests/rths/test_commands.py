@@ -303,6 +303,25 @@ def test_a_reality_leaves_no_trace_in_the_recording(
     assert b"13.1e6" not in content
 
 
+def test_a_hidden_rig_that_fails_is_not_named_in_the_recording(
+    call: Any, capsys: Any, tmp_path: Path
+) -> None:
+    (tmp_path / "secret.py").write_text(
+        "class SecretLab:\n"
+        "    def __init__(self, interval, seed): pass\n"
+        "    def arm(self): pass\n"
+        "    def read(self): return (0.0,)\n"
+        "    def write(self, command): pass\n"
+        "    def disarm(self): pass\n"
+    )
+    (tmp_path / "secret.toml").write_text("[master.rig]\nclass = 'secret.py:SecretLab'\n")
+    path = tmp_path / "a.mcap"
+    assert call("run", "--virtual", "--duration", "1", "--reality", tmp_path / "secret.toml", "-o", path) == 3
+    assert "laboratory A: read() returned 1 numbers, not 2" in capsys.readouterr().err
+    run = read(path)
+    assert "ecret" not in repr(run.events) + repr(run.metadata)
+
+
 def test_virtual_run_prints_the_summary_as_json(call: Any, capsys: Any, tmp_path: Path) -> None:
     assert call("run", "--virtual", "--duration", "1", "-o", tmp_path / "a.mcap", "--json") == 0
     captured = capsys.readouterr()
