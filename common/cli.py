@@ -43,6 +43,16 @@ def reality_argument(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def connect_argument(parser: argparse.ArgumentParser) -> None:
+    """The option that says where the master is."""
+    parser.add_argument(
+        "--connect",
+        default=DEFAULT_ENDPOINT,
+        metavar="ENDPOINT",
+        help=f"where the master listens (default: {DEFAULT_ENDPOINT})",
+    )
+
+
 def json_argument(parser: argparse.ArgumentParser, text: str) -> None:
     """The option for machine-readable output."""
     parser.add_argument("--json", action="store_true", help=text)

@@ -5,12 +5,16 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from common import cli
+from common import cli, process
 from common.clock import MonotonicClock, unix_ns
 from common.drive import Stopper
-from common.endpoint import FrameEndpoint
+from common.endpoint import Endpoint, FrameEndpoint
 from common.laboratory import Setting
+
+if TYPE_CHECKING:
+    from recorder.loop import RecorderLoop
 
 WAIT_S = 0.02
 
@@ -18,9 +22,7 @@ WAIT_S = 0.02
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the recorder."""
     cli.plan_arguments(parser)
-    parser.add_argument(
-        "--connect", default=cli.DEFAULT_ENDPOINT, metavar="ENDPOINT", help="where the master listens"
-    )
+    cli.connect_argument(parser)
     parser.add_argument(
         "-o",
         "--output",
@@ -51,13 +53,10 @@ def run(args: argparse.Namespace) -> int:
         recording = files.begin(path, plan, motion, ground, unix_ns())
         setting = Setting(plan, FrameEndpoint(link, plan.digest()), MonotonicClock(), report)
         loop = RecorderLoop(setting, ThreadedSink(FileSink(recording, setting.clock)))
-        while not loop.done:
-            if (received := setting.endpoint.receive(WAIT_S)) is not None:
-                loop.take(received.message, received.received_ns)
-            loop.poll()
-            if reason := stopping():
-                loop.stop(reason)
-        summary = loop.close()
+        try:
+            receive(loop, setting.endpoint, stopping)
+        finally:
+            summary = loop.close()
     finally:
         link.close()
     report("recording", {"file": str(path), "summary": dict(summary)})
@@ -66,13 +65,15 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def main() -> int:
-    """Entry of `python -m recorder`."""
-    parser = argparse.ArgumentParser(prog="python -m recorder", description=__doc__)
-    add_arguments(parser)
-    args = parser.parse_args()
-    return cli.guarded(lambda: run(args))
+def receive(loop: RecorderLoop, endpoint: Endpoint, stopping: Stopper) -> None:
+    """Take messages until the test is over, or somebody wants to stop."""
+    while not loop.done:
+        if (received := endpoint.receive(WAIT_S)) is not None:
+            loop.take(received.message, received.received_ns)
+        loop.poll()
+        if reason := stopping():
+            loop.stop(reason)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(process.enter("recorder", __doc__, add_arguments, run))
