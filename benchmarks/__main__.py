@@ -1,0 +1,68 @@
+"""`python -m benchmarks [NAME …] [--json FILE]`: all benchmarks or some, as a table and as JSON."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import sys
+from pathlib import Path
+
+from benchmarks import BENCHMARKS
+from benchmarks.result import Figure
+from rths.terminal import table
+
+
+def machine() -> dict[str, str]:
+    """The machine the figures are from."""
+    info = Path("/proc/cpuinfo")
+    models = [
+        line.partition(":")[2].strip() for line in info.read_text().splitlines() if "model name" in line
+    ]
+    return {
+        "processor": models[0] if models else platform.processor(),
+        "cores": str(os.cpu_count()),
+        "python": platform.python_version(),
+        "load": " ".join(f"{value:.2f}" for value in os.getloadavg()),
+    }
+
+
+def row(figure: Figure) -> list[str]:
+    """One line of the table."""
+    met = {None: "", True: "met", False: "missed"}[figure.met]
+    ratio = "" if figure.ratio is None else f"{figure.ratio:.3g} × {figure.peer}"
+    return [
+        figure.name,
+        f"{figure.best:,.4g}",
+        f"{figure.median:,.4g}",
+        figure.unit,
+        figure.target,
+        met,
+        ratio,
+    ]
+
+
+def main() -> int:
+    """Run what is asked for."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(BENCHMARKS)} (default: all)")
+    parser.add_argument("--json", type=Path, default=Path("runs/benchmarks.json"), metavar="FILE")
+    args = parser.parse_args()
+    unknown = [name for name in args.names if name not in BENCHMARKS]
+    if unknown:
+        parser.error(f"unknown benchmark '{unknown[0]}': choose of {', '.join(BENCHMARKS)}")
+    host = machine()
+    figures = {name: BENCHMARKS[name]() for name in args.names or BENCHMARKS}
+    sys.stdout.write(", ".join(f"{name} {value}" for name, value in host.items()) + "\n\n")
+    rows = [["figure", "best", "median", "unit", "target", "", "ratio of medians"]]
+    table(rows + [row(figure) for found in figures.values() for figure in found])
+    args.json.parent.mkdir(parents=True, exist_ok=True)
+    plain = {name: [figure._asdict() for figure in found] for name, found in figures.items()}
+    args.json.write_text(json.dumps({"machine": host, "figures": plain}, indent=1))
+    sys.stdout.write(f"\nwritten to {args.json}\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,51 @@
+"""Frames per second of the codec, beside bare msgpack and bare struct."""
+
+from __future__ import annotations
+
+import statistics
+import struct
+
+import msgpack
+
+from benchmarks.result import Figure, rate_figure, rates
+from common import codec
+from common.messages import Command, Feedback
+
+COUNT = 20_000
+COMMAND = Command(2**60, 10_000, 2**60, 1_000, 0.01, 50.0)
+FEEDBACK = Feedback(2**60, 10_000, 10_000, 2**60, 2**60, 0.01, 0.2, 0.03, 50.0)
+LAYOUT = struct.Struct("<Bqqqqdd")
+
+
+def run() -> list[Figure]:
+    """Encoding and decoding of the two frames of a tick."""
+    key = codec.session_key(2**60, "plan")
+    frames = {message: codec.encode(message, key) for message in (COMMAND, FEEDBACK)}
+
+    def packed() -> int:
+        for _ in range(COUNT):
+            msgpack.unpackb(msgpack.packb(tuple(COMMAND)))
+        return COUNT
+
+    def laid_out() -> int:
+        for _ in range(COUNT):
+            LAYOUT.unpack(LAYOUT.pack(9, *COMMAND))
+        return COUNT
+
+    def there_and_back(message: Command | Feedback) -> int:
+        for _ in range(COUNT):
+            codec.decode(codec.encode(message, key), key)
+        return COUNT
+
+    bare, struct_only = rates(packed), rates(laid_out)
+    figures = [
+        rate_figure(
+            f"codec, {type(message).__name__.lower()} of {len(frames[message])} bytes there and back",
+            "frames/s",
+            rates(lambda message=message: there_and_back(message)),  # type: ignore[misc]
+            peer="bare msgpack of a command, no check, no validation",
+            beside=statistics.median(bare),
+        )
+        for message in (COMMAND, FEEDBACK)
+    ]
+    return [*figures, rate_figure("bare struct of a command", "frames/s", struct_only)]

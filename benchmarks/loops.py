@@ -1,0 +1,53 @@
+"""Ticks per second of the real loops in virtual time, with and without recorder."""
+
+from __future__ import annotations
+
+import gc
+import statistics
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from benchmarks.result import Figure, rate_figure
+from common import reality
+from common.plan import Plan, Recording
+from rths import virtual
+
+TARGET = 50_000
+REPEATS = 7
+
+
+def played(plan: Plan, output: Callable[[], Path | None]) -> list[float]:
+    """Ticks per second of several tests; building and warming up are not counted."""
+    found = []
+    for _ in range(REPEATS):
+        bench = virtual.assemble(plan, reality.as_planned(plan), output())
+        gc.collect()
+        gc.disable()
+        began = time.perf_counter()
+        error = virtual.run(bench, str)
+        found.append(bench.master.ticks / (time.perf_counter() - began))
+        gc.enable()
+        if error is not None:
+            raise error
+    return found
+
+
+def run() -> list[Figure]:
+    """The default test through the loop objects over the link in memory."""
+    plan = Plan()
+    alone = played(replace(plan, recording=Recording(required=False)), lambda: None)
+    with tempfile.TemporaryDirectory() as folder:
+        recorded = played(plan, lambda: Path(folder) / "a.mcap")
+    return [
+        rate_figure("loops in virtual time", "ticks/s", alone, least=TARGET),
+        rate_figure(
+            "loops in virtual time, recorded",
+            "ticks/s",
+            recorded,
+            peer="without recorder",
+            beside=statistics.median(alone),
+        ),
+    ]

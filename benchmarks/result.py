@@ -1,0 +1,55 @@
+"""What a benchmark gives: figures with their peers and targets."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable
+from typing import NamedTuple
+
+
+class Figure(NamedTuple):
+    """One figure; `best` and `median` of several repeats, in `unit`; `peer` names what stands beside it."""
+
+    name: str
+    unit: str
+    best: float
+    median: float
+    target: str = ""
+    met: bool | None = None
+    peer: str = ""
+    ratio: float | None = None  # this figure over the peer's, medians
+
+
+def rates(work: Callable[[], int], repeats: int = 7) -> list[float]:
+    """Items per second of each repeat; `work` does some and says how many. The first run is not counted."""
+    work()
+    found = []
+    for _ in range(repeats):
+        began = time.perf_counter()
+        items = work()
+        found.append(items / (time.perf_counter() - began))
+    return found
+
+
+def rate_figure(
+    name: str,
+    unit: str,
+    found: list[float],
+    *,
+    least: float | None = None,
+    peer: str = "",
+    beside: float = 0.0,
+) -> Figure:
+    """Figure of a rate; `least` is its target, judged by the best repeat, since the machine is shared."""
+    best, median = max(found), statistics.median(found)
+    met = None if least is None else best >= least
+    target = "" if least is None else f"≥ {least:,.0f}"
+    return Figure(name, unit, best, median, target, met, peer, median / beside if beside else None)
+
+
+def cost_figure(name: str, unit: str, found: list[float], *, most: float | None = None) -> Figure:
+    """Figure of a cost; `most` is its target, judged by the median."""
+    best, median = min(found), statistics.median(found)
+    met = None if most is None else median <= most
+    return Figure(name, unit, best, median, "" if most is None else f"≤ {most:g}", met)
