@@ -7,10 +7,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 from common import cli, plan, reality
 from common.plan import Plan
 from rths import virtual
+
+settings.register_profile("rths", deadline=None, derandomize=True)  # the same cases on every machine
+settings.load_profile("rths")
 
 
 @pytest.fixture(autouse=True)

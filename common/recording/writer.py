@@ -18,6 +18,7 @@ from common.recording.schema import message_class, schema_file
 from common.signals import Signal
 
 CHUNK_SIZE = 64 * 1024
+SYNC = getattr(os, "fdatasync", os.fsync)  # not every system has the cheaper one
 
 
 class Spool:
@@ -119,7 +120,7 @@ class Recording:
 
     def sync(self) -> None:
         """Have the operating system put it onto the disk."""
-        os.fdatasync(self._stream.fileno())
+        SYNC(self._stream.fileno())
 
     def close(self, summary: Mapping[str, str]) -> None:
         """Write the summary and the index, and close."""

@@ -131,7 +131,7 @@ def test_ctrl_c_stops_in_order_and_keeps_the_recording(tmp_path: Path) -> None:
     recording = read(path)
     assert recording.finished
     assert 0 < recording.ticks("master") < 30_000
-    assert recording.ticks("slave") == pytest.approx(recording.ticks("master"), abs=5)
+    assert recording.ticks("slave") == pytest.approx(recording.ticks("master"), abs=200)
     assert "stopped by the user" in recording.metadata["summary"]["cause"]
 
 
