@@ -82,17 +82,25 @@ def test_every_tick_of_a_real_test_is_recorded(
 
 
 def test_real_time_equals_virtual_time_to_the_last_bit_until_a_message_is_late(
-    real_run: tuple[dict[str, Any], Run], virtual_recording: Path
+    real_run: tuple[dict[str, Any], Run], virtual_recording: Path, tmp_path: Path
 ) -> None:
-    _, real = real_run
-    virtual = read(virtual_recording)
-    late = np.flatnonzero(real.columns["latency"]["deadline_missed"])
-    ticks = int(late[0]) if late.size else real.ticks("master")
-    if ticks < 100:
-        pytest.skip(f"the machine was late at tick {ticks} already: nothing to compare")
+    real, virtual = real_run[1], read(virtual_recording)
+    for attempt in range(5):
+        if (ticks := ticks_in_time(real)) >= 200:
+            break
+        path = tmp_path / f"{attempt}.mcap"  # a machine that is shared may be late early; then once more
+        assert finish(start("run", "--duration", "4", "-o", path))[0] == 0
+        real = read(path)
+    assert ticks >= 200
     for topic in ("master", "slave"):
         for name, values in virtual.columns[topic].items():
             assert np.array_equal(real.columns[topic][name][:ticks], values[:ticks]), f"{topic}/{name}"
+
+
+def ticks_in_time(recording: Run) -> int:
+    """Ticks before the first late one."""
+    late = np.flatnonzero(recording.columns["latency"]["deadline_missed"])
+    return int(late[0]) if late.size else recording.ticks("master")
 
 
 def test_a_real_test_replays_to_the_last_bit_late_messages_or_not(
