@@ -9,12 +9,11 @@ from common import cli
 from common.clock import MonotonicClock
 from common.drive import Loop, Stopper, drive
 from common.endpoint import FrameEndpoint
+from common.errors import InterlockError
 from common.laboratory import Setting
 from common.links import link_model
 from common.mailbox import LinkModel
 from common.reality import Reality
-
-STOPPED = 3
 
 
 def conduct(
@@ -25,10 +24,10 @@ def conduct(
     listen: str = "",
     connect: str = "",
 ) -> int:
-    """Run one laboratory's loop over zenoh; its exit code, 3 where it was stopped before its last tick.
+    """Run one laboratory's loop over zenoh; 0 where all ticks are done.
 
     Raises:
-        RthsError: what ended the test.
+        RthsError: what ended the test before its last tick.
     """
     from common.zenoh_link import ZenohLink
 
@@ -48,7 +47,9 @@ def conduct(
         link.close()
     if loop.lab.error is not None:
         raise loop.lab.error
-    return 0 if loop.ticks == plan.ticks else STOPPED
+    if loop.ticks < plan.ticks:
+        raise InterlockError(loop.lab.exchange.cause or "The test was stopped before its end.")
+    return 0
 
 
 def enter(

@@ -13,11 +13,11 @@ import re
 import socket
 import time
 from collections.abc import Callable
-from queue import Empty, SimpleQueue
 
 import zenoh
 
 from common.errors import InputError, InterlockError, LostError
+from common.inbox import Inbox
 from common.transport import CONTROL, HEARD, SAMPLES, TICK, Packet
 
 LEASE_MS = 1000
@@ -88,7 +88,7 @@ class ZenohLink:
         stopping: Callable[[], str] = str,
     ) -> None:
         zenoh.init_log_from_env_or("off")
-        self._packets: SimpleQueue[Packet] = SimpleQueue()
+        self._packets = Inbox()
         config = configuration(role, checked(listen), checked(connect))
         if listen:
             self._session = self._listening(config, listen)
@@ -134,10 +134,7 @@ class ZenohLink:
 
     def receive(self, timeout: float) -> Packet | None:
         """The next frame, waiting at most `timeout` s; None where none came."""
-        try:
-            return self._packets.get(block=timeout > 0.0, timeout=timeout if timeout > 0.0 else None)
-        except Empty:
-            return None
+        return self._packets.get(timeout)
 
     def close(self) -> None:
         """Leave the link; without it, zenoh's threads would keep the process alive."""

@@ -89,11 +89,11 @@ def in_real_time(
     progress.say(f"{plan.test.name}: {plan.test.duration:g} s, starting master, slave and recorder")
     try:
         start_all(processes, args, endpoint, output)
-        follow(processes, progress, stopping)
+        first = follow(processes, progress, stopping)
     finally:
         processes.kill()
         progress.end()
-    return verdict(processes)
+    return verdict(processes, first)
 
 
 def check(reality: Reality) -> None:
@@ -131,8 +131,12 @@ def start_all(processes: Any, args: argparse.Namespace, endpoint: str, output: P
     processes.start("recorder", [*words, "--connect", endpoint, "-o", str(output)])
 
 
-def follow(processes: Any, progress: Progress, stopping: Stopper) -> None:
-    """Show what the processes say until all have ended; pass a wish to stop on to the master, once."""
+def follow(processes: Any, progress: Progress, stopping: Stopper) -> dict[str, int]:
+    """Show what the processes say until all have ended; the exit codes of those that failed first.
+
+    A wish to stop goes to the master, once; so does the end of another process.
+    """
+    first: dict[str, int] = {}
     asked = False
     while not processes.all_ended():
         said = processes.said(POLL_S)
@@ -140,27 +144,26 @@ def follow(processes: Any, progress: Progress, stopping: Stopper) -> None:
             progress.show(said.data)
         elif said is not None and said.data["kind"] == "event":
             progress.say(f"{said.data['lab']}: {said.data['text']}")
-        failed = {name: code for name, code in processes.ended().items() if code}
-        if (stopping() or failed) and not asked:
+        first = first or {name: code for name, code in processes.ended().items() if code}
+        if (stopping() or first) and not asked:
             asked = True
             for name in ("master", "slave", "recorder"):
-                if name == "master" or (failed and name not in failed):
+                if name == "master" or (first and name not in first):
                     processes.interrupt(name)
+    return first
 
 
-def verdict(processes: Any) -> RthsError | None:
-    """The error to show: of the process that failed first in the order of causes."""
-    codes = processes.ended()
+def verdict(processes: Any, first: dict[str, int]) -> RthsError | None:
+    """The error to show: of the processes that failed first, in the order of causes."""
     for code in (2, 1, 3, 4):
-        for name in ("master", "slave", "recorder"):
-            if codes.get(name, 0) == code:
-                text = processes.complaints.get(name, "").removeprefix("rths: ")
-                return ERRORS.get(code, LostError)(text or f"The {name} ended with exit code {code}.")
-    for name, code in codes.items():
-        if code:
-            return LostError(
-                f"The {name} was killed (signal {-code}); the recording holds what came until then."
-            )
+        for name, ended in first.items():
+            if ended == code:
+                text = processes.complaints.get(name, "").removeprefix("rths: ").splitlines()
+                return ERRORS.get(code, LostError)(
+                    text[-1] if text else f"The {name} stopped before its end."
+                )
+    for name, code in first.items():
+        return LostError(f"The {name} was killed (signal {-code}); the recording holds what came until then.")
     return None
 
 

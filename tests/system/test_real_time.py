@@ -252,6 +252,21 @@ def test_nobody_there_is_exit_code_4_in_the_time_the_plan_allows(tmp_path: Path)
     assert time.monotonic() - began < 15.0
 
 
+def test_ctrl_c_before_the_other_is_there_ends_soon(tmp_path: Path) -> None:
+    plan = plan_file(tmp_path)
+    processes = [
+        start(plan, "--listen", f"tcp/127.0.0.1:{free_port()}", module="master"),
+        start(plan, "--connect", f"tcp/127.0.0.1:{free_port()}", module="slave"),
+    ]
+    time.sleep(3.0)  # until they wait for each other
+    for process in processes:
+        process.send_signal(signal.SIGINT)
+    for process in processes:
+        code, _, err = finish(process, 20.0)
+        assert code == 3, err
+        assert "Traceback" not in err
+
+
 def test_a_port_in_use_is_exit_code_2(tmp_path: Path) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))

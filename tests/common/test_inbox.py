@@ -1,0 +1,63 @@
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+
+from common.inbox import Inbox
+from common.transport import Packet
+
+
+def packet(number: int) -> Packet:
+    return Packet("master", "tick", b"", number)
+
+
+def test_frames_come_in_order_and_none_is_waited_for_too_long() -> None:
+    inbox = Inbox()
+    for number in range(3):
+        inbox.put(packet(number))
+    assert [found.received_ns for _ in range(3) if (found := inbox.get(0.0))] == [0, 1, 2]
+    began = time.monotonic()
+    while inbox.get(0.05) is not None or time.monotonic() - began < 0.05:
+        pass
+    assert time.monotonic() - began < 2.0
+
+
+def test_a_waiting_consumer_is_woken() -> None:
+    inbox = Inbox()
+    threading.Timer(0.05, inbox.put, [packet(7)]).start()
+    found, deadline = None, time.monotonic() + 5.0
+    while found is None and time.monotonic() < deadline:
+        found = inbox.get(5.0)
+    assert found == packet(7)
+
+
+def test_nothing_is_lost_between_several_producers_and_a_consumer() -> None:
+    inbox, each = Inbox(), 2_000
+
+    def produce() -> None:
+        for number in range(each):
+            inbox.put(packet(number))
+
+    producers = [threading.Thread(target=produce) for _ in range(3)]
+    for producer in producers:
+        producer.start()
+    got, deadline = 0, time.monotonic() + 10.0
+    while got < 3 * each and time.monotonic() < deadline:
+        got += inbox.get(0.01) is not None
+    assert got == 3 * each
+    for producer in producers:
+        producer.join()
+
+
+def test_a_signal_does_not_make_it_wait_for_ever() -> None:
+    inbox = Inbox()
+    before = signal.signal(signal.SIGUSR1, lambda *_: time.sleep(0.2))
+    try:
+        threading.Timer(0.05, os.kill, [os.getpid(), signal.SIGUSR1]).start()
+        began = time.monotonic()
+        assert inbox.get(0.1) is None
+        assert time.monotonic() - began < 3.0
+    finally:
+        signal.signal(signal.SIGUSR1, before)
