@@ -15,26 +15,27 @@ class MemoryHub:
 
     def __init__(self, clock: Clock) -> None:
         self.clock = clock
-        self._queues: dict[str, deque[Received]] = {}
+        self._members: dict[str, MemoryEndpoint] = {}
 
     def join(self, role: str) -> MemoryEndpoint:
         """The access of one role."""
-        return MemoryEndpoint(self, role, self._queues.setdefault(role, deque()))
+        return self._members.setdefault(role, MemoryEndpoint(self, role))
 
-    def hearers(self, role: str, kind: type) -> list[deque[Received]]:
-        """The queues of those who hear a role's messages of a kind."""
+    def hearers(self, role: str, kind: type) -> list[MemoryEndpoint]:
+        """Those who hear a role's messages of a kind."""
         route = (role, CHANNELS.get(kind, CONTROL))
-        return [queue for hearer, queue in self._queues.items() if route in HEARD[hearer]]
+        return [member for hearer, member in self._members.items() if route in HEARD[hearer]]
 
 
 class MemoryEndpoint:
-    """One role's access to a MemoryHub."""
+    """One role's access to a MemoryHub; `clock` is the one its messages are stamped by on arrival."""
 
-    def __init__(self, hub: MemoryHub, role: str, queue: deque[Received]) -> None:
+    def __init__(self, hub: MemoryHub, role: str) -> None:
+        self.clock = hub.clock
         self._hub = hub
         self._role = role
-        self._queue = queue
-        self._hearers: dict[type, list[deque[Received]]] = {}
+        self._queue: deque[Received] = deque()
+        self._hearers: dict[type, list[MemoryEndpoint]] = {}
 
     def enter(self, session: int) -> None:
         """Memory needs no key."""
@@ -44,12 +45,15 @@ class MemoryEndpoint:
         kind = type(message)
         if kind not in self._hearers:
             self._hearers[kind] = self._hub.hearers(self._role, kind)
-        received = Received(message, self._role, self._hub.clock.now())
-        for queue in self._hearers[kind]:
-            queue.append(received)
+        for hearer in self._hearers[kind]:
+            hearer.arrive(message, self._role)
+
+    def arrive(self, message: Message, role: str) -> None:
+        """Take in what a role has sent."""
+        self._queue.append(Received(message, role, self.clock.now()))
 
     def receive(self, timeout: float = 0.0) -> Received | None:
-        """The next message that is there already."""
+        """The next message that is there already; time stands still in memory."""
         return self._queue.popleft() if self._queue else None
 
     def close(self) -> None:

@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 
 from common import reality
+from common.clock import VirtualClock
 from common.errors import InputError, InterlockError, LostError, RigError, RthsError
 from common.exchange import State
+from common.memory_link import MemoryEndpoint
 from common.messages import Command, Feedback, Register, Trip
 from common.plan import PROTOCOL_VERSION, Plan, Rig, from_tables
 from common.reality import Reality
@@ -320,6 +322,41 @@ def test_a_link_plug_in_delays_and_loses_messages(short_plan: Plan, tmp_path: Pa
     assert found.columns["slave"]["command_seq"][55:59].tolist() == [55, 56, 56, 58]
     ages = found.columns["master"]["damper_force_age"]
     assert np.allclose(ages[30:36], [0.002, 0.004, 0.002, 0.002, 0.004, 0.002])
+
+
+class SkewedClock:
+    """Another machine's clock: a second ahead, and gaining."""
+
+    def __init__(self, true: VirtualClock, gain: float) -> None:
+        self.true, self.gain = true, gain
+
+    def now(self) -> int:
+        return self.true.time + 1_000_000_000 + round(self.true.time * self.gain)
+
+    def sleep_until(self, deadline: int) -> None:
+        raise AssertionError("the loops do not sleep")
+
+
+def test_clocks_that_differ_and_drift_apart_do_not_shift_the_laboratories(
+    short_plan: Plan, tmp_path: Path
+) -> None:
+    gain = 500e-6  # a millisecond in two seconds
+    path = tmp_path / "skewed.mcap"
+    bench = virtual.assemble(short_plan, reality.as_planned(short_plan), path)
+    endpoint = bench.endpoints["slave"]
+    assert isinstance(endpoint, MemoryEndpoint)
+    bench.slave.lab.clock = endpoint.clock = SkewedClock(bench.clock, gain)
+    bench.slave.lab.heard_ns = endpoint.clock.now()
+    assert virtual.run(bench, lambda: "") is None
+    found = read(path)
+    assert found.columns["slave"]["command_seq"].tolist() == list(range(short_plan.ticks))
+    latency = found.columns["latency"]
+    assert np.all(latency["deadline_missed"] == 0)
+    truth = 1.0 + gain * (latency["tick_ns"] * 1e-9)
+    assert np.allclose(
+        latency["clock_offset"], truth, atol=0.8e-3
+    )  # followed by its window late, about a second
+    assert bench.slave._shift_ns == pytest.approx(gain * 4e9, abs=0.8e6)
 
 
 def test_early_stop_by_the_user_is_orderly(short_plan: Plan, tmp_path: Path) -> None:
