@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from common import cli
 
 if TYPE_CHECKING:
     from common.recording.reader import Run
@@ -22,6 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="OUT",
         help="the file to write: .csv, .parquet or .mat",
     )
+    cli.json_argument(parser, "say what was written as JSON on standard output")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -32,7 +36,12 @@ def run(args: argparse.Namespace) -> int:
     columns = flat(read(args.file))
     tabular.write(args.output, columns)
     ticks = len(next(iter(columns.values())))
-    sys.stdout.write(f"{args.output}: {ticks} ticks, {len(columns)} columns, SI units\n")
+    if args.json:
+        sys.stdout.write(
+            json.dumps({"file": str(args.output), "ticks": ticks, "columns": list(columns)}) + "\n"
+        )
+    else:
+        sys.stdout.write(f"{args.output}: {ticks} ticks, {len(columns)} columns, SI units\n")
     return 0
 
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from common import cli, signals
 from common import plan as plans
-from common import signals
 from common.errors import InputError, PlanError
 from common.plan import Plan
 from common.schema import fill, key, nearest
@@ -53,6 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-o", "--output", type=Path, required=True, metavar="FILE", help="the recording to write"
     )
+    cli.json_argument(parser, "say what was written as JSON on standard output")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -63,11 +65,20 @@ def run(args: argparse.Namespace) -> int:
     columns = tabular.read(args.data)
     t, values = resampled(mapping, columns, args.data)
     write(args.output, mapping, t, values, args.data.name)
-    names = ", ".join(values)
-    sys.stdout.write(f"{args.output}: {t.size} ticks of {mapping.plan.test.interval:g} s; signals: {names}\n")
-    absent = [name for name in LAB_SIGNALS if name not in values]
-    sys.stdout.write(f"absent: {', '.join(absent) or 'none'}\n")
+    show(args, mapping, t.size, list(values))
     return 0
+
+
+def show(args: argparse.Namespace, mapping: Mapping, ticks: int, present: list[str]) -> None:
+    """Say what was written, and which signals are absent."""
+    absent = [name for name in LAB_SIGNALS if name not in present]
+    if args.json:
+        report = {"file": str(args.output), "ticks": ticks, "signals": present, "absent": absent}
+        sys.stdout.write(json.dumps(report) + "\n")
+        return
+    interval = mapping.plan.test.interval
+    sys.stdout.write(f"{args.output}: {ticks} ticks of {interval:g} s; signals: {', '.join(present)}\n")
+    sys.stdout.write(f"absent: {', '.join(absent) or 'none'}\n")
 
 
 def load_map(path: Path) -> Mapping:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from common import cli
 from common.errors import InputError
 
 if TYPE_CHECKING:
@@ -25,6 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--format", choices=FORMATS, default="png", help="format of the pictures (default: png)"
     )
+    cli.json_argument(parser, "name the pictures as JSON on standard output")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -44,8 +47,9 @@ def run(args: argparse.Namespace) -> int:
     ]
     if not drawn:
         raise InputError(f"{args.file} has no signals for any picture: see rths inspect {args.file}.")
-    for name in drawn:
-        sys.stdout.write(f"{folder / name}.{args.format}\n")
+    paths = [f"{folder / name}.{args.format}" for name in drawn]
+    sys.stdout.write(json.dumps({"pictures": paths}) if args.json else "\n".join(paths))
+    sys.stdout.write("\n")
     return 0
 
 

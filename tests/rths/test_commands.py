@@ -151,6 +151,15 @@ def test_export_and_import_return_the_same_numbers(
     assert call("inspect", again) == 0
 
 
+def test_what_writes_files_names_them_as_json(
+    call: Any, capsys: Any, virtual_recording: Path, tmp_path: Path
+) -> None:
+    assert call("export", virtual_recording, "-o", tmp_path / "a.csv", "--json") == 0
+    assert json.loads(capsys.readouterr().out)["ticks"] == 2000
+    assert call("plot", virtual_recording, "-o", tmp_path, "--json") == 0
+    assert all(Path(path).stat().st_size > 10_000 for path in json.loads(capsys.readouterr().out)["pictures"])
+
+
 def test_import_resamples_to_the_plans_interval(call: Any, tmp_path: Path) -> None:
     (tmp_path / "plan.toml").write_text("[test]\ninterval = 0.001\n")
     (tmp_path / "data.csv").write_text("y\n" + "".join(f"{value}\n" for value in (0.0, 1.0, 4.0)))
