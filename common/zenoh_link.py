@@ -119,7 +119,7 @@ class ZenohLink:
                 "choose another with --listen."
             ) from None
 
-    def _hear(self, role: str, channel: str):  # type: ignore[no-untyped-def]
+    def _hear(self, role: str, channel: str) -> Callable[[zenoh.Sample], None]:
         put = self._packets.put
         now = time.monotonic_ns
 
