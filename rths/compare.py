@@ -5,10 +5,13 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from common import cli
 from common.errors import InputError
+
+if TYPE_CHECKING:
+    from rths.source import Source
 
 LEFT_OUT = ("seq", "t")
 
@@ -27,7 +30,8 @@ def run(args: argparse.Namespace) -> int:
     """Compare; 1 where a signal differs by more than the tolerance."""
     from rths.source import columns
 
-    result = compare(columns(args.a), columns(args.b))
+    a, b = columns(args.a), columns(args.b)
+    result = compare(a, b) | {"motion_a": a.motion, "motion_b": b.motion}
     if not result["signals"]:
         raise InputError(f"{args.a} and {args.b} have no tick and signal in common.")
     beyond = [
@@ -43,19 +47,19 @@ def run(args: argparse.Namespace) -> int:
     return 1 if beyond else 0
 
 
-def compare(a: tuple[Any, dict[str, Any]], b: tuple[Any, dict[str, Any]]) -> dict[str, Any]:
+def compare(a: Source, b: Source) -> dict[str, Any]:
     """Differences of every signal that both have, on the ticks that both have.
 
     NRMSE is rms(a − b)/rms(a); `equal` says that all values agree to the last bit.
     """
     import numpy as np
 
-    ticks, in_a, in_b = np.intersect1d(a[0], b[0], return_indices=True)
+    ticks, in_a, in_b = np.intersect1d(a.ticks, b.ticks, return_indices=True)
     result = {}
-    for name in a[1]:
-        if name in LEFT_OUT or name not in b[1] or not ticks.size:
+    for name in a.signals:
+        if name in LEFT_OUT or name not in b.signals or not ticks.size:
             continue
-        x, y = a[1][name][in_a].astype(float), b[1][name][in_b].astype(float)
+        x, y = a.signals[name][in_a].astype(float), b.signals[name][in_b].astype(float)
         if x.shape == y.shape:
             result[name] = difference(x, y)
     return {"ticks": int(ticks.size), "signals": result}
@@ -84,7 +88,9 @@ def show(args: argparse.Namespace, result: dict[str, Any]) -> None:
     for name, facts in result["signals"].items():
         numbers = [f"{facts[key]:.4g}" for key in ("nrmse", "largest", "peak_a", "peak_b")]
         rows.append([name, *numbers, "equal" if facts["equal"] else ""])
-    sys.stdout.write(f"A {args.a}\nB {args.b}\n{result['ticks']} ticks in common\n\n")
+    sys.stdout.write(
+        f"A {args.a}: {result['motion_a']}\nB {args.b}: {result['motion_b']}\n{result['ticks']} ticks in common\n\n"
+    )
     table(rows)
     for name in result["beyond_tolerance"]:
         sys.stdout.write(f"{name} differs by more than the tolerance {args.tolerance:g}\n")

@@ -55,6 +55,8 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         sys.stdout.write(json.dumps({"matches": same, "signals": result}) + "\n")
     else:
+        motion = recording.metadata.get("ground_motion", {})
+        sys.stdout.write(f"ground motion: {motion.get('record')}, scaled by {motion.get('scale')}\n\n")
         show(matches, same)
     return 0 if same else 1
 
