@@ -1,42 +1,88 @@
-"""Compensators of the actuator's delay: one file each, listed here."""
+"""Compensators of the actuator's delay: one file each, listed here.
+
+A method is a file with `Params`, `RULES` and `step`; one with a memory adds `state`, the array at rest, and
+one with derived numbers adds `pack`, which appends them to the parameters. It is added by its line in
+`COMPENSATORS` and one in `step`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from common.errors import InputError
-from common.schema import nearest
-from models.compensators import none, pid, pid_taylor, taylor
+from common.schema import Rule, nearest
+from models import registry
+from models.compensators import ats, horiuchi, inverse, none, pid, pid_inverse, pid_taylor, taylor
 from models.compiled import jit
-from models.registry import Array, pack
+from models.registry import Array
 
-STATE_SIZE = 4
+WHOLE = ("order",)  # parameters that count something
+
+
+def as_given(params: Array, _interval: float) -> Array:
+    """The parameters of a method that derives nothing from them."""
+    return params
+
+
+def no_memory(_params: Array, _interval: float) -> Array:
+    """The memory of a method that keeps nothing."""
+    return np.zeros(0)
 
 
 @dataclass(frozen=True)
 class Compensator:
-    """One method: its code in the dispatch below and its parameters."""
+    """One method: its code in `step`, its parameters with their ranges, derived numbers, memory at rest."""
 
     code: int
     params: type[Any]
+    rules: Mapping[str, Rule]
+    state: Callable[[Array, float], Array] = no_memory  # of the packed parameters
+    pack: Callable[[Array, float], Array] = as_given
 
 
 COMPENSATORS = {
-    "none": Compensator(0, none.Params),
-    "pid": Compensator(1, pid.Params),
-    "taylor": Compensator(2, taylor.Params),
-    "pid_taylor": Compensator(3, pid_taylor.Params),
+    "none": Compensator(0, none.Params, none.RULES),
+    "pid": Compensator(1, pid.Params, pid.RULES, pid.state),
+    "taylor": Compensator(2, taylor.Params, taylor.RULES),
+    "pid_taylor": Compensator(3, pid_taylor.Params, pid_taylor.RULES, pid.state),
+    "horiuchi": Compensator(4, horiuchi.Params, horiuchi.RULES, horiuchi.state, horiuchi.pack),
+    "inverse": Compensator(5, inverse.Params, inverse.RULES, pack=inverse.pack),
+    "pid_inverse": Compensator(6, pid_inverse.Params, pid_inverse.RULES, pid.state, pid_inverse.pack),
+    "ats": Compensator(7, ats.Params, ats.RULES, ats.state, ats.pack),
 }
 
 
-def build(kind: str, parameters: Mapping[str, float]) -> tuple[int, Array]:
-    """Code and parameter array of a compensator; raises InputError for an unknown name or parameter."""
+class Built(NamedTuple):
+    """A compensator at rest, in the order `step` takes its parts."""
+
+    code: int
+    params: Array
+    state: Array
+
+
+def build(kind: str, parameters: Mapping[str, float], interval: float) -> Built:
+    """Code, packed parameters and memory at rest of a compensator; `interval` in s.
+
+    Raises:
+        InputError: the kind or a parameter is unknown, missing, not finite or out of its range.
+    """
     if kind not in COMPENSATORS:
         raise InputError(f"Unknown compensator '{kind}' in [compensator]: {nearest(kind, COMPENSATORS)}")
     method = COMPENSATORS[kind]
-    return method.code, pack(method.params, parameters, f"compensator '{kind}' in [compensator]")
+    what = f"compensator '{kind}' in [compensator]"
+    values = registry.pack(method.params, parameters, what)
+    for name, value in method.params(*values.tolist())._asdict().items():
+        rule = method.rules[name]
+        if not rule.admits(value):
+            raise InputError(f"{name} of {what} is {value:g}, but must be {rule.allowed()}.")
+        if name in WHOLE and not value.is_integer():
+            raise InputError(f"{name} of {what} is {value:g}, but must be a whole number.")
+    params = method.pack(values, interval)
+    return Built(method.code, params, method.state(params, interval))
 
 
 @jit
@@ -47,18 +93,29 @@ def step(
     target: float,
     rate: float,
     acceleration: float,
-    error: float,
+    jerk: float,
+    present: float,
+    measured: float,
     interval: float,
 ) -> float:
-    """Command (m) to be reached at the end of the interval.
+    """Command (m) to be reached at t_{k+1}, the end of the interval (s); the memory `s` moves on.
 
-    `target` (m), `rate` (m/s) and `acceleration` (m/s²) are the target's at the interval's end; `error`
-    (m) is target minus measurement at its beginning; `interval` in s. `s` holds the method's memory.
+    `target` (m), `rate` (m/s), `acceleration` (m/s²) and `jerk` (m/s³) are the target's at t_{k+1};
+    `present` (m) is the target and `measured` (m) the displacement at t_k.
     """
+    command = target
     if code == 1:
-        return pid.step(p, s, target, error, interval)
-    if code == 2:
-        return taylor.step(p, target, rate, acceleration)
-    if code == 3:
-        return pid_taylor.step(p, s, target, rate, error, interval)
-    return none.step(target)
+        command = pid.step(p, s, target, present - measured, interval)
+    elif code == 2:
+        command = taylor.step(p, target, rate, acceleration, jerk)
+    elif code == 3:
+        command = pid_taylor.step(p, s, target, rate, acceleration, jerk, present - measured, interval)
+    elif code == 4:
+        command = horiuchi.step(p, s, target, present)
+    elif code == 5:
+        command = inverse.step(p, target, rate, acceleration, jerk)
+    elif code == 6:
+        command = pid_inverse.step(p, s, target, rate, acceleration, jerk, present - measured, interval)
+    elif code == 7:
+        command = ats.step(p, s, target, rate, acceleration, present, measured, interval)
+    return command

@@ -1,17 +1,17 @@
-"""No compensation: the command is the target."""
+"""No compensation: the command is the target, `u = r` (m).
+
+Not to be confused with a switched-off actuator: the target still moves it, one actuator delay late.
+"""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from models.compiled import jit
+from common.schema import Rule
 
 
 class Params(NamedTuple):
     """No parameters."""
 
 
-@jit
-def step(target: float) -> float:
-    """The target (m) itself."""
-    return target
+RULES: dict[str, Rule] = {}

@@ -1,6 +1,6 @@
 """PID feedback beside a direct feedforward of the target.
 
-`u = r + P·e + I·∫e dt + D·ė` with `e = r − y`: eq. (3) of Yokoyama et al. (17WCEE, 2020), with the
+`u = r + P·e + I·∫e dt + D·ė` with `e = r − y` (m): eq. (3) of Yokoyama et al. (17WCEE, 2020), with the
 target itself fed forward, as their block diagram (fig. 9) has it. Not to be confused with a PID loop
 without that feedforward, whose static gain on a unit-gain actuator is P/(1 + P).
 """
@@ -9,6 +9,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
+from common.schema import Rule
 from models.compiled import jit
 from models.registry import Array
 
@@ -21,6 +24,18 @@ class Params(NamedTuple):
     proportional: float  # P, –
     integral: float  # I, 1/s
     derivative: float  # D, s
+
+
+RULES = {
+    "proportional": Rule("gain on the error", least=0.0),
+    "integral": Rule("gain on the error's integral", "1/s", least=0.0),
+    "derivative": Rule("gain on the error's rate", "s", least=0.0),
+}
+
+
+def state(_params: Array, _interval: float) -> Array:
+    """Integral of the error (m·s) and the last error (m), at rest."""
+    return np.zeros(2)
 
 
 @jit

@@ -1,14 +1,15 @@
-"""PID feedback in parallel with a first-order Taylor prediction: the compensator of the seed paper.
+"""PID feedback in parallel with a Taylor prediction: with order 1 the compensator of the seed paper.
 
-`u = r + τ·ṙ + P·e + I·∫e dt + D·ė`: eqs. (3) and (6) and fig. 9 of Yokoyama et al. (17WCEE, 2020). On a
-lag T with dead time L it leaves about `(L + T − τ)/(1 + P)` of delay at low frequency.
+`u = r + τ·ṙ + … + P·e + I·∫e dt + D·ė` (m): eqs. (3) and (6) and fig. 9 of Yokoyama et al. (17WCEE, 2020).
+On a lag T with dead time L it leaves about `(L + T − τ)/(1 + P)` of delay at low frequency. Not to be
+confused with a PID loop whose reference is the prediction: here the error is that of the target itself.
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from models.compensators import pid
+from models.compensators import pid, taylor
 from models.compiled import jit
 from models.registry import Array
 
@@ -20,9 +21,23 @@ class Params(NamedTuple):
     integral: float  # I, 1/s
     derivative: float  # D, s
     lead: float  # τ, s
+    order: float = 1.0  # 1, 2 or 3
+
+
+RULES = {**pid.RULES, **taylor.RULES}
 
 
 @jit
-def step(p: Array, s: Array, target: float, rate: float, error: float, interval: float) -> float:
+def step(
+    p: Array,
+    s: Array,
+    target: float,
+    rate: float,
+    acceleration: float,
+    jerk: float,
+    error: float,
+    interval: float,
+) -> float:
     """Command (m)."""
-    return pid.step(p, s, target + p[3] * rate, error, interval)
+    ahead = taylor.predict(p[3], p[4], target, rate, acceleration, jerk)
+    return pid.step(p, s, ahead, error, interval)
