@@ -82,6 +82,9 @@ class Command(NamedTuple):
     shift_ns: int  # how far the slave's clock has drifted from the master's since the start, estimated
     table_target: float
     damper_command: float
+    table_target_velocity: float
+    table_target_acceleration: float
+    table_target_jerk: float
 
 
 class Feedback(NamedTuple):

@@ -90,11 +90,32 @@ PAPER_COMPENSATOR = {"lead": 0.044, "proportional": 1.93, "integral": 0.047, "de
 
 
 @dataclass(frozen=True)
+class ForceCorrection:
+    """Phase lead of the measured column force before it enters the equation of motion."""
+
+    cutoff: float = key(
+        "corner frequency of the high-pass filter, 0 for none", default=0.0, unit="Hz", least=0.0
+    )
+    unity: float = key("frequency at which the filter's gain is one", default=2.0, unit="Hz", above=0.0)
+
+
+@dataclass(frozen=True)
 class Compensator:
     """Compensation of the actuator's delay."""
 
     kind: str = key("name of a compensator", default="pid_taylor")
     parameters: dict[str, float] = key("its parameters", default=PAPER_COMPENSATOR, more=True)
+    force: ForceCorrection = field(
+        default_factory=ForceCorrection, metadata={"table": ForceCorrection, "more": False}
+    )
+
+
+@dataclass(frozen=True)
+class TableCompensator:
+    """Compensation of the shaking table, computed by the slave."""
+
+    kind: str = key("name of a compensator", default="none")
+    parameters: dict[str, float] = key("its parameters", default={}, more=True)
 
 
 @dataclass(frozen=True)
@@ -106,6 +127,9 @@ class Table:
     )
     damping_ratio: float = key("damping ratio", default=0.7, unit="", above=0.0)
     delay: float = key("dead time", default=0.004, unit="s", least=0.0, most=1.0)
+    compensator: TableCompensator = field(
+        default_factory=TableCompensator, metadata={"table": TableCompensator, "more": False}
+    )
 
 
 @dataclass(frozen=True)
@@ -168,6 +192,7 @@ class Limits:
     column_displacement: float = key("specimen deformation", default=0.03, unit="m", above=0.0)
     column_force: float = key("specimen force", default=400e3, unit="N", above=0.0)
     table_target: float = key("table target", default=0.40, unit="m", above=0.0)
+    table_command: float = key("table command", default=0.40, unit="m", above=0.0)
     damper_command: float = key("motor force", default=1000.0, unit="N", above=0.0)
     table_displacement: float = key("table displacement", default=0.40, unit="m", above=0.0)
     table_acceleration: float = key("table acceleration", default=30.0, unit="m/s²", above=0.0)

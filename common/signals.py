@@ -52,6 +52,9 @@ MASTER = (
     Signal("damper_force_age", "s", "its age at use"),
     Signal("table_target", "m", "absolute floor displacement wanted at the end of the interval, as sent"),
     Signal("damper_command", "N", "motor force of the damper, as sent"),
+    Signal("table_target_velocity", "m/s", "velocity of the table's target, as sent"),
+    Signal("table_target_acceleration", "m/s²", "its acceleration, as sent"),
+    Signal("table_target_jerk", "m/s³", "the rate of that acceleration, as sent"),
 )
 
 SLAVE = (
@@ -65,6 +68,9 @@ SLAVE = (
     Signal("table_acceleration", "m/s²", "table acceleration measured"),
     Signal("damper_stroke", "m", "stroke of the damper measured"),
     Signal("damper_force", "N", "force of the damper on the table measured"),
+    Signal("table_target_velocity", "m/s", "velocity of the table's target, as received"),
+    Signal("table_target_acceleration", "m/s²", "its acceleration, as received"),
+    Signal("table_target_jerk", "m/s³", "the rate of that acceleration, as received"),
 )
 
 LATENCY = (

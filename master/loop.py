@@ -40,6 +40,8 @@ LEAD_NS = 250_000_000  # from the agreement on the start to the start
 
 NO_FEEDBACK = Feedback(0, -1, -1, 0, 0, 0.0, 0.0, 0.0, 0.0)
 
+NOTHING_SENT = (0.0, 0.0, 0.0, 0.0, 0.0)
+
 
 class MasterLoop:
     """Laboratory A in a test."""
@@ -65,7 +67,7 @@ class MasterLoop:
         self._used = NO_FEEDBACK
         self._command = 0.0
         self._drift = 0.0
-        self._sent = (0.0, 0.0)
+        self._sent = NOTHING_SENT
         self._asked_ns = -REPEAT_NS
         self._syncs = 0
         self._wall_ns = epoch_ns - setting.clock.now()
@@ -227,7 +229,7 @@ class MasterLoop:
             violation = self._limits.violation(measured, outputs)
             if not (held or violation):
                 self._command = outputs.actuator_command
-                self._sent = (outputs.table_target, outputs.damper_command)
+                self._sent = outputs.sent()
             self._rig.write(ColumnCommand(self._command))
         except RigError as error:
             self._trip(error, "rig", tick)

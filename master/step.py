@@ -19,11 +19,18 @@ class Outputs(NamedTuple):
     actuator_command: float
     table_target: float
     damper_command: float
+    table_target_velocity: float
+    table_target_acceleration: float
+    table_target_jerk: float
     displacement: Storeys
     velocity: Storeys
     acceleration: Storeys
     absolute_acceleration: Storeys
     numerical_force: Storeys
+
+    def sent(self) -> tuple[float, float, float, float, float]:
+        """The command for laboratory B in its message's order: the target, the motor's force, the target's rates."""
+        return self[3:8]
 
 
 class MasterStep:

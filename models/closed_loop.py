@@ -13,11 +13,20 @@ from numpy.typing import NDArray
 
 from common import signals as table
 from common.plan import Plan
-from models import substructure
+from models import compensators, substructure
 from models.compiled import jit
 from models.labs import column_lab, noise, table_lab
 from models.registry import Array
-from models.substructure import ACTUATOR_COMMAND, COLUMN_TARGET, DAMPER_COMMAND, STOREYS, TABLE_TARGET
+from models.substructure import (
+    ACTUATOR_COMMAND,
+    COLUMN_TARGET,
+    DAMPER_COMMAND,
+    STOREYS,
+    TABLE_ACCELERATION,
+    TABLE_JERK,
+    TABLE_TARGET,
+    TABLE_VELOCITY,
+)
 
 Index = NDArray[np.int64]
 
@@ -32,6 +41,7 @@ class Rollout(NamedTuple):
     measured_a: Array  # (ticks, 2)
     measured_b: Array  # (ticks, 4)
     damper_force_used: Array  # (ticks,)
+    table_command: Array  # (ticks,)
     finite: bool  # False where the loop diverged; the rows from there on are zero
     ticks: int  # rows filled
 
@@ -67,10 +77,14 @@ def simulate(
     master = substructure.build(plan, ground)
     outputs = np.zeros((ticks, master.output.size))
     measured_a, measured_b, used = np.zeros((ticks, 2)), np.zeros((ticks, 4)), np.zeros(ticks)
+    follow = plan.table.compensator
+    compensator_b = compensators.build(follow.kind, follow.parameters, plan.test.interval)
+    written = np.zeros(ticks)
     filled = roll(
         *master,
         *lab_a,
         *lab_b,
+        *compensator_b,
         *(exchange or on_time(ticks)),
         noise_a,
         noise_b,
@@ -78,8 +92,9 @@ def simulate(
         measured_a,
         measured_b,
         used,
+        written,
     )
-    return Rollout(outputs, measured_a, measured_b, used, filled == ticks, filled)
+    return Rollout(outputs, measured_a, measured_b, used, written, filled == ticks, filled)
 
 
 @jit
@@ -94,6 +109,8 @@ def roll(
     state: Array,
     column_memory: Array,
     compensator_memory: Array,
+    recent: Array,
+    filtered: Array,
     target: Array,
     balance: Array,
     output: Array,
@@ -110,6 +127,9 @@ def roll(
     history_b: Array,
     state_b: Array,
     scratch: Array,
+    code_c: int,
+    params_c: Array,
+    memory_c: Array,
     command: Index,
     feedback: Index,
     noise_a: Array,
@@ -118,10 +138,12 @@ def roll(
     measured_a: Array,
     measured_b: Array,
     used: Array,
+    written: Array,
 ) -> int:
-    """Fill the last four arrays tick by tick; return how many ticks stayed finite."""
+    """Fill the last five arrays tick by tick; return how many ticks stayed finite."""
     displacement, force = 0.0, 0.0
-    y, y_acceleration, stroke, damper_force = 0.0, 0.0, 0.0, 0.0
+    y, y_acceleration, stroke, damper_force, present = 0.0, 0.0, 0.0, 0.0, 0.0
+    nothing, interval = np.zeros(outputs.shape[1]), scalars[substructure.INTERVAL]
     for tick in range(outputs.shape[0]):
         measured_a[tick, 0] = displacement + noise_a[tick, 0]
         measured_a[tick, 1] = force + noise_a[tick, 1]
@@ -137,6 +159,8 @@ def roll(
             state,
             column_memory,
             compensator_memory,
+            recent,
+            filtered,
             target,
             balance,
             output,
@@ -157,10 +181,22 @@ def roll(
         measured_b[tick, 2] = stroke + noise_b[tick, 2]
         measured_b[tick, 3] = damper_force + noise_b[tick, 3]
         sent = command[tick]
-        table_target = outputs[sent, TABLE_TARGET] if sent >= 0 else 0.0
-        motor = outputs[sent, DAMPER_COMMAND] if sent >= 0 else 0.0
+        row = outputs[sent] if sent >= 0 else nothing
+        written[tick] = compensators.step(
+            code_c,
+            params_c,
+            memory_c,
+            row[TABLE_TARGET],
+            row[TABLE_VELOCITY],
+            row[TABLE_ACCELERATION],
+            row[TABLE_JERK],
+            present,
+            measured_b[tick, 0],
+            interval,
+        )
+        present = row[TABLE_TARGET]
         y, y_acceleration, stroke, damper_force = table_lab.advance(
-            taps_b, matrices, spring, history_b, state_b, scratch, table_target, motor
+            taps_b, matrices, spring, history_b, state_b, scratch, written[tick], row[DAMPER_COMMAND]
         )
     return outputs.shape[0]
 
@@ -174,8 +210,11 @@ def signals(plan: Plan, rollout: Rollout) -> dict[str, Array]:
         "column_target": rollout.outputs[rows, COLUMN_TARGET],
         "actuator_command": rollout.outputs[rows, ACTUATOR_COMMAND],
         "table_target": rollout.outputs[rows, TABLE_TARGET],
+        "table_target_velocity": rollout.outputs[rows, TABLE_VELOCITY],
+        "table_target_acceleration": rollout.outputs[rows, TABLE_ACCELERATION],
+        "table_target_jerk": rollout.outputs[rows, TABLE_JERK],
         "damper_command": rollout.outputs[rows, DAMPER_COMMAND],
-        "table_command": rollout.outputs[rows, TABLE_TARGET],
+        "table_command": rollout.table_command[rows],
         "damper_force_used": rollout.damper_force_used[rows],
     }
     for place, name in enumerate(substructure.STOREY_ROWS):

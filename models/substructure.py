@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.plan import Plan, resolve
-from models import compensators, integrators, specimens
+from models import compensators, force_correction, integrators, specimens, trend
 from models.compiled import jit
 from models.ground_motion import GroundMotion, ground, load
 from models.integrators.state import ACCELERATION, DISPLACEMENT, NEXT_DISPLACEMENT, NEXT_VELOCITY, VELOCITY
@@ -25,11 +25,12 @@ Codes = NDArray[np.int64]
 
 # places in `codes` and `scalars`
 INTEGRATOR, SPECIMEN, COMPENSATOR, STOREY, FLOOR = range(5)
-INTERVAL, RATIO, REPRESENTS, FORCE_SCALE, MOTOR_GAIN = range(5)
+INTERVAL, RATIO, REPRESENTS, FORCE_SCALE, MOTOR_GAIN, HIGH_PASS, HIGH_PASS_GAIN = range(7)
 
 # places in the output row; one value per storey each from STOREYS on
-GROUND_ACCELERATION, COLUMN_TARGET, ACTUATOR_COMMAND, TABLE_TARGET, DAMPER_COMMAND = range(5)
-STOREYS = 5
+GROUND_ACCELERATION, COLUMN_TARGET, ACTUATOR_COMMAND = range(3)
+TABLE_TARGET, DAMPER_COMMAND, TABLE_VELOCITY, TABLE_ACCELERATION, TABLE_JERK = range(3, 8)
+STOREYS = 8
 STOREY_ROWS = ("displacement", "velocity", "acceleration", "absolute_acceleration", "numerical_force")
 
 
@@ -46,6 +47,8 @@ class Substructure(NamedTuple):
     state: Array  # (rows, n) of the integrator
     column_memory: Array  # (n, memory)
     compensator_memory: Array
+    recent: Array  # (2, RECENT): accelerations of specimen and floor at the last ticks, newest first, m/s²
+    filtered: Array  # (2,): the column force of the tick before, measured and corrected, N
     target: Array  # (1,): the specimen's target of the present tick, m
     balance: Array  # (n,): external minus restoring force, N
     output: Array
@@ -65,7 +68,8 @@ def build(plan: Plan, rows: Array) -> Substructure:
     packed = [specimens.pack(model.model, stiffness=float(k), **model.parameters) for k in own]
     M, C, K = shear_building.matrices(mass, stiffness, np.array(structure.damping))
     method = integrators.build(structure.integrator, M, C, K, plan.test.interval, structure.rho_infinity)
-    kind, compensator = compensators.build(plan.compensator.kind, plan.compensator.parameters)
+    chosen = plan.compensator
+    compensator = compensators.build(chosen.kind, chosen.parameters, plan.test.interval)
     force_scale = plan.damper.force_scale if plan.control.amd else 0.0
     motor_gain = plan.control.gain / plan.damper.force_scale if force_scale else 0.0
     scalars = [
@@ -74,19 +78,22 @@ def build(plan: Plan, rows: Array) -> Substructure:
         float(column.represents),
         force_scale,
         motor_gain,
+        *force_correction.coefficients(plan.compensator.force, plan.test.interval),
     ]
     n = plan.storeys
     return Substructure(
-        np.array([method.code, packed[0][0], kind, column.storey - 1, plan.damper.floor - 1]),
+        np.array([method.code, packed[0][0], compensator.code, column.storey - 1, plan.damper.floor - 1]),
         np.array(scalars),
         mass,
         method.coefficients,
         np.stack([params for _, params, _ in packed]),
-        compensator,
+        compensator.params,
         rows,
         method.start(np.zeros(n), np.zeros(n), -mass * rows[0, 0]),
         np.stack([memory for _, _, memory in packed]),
-        np.zeros(compensators.STATE_SIZE),
+        compensator.state,
+        np.zeros((2, trend.RECENT)),
+        np.zeros(2),
         np.zeros(1),
         np.zeros(n),
         np.zeros(STOREYS + len(STOREY_ROWS) * n),
@@ -116,6 +123,8 @@ def advance(
     state: Array,
     column_memory: Array,
     compensator_memory: Array,
+    recent: Array,
+    filtered: Array,
     target: Array,
     balance: Array,
     output: Array,
@@ -130,6 +139,7 @@ def advance(
     scale as used. The arrays are those of `Substructure`; the states move on by one interval.
     """
     n = mass.size
+    corrected = force_correction.step(scalars[HIGH_PASS], scalars[HIGH_PASS_GAIN], filtered, column_force)
     storey, floor = codes[STOREY], codes[FLOOR]
     interval, ratio = scalars[INTERVAL], scalars[RATIO]
     for i in range(n):
@@ -140,14 +150,15 @@ def advance(
         force = specimens.step(codes[SPECIMEN], column_params[i], column_memory[i], drift)
         output[STOREYS + 4 * n + i] = force
         if i == storey:
-            force += scalars[REPRESENTS] * column_force
+            force += scalars[REPRESENTS] * corrected
         shear_building.add_nodal(-force, i, balance)
     integrators.step(codes[INTEGRATOR], coefficients, state, balance, interval)
 
     previous_target = target[0]
     target[0] = ratio * shear_building.storey_drift(state[NEXT_DISPLACEMENT], storey)
     rate = ratio * shear_building.storey_drift(state[NEXT_VELOCITY], storey)
-    bend = ratio * shear_building.storey_drift(state[ACCELERATION], storey)
+    trend.remember(recent[0], ratio * shear_building.storey_drift(state[ACCELERATION], storey))
+    trend.remember(recent[1], state[ACCELERATION, floor])
     output[GROUND_ACCELERATION] = ground[0, tick]
     output[COLUMN_TARGET] = previous_target
     output[ACTUATOR_COMMAND] = compensators.step(
@@ -156,11 +167,19 @@ def advance(
         compensator_memory,
         target[0],
         rate,
-        bend,
-        previous_target - column_displacement,
+        trend.ahead(recent[0]),
+        trend.slope(recent[0], interval),
+        previous_target,
+        column_displacement,
         interval,
     )
-    output[TABLE_TARGET] = state[NEXT_DISPLACEMENT, floor] + ground[1, tick + 1]
+    here, ahead = ground[1, tick], ground[1, tick + 1]
+    output[TABLE_TARGET] = state[NEXT_DISPLACEMENT, floor] + ahead
+    output[TABLE_VELOCITY] = (
+        state[NEXT_VELOCITY, floor] + (ahead - here) / interval + 0.5 * interval * ground[0, tick + 1]
+    )
+    output[TABLE_ACCELERATION] = trend.ahead(recent[1]) + ground[0, tick + 1]
+    output[TABLE_JERK] = trend.slope(recent[1], interval) + (ground[0, tick + 1] - ground[0, tick]) / interval
     output[DAMPER_COMMAND] = scalars[MOTOR_GAIN] * state[NEXT_VELOCITY, floor]
     for i in range(n):
         output[STOREYS + i] = state[DISPLACEMENT, i]

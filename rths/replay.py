@@ -15,7 +15,14 @@ from common.errors import InputError
 if TYPE_CHECKING:
     from common.recording.reader import Run
 
-HELD = ("actuator_command", "table_target", "damper_command")
+SENT = (
+    "table_target",
+    "damper_command",
+    "table_target_velocity",
+    "table_target_acceleration",
+    "table_target_jerk",
+)
+HELD = ("actuator_command", *SENT)
 
 
 @dataclass
@@ -120,13 +127,11 @@ def replay_slave(recording: Run) -> dict[str, Match]:
     master = {name: values.tolist() for name, values in recording.columns["master"].items()}
     sent = {seq: place for place, seq in enumerate(master["seq"])}
     read = {seq: place for place, seq in enumerate(slave["seq"])}
-    matches = {
-        name: Match() for name in ("table_command", "table_target", "damper_command", "damper_force_used")
-    }
+    matches = {name: Match() for name in (*SENT, "table_command", "damper_force_used")}
+    replay_table(recording, slave, matches["table_command"])
     for place, t in enumerate(slave["t"]):
-        matches["table_command"].take(t, slave["table_target"][place], slave["table_command"][place])
         if (source := sent.get(slave["command_seq"][place])) is not None:
-            for name in ("table_target", "damper_command"):
+            for name in SENT:
                 matches[name].take(t, master[name][source], slave[name][place])
     for place, t in enumerate(master["t"]):
         if (source := read.get(master["damper_force_seq"][place])) is not None:
@@ -137,6 +142,25 @@ def replay_slave(recording: Run) -> dict[str, Match]:
         f"slave/{name}" if name != "damper_force_used" else f"master/{name}": match
         for name, match in matches.items()
     }
+
+
+def replay_table(recording: Run, slave: dict[str, Any], match: Match) -> None:
+    """The table's compensator again, from the first tick to the first hole."""
+    from common.messages import Command
+    from common.rig import TableMeasurement
+    from rths.summary import plan_of
+    from slave.step import SlaveStep
+
+    plan = plan_of(recording)
+    if plan is None:
+        return
+    step = SlaveStep(plan)
+    for place, (t, seq) in enumerate(zip(slave["t"], slave["seq"], strict=True)):
+        if seq != place:
+            break
+        command = Command(0, seq, 0, 0, *(slave[name][place] for name in SENT))
+        measured = TableMeasurement(*(slave[name][place] for name in TableMeasurement._fields))
+        match.take(t, step(command, measured), slave["table_command"][place])
 
 
 def show(matches: dict[str, Match], same: bool) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from common.limits import Guard
 from common.messages import Command
 from common.plan import Limits
-from common.rig import TableMeasurement
+from common.rig import TableCommand, TableMeasurement
 
 
 class SlaveLimits:
@@ -14,7 +14,12 @@ class SlaveLimits:
     def __init__(self, limits: Limits) -> None:
         self._measurements = Guard(limits, TableMeasurement._fields)
         self._command = Guard(limits, Command._fields)
+        self._written = Guard(limits, TableCommand._fields)
 
-    def violation(self, measured: TableMeasurement, command: Command) -> str:
+    def violation(self, measured: TableMeasurement, command: Command, wanted: TableCommand) -> str:
         """A sentence on the first value beyond its limit, empty where there is none."""
-        return self._measurements.violation(measured) or self._command.violation(command)
+        return (
+            self._measurements.violation(measured)
+            or self._command.violation(command)
+            or self._written.violation(wanted)
+        )

@@ -32,8 +32,9 @@ from common.messages import (
 from common.plan import PROTOCOL_VERSION
 from common.rig import GuardedRig, TableCommand, TableMeasurement
 from slave.limits import SlaveLimits
+from slave.step import SlaveStep
 
-NO_COMMAND = Command(0, -1, 0, 0, 0.0, 0.0)
+NO_COMMAND = Command(0, -1, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class SlaveLoop:
@@ -45,6 +46,7 @@ class SlaveLoop:
         self._limits = SlaveLimits(setting.plan.limits)
         self._commands: Mailbox[Command] = Mailbox(link, "command", setting.plan.test.interval, nominal=0)
         self._received_ns: dict[int, int] = {}
+        self._step = SlaveStep(setting.plan)
         self._command = NO_COMMAND
         self._shift_ns = 0
         self._said_ns = -REPEAT_NS
@@ -170,28 +172,29 @@ class SlaveLoop:
         command = self._command
         try:
             measured = self._rig.read()
-            violation = self._limits.violation(measured, command)
+            wanted = TableCommand(self._step(command, measured), command.damper_command)
+            violation = self._limits.violation(measured, command, wanted)
             if not violation:
-                self._rig.write(TableCommand(command.table_target, command.damper_command))
+                self._rig.write(wanted)
         except RigError as error:
             lab.fail(Event.TRIP, error, code="rig", tick=tick)
             return
-        self._answer(tick, measured)
+        self._answer(tick, measured, wanted)
         self.ticks = tick + 1
         if violation:
             lab.fail(Event.TRIP, InterlockError(violation), code="limit", tick=tick)
         elif now - lab.heard_ns > lab.plan.link.loss_timeout * 1e9:
             lab.lost("The master", lab.plan.link.loss_timeout, tick)
 
-    def _answer(self, tick: int, measured: TableMeasurement) -> None:
+    def _answer(self, tick: int, measured: TableMeasurement, wanted: TableCommand) -> None:
         lab, command = self.lab, self._command
         received_ns = self._received_ns.pop(command.seq, 0) if command.seq == tick else 0
         sent_ns = lab.clock.now()
         lab.endpoint.send(Feedback(lab.exchange.session, tick, command.seq, received_ns, sent_ns, *measured))
         if lab.recorder is not None:
-            self._sample(tick, measured, sent_ns)
+            self._sample(tick, measured, wanted, sent_ns)
 
-    def _sample(self, tick: int, measured: TableMeasurement, sent_ns: int) -> None:
+    def _sample(self, tick: int, measured: TableMeasurement, wanted: TableCommand, sent_ns: int) -> None:
         lab, command = self.lab, self._command
         log_ns = lab.epoch_ns + tick * lab.interval_ns
         publish_ns = log_ns + sent_ns - self.tick_ns(tick)
@@ -201,8 +204,11 @@ class SlaveLoop:
             command.seq,
             command.table_target,
             command.damper_command,
-            command.table_target,
+            wanted.table_command,
             *measured,
+            command.table_target_velocity,
+            command.table_target_acceleration,
+            command.table_target_jerk,
         )
         lab.outlet.add("slave", log_ns, publish_ns, values)
 

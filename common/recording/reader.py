@@ -26,6 +26,7 @@ Values = NDArray[Any]
 
 RECORD_LIMIT = 64 << 20
 GROUND = "ground_motion"
+DAMAGE = (McapError, ValueError, struct.error, zstandard.ZstdError)  # what the libraries raise on it
 
 
 @dataclass
@@ -98,7 +99,7 @@ def _records(path: Path, run: Run) -> Iterator[Any]:
             yield from _up_to_damage(stream, run)
     except OSError as error:
         raise InputError(f"Cannot read the recording {path}: {error.strerror}.") from None
-    except McapError as error:
+    except DAMAGE as error:
         raise InputError(
             f"{path} is not a readable MCAP recording: {error or type(error).__name__}."
         ) from None
@@ -113,7 +114,7 @@ def _up_to_damage(stream: io.BufferedReader, run: Run) -> Iterator[Any]:
             inner = breakup_chunk(record, validate_crc=True) if isinstance(record, Chunk) else [record]
         except StopIteration:
             return
-        except (McapError, ValueError, struct.error, zstandard.ZstdError):
+        except DAMAGE:
             if first:
                 raise
             return

@@ -36,7 +36,8 @@ def test_every_message_survives_the_wire(kind: type[Any], data: st.DataObject) -
     assert returned == message
 
 
-COMMAND = Command(7, 3, 10, 0, 0.001, 12.5)
+REST = (0.0, 0.0, 0.0)  # the rates of the target
+COMMAND = Command(7, 3, 10, 0, 0.001, 12.5, 0.02, 0.3, 4.0)
 
 
 def framed(content: object, key: bytes = KEY) -> bytes:
@@ -47,15 +48,15 @@ def framed(content: object, key: bytes = KEY) -> bytes:
 @pytest.mark.parametrize(
     ("content", "reason"),
     [
-        ([codec.KINDS[Command], 7, 3, 10, 0, math.nan, 0.0], "value"),
-        ([codec.KINDS[Command], 7, 3, 10, 0, math.inf, 0.0], "value"),
-        ([codec.KINDS[Command], 7, 3, 10, 0, 1, 0.0], "value"),
-        ([codec.KINDS[Command], 7, True, 10, 0, 1.0, 0.0], "value"),
-        ([codec.KINDS[Command], 7, -2, 10, 0, 1.0, 0.0], "value"),
-        ([codec.KINDS[Command], 2**64 - 1, 3, 10, 0, 1.0, 0.0], "value"),
-        ([codec.KINDS[Command], "7", 3, 10, 0, 1.0, 0.0], "value"),
-        ([codec.KINDS[Command], 7, 3, 10, 0, 1.0], "fields"),
-        ([codec.KINDS[Command], 7, 3, 10, 0, 1.0, 0.0, 0.0], "fields"),
+        ([codec.KINDS[Command], 7, 3, 10, 0, math.nan, 0.0, *REST], "value"),
+        ([codec.KINDS[Command], 7, 3, 10, 0, math.inf, 0.0, *REST], "value"),
+        ([codec.KINDS[Command], 7, 3, 10, 0, 1, 0.0, *REST], "value"),
+        ([codec.KINDS[Command], 7, True, 10, 0, 1.0, 0.0, *REST], "value"),
+        ([codec.KINDS[Command], 7, -2, 10, 0, 1.0, 0.0, *REST], "value"),
+        ([codec.KINDS[Command], 2**64 - 1, 3, 10, 0, 1.0, 0.0, *REST], "value"),
+        ([codec.KINDS[Command], "7", 3, 10, 0, 1.0, 0.0, *REST], "value"),
+        ([codec.KINDS[Command], 7, 3, 10, 0, 1.0, *REST], "fields"),
+        ([codec.KINDS[Command], 7, 3, 10, 0, 1.0, 0.0, *REST, 0.0], "fields"),
         ([len(MESSAGES), 7], "kind"),
         ([-1, 7], "kind"),
         (["0", 7], "kind"),

@@ -20,8 +20,9 @@ from common.reality import Reality
 from common.recording.reader import Run, read
 from common.signals import TOPICS
 from models import substructure
-from models.closed_loop import rows, simulate
+from models.closed_loop import rows, signals, simulate
 from rths import virtual
+from rths.replay import replay_master, replay_slave
 from rths.virtual import Bench
 from tests.helpers import with_table, without_recorder
 
@@ -46,6 +47,51 @@ def test_the_loops_equal_the_compiled_rollout(short_plan: Plan, recording: Run) 
         for place, signal in enumerate(TOPICS[topic]):
             column = np.array([values[place] for values in table])
             assert np.array_equal(recording.columns[topic][signal.name], column), f"{topic}/{signal.name}"
+
+
+@pytest.mark.parametrize("kind", ["taylor", "pid_taylor", "ats"])
+def test_the_loops_equal_the_rollout_with_every_correction(
+    kind: str, short_plan: Plan, tmp_path: Path
+) -> None:
+    own: dict[str, float] = {
+        "taylor": {"lead": 0.044, "order": 3},
+        "pid_taylor": {"lead": 0.044, "proportional": 1.9, "integral": 0.05, "derivative": 0.0},
+        "ats": {"lead": 0.03},
+    }[kind]
+    compensator = {"kind": kind, "force": {"cutoff": 0.05, "unity": 2.0}, **own}
+    tables = short_plan.with_test(duration=2.0).tables() | {"compensator": compensator}
+    tables["table"] |= {"compensator": {"kind": "taylor", "lead": 0.0189, "order": 2}}
+    plan = from_tables(tables, short_plan.base)
+    found, error, _ = run(plan, tmp_path / "corrected.mcap")
+    assert error is None
+    ground = substructure.ground_rows(plan, substructure.motion(plan))
+    expected = signals(plan, simulate(plan, ground, seed=plan.test.seed))
+    for name in ("actuator_command", "displacement", "table_command", "table_displacement", "damper_force"):
+        assert np.array_equal(np.asarray(found.signal(name)), expected[name]), name
+    assert not np.array_equal(expected["table_command"], expected["table_target"])
+    assert found.metadata["plan"]["digest"] == plan.digest()
+    assert replay_matches(tmp_path / "corrected.mcap")
+
+
+def replay_matches(path: Path) -> bool:
+    """Whether master's and table's computations come out again."""
+    recording = read(path)
+    matches = replay_master(recording) | replay_slave(recording)
+    assert {"slave/table_command", "master/actuator_command"} <= matches.keys()
+    return all(match.differing == 0 and match.compared > 0 for match in matches.values())
+
+
+def test_the_table_follows_the_floor_behind_its_compensator(short_plan: Plan, tmp_path: Path) -> None:
+    delays = []
+    for number, compensator in enumerate(({}, {"kind": "taylor", "lead": 0.01885, "order": 2})):
+        plan = with_table(short_plan, "table", compensator=compensator)
+        found, _, _ = run(plan, tmp_path / f"{number}.mcap")
+        wanted = np.concatenate([[0.0], found.columns["slave"]["table_target"][:-1]])
+        got = found.columns["slave"]["table_displacement"]
+        lags = np.arange(-5, 20)
+        errors = [np.std((got - np.roll(wanted, lag))[50:-50]) for lag in lags]
+        delays.append(2 * int(lags[int(np.argmin(errors))]))
+    assert delays == [pytest.approx(18.85, abs=2.0), 0]
 
 
 def test_the_same_inputs_give_the_same_bits(short_plan: Plan, recording: Run, tmp_path: Path) -> None:
@@ -201,7 +247,7 @@ def test_a_slave_has_one_master(short_plan: Plan) -> None:
     bench.slave.take(Register(5, PROTOCOL_VERSION, plan.digest()), 0)
     bench.slave.take(Register(6, PROTOCOL_VERSION, plan.digest()), 0)
     assert bench.slave.lab.exchange.session == 5
-    bench.slave.take(Command(6, 0, 0, 0, 1.0, 1.0), 0)
+    bench.slave.take(Command(6, 0, 0, 0, 1.0, 1.0, 0.0, 0.0, 0.0), 0)
     bench.slave.take(Trip(6, "master", "x", "y"), 0)
     assert not bench.slave.heard(0)
     assert bench.slave.lab.exchange.state is State.REGISTERED

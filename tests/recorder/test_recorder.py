@@ -24,7 +24,7 @@ from recorder.sink import FileSink, ThreadedSink
 from rths import virtual
 from tests.helpers import with_table
 
-ITEM = ["slave", 0, 0, 0, 0.0, -1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+ITEM = ["slave", 0, 0, 0, 0.0, -1, *[0.0] * 10]
 
 
 def recording(tmp_path: Path) -> Recording:
