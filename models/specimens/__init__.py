@@ -17,7 +17,7 @@ from common.schema import Rule, nearest
 from models import registry
 from models.compiled import jit
 from models.registry import Array
-from models.specimens import bilinear, bouc_wen, linear
+from models.specimens import bilinear, bouc_wen, bwbn, clough, linear
 
 
 def no_fault(_params: Any) -> str:
@@ -43,6 +43,8 @@ SPECIMENS = {
         Specimen("linear", 0, linear.Params, linear.RULES, linear.STATE_SIZE),
         Specimen("bilinear", 1, bilinear.Params, bilinear.RULES, bilinear.STATE_SIZE),
         Specimen("bouc_wen", 2, bouc_wen.Params, bouc_wen.RULES, bouc_wen.STATE_SIZE, bouc_wen.fault),
+        Specimen("clough", 3, clough.Params, clough.RULES, clough.STATE_SIZE, clough.fault),
+        Specimen("bwbn", 4, bwbn.Params, bwbn.RULES, bwbn.STATE_SIZE, bwbn.fault),
     )
 }
 STATE_SIZE = max(model.state_size for model in SPECIMENS.values())
@@ -77,4 +79,8 @@ def step(kind: int, p: Array, s: Array, deformation: float) -> float:
         return bilinear.step(p, s, deformation)
     if kind == 2:
         return bouc_wen.step(p, s, deformation)
+    if kind == 3:
+        return clough.step(p, s, deformation)
+    if kind == 4:
+        return bwbn.step(p, s, deformation)
     return linear.step(p, s, deformation)

@@ -20,6 +20,15 @@ EXAMPLES: dict[str, dict[str, float]] = {
     "linear": {"stiffness": K},
     "bilinear": {"stiffness": K, "yield_displacement": DY, "hardening": 0.1},
     "bouc_wen": {"stiffness": K, "yield_displacement": DY, "hardening": 0.05, "n": 2.0},
+    "clough": {
+        "stiffness": K,
+        "yield_displacement": DY,
+        "hardening": 0.05,
+        "unloading": 0.4,
+        "crack_displacement": 0.2 * DY,
+        "closing": 0.3,
+    },
+    "bwbn": {"stiffness": K, "yield_displacement": DY, "hardening": 0.05},
 }
 
 

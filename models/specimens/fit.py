@@ -1,0 +1,273 @@
+"""Parameters of a specimen model from a measured path of deformation and force.
+
+The sum of squares of the force's misfit is minimised by a trust-region method (Branch, Coleman and Li, SIAM J.
+Sci. Comput. 21 (1999), 1-23) from a few fixed starting points, because it has more than one minimum. Long
+records are thinned to the extremes of equal blocks, which keeps every turning point; the misfit that is
+reported is that of all rows. Two parameters are tied, as a path cannot tell them apart: β + γ = 1 (any other
+sum is another yield displacement), and the hardening of `clough` is sought as a share of what its open
+cracks leave.
+
+The intervals hold for independent errors of equal spread. What a model cannot follow is neither, so they
+say how sharply the minimum is cut rather than how far another column may be.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise, product
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+from scipy.stats import t as student
+
+from common.errors import InputError
+from common.schema import nearest
+from models import specimens
+from models.compiled import jit
+from models.registry import Array
+from models.specimens import SPECIMENS
+
+MOST_ROWS = 1200  # of a thinned record
+FOLLOWED = 600  # starting points followed to their minimum, times parameters squared; at least two are
+EVALUATIONS = 50  # most steps to a minimum
+CONFIDENCE = 0.95
+WEAKEST = 1e-13  # smallest eigenvalue of the normal matrix, relative to its largest
+WIDEST = 50.0  # bound on the logarithm of a factor between estimate and interval
+
+
+@dataclass(frozen=True)
+class Range:
+    """Where a parameter is sought, and from which values; `unit` is what they are multiples of."""
+
+    low: float
+    high: float
+    starts: tuple[float, ...]
+    unit: str = ""
+    log: bool = True
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted model: parameters, misfit `rms(f − f̂)/rms(f)`, and their 95 % intervals."""
+
+    model: str
+    parameters: dict[str, float]
+    nrmse: float
+    intervals: dict[str, tuple[float, float]]
+
+
+STIFFNESS = Range(0.2, 100.0, (1.2, 3.0), "secant")
+YIELDING = Range(0.002, 5.0, (0.25, 0.6), "reach")
+HARDENING = Range(0.0, 0.95, (0.05, 0.3), log=False)
+SHARPNESS = Range(1.0, 20.0, (1.5,))
+SHARE = Range(0.005, 3.0, (0.1, 0.5))
+ROUND = {
+    "stiffness": STIFFNESS,
+    "yield_displacement": YIELDING,
+    "hardening": HARDENING,
+    "n": SHARPNESS,
+    "beta": SHARE,
+}
+FREE: dict[str, dict[str, Range]] = {
+    "linear": {"stiffness": STIFFNESS},
+    "bilinear": {"stiffness": STIFFNESS, "yield_displacement": YIELDING, "hardening": HARDENING},
+    "bouc_wen": ROUND,
+    "clough": {
+        "stiffness": STIFFNESS,
+        "yield_displacement": YIELDING,
+        "hardening": HARDENING,
+        "unloading": Range(0.0, 1.0, (0.2, 0.6), log=False),
+        "crack_displacement": Range(0.002, 1.0, (0.1, 0.2), "reach"),
+        "closing": Range(0.0, 0.95, (0.05, 0.3), log=False),
+    },
+    "bwbn": ROUND
+    | {
+        "delta_nu": Range(1e-5, 10.0, (0.003, 0.1)),
+        "delta_eta": Range(1e-5, 10.0, (0.003, 0.1)),
+        "zeta_s": Range(0.0, 0.99, (0.3,), log=False),
+        "q": Range(-1.0, 1.0, (0.1,), log=False),
+        "p": Range(1e-4, 50.0, (0.1,)),
+        "psi": Range(0.02, 5.0, (0.3,)),
+        "delta_psi": Range(1e-6, 5.0, (0.005,)),
+        "lambda_": Range(0.01, 5.0, (0.5,)),
+    },
+}
+
+
+@jit
+def rollout(kind: int, p: Array, s: Array, path: Array, force: Array) -> None:
+    """Force (N) of a model along a path (m), into `force`; its memory `s` moves on."""
+    for i in range(path.size):
+        force[i] = specimens.step(kind, p, s, path[i])
+
+
+def forces(model: str, parameters: Mapping[str, float], path: Array) -> Array:
+    """Force (N) of a model along a path (m) that starts at rest."""
+    kind, p, s = specimens.pack(model, **parameters)
+    force = np.empty(path.size)
+    rollout(kind, p, s, path, force)
+    return force
+
+
+def fit(model: str, deformation: Array, force: Array, start: Mapping[str, float] | None = None) -> Fit:
+    """Parameters of `model` with which it follows a path of deformation (m) and force (N) from rest.
+
+    `start` are parameters to start from instead of the fixed points, by name; what it leaves out is theirs.
+
+    Raises:
+        InputError: the model or a parameter is unknown, or the record is none.
+    """
+    path, measured = record(model, deformation, force)
+    fields = SPECIMENS[model].params._fields
+    for name in start or {}:
+        if name not in fields:
+            raise InputError(f"Unknown parameter '{name}' of model '{model}': {nearest(name, fields)}")
+    ranges = FREE[model]
+    scale = scales(path, measured)
+    units = np.array([scale[item.unit] for item in ranges.values()])
+    low, high = bounds(ranges)
+    kept = thinned(path, MOST_ROWS)
+    rms = math.sqrt(float(np.mean(measured**2)))
+
+    def misfit(x: Array) -> Array:
+        return (forces(model, parameters(model, x, units), path[kept]) - measured[kept]) / rms
+
+    trials = [np.clip(x, low, high) for x in starting_points(model, units, start)]
+    ranked = sorted(trials, key=lambda x: float(np.sum(misfit(x) ** 2)))
+    chosen = ranked[: max(2, FOLLOWED // len(ranges) ** 2)]
+    found = [
+        least_squares(misfit, x, bounds=(low, high), x_scale="jac", max_nfev=EVALUATIONS) for x in chosen
+    ]
+    best = min(found, key=lambda solution: float(solution.cost))
+    values = parameters(model, best.x, units)
+    gap = forces(model, values, path) - measured
+    return Fit(
+        model,
+        values,
+        math.sqrt(float(np.mean(gap**2))) / rms,
+        intervals(model, np.asarray(best.x), units, np.asarray(best.jac), 2.0 * float(best.cost)),
+    )
+
+
+def record(model: str, deformation: Array, force: Array) -> tuple[Array, Array]:
+    """Path (m) and force (N), checked.
+
+    Raises:
+        InputError: the model is unknown or the record cannot be fitted.
+    """
+    if model not in FREE:
+        raise InputError(f"No fit for specimen model '{model}': {nearest(model, FREE)}")
+    path = np.ascontiguousarray(deformation, dtype=np.float64)
+    measured = np.ascontiguousarray(force, dtype=np.float64)
+    if path.ndim != 1 or path.shape != measured.shape:
+        raise InputError(
+            f"Deformation and force have the shapes {path.shape} and {measured.shape}: give one length."
+        )
+    if path.size <= len(FREE[model]):
+        raise InputError(f"{path.size} rows are too few to fit {len(FREE[model])} parameters of '{model}'.")
+    if not (np.isfinite(path).all() and np.isfinite(measured).all()):
+        raise InputError("Deformation and force must be finite in every row.")
+    if not (np.any(path) and np.any(measured)):
+        raise InputError("Deformation or force is zero in every row, so there is nothing to fit.")
+    return path, measured
+
+
+def scales(path: Array, force: Array) -> dict[str, float]:
+    """What the ranges are multiples of: the largest deformation (m), the secant (N/m), and one."""
+    reach = float(np.abs(path).max())
+    return {"reach": reach, "secant": float(np.abs(force).max()) / reach, "": 1.0}
+
+
+def thinned(path: Array, most: int) -> NDArray[np.intp]:
+    """Rows to keep of a path: the lowest and the highest of each of `most`/2 blocks, first and last."""
+    if path.size <= most:
+        return np.arange(path.size)
+    edges = np.linspace(0, path.size, most // 2 + 1).astype(np.intp)
+    pairs = [(a + path[a:b].argmin(), a + path[a:b].argmax()) for a, b in pairwise(edges)]
+    return np.unique([0, path.size - 1, *np.ravel(pairs)]).astype(np.intp)
+
+
+def bounds(ranges: Mapping[str, Range]) -> tuple[Array, Array]:
+    """Lowest and highest of what is sought."""
+    low = [math.log(item.low) if item.log else item.low for item in ranges.values()]
+    high = [math.log(item.high) if item.log else item.high for item in ranges.values()]
+    return np.array(low), np.array(high)
+
+
+def parameters(model: str, x: Array, units: Array) -> dict[str, float]:
+    """The model's parameters from what is sought: logarithms, multiples and shares."""
+    ranges = FREE[model]
+    values = {
+        name: float(unit * (math.exp(value) if item.log else value))
+        for (name, item), value, unit in zip(ranges.items(), x.tolist(), units.tolist(), strict=True)
+    }
+    if "beta" in values:
+        values["gamma"] = 1.0 - values["beta"]
+    if "closing" in values:
+        values["hardening"] *= 1.0 - values["closing"]
+    return values
+
+
+def sought(model: str, values: Mapping[str, float], units: Array) -> Array:
+    """What is sought, from the model's parameters; the inverse of `parameters`."""
+    given = dict(values)
+    if "beta" in given:
+        # any other sum of both is the same loop with another yield displacement
+        total = given["beta"] + given.pop("gamma", 1.0 - given["beta"])
+        if total > 0.0:
+            given["beta"] /= total
+            given["yield_displacement"] *= total ** (-1.0 / given["n"])
+    if "closing" in given:
+        given["hardening"] /= max(1.0 - given["closing"], 1e-9)
+    x = []
+    for (name, item), unit in zip(FREE[model].items(), units.tolist(), strict=True):
+        value = given[name] / unit
+        x.append(math.log(max(value, item.low)) if item.log else value)
+    return np.array(x)
+
+
+def starting_points(model: str, units: Array, start: Mapping[str, float] | None) -> list[Array]:
+    """The caller's point, or else every combination of the ranges' starting values."""
+    ranges = FREE[model]
+    points = [
+        np.array(
+            [math.log(value) if item.log else value for item, value in zip(ranges.values(), row, strict=True)]
+        )
+        for row in product(*(item.starts for item in ranges.values()))
+    ]
+    if start:
+        return [sought(model, parameters(model, points[0], units) | dict(start), units)]
+    return points
+
+
+def intervals(
+    model: str, x: Array, units: Array, jacobian: Array, squares: float
+) -> dict[str, tuple[float, float]]:
+    """95 % interval of every parameter, from the Jacobian of the misfit at the minimum."""
+    rows, count = jacobian.shape
+    weights, vectors = np.linalg.eigh(jacobian.T @ jacobian)
+    # a direction without influence is uncertain, not certain
+    weights = np.maximum(weights, WEAKEST * max(float(weights[-1]), 1e-300))
+    covariance = (vectors / weights) @ vectors.T * (squares / (rows - count))
+    factor = float(student.ppf(0.5 + 0.5 * CONFIDENCE, rows - count))
+    values = parameters(model, x, units)
+    found = {}
+    for name, value in values.items():
+        ranged = FREE[model].get(name)
+        log = ranged is not None and ranged.log
+        gradient = np.array(
+            [
+                (parameters(model, x + h, units)[name] - parameters(model, x - h, units)[name]) / 2e-6
+                for h in 1e-6 * np.eye(count)
+            ]
+        )
+        half = factor * math.sqrt(float(gradient @ covariance @ gradient))
+        if log:
+            spread = math.exp(min(half / value, WIDEST))
+            found[name] = (value / spread, value * spread)
+        else:
+            found[name] = (value - half, value + half)
+    return found

@@ -1,0 +1,85 @@
+"""The columns against OpenSees's uniaxial materials, where OpenSeesPy is installed and loads."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+from importlib import import_module
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+
+from models import specimens
+from models.registry import Array
+
+K, DY = 12.5, 8.0  # kN/mm, mm: OpenSees's local iteration has an absolute tolerance
+CORNERS = np.array([0.0, 2.0, -1.0, 0.7, -3.0, 4.0, 3.5, 3.8, -0.2, 5.0, -5.0]) * DY
+
+
+@pytest.fixture(name="ops")
+def _ops() -> Iterator[Any]:
+    try:
+        ops = import_module("openseespy.opensees")
+    except (ImportError, RuntimeError, OSError) as why:
+        pytest.skip(f"OpenSeesPy does not load here: {why}")
+    ops.wipe()
+    yield ops
+    with suppress(Exception):
+        ops.wipe()
+
+
+def path(steps: int) -> Array:
+    parts = [np.linspace(a, b, steps + 1)[1:] for a, b in pairwise(CORNERS)]
+    return np.concatenate(parts)
+
+
+def theirs(ops: Any, deformations: Array, *material: float | str) -> Array:
+    ops.uniaxialMaterial(material[0], 1, *material[1:])
+    ops.testUniaxialMaterial(1)
+    force = []
+    for x in deformations:
+        ops.setStrain(float(x))
+        force.append(ops.getStress())
+    return np.array(force)
+
+
+def ours(name: str, deformations: Array, **params: float) -> Array:
+    kind, p, s = specimens.pack(name, stiffness=K, yield_displacement=DY, **params)
+    return np.array([specimens.step(kind, p, s, float(x)) for x in deformations])
+
+
+@pytest.mark.parametrize("hardening", [0.0, 0.05, 0.3])
+def test_bilinear_is_steel01(ops: Any, hardening: float) -> None:
+    points = path(200)
+    expected = theirs(ops, points, "Steel01", K * DY, K, hardening)
+    np.testing.assert_allclose(
+        ours("bilinear", points, hardening=hardening), expected, rtol=0, atol=1e-9 * K * DY
+    )
+
+
+@pytest.mark.parametrize("n", [1.0, 2.0, 4.0])
+@pytest.mark.parametrize(("beta", "gamma"), [(0.5, 0.5), (0.8, 0.2), (0.3, 0.7)])
+def test_bouc_wen_is_theirs(ops: Any, n: float, beta: float, gamma: float) -> None:
+    # theirs has units of m⁻ⁿ and integrates by backward Euler, of order 1 in the step
+    points = path(4000)
+    unit = DY**-n
+    expected = theirs(
+        ops, points, "BoucWen", 0.05, K, n, gamma * unit, beta * unit, 1.0, 0.0, 0.0, 0.0, 1e-10, 200
+    )
+    found = ours("bouc_wen", points, hardening=0.05, n=n, beta=beta, gamma=gamma)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=3e-3 * K * DY)
+
+
+def test_degradation_is_theirs(ops: Any) -> None:
+    # their energy is k·∫z dx over lengths, ours over k·δ_y²
+    points, n, rate = path(4000), 2.0, 1.0 / (K * DY**2)
+    unit = DY**-n
+    expected = theirs(
+        ops,
+        points,
+        *("BoucWen", 0.05, K, n, 0.5 * unit, 0.5 * unit, 1.0, 0.0, 0.05 * rate, 0.1 * rate, 1e-10, 200),
+    )
+    found = ours("bwbn", points, hardening=0.05, n=n, delta_nu=0.05, delta_eta=0.1, zeta_s=0.0)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=5e-3 * K * DY)
