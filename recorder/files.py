@@ -20,8 +20,8 @@ from models.registry import Array
 PACKAGES = ("rths", "eclipse-zenoh", "mcap", "msgpack", "numba", "numpy", "protobuf", "scipy")
 
 
-def choose_path(given: Path | None, plan: Plan) -> Path:
-    """Where a recording goes: the file given, or `<folder>/<test>-<time>.mcap` in a folder that is made.
+def choose_path(given: Path | None, plan: Plan, label: str = "") -> Path:
+    """Where a recording goes: the file given, or `<folder>/<test>[-<label>]-<time>.mcap` in a folder that is made.
 
     Raises:
         InputError: nothing can be written there.
@@ -35,7 +35,8 @@ def choose_path(given: Path | None, plan: Plan) -> Path:
         raise InputError(
             f"Cannot make the folder {folder} for recordings: {error.strerror}; give a file with -o."
         ) from None
-    return checked(folder / f"{plan.test.name}-{time.strftime('%Y%m%d-%H%M%S')}.mcap")
+    name = f"{plan.test.name}-{label}" if label else plan.test.name
+    return checked(folder / f"{name}-{time.strftime('%Y%m%d-%H%M%S')}.mcap")
 
 
 def checked(path: Path) -> Path:

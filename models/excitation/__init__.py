@@ -1,0 +1,99 @@
+"""What a bench test asks of one part: pieces of motion or force on the grid of ticks, joined into a programme.
+
+A programme starts and ends at rest; every piece is at rest at both ends and lies between still spans.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from models.excitation.pieces import Piece, random_wave, sine, static_cycles, steps, sweep
+from models.registry import Array
+
+__all__ = [
+    "PARTS",
+    "Piece",
+    "Programme",
+    "Segment",
+    "join",
+    "programme",
+]
+
+STILL = 0.5  # s, between pieces
+POSITION, RATE, ACCELERATION, JERK = range(4)
+
+
+class Segment(NamedTuple):
+    """Where a piece lies: ticks `begin` to `end`, the latter excluded, and what it was made with."""
+
+    name: str
+    begin: int
+    end: int
+    values: dict[str, float]
+
+
+class Programme(NamedTuple):
+    """What is asked at every tick."""
+
+    motion: Array  # (4, ticks + 1): value (m or N) and its first three derivatives in time
+    segments: tuple[Segment, ...]
+
+
+def join(pieces: Sequence[Piece], interval: float) -> Programme:
+    """The pieces one after the other, with a still span before, between and behind them."""
+    still = np.zeros((4, round(STILL / interval)))
+    parts, segments, at = [still], [], still.shape[1]
+    for piece in pieces:
+        count = piece.values.size
+        motion = np.zeros((4, count))
+        motion[POSITION] = piece.values
+        if piece.smooth:
+            for order in range(1, 4):
+                motion[order] = np.gradient(motion[order - 1], interval)
+        parts += [motion, still]
+        segments.append(Segment(piece.name, at, at + count, piece.made_with))
+        at += count + still.shape[1]
+    return Programme(np.concatenate([*parts, still[:, :1]], axis=1), tuple(segments))
+
+
+def column(interval: float, _seed: int) -> list[Piece]:
+    """Static cyclic loading of the seed paper (section 2.2): ±1.5 to ±7.5 mm, three cycles each."""
+    return [
+        static_cycles(interval, (1.5e-3, 3.0e-3, 4.5e-3, 6.0e-3, 7.5e-3), cycles=3, speed=3e-3, hold=0.25)
+    ]
+
+
+def actuator(interval: float, seed: int) -> list[Piece]:
+    """Steps of 5 mm, sines of 0.5 to 3 Hz, a random wave below 3 Hz (section 3)."""
+    sines = [
+        sine(interval, frequency, amplitude=5e-3, cycles=max(6, round(6 * frequency)))
+        for frequency in (0.5, 1.0, 2.0, 3.0)
+    ]
+    wave = random_wave(interval, band=(0.1, 3.0), rms=1.5e-3, duration=30.0, seed=seed)
+    return [steps(interval, height=5e-3, hold=0.5, count=8), *sines, wave]
+
+
+def table(interval: float, _seed: int) -> list[Piece]:
+    """Steps of 2 mm and a sweep of 0.5 to 25 Hz, at most 10 mm and 3 m/s²."""
+    return [
+        steps(interval, height=2e-3, hold=0.5, count=8),
+        sweep(interval, (0.5, 25.0), duration=40.0, amplitude=10e-3, curvature=3.0),
+    ]
+
+
+def damper(interval: float, _seed: int) -> list[Piece]:
+    """A sweep of the motor's force of 20 N from 0.8 to 20 Hz."""
+    return [sweep(interval, (0.8, 20.0), duration=40.0, amplitude=20.0, curvature=np.inf)]
+
+
+PARTS = {"column": column, "actuator": actuator, "table": table, "damper": damper}
+
+
+def programme(part: str, interval: float, seed: int, only: Sequence[str] = ()) -> Programme:
+    """The bench test of a part, or those of its pieces whose names begin with one of `only`."""
+    pieces = PARTS[part](interval, seed)
+    chosen = [piece for piece in pieces if not only or any(piece.name.startswith(word) for word in only)]
+    return join(chosen, interval)
