@@ -18,6 +18,7 @@ from common.laboratory import Report
 from common.plan import Plan
 from common.reality import Reality
 
+SHIPPED = ("default", "paper", "rc_column")
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 
 
@@ -29,7 +30,7 @@ def plan_arguments(parser: argparse.ArgumentParser, *, optional: bool = False) -
         )
     else:
         parser.add_argument(
-            "plan", metavar="PLAN", help="TOML file of the test; 'default' or 'paper' for those that ship"
+            "plan", metavar="PLAN", help=f"TOML file of the test; {', '.join(SHIPPED)} for those that ship"
         )
     parser.add_argument("--duration", type=float, metavar="S", help="length of the test in seconds")
     parser.add_argument("--scale", type=float, metavar="X", help="factor on the ground motion")
@@ -66,8 +67,8 @@ def load_plan(args: argparse.Namespace) -> Plan:
 
 
 def plan_path(name: str | None) -> Path:
-    """The file behind the name of a plan that ships ('default', 'paper'), or the path itself."""
-    if name is None or (name in ("default", "paper") and not Path(name).exists()):
+    """The file behind the name of a plan that ships, or the path itself."""
+    if name is None or (name in SHIPPED and not Path(name).exists()):
         return Path(__file__).resolve().parent.parent / "rths" / "plans" / f"{name or 'default'}.toml"
     return Path(name)
 

@@ -44,6 +44,7 @@ def write_report(summary: dict[str, Any]) -> None:
         say(f"ground motion: {motion['record']}, scaled by {motion['scale']}\n")
     write_completeness(summary)
     write_peaks(summary["peaks"])
+    write_tracking(summary["tracking"])
     write_latency(summary)
     for event in summary["events"]:
         if event["level"] != "info":
@@ -77,6 +78,27 @@ def write_peaks(peaks: dict[str, dict[str, Any]]) -> None:
             f"{facts['t']:.3f} s" if facts["t"] is not None else "",
         ]
         for name, facts in peaks.items()
+    ]
+    sys.stdout.write("\n")
+    table(rows)
+
+
+def write_tracking(tracking: dict[str, dict[str, float]]) -> None:
+    """How the transfer systems followed their targets."""
+    if not tracking:
+        return
+    rows = [["tracking", "delay", "by correlation", "amplitude", "at", "NRMSE", "peak error"]]
+    rows += [
+        [
+            part,
+            f"{facts['delay'] * 1e3:.2f} ms",
+            f"{facts['correlation_delay'] * 1e3:.2f} ms",
+            f"{facts['amplitude']:.4f}",
+            f"{facts['frequency']:.2f} Hz",
+            f"{facts['nrmse']:.4f}",
+            f"{facts['peak_error']:.4f}",
+        ]
+        for part, facts in tracking.items()
     ]
     sys.stdout.write("\n")
     table(rows)

@@ -60,12 +60,20 @@ def in_virtual_time(plan: Plan, reality: Reality, output: Path, stopping: Stoppe
     from rths import virtual
 
     bench = virtual.assemble(plan, reality, output, virtual_report)
+    sys.stderr.write(f"{before_the_start(plan)}\n")
     calm()
     started = time.monotonic()
     error = virtual.run(bench, stopping)
     seconds = time.monotonic() - started
     sys.stderr.write(f"{plan.test.duration:g} s of test in {seconds:.1f} s of computing\n")
     return error
+
+
+def before_the_start(plan: Plan) -> str:
+    """What the nominal models say about the loop that is about to be closed."""
+    from rths.partition import assess, sentence
+
+    return f"before the start: {sentence(assess(plan))}"
 
 
 def virtual_report(kind: str, data: Any) -> None:
@@ -86,6 +94,7 @@ def in_real_time(
     progress = Progress(plan.test.duration)
     endpoint = listenable()
     warm_up(progress)
+    progress.say(before_the_start(plan))
     progress.say(f"{plan.test.name}: {plan.test.duration:g} s, starting master, slave and recorder")
     try:
         start_all(processes, args, endpoint, output)

@@ -10,8 +10,15 @@ from common import signals
 from common.plan import Plan, parse
 from common.recording.reader import Run
 from common.signals import Kind
+from models import indicators
 
 PERCENTILES = (50, 90, 99, 99.9)
+LEAST_TICKS = 500
+# topic, part, target, measurement, ticks by which the target stands before the measurement that it belongs to
+PATHS = (
+    ("master", "actuator", "column_target", "column_displacement", 0),
+    ("slave", "table", "table_target", "table_displacement", 1),
+)
 SEGMENTS = (
     "wake_lateness",
     "compute_time",
@@ -40,6 +47,7 @@ def summarize(run: Run) -> dict[str, Any]:
         "topics": {topic: completeness(run, topic, plan) for topic in run.columns},
         "recorder": dict(run.metadata.get("summary", {})),
         "peaks": peaks(run),
+        "tracking": tracking(run),
         "latency": latency(run),
         "late_ticks": int(np.sum(run.columns["latency"]["deadline_missed"])) if run.has("latency") else None,
         "events": run.events,
@@ -79,6 +87,29 @@ def peaks(run: Run) -> dict[str, dict[str, Any]]:
             place = int(np.argmax(magnitude))
             at = float(t[place]) if t is not None else None
             result[f"{topic}/{row.name}"] = {"peak": float(magnitude[place]), "t": at, "unit": row.unit}
+    return result
+
+
+def tracking(run: Run) -> dict[str, dict[str, float]]:
+    """How the transfer systems followed their targets: delay (s) two ways, amplitude, NRMSE, peak error."""
+    result = {}
+    for topic, part, target, measured, late in PATHS:
+        columns = run.columns.get(topic, {})
+        if not {target, measured, "t"} <= columns.keys() or columns["t"].size <= LEAST_TICKS:
+            continue
+        wanted, got = columns[target][: columns["t"].size - late], columns[measured][late:]
+        if not np.std(wanted) or not np.std(got):
+            continue
+        interval = float(np.median(np.diff(columns["t"])))
+        path = indicators.frequency_evaluation_index(wanted, got, interval)
+        result[part] = {
+            "delay": path.delay,
+            "amplitude": path.amplitude,
+            "frequency": path.frequency,
+            "correlation_delay": indicators.correlation_delay(wanted, got, interval),
+            "nrmse": indicators.nrmse(wanted, got),
+            "peak_error": indicators.peak_error(wanted, got),
+        }
     return result
 
 

@@ -1,0 +1,37 @@
+"""How well a test tracks, what that costs, and how near the loop is to instability: one room for all reports."""
+
+from __future__ import annotations
+
+from models.indicators.damping import (
+    apparent_damping,
+    damping_equivalent,
+    damping_points,
+    free_vibration_damping,
+)
+from models.indicators.energy import hybrid_simulation_error_energy
+from models.indicators.stability import critical_delay, predictive_stability_indicator, sensitivity
+from models.indicators.tracking import (
+    FrequencyEvaluation,
+    correlation_delay,
+    frequency_evaluation_index,
+    nrmse,
+    peak_error,
+    tracking_indicator,
+)
+
+__all__ = [
+    "FrequencyEvaluation",
+    "apparent_damping",
+    "correlation_delay",
+    "critical_delay",
+    "damping_equivalent",
+    "damping_points",
+    "free_vibration_damping",
+    "frequency_evaluation_index",
+    "hybrid_simulation_error_energy",
+    "nrmse",
+    "peak_error",
+    "predictive_stability_indicator",
+    "sensitivity",
+    "tracking_indicator",
+]

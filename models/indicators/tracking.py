@@ -1,0 +1,110 @@
+"""How a measurement follows its target: delay, amplitude, error."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from common.errors import InputError
+from models.indicators.checks import checked, moving
+from models.registry import Array
+
+
+class FrequencyEvaluation(NamedTuple):
+    """What the frequency evaluation index says."""
+
+    amplitude: float  # measured over target, –
+    delay: float  # s, negative where the measurement leads
+    frequency: float  # Hz, at which they are meant
+
+
+def frequency_evaluation_index(target: Array, measured: Array, interval: float) -> FrequencyEvaluation:
+    """Amplitude, delay and the frequency they are meant at, each weighted by the target's power.
+
+    `FEI = Σ (X_m/X_t)·|X_t|² / Σ |X_t|²`, amplitude `|FEI|`, delay `−arg(FEI)/(2π·f_eq)`, f_eq the mean
+    frequency under |X_t|². `target` and `measured` (n,) in one unit, `interval` in s; means are removed and
+    a Hann window is laid over both. A delay beyond half a period of f_eq comes out a period short.
+
+    Raises:
+        InputError: signals empty, unequal, not finite or constant.
+
+    Source: Guo, Chen, Chen, Chen and Li, Frequency-domain-based evaluation of actuator tracking, Smart
+    Materials and Structures 23 (2014).
+    """
+    checked(target=target, measured=measured)
+    moving(target=target)
+    window = np.hanning(target.size)
+    wanted = np.fft.rfft((target - np.average(target, weights=window)) * window)
+    got = np.fft.rfft((measured - np.average(measured, weights=window)) * window)
+    power = np.abs(wanted) ** 2
+    index = np.sum(got * np.conj(wanted)) / np.sum(power)
+    frequency = float(np.sum(power * np.fft.rfftfreq(target.size, interval)) / np.sum(power))
+    phase = math.atan2(index.imag, index.real)
+    return FrequencyEvaluation(float(abs(index)), -phase / (2.0 * math.pi * frequency), frequency)
+
+
+def correlation_delay(target: Array, measured: Array, interval: float, most: float = 0.2) -> float:
+    """Delay (s) at which target and measurement correlate best, between ±`most` s.
+
+    Positive where the measurement is late, negative where it is early. Each lag is normalised by the part
+    of both signals (n,) that overlaps there; a parabola through the best three gives the fraction of an
+    interval.
+
+    Raises:
+        InputError: signals empty, unequal, not finite, constant or shorter than the lags asked for.
+    """
+    checked(target=target, measured=measured)
+    moving(target=target, measured=measured)
+    reach, n = math.ceil(most / interval), target.size
+    if n < 4 * reach:
+        raise InputError(f"{n} ticks are too few for delays up to {most:g} s: give at least {4 * reach}.")
+    values = np.array([overlap(target, measured, lag) for lag in range(-reach, reach + 1)])
+    best = int(np.argmax(values))
+    if not 0 < best < values.size - 1:
+        return (best - reach) * interval
+    before, at, after = values[best - 1 : best + 2]
+    return float((best - reach + 0.5 * (before - after) / (before - 2.0 * at + after)) * interval)
+
+
+def overlap(target: Array, measured: Array, lag: int) -> float:
+    """Correlation coefficient of the target with a measurement that is `lag` ticks late."""
+    n = target.size
+    a = target[max(0, -lag) : n - max(0, lag)]
+    b = measured[max(0, lag) : n - max(0, -lag)]
+    a, b = a - a.mean(), b - b.mean()
+    size = math.sqrt(float(a @ a) * float(b @ b))
+    return float(a @ b) / size if size > 0.0 else 0.0
+
+
+def tracking_indicator(target: Array, measured: Array) -> Array:
+    """Running area enclosed by measured over target (n,), in their units squared; it grows while the measurement lags.
+
+    Raises:
+        InputError: signals empty, unequal or not finite.
+
+    Source: Mercan, Analytical and experimental studies on large scale, real-time pseudodynamic testing,
+    dissertation, Lehigh University (2007).
+    """
+    checked(target=target, measured=measured)
+    swept = 0.5 * (target[:-1] * measured[1:] - measured[:-1] * target[1:])
+    return np.concatenate([[0.0], np.cumsum(swept)])
+
+
+def nrmse(reference: Array, values: Array) -> float:
+    """`rms(values − reference)/rms(reference)`; raises InputError for signals empty, unequal, not finite or zero."""
+    checked(reference=reference, values=values)
+    size = float(np.sqrt(np.mean(reference**2)))
+    if size == 0.0:
+        raise InputError("The reference is zero throughout: an error relative to it means nothing.")
+    return float(np.sqrt(np.mean((values - reference) ** 2))) / size
+
+
+def peak_error(reference: Array, values: Array) -> float:
+    """`max|values − reference|/max|reference|`; raises InputError for signals empty, unequal, not finite or zero."""
+    checked(reference=reference, values=values)
+    size = float(np.max(np.abs(reference)))
+    if size == 0.0:
+        raise InputError("The reference is zero throughout: an error relative to it means nothing.")
+    return float(np.max(np.abs(values - reference))) / size

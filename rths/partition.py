@@ -1,0 +1,130 @@
+"""What a plan's partition can bear: critical delay, sensitivity, and what the actuator's path will cost."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from common.plan import Plan
+from models import compensators, excitation, indicators
+from models.excitation import Programme, join
+from models.excitation.pieces import sine
+from models.labs import column_lab
+from models.structures import shear_building
+
+CYCLES = 12
+
+
+class Partition(NamedTuple):
+    """Margins of the column's path, from nominal models."""
+
+    frequency: float  # Hz, of the building's first mode
+    critical_delay: float  # s, inf where no delay makes the loop unstable
+    sensitivity: float  # predictive stability indicator, log10 of it in ms
+    amplitude: float  # of the compensated actuator at that frequency
+    delay: float  # s, there
+    damping_points: float  # damping ratio that the path costs the first mode
+
+
+def assess(plan: Plan) -> Partition:
+    """The partition of a plan; raises InputError where a model or parameter is unknown."""
+    modes = shear_building.modes(*matrices(plan))
+    frequency = 1.0 / float(modes.periods[0])
+    omega = 2.0 * math.pi * frequency
+    critical = critical_delay_of(plan)
+    path = path_at(plan, frequency)
+    share = experimental_stiffness(plan) * float(drift_direction(plan) @ modes.shapes[:, 0]) ** 2
+    lost, _ = indicators.damping_equivalent(share, path.amplitude, path.delay, omega)
+    return Partition(
+        frequency,
+        critical,
+        indicators.predictive_stability_indicator(critical),
+        path.amplitude,
+        path.delay,
+        lost / (2.0 * omega),
+    )
+
+
+def sentence(found: Partition) -> str:
+    """What a user must know before the start."""
+    if math.isinf(found.critical_delay):
+        margin = "no delay makes this loop unstable"
+    else:
+        margin = (
+            f"critical delay of the column's path {found.critical_delay * 1e3:.1f} ms "
+            f"(predictive stability indicator {found.sensitivity:.2f})"
+        )
+    return (
+        f"{margin}; nominal actuator behind its compensator at {found.frequency:.2f} Hz: "
+        f"delay {found.delay * 1e3:+.1f} ms, amplitude {found.amplitude:.3f}, "
+        f"{found.damping_points * 100.0:+.2f} points of damping lost"
+    )
+
+
+def matrices(plan: Plan) -> tuple[Any, Any, Any]:
+    """Mass, damping and stiffness of the whole building, specimen included."""
+    structure = plan.structure
+    return shear_building.matrices(
+        np.array(structure.mass), np.array(structure.stiffness), np.array(structure.damping)
+    )
+
+
+def drift_direction(plan: Plan) -> Any:
+    """The specimen's storey drift as a row over the floors' displacements."""
+    storey = plan.column.storey - 1
+    direction = np.zeros(plan.storeys)
+    direction[storey] = 1.0
+    if storey > 0:
+        direction[storey - 1] = -1.0
+    return direction
+
+
+def experimental_stiffness(plan: Plan) -> float:
+    """Storey stiffness that comes from the laboratory, N/m."""
+    column = plan.column
+    return column.deformation_ratio * column.represents * column.stiffness
+
+
+def critical_delay_of(plan: Plan) -> float:
+    """Smallest delay (s) of the column's force that makes the linear loop unstable."""
+    M, C, K = matrices(plan)
+    direction, stiffness = drift_direction(plan), experimental_stiffness(plan)
+    share = plan.structure.stiffness[plan.column.storey - 1]
+    share *= plan.column.represents / plan.column.columns_per_storey
+    numerical = K - share * np.outer(direction, direction)
+    return float(indicators.critical_delay(M, C, numerical, direction, stiffness))
+
+
+def path_at(plan: Plan, frequency: float) -> Any:
+    """Amplitude and delay of the compensated nominal actuator for a sine of that frequency (Hz)."""
+    interval = plan.test.interval
+    cycles = max(CYCLES, round(2.0 * frequency))
+    piece = sine(interval, frequency, amplitude=1e-3, cycles=cycles)
+    target, measured = follow(plan, join([piece], interval))
+    return indicators.frequency_evaluation_index(target, measured, interval)
+
+
+def follow(plan: Plan, programme: Programme) -> tuple[Any, Any]:
+    """Target and achieved displacement of the compensated nominal actuator, m."""
+    interval = plan.test.interval
+    built = compensators.build(plan.compensator.kind, plan.compensator.parameters, interval)
+    lab = column_lab.build(interval, plan.actuator, plan.column)
+    motion = programme.motion
+    achieved = np.zeros(motion.shape[1])
+    for tick in range(achieved.size - 1):
+        ahead = motion[:, tick + 1]
+        present = float(motion[excitation.POSITION, tick])
+        command = compensators.step(
+            *built,
+            float(ahead[excitation.POSITION]),
+            float(ahead[excitation.RATE]),
+            float(ahead[excitation.ACCELERATION]),
+            float(ahead[excitation.JERK]),
+            present,
+            float(achieved[tick]),
+            interval,
+        )
+        achieved[tick + 1] = column_lab.advance(*lab, command)[0]
+    return motion[excitation.POSITION], achieved

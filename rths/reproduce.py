@@ -1,0 +1,75 @@
+"""`rths reproduce`: the seed paper's numbers and figures, paper beside computed."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from common import cli
+from common.errors import InputError
+
+if TYPE_CHECKING:
+    from rths.reproduction.rows import Row
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of `reproduce`."""
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        default=Path("runs/reproduce"),
+        metavar="FOLDER",
+        help="where recordings, figures and the page go (default: runs/reproduce)",
+    )
+    cli.json_argument(parser, "write the table as JSON on standard output")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run every experiment; 1 where a row is outside its tolerance."""
+    from rths.reproduction import experiments, figures, page
+    from rths.reproduction.rows import rows
+
+    folder: Path = args.output
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "index.html").touch()
+    except OSError as error:
+        raise InputError(
+            f"Cannot write into {folder}: {error.strerror}; give another folder with -o."
+        ) from None
+    evidence = experiments.gather(folder, say)
+    table = rows(evidence)
+    pictures = figures.draw_all(evidence, folder)
+    (folder / "index.html").write_text(page.page(table, pictures, folder), encoding="utf-8")
+    if args.json:
+        sys.stdout.write(
+            json.dumps({"rows": [asdict(row) for row in table], "page": str(folder / "index.html")})
+        )
+        sys.stdout.write("\n")
+    else:
+        show(table)
+        sys.stdout.write(f"page: {folder / 'index.html'}\n")
+    return 0 if all(row.passed for row in table) else 1
+
+
+def say(text: str) -> None:
+    """Progress, on standard error."""
+    sys.stderr.write(f"{text}\n")
+
+
+def show(table: list[Row]) -> None:
+    """The table as text, one block per row."""
+    for row in table:
+        verdict = "pass" if row.passed else "FAIL"
+        sys.stdout.write(
+            f"{verdict}  {row.name}: paper {row.paper} | computed {row.computed} | must be {row.wanted}\n"
+        )
+        if row.note:
+            sys.stdout.write(f"      {row.note}\n")
+    passed = sum(row.passed for row in table)
+    sys.stdout.write(f"{passed} of {len(table)} rows within their tolerance\n")

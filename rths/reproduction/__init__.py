@@ -1,0 +1,1 @@
+"""The seed paper reproduced: its experiments on the emulated laboratories, its numbers, its figures, one page."""

@@ -1,0 +1,184 @@
+"""Indicators against published figures and closed forms."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from common.errors import InputError
+from models import indicators
+from models.registry import Array
+
+DT = 0.002
+M, C, K = 160e3, 200e3, 25e6
+OMEGA = math.sqrt(K / M)
+
+
+def chirp(delay: float = 0.0) -> Array:
+    t = np.arange(0.0, 20.0, DT) - delay
+    return np.sin(2.0 * np.pi * (0.5 + 0.1 * t) * t) * np.exp(-0.02 * t)
+
+
+class TestTracking:
+    @pytest.mark.parametrize("delay", [-0.031, -0.0012, 0.0, 0.0005, 0.012, 0.044, 0.15])
+    def test_a_known_delay_is_found_both_ways(self, delay: float) -> None:
+        assert indicators.correlation_delay(chirp(), chirp(delay), DT) == pytest.approx(delay, abs=2e-5)
+        if abs(delay) < 0.1:
+            found = indicators.frequency_evaluation_index(chirp(), 1.1 * chirp(delay), DT)
+            assert found.delay == pytest.approx(delay, rel=0.03, abs=1e-5)
+
+    @given(amplitude=st.floats(0.2, 3.0), phase=st.floats(-2.5, 2.5), frequency=st.floats(0.5, 8.0))
+    def test_the_index_of_a_sine_is_its_amplitude_and_phase(
+        self, amplitude: float, phase: float, frequency: float
+    ) -> None:
+        turn = 2.0 * np.pi * frequency * np.arange(0.0, 20.0, DT)
+        found = indicators.frequency_evaluation_index(np.sin(turn), amplitude * np.sin(turn - phase), DT)
+        assert found.amplitude == pytest.approx(amplitude, rel=1e-3)
+        assert found.frequency == pytest.approx(frequency, rel=1e-3)
+        assert found.delay == pytest.approx(phase / (2.0 * np.pi * frequency), rel=2e-3, abs=1e-6)
+
+    def test_the_area_is_that_of_the_ellipse_and_has_the_sign_of_the_lag(self) -> None:
+        turn = np.linspace(0.0, 2.0 * np.pi, 5001)
+        area = indicators.tracking_indicator(np.sin(turn), np.sin(turn - 0.3))
+        assert area[-1] == pytest.approx(np.pi * math.sin(0.3), rel=1e-6)
+        assert indicators.tracking_indicator(np.sin(turn), np.sin(turn + 0.3))[-1] == pytest.approx(-area[-1])
+
+    @given(scale=st.floats(1e-6, 1e6), error=st.floats(-2.0, 2.0))
+    def test_relative_errors_are_relative(self, scale: float, error: float) -> None:
+        reference = scale * chirp()
+        values = (1.0 + error) * reference
+        assert indicators.nrmse(reference, values) == pytest.approx(abs(error), abs=1e-12)
+        assert indicators.peak_error(reference, values) == pytest.approx(abs(error), abs=1e-12)
+
+
+class TestDamping:
+    @pytest.mark.parametrize(
+        ("delay", "percent"),
+        [
+            (0.001, 4.84),
+            (0.004, 4.37),
+            (0.008, 3.75),
+            (0.012, 3.13),
+            (0.016, 2.51),
+            (0.030, 0.42),
+            (0.044, -1.5),
+        ],
+    )
+    def test_apparent_damping_is_the_published_one(self, delay: float, percent: float) -> None:
+        found = 100.0 * indicators.apparent_damping(M, C, K, K / 4.0, 1.0, delay)
+        assert found == pytest.approx(percent, abs=0.06 if percent < 0.0 else 0.02)
+
+    def test_the_equivalent_agrees_for_small_delays(self) -> None:
+        lost, softer = indicators.damping_equivalent(K / 4.0, 1.0, 0.001, OMEGA)
+        points = indicators.damping_points(lost, M, K)
+        assert 100.0 * points == pytest.approx(0.156, abs=0.001)
+        assert softer == pytest.approx(K / 4.0 * (OMEGA * 0.001) ** 2 / 2.0, rel=1e-3)
+        root = indicators.apparent_damping(M, C, K, K / 4.0, 1.0, 0.001)
+        assert 0.05 - root == pytest.approx(points, rel=0.02)
+
+    @given(ratio=st.floats(-0.03, 0.2), frequency=st.floats(0.7, 6.0), phase=st.floats(0.0, 6.0))
+    def test_a_free_vibration_is_read(self, ratio: float, frequency: float, phase: float) -> None:
+        t = np.arange(0.0, 5.0, DT)
+        natural = 2.0 * np.pi * frequency
+        signal = np.exp(-ratio * natural * t) * np.cos(natural * math.sqrt(1 - ratio**2) * t + phase)
+        signal += 1e-3 * np.random.default_rng(1).standard_normal(t.size) * np.max(np.abs(signal))
+        found = indicators.free_vibration_damping(3e-3 * signal, DT)
+        assert found[0] == pytest.approx(frequency, rel=2e-3)
+        assert found[1] == pytest.approx(ratio, abs=1e-3)
+
+
+class TestEnergy:
+    def test_a_late_spring_puts_in_what_its_loop_encloses(self) -> None:
+        turn = np.linspace(0.0, 20.0 * np.pi, 50_001)
+        target, measured = np.sin(turn), np.sin(turn - 0.1)
+        force = 2.0 * measured
+        found = indicators.hybrid_simulation_error_energy(target, measured, force, np.zeros(turn.size), 1.0)
+        assert found[-1] == pytest.approx(10.0 * 2.0 * np.pi * math.sin(0.1), rel=1e-4)
+
+    def test_perfect_tracking_has_no_error_energy(self) -> None:
+        x = chirp()
+        assert np.all(indicators.hybrid_simulation_error_energy(x, x, x, np.ones(x.size), 1.0) == 0.0)
+
+
+def one(value: float) -> Array:
+    return np.array([[value]])
+
+
+BENCHMARK = 1e6 * np.array(
+    [[26.0549, -23.1339, 5.9370], [-23.1339, 32.5608, -14.4200], [5.9370, -14.4200, 9.2673]]
+)
+
+
+class TestStability:
+    @pytest.mark.parametrize(("share", "ms"), [(0.25, 32.9), (0.5, 16.1), (0.75, 10.7), (1.0, 8.0)])
+    def test_the_papers_building(self, share: float, ms: float) -> None:
+        found = indicators.critical_delay(one(M), one(C), one((1 - share) * K), np.ones(1), share * K)
+        assert 1e3 * found == pytest.approx(ms, abs=0.06)
+
+    @pytest.mark.parametrize(
+        ("mass", "ratio", "ms"),
+        [(1000.0, 0.05, 14.65), (1100.0, 0.04, 12.23), (1300.0, 0.03, 9.92), (1000.0, 0.03, 8.73)],
+    )
+    def test_the_2020_benchmark_problem(self, mass: float, ratio: float, ms: float) -> None:
+        """Force delay of cases C1 to C4: Silva, Gomez, Maghareh, Dyke and Spencer, MSSP (2020)."""
+        whole = mass * np.eye(3)
+        values, vectors = np.linalg.eigh(BENCHMARK / mass)
+        damping = mass * vectors @ np.diag(2.0 * ratio * np.sqrt(values)) @ vectors.T
+        direction = np.array([1.0, 0.0, 0.0])
+        outer = np.outer(direction, direction)
+        specimen = (1.19e6, 114.6, 29.13)
+        numerical = [
+            matrix - value * outer
+            for matrix, value in zip((whole, damping, BENCHMARK), reversed(specimen), strict=True)
+        ]
+        found = indicators.critical_delay(numerical[0], numerical[1], numerical[2], direction, *specimen)
+        assert 1e3 * found == pytest.approx(ms, abs=0.1)
+
+    @given(share=st.floats(0.15, 1.0), ratio=st.floats(0.01, 0.05))
+    def test_the_loop_vibrates_undamped_at_its_critical_delay(self, share: float, ratio: float) -> None:
+        damping = 2.0 * ratio * math.sqrt(K * M)
+        critical = indicators.critical_delay(
+            one(M), one(damping), one((1 - share) * K), np.ones(1), share * K
+        )
+        roots = [
+            indicators.apparent_damping(M, damping, K, share * K, 1.0, factor * critical)
+            for factor in (0.9, 1.0, 1.1)
+        ]
+        assert roots[0] > 0.0
+        assert abs(roots[1]) < 1e-9
+        assert roots[2] < 0.0
+
+    def test_a_small_share_bears_any_delay(self) -> None:
+        assert indicators.critical_delay(one(M), one(C), one(0.95 * K), np.ones(1), 0.05 * K) == math.inf
+
+    def test_the_indicator_and_its_words(self) -> None:
+        assert indicators.predictive_stability_indicator(0.01) == pytest.approx(1.0)
+        assert [indicators.sensitivity(x) for x in (1.5, 0.3, -0.1)] == [
+            "slightly",
+            "moderately",
+            "extremely",
+        ]
+
+
+@pytest.mark.parametrize(
+    ("signals", "sentence"),
+    [
+        ((np.zeros(0), np.zeros(0)), "give one value per tick"),
+        ((np.ones(9), np.ones(8)), "differ in length"),
+        ((np.array([1.0, np.nan]), np.ones(2)), "not finite"),
+        ((np.zeros(900), chirp()[:900]), "zero throughout|constant"),
+    ],
+)
+def test_signals_that_say_nothing_are_refused(signals: tuple[Array, Array], sentence: str) -> None:
+    for call in (
+        lambda: indicators.nrmse(*signals),
+        lambda: indicators.peak_error(*signals),
+        lambda: indicators.correlation_delay(*signals, DT),
+        lambda: indicators.frequency_evaluation_index(*signals, DT),
+    ):
+        with pytest.raises(InputError, match=sentence):
+            call()

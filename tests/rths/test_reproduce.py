@@ -1,0 +1,64 @@
+"""The seed paper reproduced: every row within its tolerance, every picture there, and rows that can fail."""
+
+from __future__ import annotations
+
+import copy
+import json
+import struct
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from common.recording.reader import read
+from rths.__main__ import main
+from rths.reproduction import experiments
+from rths.reproduction.experiments import Evidence
+from rths.reproduction.figures import FIGURES
+from rths.reproduction.rows import apparent_damping, beyond, building, critical_delay, instability, rows
+
+
+@pytest.fixture(scope="module")
+def evidence(tmp_path_factory: pytest.TempPathFactory) -> Evidence:
+    return experiments.gather(tmp_path_factory.mktemp("experiments"), lambda _text: None)
+
+
+def test_every_row_is_within_its_tolerance(evidence: Evidence) -> None:
+    table = rows(evidence)
+    assert len(table) >= 19
+    assert [f"{row.name}: {row.computed}" for row in table if not row.passed] == []
+
+
+def test_a_row_fails_where_its_number_is_wrong(evidence: Evidence) -> None:
+    wrong = copy.copy(evidence)
+    wrong.damping = evidence.damping | {"paper": 0.05, "ideal": 0.045, "beyond": 0.05}
+    wrong.critical_delay = (0.034, 0.0341)
+    wrong.period = 0.51
+    wrong.tests = evidence.tests | {"uncompensated": evidence.tests["pid"]}
+    for maker in (building, instability, critical_delay, apparent_damping, beyond):
+        assert not all(row.passed for row in maker(wrong)), maker.__name__
+
+
+def test_the_command_leaves_recordings_pictures_and_one_page(
+    tmp_path: Path, monkeypatch: Any, capsys: Any
+) -> None:
+    monkeypatch.setattr("sys.argv", ["rths", "reproduce", "-o", str(tmp_path), "--json"])
+    assert main() == 0
+    report = json.loads(capsys.readouterr().out)
+    assert all(row["passed"] for row in report["rows"])
+    text = Path(report["page"]).read_text(encoding="utf-8")
+    assert "http" not in text
+    for figure in FIGURES:
+        width, height = struct.unpack(">II", (tmp_path / figure.file).read_bytes()[16:24])
+        assert width >= 1000
+        assert height >= 400
+        assert figure.caption in text
+    for path in tmp_path.glob("*.mcap"):
+        assert read(path).finished, path
+
+
+def test_a_folder_that_cannot_be_written_is_said(tmp_path: Path, monkeypatch: Any, capsys: Any) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setattr("sys.argv", ["rths", "reproduce", "-o", str(tmp_path / "file" / "x")])
+    assert main() == 2
+    assert "give another folder with -o" in capsys.readouterr().err
