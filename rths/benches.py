@@ -83,7 +83,7 @@ def play(
     sink: Sink = ThreadedSink(file_sink) if order.real_time else file_sink
     done, late, error = 0, 0, None
     try:
-        with armed(bench.rig):
+        with armed(bench.rig, sink, epoch_ns):
             done, late = loop(bench, clock, sink, epoch_ns, stopping)
         if sink.failure:
             raise InterlockError(f"The recording is lost: {sink.failure}")
@@ -115,13 +115,14 @@ class StoppedError(Exception):
 
 
 @contextlib.contextmanager
-def armed(rig: GuardedRig) -> Iterator[None]:
-    """The rig armed, and disarmed whatever happens."""
+def armed(rig: GuardedRig, sink: Sink, at_ns: int) -> Iterator[None]:
+    """The rig armed, and disarmed whatever happens; what it complains of then is recorded."""
     rig.arm()
     try:
         yield
     finally:
-        rig.disarm()
+        if complaint := rig.disarm():
+            sink.put([["event", at_ns, at_ns, 0.0, "bench", "warning", "disarm", complaint, {}]])
 
 
 class ColumnBench:

@@ -78,7 +78,7 @@ def step_response(evidence: Evidence, canvas: Any) -> None:
     axis.annotate(
         f"T {constant:.1f} ms",
         (dead + constant, height),
-        (dead + constant + 12, height - 0.6),
+        (dead + constant + 55, height - 1.2),
         arrowprops={"arrowstyle": "-"},
     )
     axis.set(xlabel="time after the step, ms", ylabel="displacement, mm")

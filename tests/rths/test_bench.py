@@ -125,3 +125,21 @@ def test_a_plug_in_laboratory_goes_through_the_same_bench_test(
 ) -> None:
     assert call("bench", "column", ROOT / "examples" / "my_test.toml", "-o", tmp_path / "a.mcap") == 0
     assert "rths identify" in capsys.readouterr().out
+
+
+def test_a_hysteretic_model_is_fitted_to_the_realistic_column(
+    call: Any,  # noqa: F811
+    capsys: Any,
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "a.mcap"
+    assert call("bench", "column", "rc_column", "-o", path) == 0
+    capsys.readouterr()
+    assert call("identify", path, "--fit", "clough", "--json") == 0
+    cycles, fitted = json.loads(capsys.readouterr().out)["parts"]
+    assert fitted["nrmse"] < 0.01
+    assert fitted["parameters"]["stiffness"]["value"] == pytest.approx(32.7e6, rel=0.02)
+    assert fitted["parameters"]["yield_displacement"]["value"] == pytest.approx(4.97e-3, rel=0.02)
+    assert cycles["cycles"][-1]["stiffness"] < 0.5 * cycles["cycles"][0]["stiffness"]
+    assert call("identify", path, "--fit", "clugh") == 2
+    assert "did you mean clough?" in capsys.readouterr().err

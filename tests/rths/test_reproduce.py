@@ -39,6 +39,19 @@ def test_a_row_fails_where_its_number_is_wrong(evidence: Evidence) -> None:
         assert not all(row.passed for row in maker(wrong)), maker.__name__
 
 
+def test_the_command_ends_with_1_where_a_row_fails(
+    evidence: Evidence, tmp_path: Path, monkeypatch: Any, capsys: Any
+) -> None:
+    wrong = copy.copy(evidence)
+    wrong.critical_delay = (0.040, 0.0401)
+    monkeypatch.setattr(experiments, "gather", lambda _folder, _say: wrong)
+    monkeypatch.setattr("sys.argv", ["rths", "reproduce", "-o", str(tmp_path)])
+    assert main() == 1
+    out = capsys.readouterr().out
+    assert "FAIL  critical delay" in out
+    assert out.count("FAIL") == 1
+
+
 def test_the_command_leaves_recordings_pictures_and_one_page(
     tmp_path: Path, monkeypatch: Any, capsys: Any
 ) -> None:

@@ -1,0 +1,68 @@
+"""What is said before a test starts."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from common import cli
+from common import plan as plans
+from common.plan import Compensator, Plan
+from models import substructure
+from models.closed_loop import signals, simulate
+from rths.partition import assess, critical_delay_of, sentence
+from rths.reproduction.experiments import delayed, pulse
+from tests.helpers import with_table
+
+
+def test_the_default_partition(default_plan: Plan) -> None:
+    found = assess(default_plan)
+    assert found.frequency == pytest.approx(1.989, abs=1e-3)
+    assert found.critical_delay == pytest.approx(0.0329, abs=1e-4)
+    assert found.delay == pytest.approx(0.0002, abs=1e-4)
+    assert found.amplitude == pytest.approx(1.028, abs=2e-3)
+    assert "critical delay of the column's path 32.9 ms" in sentence(found)
+
+
+@pytest.mark.parametrize(("lead", "points"), [(0.0088, 1.9), (0.044, 0.0)])
+def test_the_cost_is_that_of_the_residual_delay(default_plan: Plan, lead: float, points: float) -> None:
+    plan = with_table(default_plan, "compensator", lead=lead)
+    assert 100.0 * assess(plan).damping_points == pytest.approx(points, abs=0.05)
+
+
+def test_without_compensation_the_path_is_beyond_what_the_loop_bears(default_plan: Plan) -> None:
+    found = assess(dataclasses.replace(default_plan, compensator=Compensator("none", {})))
+    assert found.delay > found.critical_delay
+
+
+def test_a_specimen_without_stiffness_bears_any_delay(default_plan: Plan) -> None:
+    found = assess(with_table(default_plan, "column", stiffness=0.0))
+    assert math.isinf(found.critical_delay)
+    assert "no delay makes this loop unstable" in sentence(found)
+
+
+def test_two_storeys_diverge_beyond_their_critical_delay_only(default_plan: Plan) -> None:
+    plan = with_table(
+        default_plan, "structure", mass=[1.6e5, 1.6e5], stiffness=[50e6, 40e6], damping=[4e5, 3e5]
+    )
+    plan = with_table(plan, "column", stiffness=20e6, storey=2)
+    critical = critical_delay_of(plan)
+    growth = []
+    for factor in (0.9, 1.1):
+        late = delayed(plan, factor * critical).with_test(duration=20.0)
+        drift = np.abs(signals(late, simulate(late, pulse(late)))["column_target"])
+        middle = drift.size // 2
+        growth.append(drift[middle:].max() / drift[1000:middle].max())
+    assert growth[0] < 1.0 < growth[1]
+
+
+@pytest.mark.parametrize("name", cli.SHIPPED)
+def test_every_plan_that_ships_is_stable_and_says_so(name: str) -> None:
+    plan = plans.load(cli.plan_path(name))
+    assert plan.test.name == name
+    found = assess(plan)
+    assert found.delay < found.critical_delay
+    assert simulate(plan, substructure.ground_rows(plan, substructure.motion(plan))).finite
