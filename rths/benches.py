@@ -189,6 +189,8 @@ class Follower:
         self._motion = programme.motion
         self._built = compensators.build(kind, parameters, interval)
         self._interval = interval
+        still = compensators.build(kind, parameters, interval)  # compiled before the rig is armed
+        compensators.step(*still, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, interval)
 
     def wanted(self, tick: int) -> float:
         """The programme's value at a tick."""

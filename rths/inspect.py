@@ -83,7 +83,7 @@ def write_peaks(peaks: dict[str, dict[str, Any]]) -> None:
     table(rows)
 
 
-def write_tracking(tracking: dict[str, dict[str, float]]) -> None:
+def write_tracking(tracking: dict[str, dict[str, Any]]) -> None:
     """How the transfer systems followed their targets."""
     if not tracking:
         return
@@ -92,7 +92,7 @@ def write_tracking(tracking: dict[str, dict[str, float]]) -> None:
         [
             part,
             f"{facts['delay'] * 1e3:.2f} ms",
-            f"{facts['correlation_delay'] * 1e3:.2f} ms",
+            "none" if facts["correlation_delay"] is None else f"{facts['correlation_delay'] * 1e3:.2f} ms",
             f"{facts['amplitude']:.4f}",
             f"{facts['frequency']:.2f} Hz",
             f"{facts['nrmse']:.4f}",

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from common import signals
+from common.errors import InputError
 from common.plan import Plan, parse
-from common.recording.reader import Run
+from common.recording.reader import Run, Values
 from common.signals import Kind
 from models import indicators
 
@@ -90,9 +91,9 @@ def peaks(run: Run) -> dict[str, dict[str, Any]]:
     return result
 
 
-def tracking(run: Run) -> dict[str, dict[str, float]]:
+def tracking(run: Run) -> dict[str, dict[str, float | None]]:
     """How the transfer systems followed their targets: delay (s) two ways, amplitude, NRMSE, peak error."""
-    result = {}
+    result: dict[str, dict[str, float | None]] = {}
     for topic, part, target, measured, late in PATHS:
         columns = run.columns.get(topic, {})
         if not {target, measured, "t"} <= columns.keys() or columns["t"].size <= LEAST_TICKS:
@@ -106,11 +107,19 @@ def tracking(run: Run) -> dict[str, dict[str, float]]:
             "delay": path.delay,
             "amplitude": path.amplitude,
             "frequency": path.frequency,
-            "correlation_delay": indicators.correlation_delay(wanted, got, interval),
+            "correlation_delay": correlation_delay(wanted, got, interval),
             "nrmse": indicators.nrmse(wanted, got),
             "peak_error": indicators.peak_error(wanted, got),
         }
     return result
+
+
+def correlation_delay(wanted: Values, got: Values, interval: float) -> float | None:
+    """Delay (s) by cross-correlation, None where there is none within its search."""
+    try:
+        return indicators.correlation_delay(wanted, got, interval)
+    except InputError:
+        return None
 
 
 def latency(run: Run) -> dict[str, dict[str, float]]:

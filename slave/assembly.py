@@ -11,8 +11,9 @@ from common.plugins import construct, find
 from common.reality import Reality
 from common.rig import GuardedRig, TableMeasurement
 from models.labs import noise, table_lab
-from slave.loop import SlaveLoop
+from slave.loop import NO_COMMAND, SlaveLoop
 from slave.rig import TableLab
+from slave.step import SlaveStep
 
 
 def build_rig(reality: Reality) -> GuardedRig:
@@ -33,6 +34,7 @@ def build_rig(reality: Reality) -> GuardedRig:
 def check(reality: Reality) -> None:
     """Raise InputError where the laboratory could not be built; nothing of it is constructed or moved."""
     table_lab.build(reality.plan.test.interval, reality.plan.table, reality.plan.damper)
+    SlaveStep(reality.plan)
     if reality.slave.class_:
         find(reality.slave.class_, reality.base, "[slave.rig]")
 
@@ -41,4 +43,5 @@ def build_loop(setting: Setting, reality: Reality, link: LinkModel) -> SlaveLoop
     """The slave's loop, its kernels compiled."""
     plan = reality.plan
     table_lab.advance(*table_lab.build(plan.test.interval, plan.table, plan.damper), 0.0, 0.0)
+    SlaveStep(plan)(NO_COMMAND, TableMeasurement(0.0, 0.0, 0.0, 0.0))
     return SlaveLoop(setting, build_rig(reality), link)

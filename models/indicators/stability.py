@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.polynomial import Polynomial
 
 from common.errors import InputError
 from models.registry import Array
 
-ON_AXIS = 1e-4  # imaginary part of a root over its size up to which it counts as real
-SAME = 1e-9  # delays below this share of a period count as none
+ON_AXIS = 1e-6  # real part of an eigenvalue over its size up to which it lies on the imaginary axis
+STILL = 1e-9  # growth, frequency and angle that count as none
 
 
 def critical_delay(
@@ -27,65 +26,100 @@ def critical_delay(
 
     `det[M·s² + C·s + K + e·eᵀ·(m·s² + c·s + k)·e^(−s·τ)] = 0` on `s = jω`. M, C, K (n, n) of the numerical
     part in kg, N·s/m, N/m; `direction` e (n,) takes displacements to the specimen's; k N/m, c N·s/m, m kg of
-    the specimen. With `G = eᵀ·D⁻¹·e·(k + c·s + m·s²)` the crossings are the roots of `|G(jω)| = 1`, a
-    polynomial in ω².
+    the specimen. With `G = eᵀ·D⁻¹·e·(k + c·s + m·s²)` only frequencies of `|G(jω)| = 1` can do so. Zero
+    where the specimen's mass outweighs the numerical part's.
 
     Raises:
-        InputError: M is singular, or the undelayed loop is unstable.
+        InputError: shapes do not fit, a value is not finite, M is singular, or the undelayed loop is unstable.
 
     Source: Maghareh, Dyke, Prakash and Rhoads, Establishing a predictive performance indicator for real-time
     hybrid simulation, Earthq. Eng. Struct. Dyn. 43 (2014).
     """
-    if np.linalg.matrix_rank(M) < M.shape[0]:
-        raise InputError("The numerical mass matrix is singular: give every degree of freedom a mass.")
+    shaped(M, C, K, direction, stiffness, damping, mass)
     outer = np.outer(direction, direction)
-    unit = math.sqrt(float(np.max(np.abs(np.linalg.eigvals(np.linalg.solve(M, K + stiffness * outer))))))
-    whole = determinant(M + mass * outer, C + damping * outer, K + stiffness * outer, unit)
-    if np.any(whole.roots().real > 1e-9):
+    whole = K + stiffness * outer
+    unit = math.sqrt(float(np.max(np.abs(np.linalg.eigvals(np.linalg.solve(M, whole))))))
+    undelayed = companion(M + mass * outer, C + damping * outer, whole, unit)
+    if np.any(np.linalg.eigvals(undelayed).real > STILL):
         raise InputError("The loop is unstable without any delay.")
-    below = determinant(M, C, K, unit)
-    scale = float(np.max(np.abs(K))) or stiffness
-    difference = determinant(M, C, K + scale * outer, unit) - below
-    lower = difference.coef[: below.degree() - 1]  # what is above cancels but for rounding
-    above = Polynomial(lower) * (1.0 / scale)
-    above *= Polynomial([stiffness, damping * unit, mass * unit**2])
-    delays = [delay_at(above, below, x) / unit for x in crossings(above, below)]
+    if mass * float(direction @ np.linalg.solve(M, direction)) >= 1.0:
+        return (
+            0.0  # the specimen's inertia outweighs the numerical one: any delay feeds the highest frequencies
+        )
+    specimen = (stiffness, damping, mass)
+    delays = [
+        delay_at(M, C, K, direction, specimen, x * unit)
+        for x in crossings(M, C, K, direction, specimen, unit)
+    ]
     return min(delays, default=math.inf)
 
 
-def determinant(M: Array, C: Array, K: Array, unit: float) -> Polynomial:
-    """`det(M·s² + C·s + K)` as a polynomial of s over `unit` (rad/s)."""
+def shaped(M: Array, C: Array, K: Array, direction: Array, *specimen: float) -> None:
+    """Raise InputError where shapes do not fit, a value is not finite, or M is singular."""
     n = M.shape[0]
-    inverse = np.linalg.inv(M)
-    companion = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ K / unit**2, -inverse @ C / unit]])
-    coefficients = np.poly(companion)[::-1].real * np.linalg.det(M)
-    return Polynomial(coefficients * unit ** (2 * n))
+    for name, value in {"M": M, "C": C, "K": K}.items():
+        if value.shape != (n, n) or not np.all(np.isfinite(value)):
+            raise InputError(f"{name} of the numerical part must be {n} by {n} finite numbers.")
+    if direction.shape != (n,) or not np.all(np.isfinite([*direction, *specimen])):
+        raise InputError(f"The direction must be {n} finite numbers, and the specimen's parameters finite.")
+    if np.linalg.matrix_rank(M) < n:
+        raise InputError("The numerical mass matrix is singular: give every degree of freedom a mass.")
 
 
-def crossings(above: Polynomial, below: Polynomial) -> list[float]:
-    """Frequencies (over the unit) at which numerator and denominator are of one size on the imaginary axis."""
-    difference = size_squared(above) - size_squared(below)
-    roots: list[complex] = difference.roots().tolist()
+def companion(M: Array, C: Array, K: Array, unit: float) -> Array:
+    """State matrix (2n, 2n) of `M·ẍ + C·ẋ + K·x = 0` in displacements and velocities, time in units of 1/`unit`."""
+    n = M.shape[0]
+    lower = np.hstack([-np.linalg.solve(M, K) / unit**2, -np.linalg.solve(M, C) / unit])
+    return np.vstack([np.eye(n, 2 * n, k=n), lower])
+
+
+def crossings(
+    M: Array, C: Array, K: Array, direction: Array, specimen: tuple[float, float, float], unit: float
+) -> list[float]:
+    """Frequencies (over `unit`) at which `|G(jω)| = 1`: imaginary eigenvalues of the Hamiltonian of `1 − |G|²`.
+
+    Boyd, Balakrishnan and Kabamba, A bisection method for computing the H∞ norm of a transfer matrix,
+    Math. Control Signals Systems 2 (1989).
+    """
+    n = M.shape[0]
+    stiffness, damping, mass = specimen
+    A = companion(M, C, K, unit)
+    b = np.concatenate([np.zeros(n), np.linalg.solve(M, direction)]) / unit**2
+    row = np.concatenate([stiffness * direction, damping * unit * direction])
+    row = row + mass * unit**2 * (direction @ A[n:])
+    through = float(mass * unit**2 * (direction @ b[n:]))
+    rest = 1.0 - through**2
+    size = math.sqrt(float(np.linalg.norm(row) / np.linalg.norm(b)))  # equal sizes keep the matrix balanced
+    if size == 0.0:
+        return []
+    b, row = b * size, row / size
+    left = A + np.outer(b, row) * through / rest
+    hamiltonian = np.block([[left, np.outer(b, b) / rest], [-np.outer(row, row) / rest, -left.T]])
+    values: list[complex] = np.linalg.eigvals(hamiltonian).tolist()
     return sorted(
-        math.sqrt(root.real) for root in roots if root.real > 0.0 and abs(root.imag) <= ON_AXIS * abs(root)
+        value.imag
+        for value in values
+        if value.imag > STILL and abs(value.real) <= ON_AXIS * max(1.0, abs(value))
     )
 
 
-def size_squared(p: Polynomial) -> Polynomial:
-    """`|p(jx)|²` as a polynomial of x²."""
-    even = Polynomial([value * (-1) ** k for k, value in enumerate(p.coef[0::2])])
-    odd = Polynomial([value * (-1) ** k for k, value in enumerate(p.coef[1::2])] or [0.0])
-    return even**2 + Polynomial([0.0, 1.0]) * odd**2
-
-
-def delay_at(above: Polynomial, below: Polynomial, x: float) -> float:
-    """Smallest positive delay (over the unit's inverse) for which `1 + G·e^(−jxτ) = 0` at a crossing."""
-    turn = float(np.angle(-above(1j * x) / below(1j * x))) % (2.0 * math.pi)
-    return (turn if turn > SAME else 2.0 * math.pi) / x
+def delay_at(
+    M: Array, C: Array, K: Array, direction: Array, specimen: tuple[float, float, float], omega: float
+) -> float:
+    """Smallest positive delay (s) for which `1 + G·e^(−jωτ) = 0` at a crossing (rad/s)."""
+    stiffness, damping, mass = specimen
+    dynamic = K - omega**2 * M + 1j * omega * C
+    gain = (direction @ np.linalg.solve(dynamic, direction)) * (
+        stiffness - omega**2 * mass + 1j * omega * damping
+    )
+    turn = float(np.angle(-gain)) % (2.0 * math.pi)
+    return (turn if turn > STILL else 2.0 * math.pi) / omega
 
 
 def predictive_stability_indicator(critical: float) -> float:
-    """`log10` of the critical delay in ms (Maghareh et al. 2014); inf where no delay is critical."""
+    """`log10` of the critical delay in ms (Maghareh et al. 2014); inf where none is critical, −inf where any is."""
+    if critical <= 0.0:
+        return -math.inf
     return math.log10(critical * 1e3) if math.isfinite(critical) else math.inf
 
 

@@ -11,6 +11,8 @@ from common.errors import InputError
 from models.indicators.checks import checked, moving
 from models.registry import Array
 
+TIE = 1e-3  # correlation by which a peak may stand below the best and still be as good
+
 
 class FrequencyEvaluation(NamedTuple):
     """What the frequency evaluation index says."""
@@ -50,10 +52,11 @@ def correlation_delay(target: Array, measured: Array, interval: float, most: flo
 
     Positive where the measurement is late, negative where it is early. Each lag is normalised by the part
     of both signals (n,) that overlaps there; a parabola through the best three gives the fraction of an
-    interval.
+    interval. Of peaks as good as the best, as a sine has one every period, that nearest to no delay counts.
 
     Raises:
-        InputError: signals empty, unequal, not finite, constant or shorter than the lags asked for.
+        InputError: signals empty, unequal, not finite, constant or shorter than the lags asked for, or no
+            peak between these.
     """
     checked(target=target, measured=measured)
     moving(target=target, measured=measured)
@@ -61,9 +64,11 @@ def correlation_delay(target: Array, measured: Array, interval: float, most: flo
     if n < 4 * reach:
         raise InputError(f"{n} ticks are too few for delays up to {most:g} s: give at least {4 * reach}.")
     values = np.array([overlap(target, measured, lag) for lag in range(-reach, reach + 1)])
-    best = int(np.argmax(values))
-    if not 0 < best < values.size - 1:
-        return (best - reach) * interval
+    inner = (values[1:-1] >= values[:-2]) & (values[1:-1] >= values[2:])
+    peaks = np.flatnonzero(inner & (values[1:-1] >= values.max() - TIE)) + 1
+    if not peaks.size:
+        raise InputError(f"The delay is not within ±{most:g} s: the correlation still grows there.")
+    best = int(peaks[np.argmin(np.abs(peaks - reach))])
     before, at, after = values[best - 1 : best + 2]
     return float((best - reach + 0.5 * (before - after) / (before - 2.0 * at + after)) * interval)
 

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from common.errors import InputError
 from models import indicators
 from models.registry import Array
+from models.structures import shear_building
 
 DT = 0.002
 M, C, K = 160e3, 200e3, 25e6
@@ -53,6 +54,18 @@ class TestTracking:
         values = (1.0 + error) * reference
         assert indicators.nrmse(reference, values) == pytest.approx(abs(error), abs=1e-12)
         assert indicators.peak_error(reference, values) == pytest.approx(abs(error), abs=1e-12)
+
+    @pytest.mark.parametrize("frequency", [0.5, 2.0, 5.0, 8.0])
+    @pytest.mark.parametrize("delay", [-0.03, 0.0, 0.0013, 0.044])
+    def test_a_sine_is_not_taken_for_another_period(self, frequency: float, delay: float) -> None:
+        t = np.arange(0.0, 10.0, DT)
+        target, measured = (np.sin(2.0 * np.pi * frequency * (t - late)) for late in (0.0, delay))
+        measured += 1e-3 * np.random.default_rng(2).standard_normal(t.size)
+        assert indicators.correlation_delay(target, measured, DT) == pytest.approx(delay, abs=2e-4)
+
+    def test_a_delay_beyond_the_search_is_said(self) -> None:
+        with pytest.raises(InputError, match="not within ±0.02 s"):
+            indicators.correlation_delay(chirp(), chirp(0.15), DT, most=0.02)
 
 
 class TestDamping:
@@ -151,6 +164,36 @@ class TestStability:
         assert roots[0] > 0.0
         assert abs(roots[1]) < 1e-9
         assert roots[2] < 0.0
+
+    @pytest.mark.parametrize("n", [2, 5, 12, 20, 30])
+    def test_many_storeys_agree_with_a_scan_over_frequency(self, n: int) -> None:
+        ones = np.ones(n)
+        mass, _, whole = shear_building.matrices(1e5 * ones, 1e8 * ones, ones)
+        direction = np.eye(n)[n // 2] - np.eye(n)[n // 2 - 1]
+        numerical = whole - 4e7 * np.outer(direction, direction)
+        omega = np.linspace(0.5, 80.0, 100_001)
+        values, vectors = np.linalg.eigh(numerical / 1e5)
+        shares = (vectors.T @ direction) ** 2 / 1e5
+        modal = values[:, None] - omega**2 + 1j * omega * (0.3 + 5e-4 * values[:, None])
+        gain = 4e7 * np.sum(shares[:, None] / modal, axis=0)
+        at = np.flatnonzero(np.diff(np.sign(np.abs(gain) - 1.0)) != 0)
+        scanned = np.min((np.angle(-gain[at]) % (2.0 * np.pi)) / omega[at])
+        damping = 0.3 * mass + 5e-4 * numerical
+        found = indicators.critical_delay(mass, damping, numerical, direction, 4e7)
+        assert found == pytest.approx(scanned, rel=2e-3)
+
+    def test_a_specimen_heavier_than_the_numerical_part_bears_no_delay(self) -> None:
+        heavy = indicators.critical_delay(one(M), one(C), one(K), np.ones(1), K, 0.0, 2.0 * M)
+        assert heavy == 0.0
+        assert indicators.predictive_stability_indicator(heavy) == -math.inf
+
+    def test_an_unstable_or_misshapen_loop_is_refused(self) -> None:
+        with pytest.raises(InputError, match="unstable without any delay"):
+            indicators.critical_delay(one(M), one(-C), one(K), np.ones(1), 1.0)
+        with pytest.raises(InputError, match="must be 1 by 1 finite"):
+            indicators.critical_delay(one(M), np.ones((2, 2)), one(K), np.ones(1), K)
+        with pytest.raises(InputError, match="singular"):
+            indicators.critical_delay(one(0.0), one(C), one(K), np.ones(1), K)
 
     def test_a_small_share_bears_any_delay(self) -> None:
         assert indicators.critical_delay(one(M), one(C), one(0.95 * K), np.ones(1), 0.05 * K) == math.inf
