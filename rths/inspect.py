@@ -45,6 +45,10 @@ def write_report(summary: dict[str, Any]) -> None:
     write_completeness(summary)
     write_peaks(summary["peaks"])
     write_tracking(summary["tracking"])
+    if summary["error_energy"] is not None:
+        say(
+            f"hybrid simulation error energy at the column: {summary['error_energy'] * 100.0:+.2f} % of the energy in\n"
+        )
     write_latency(summary)
     for event in summary["events"]:
         if event["level"] != "info":

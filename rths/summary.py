@@ -49,6 +49,7 @@ def summarize(run: Run) -> dict[str, Any]:
         "recorder": dict(run.metadata.get("summary", {})),
         "peaks": peaks(run),
         "tracking": tracking(run),
+        "error_energy": error_energy(run, plan) if plan else None,
         "latency": latency(run),
         "late_ticks": int(np.sum(run.columns["latency"]["deadline_missed"])) if run.has("latency") else None,
         "events": run.events,
@@ -110,8 +111,29 @@ def tracking(run: Run) -> dict[str, dict[str, float | None]]:
             "correlation_delay": correlation_delay(wanted, got, interval),
             "nrmse": indicators.nrmse(wanted, got),
             "peak_error": indicators.peak_error(wanted, got),
+            "enclosed_area": float(indicators.tracking_indicator(wanted, got)[-1]),
         }
     return result
+
+
+def error_energy(run: Run, plan: Plan) -> float | None:
+    """Largest share of energy that tracking errors put in or took out at the column; None without its signals."""
+    columns = run.columns.get("master", {})
+    needed = {"t", "column_target", "column_displacement", "column_force", "ground_acceleration", "velocity"}
+    if not needed <= columns.keys() or not columns["t"].size:
+        return None
+    column, structure = plan.column, plan.structure
+    target, measured = (
+        columns[name] / column.deformation_ratio for name in ("column_target", "column_displacement")
+    )
+    strain = 0.5 * structure.stiffness[column.storey - 1] * float(np.max(np.abs(target))) ** 2
+    if strain == 0.0:
+        return None
+    momentum = columns["velocity"].reshape(columns["t"].size, -1) @ np.array(structure.mass)
+    given = np.cumsum(-columns["ground_acceleration"] * momentum) * plan.test.interval
+    force = column.represents * columns["column_force"]
+    share = indicators.hybrid_simulation_error_energy(target, measured, force, given, strain)
+    return float(share[np.argmax(np.abs(share))])
 
 
 def correlation_delay(wanted: Values, got: Values, interval: float) -> float | None:

@@ -58,6 +58,12 @@ def test_inspect_says_what_is_in_a_recording(call: Any, capsys: Any, virtual_rec
     assert "El Centro 1940 NS" in out
     assert "PGA 0.3188 g" in out
     assert ["master", "2000", "2000", "0", "none"] in [line.split() for line in out.splitlines()]
+    assert call("inspect", virtual_recording, "--json") == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["tracking"]["actuator"]["delay"] == pytest.approx(0.0002, abs=2e-4)
+    assert summary["tracking"]["table"]["correlation_delay"] == pytest.approx(0.0189, abs=5e-4)
+    assert summary["tracking"]["table"]["enclosed_area"] > 0.0
+    assert 0.0 < summary["error_energy"] < 0.02
     assert "outcome: completed" in out
 
 
