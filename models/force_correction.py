@@ -2,9 +2,9 @@
 
     H(s) = √(1 + (ω_c/ω_0)²)·s/(s + ω_c)
 
-At ω_0 the gain is one and the lead `atan(ω_c/ω_0)/ω_0`. The idea is that of Fushihara et al., Frontiers in
-Built Environment 6:145 (2020); the normalisation to a gain of one at the structure's frequency is a choice
-made here. Discretised by the trapezoid rule.
+At ω_0 the gain is one and the lead `atan(ω_c/ω_0)/ω_0`. The idea is that of the seed paper's journal
+version, Frontiers in Built Environment 6:145 (2020), doi 10.3389/fbuil.2020.00145; the normalisation to a
+gain of one at the structure's frequency is a choice made here. Discretised by the trapezoid rule.
 
 What it costs: a force that does not change is lost, so it belongs to specimens that vibrate about zero,
 not to one that yields to one side.

@@ -13,18 +13,20 @@ from common import signals
 from common.clock import Clock, MonotonicClock, VirtualClock, unix_ns
 from common.errors import InputError, InterlockError, RigError, RthsError
 from common.limits import Guard
-from common.plan import Plan
+from common.plan import Plan, TableCompensator
 from common.reality import Reality
 from common.recording.writer import Recording
 from common.rig import ColumnCommand, ColumnMeasurement, GuardedRig, TableCommand, TableMeasurement
 from master import assembly as master
-from models import compensators, excitation
-from models.excitation import ACCELERATION, JERK, POSITION, RATE, Programme, Segment
+from models import excitation
+from models.excitation import POSITION, Programme, Segment
 from recorder import files
 from recorder.sink import FileSink, Item, Sink, ThreadedSink
+from rths.follower import Follower
 from slave import assembly as slave
 
 LEAD_NS = 100_000_000
+UNCOMPENSATED = TableCompensator()
 
 MASTER_FIELDS = ("seq", "t", "column_target", "actuator_command", "column_displacement", "column_force")
 SLAVE_FIELDS = (
@@ -85,8 +87,6 @@ def play(
     try:
         with armed(bench.rig, sink, epoch_ns):
             done, late = loop(bench, clock, sink, epoch_ns, stopping)
-        if sink.failure:
-            raise InterlockError(f"The recording is lost: {sink.failure}")
     except StoppedError as stop:
         done, late, error = stop.ticks, stop.late, stop.error
     except RthsError as failure:
@@ -94,6 +94,8 @@ def play(
     finally:
         cause = str(error) if error else "completed"
         sink.close({"outcome": "stopped" if error else "completed", "cause": cause, "ticks": str(done)})
+    if sink.failure and error is None:
+        error = InterlockError(f"The recording is lost: {sink.failure}")
     return Result(path, order.part, plan.test.interval, done, late, programme.segments, error)
 
 
@@ -134,10 +136,8 @@ class ColumnBench:
         self.plan, self.rig = plan, master.build_rig(reality)
         self._measurements = Guard(plan.limits, ColumnMeasurement._fields)
         self._commands = Guard(plan.limits, ColumnCommand._fields)
-        kind, parameters = ("none", {})
-        if order.compensated:
-            kind, parameters = plan.compensator.kind, plan.compensator.parameters
-        self._follow = Follower(kind, parameters, programme, plan.test.interval)
+        chosen = plan.compensator if order.compensated else UNCOMPENSATED
+        self._follow = Follower(chosen, programme, plan.test.interval)
 
     def tick(self, tick: int) -> tuple[tuple[float, ...], str]:
         """Read, compute, write; the recorded values behind seq and t, and the violation of a limit."""
@@ -160,10 +160,8 @@ class TableBench:
         self._measurements = Guard(plan.limits, TableMeasurement._fields)
         self._commands = Guard(plan.limits, ("table_target", *TableCommand._fields))
         self._force = programme.motion[POSITION] if order.part == "damper" else None
-        kind, parameters = ("none", {})
-        if order.compensated:
-            kind, parameters = plan.table.compensator.kind, plan.table.compensator.parameters
-        self._follow = Follower(kind, parameters, programme, plan.test.interval)
+        chosen = plan.table.compensator if order.compensated else UNCOMPENSATED
+        self._follow = Follower(chosen, programme, plan.test.interval)
 
     def tick(self, tick: int) -> tuple[tuple[float, ...], str]:
         """Read, compute, write; the recorded values behind seq and t, and the violation of a limit."""
@@ -178,38 +176,6 @@ class TableBench:
         if not violation:
             self.rig.write(wanted)
         return (target, force, command, *measured), violation
-
-
-class Follower:
-    """A programme behind a compensator."""
-
-    def __init__(
-        self, kind: str, parameters: dict[str, float], programme: Programme, interval: float
-    ) -> None:
-        self._motion = programme.motion
-        self._built = compensators.build(kind, parameters, interval)
-        self._interval = interval
-        still = compensators.build(kind, parameters, interval)  # compiled before the rig is armed
-        compensators.step(*still, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, interval)
-
-    def wanted(self, tick: int) -> float:
-        """The programme's value at a tick."""
-        return float(self._motion[POSITION, tick])
-
-    def __call__(self, tick: int, measured: float) -> tuple[float, float]:
-        """The target at t_k, and the command for the interval's end."""
-        ahead, present = self._motion[:, tick + 1], self.wanted(tick)
-        command = compensators.step(
-            *self._built,
-            float(ahead[POSITION]),
-            float(ahead[RATE]),
-            float(ahead[ACCELERATION]),
-            float(ahead[JERK]),
-            present,
-            measured,
-            self._interval,
-        )
-        return present, float(command)
 
 
 def begin(
@@ -248,6 +214,8 @@ def loop(
         try:
             if reason := stopping():
                 raise InterlockError(f"The bench test was {reason}")
+            if sink.failure:
+                raise InterlockError(f"The recording is lost: {sink.failure}")
             values, violation = bench.tick(tick)
         except (RigError, InterlockError) as error:
             raise StoppedError(error, tick, late) from None

@@ -8,11 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from common.plan import Plan
-from models import compensators, excitation, indicators
+from models import excitation, indicators
 from models.excitation import Programme, join
 from models.excitation.pieces import sine
 from models.labs import column_lab
 from models.structures import shear_building
+from rths.follower import Follower
 
 CYCLES = 12
 
@@ -32,19 +33,25 @@ def assess(plan: Plan) -> Partition:
     """The partition of a plan; raises InputError where a model or parameter is unknown."""
     modes = shear_building.modes(*matrices(plan))
     frequency = 1.0 / float(modes.periods[0])
-    omega = 2.0 * math.pi * frequency
     critical = critical_delay_of(plan)
     path = path_at(plan, frequency)
-    share = experimental_stiffness(plan) * float(drift_direction(plan) @ modes.shapes[:, 0]) ** 2
-    lost, _ = indicators.damping_equivalent(share, path.amplitude, path.delay, omega)
     return Partition(
         frequency,
         critical,
         indicators.predictive_stability_indicator(critical),
         path.amplitude,
         path.delay,
-        lost / (2.0 * omega),
+        damping_lost(plan, path),
     )
+
+
+def damping_lost(plan: Plan, path: indicators.FrequencyEvaluation) -> float:
+    """Damping ratio of the building's first mode that an amplitude and a delay of the column's path cost."""
+    modes = shear_building.modes(*matrices(plan))
+    omega = 2.0 * math.pi / float(modes.periods[0])
+    share = experimental_stiffness(plan) * float(drift_direction(plan) @ modes.shapes[:, 0]) ** 2
+    lost, _ = indicators.damping_equivalent(share, path.amplitude, path.delay, omega)
+    return indicators.damping_points(lost, 1.0, omega**2)
 
 
 def sentence(found: Partition) -> str:
@@ -97,7 +104,7 @@ def critical_delay_of(plan: Plan) -> float:
     return float(indicators.critical_delay(M, C, numerical, direction, stiffness))
 
 
-def path_at(plan: Plan, frequency: float) -> Any:
+def path_at(plan: Plan, frequency: float) -> indicators.FrequencyEvaluation:
     """Amplitude and delay of the compensated nominal actuator for a sine of that frequency (Hz)."""
     interval = plan.test.interval
     cycles = max(CYCLES, round(2.0 * frequency))
@@ -108,23 +115,11 @@ def path_at(plan: Plan, frequency: float) -> Any:
 
 def follow(plan: Plan, programme: Programme) -> tuple[Any, Any]:
     """Target and achieved displacement of the compensated nominal actuator, m."""
-    interval = plan.test.interval
-    built = compensators.build(plan.compensator.kind, plan.compensator.parameters, interval)
-    lab = column_lab.build(interval, plan.actuator, plan.column)
-    motion = programme.motion
-    achieved = np.zeros(motion.shape[1])
-    for tick in range(achieved.size - 1):
-        ahead = motion[:, tick + 1]
-        present = float(motion[excitation.POSITION, tick])
-        command = compensators.step(
-            *built,
-            float(ahead[excitation.POSITION]),
-            float(ahead[excitation.RATE]),
-            float(ahead[excitation.ACCELERATION]),
-            float(ahead[excitation.JERK]),
-            present,
-            float(achieved[tick]),
-            interval,
-        )
+    follower = Follower(plan.compensator, programme, plan.test.interval)
+    lab = column_lab.build(plan.test.interval, plan.actuator, plan.column)
+    target = programme.motion[excitation.POSITION]
+    achieved = np.zeros(target.size)
+    for tick in range(target.size - 1):
+        _, command = follower(tick, float(achieved[tick]))
         achieved[tick + 1] = column_lab.advance(*lab, command)[0]
-    return motion[excitation.POSITION], achieved
+    return target, achieved

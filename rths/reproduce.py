@@ -31,29 +31,28 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run every experiment; 1 where a row is outside its tolerance."""
+    from recorder.files import checked
     from rths.reproduction import experiments, figures, page
     from rths.reproduction.rows import rows
 
     folder: Path = args.output
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / "index.html").touch()
     except OSError as error:
         raise InputError(
             f"Cannot write into {folder}: {error.strerror}; give another folder with -o."
         ) from None
+    target = checked(folder / "index.html")
     evidence = experiments.gather(folder, say)
     table = rows(evidence)
     pictures = figures.draw_all(evidence, folder)
-    (folder / "index.html").write_text(page.page(table, pictures, folder), encoding="utf-8")
+    target.write_text(page.page(table, pictures, folder), encoding="utf-8")
     if args.json:
-        sys.stdout.write(
-            json.dumps({"rows": [asdict(row) for row in table], "page": str(folder / "index.html")})
-        )
+        sys.stdout.write(json.dumps({"rows": [asdict(row) for row in table], "page": str(target)}))
         sys.stdout.write("\n")
     else:
         show(table)
-        sys.stdout.write(f"page: {folder / 'index.html'}\n")
+        sys.stdout.write(f"page: {target}\n")
     return 0 if all(row.passed for row in table) else 1
 
 

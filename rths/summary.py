@@ -100,7 +100,7 @@ def tracking(run: Run) -> dict[str, dict[str, float | None]]:
         if not {target, measured, "t"} <= columns.keys() or columns["t"].size <= LEAST_TICKS:
             continue
         wanted, got = columns[target][: columns["t"].size - late], columns[measured][late:]
-        if not np.std(wanted) or not np.std(got):
+        if not np.all(np.isfinite([wanted, got])) or not np.ptp(wanted) or not np.ptp(got):
             continue
         interval = float(np.median(np.diff(columns["t"])))
         path = indicators.frequency_evaluation_index(wanted, got, interval)
@@ -127,7 +127,7 @@ def error_energy(run: Run, plan: Plan) -> float | None:
         columns[name] / column.deformation_ratio for name in ("column_target", "column_displacement")
     )
     strain = 0.5 * structure.stiffness[column.storey - 1] * float(np.max(np.abs(target))) ** 2
-    if strain == 0.0:
+    if strain == 0.0 or not all(np.all(np.isfinite(columns[name])) for name in needed):
         return None
     momentum = columns["velocity"].reshape(columns["t"].size, -1) @ np.array(structure.mass)
     given = np.cumsum(-columns["ground_acceleration"] * momentum) * plan.test.interval

@@ -64,16 +64,16 @@ class Built(NamedTuple):
     state: Array
 
 
-def build(kind: str, parameters: Mapping[str, float], interval: float) -> Built:
-    """Code, packed parameters and memory at rest of a compensator; `interval` in s.
+def build(kind: str, parameters: Mapping[str, float], interval: float, table: str = "compensator") -> Built:
+    """Code, packed parameters and memory at rest of a compensator; `interval` in s, `table` of the plan for errors.
 
     Raises:
         InputError: the kind or a parameter is unknown, missing, not finite or out of its range.
     """
     if kind not in COMPENSATORS:
-        raise InputError(f"Unknown compensator '{kind}' in [compensator]: {nearest(kind, COMPENSATORS)}")
+        raise InputError(f"Unknown compensator '{kind}' in [{table}]: {nearest(kind, COMPENSATORS)}")
     method = COMPENSATORS[kind]
-    what = f"compensator '{kind}' in [compensator]"
+    what = f"compensator '{kind}' in [{table}]"
     values = registry.pack(method.params, parameters, what)
     for name, value in method.params(*values.tolist())._asdict().items():
         rule = method.rules[name]

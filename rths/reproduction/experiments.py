@@ -27,6 +27,7 @@ from models.closed_loop import signals, simulate
 from models.registry import Array
 from rths import benches, virtual
 from rths.benches import Order
+from rths.partition import experimental_stiffness
 
 GAINS = {"proportional": 1.93, "integral": 0.047, "derivative": 0.0}
 PID = Compensator("pid", GAINS)
@@ -152,9 +153,8 @@ def simulated(plan: Plan, ground: Array) -> dict[str, Array]:
 def with_path(plan: Plan, path: Any) -> Plan:
     """The building that an amplitude and a delay in the column's path make of it (damping equivalent)."""
     column, structure = plan.column, plan.structure
-    stiffness = column.deformation_ratio * column.represents * column.stiffness
     omega = float(np.sqrt(structure.stiffness[0] / structure.mass[0]))
-    lost, _ = indicators.damping_equivalent(stiffness, path.amplitude, path.delay, omega)
+    lost, _ = indicators.damping_equivalent(experimental_stiffness(plan), path.amplitude, path.delay, omega)
     softer = column.stiffness * path.amplitude * float(np.cos(omega * path.delay))
     return replace(
         plan,

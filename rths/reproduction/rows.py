@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from common.plan import Plan
 from common.recording.reader import Run
 from models import indicators
 from models.registry import Array
-from rths.identification import identify
+from rths.identification import identify, segments
+from rths.partition import critical_delay_of, damping_lost
 from rths.reproduction.experiments import DELAYS, Evidence
 
 POINT = 100.0  # damping ratio in points of per cent
@@ -102,8 +104,6 @@ def step_response(evidence: Evidence) -> list[Row]:
 
 def pieces(run: Run, word: str) -> dict[str, tuple[Array, Array]]:
     """Target and measurement of every piece of a bench recording whose name begins with a word."""
-    from rths.identification import segments
-
     columns = run.columns["master"]
     return {
         segment.name: (
@@ -192,18 +192,11 @@ def critical_delay(evidence: Evidence) -> list[Row]:
     """The delay from which the closed loop is unstable, found in the loop, beside theory."""
     low, high = evidence.critical_delay
     middle = 500.0 * (low + high)
-    theory = theoretical_critical_delay(evidence) * 1e3
+    theory = critical_delay_of(evidence.default) * 1e3
     index = indicators.predictive_stability_indicator(theory * 1e-3)
     note = f"characteristic equation {theory:.2f} ms; predictive stability indicator {index:.2f}"
     text = f"{middle:.2f} ± {500.0 * (high - low):.2f} ms"
     return [Row("critical delay", "–", text, "32.9 ± 0.5 ms", within(middle, 32.9, 0.5), note)]
-
-
-def theoretical_critical_delay(evidence: Evidence) -> float:
-    """The same from the characteristic equation, s."""
-    from rths.partition import critical_delay_of
-
-    return critical_delay_of(evidence.default)
 
 
 def apparent_damping(evidence: Evidence) -> list[Row]:
@@ -275,22 +268,20 @@ def agreement(evidence: Evidence) -> list[Row]:
             )
             passed, wanted = left <= 0.10, "accounted: drift ≤ 0.10 left"
             note = (
-                f"NRMSE against the pure simulation with the path's damping equivalent ({cost(run, interval)}): "
-                f"drift {left:.3f}"
+                "NRMSE against the pure simulation with the path's damping equivalent "
+                f"({cost(run, evidence.default)}): drift {left:.3f}"
             )
         result.append(Row(f"test against simulation, {label}", "good agreement", text, wanted, passed, note))
     return result
 
 
-def cost(run: Run, interval: float) -> str:
+def cost(run: Run, plan: Plan) -> str:
     """Residual delay of the actuator's path in damping points."""
     columns = run.columns["master"]
     path = indicators.frequency_evaluation_index(
-        columns["column_target"], columns["column_displacement"], interval
+        columns["column_target"], columns["column_displacement"], plan.test.interval
     )
-    lost, _ = indicators.damping_equivalent(6.25e6, path.amplitude, path.delay, float(np.sqrt(25e6 / 160e3)))
-    points = indicators.damping_points(lost, 160e3, 25e6) * POINT
-    return f"{path.delay * 1e3:.1f} ms, {points:.2f} points"
+    return f"{path.delay * 1e3:.1f} ms, {damping_lost(plan, path) * POINT:.2f} points"
 
 
 def amd_damping(evidence: Evidence) -> list[Row]:

@@ -1,0 +1,36 @@
+"""A programme of motion followed tick by tick behind a compensator: on the bench, and before a test."""
+
+from __future__ import annotations
+
+from common.plan import Compensator, TableCompensator
+from models import compensators
+from models.excitation import ACCELERATION, JERK, POSITION, RATE, Programme
+
+
+class Follower:
+    """A programme behind a compensator."""
+
+    def __init__(self, chosen: Compensator | TableCompensator, programme: Programme, interval: float) -> None:
+        self._motion = programme.motion
+        self._interval = interval
+        still, self._built = (compensators.build(chosen.kind, chosen.parameters, interval) for _ in range(2))
+        compensators.step(*still, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, interval)  # compiled before a rig is armed
+
+    def wanted(self, tick: int) -> float:
+        """The programme's value at a tick."""
+        return float(self._motion[POSITION, tick])
+
+    def __call__(self, tick: int, measured: float) -> tuple[float, float]:
+        """The target at t_k, and the command for the interval's end."""
+        ahead, present = self._motion[:, tick + 1], self.wanted(tick)
+        command = compensators.step(
+            *self._built,
+            float(ahead[POSITION]),
+            float(ahead[RATE]),
+            float(ahead[ACCELERATION]),
+            float(ahead[JERK]),
+            present,
+            measured,
+            self._interval,
+        )
+        return present, float(command)
