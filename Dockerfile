@@ -23,6 +23,7 @@ COPY models models
 COPY master master
 COPY slave slave
 COPY recorder recorder
+COPY diagnosis diagnosis
 COPY rths rths
 COPY examples examples
 # A plan's folder for recordings is `runs` unless it says otherwise: the one that is mounted.

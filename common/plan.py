@@ -268,6 +268,11 @@ class Plan:
         """Number of control intervals of the whole test."""
         return round(self.test.duration / self.test.interval)
 
+    def with_ticks(self, ticks: int) -> Plan:
+        """The plan over another number of control intervals."""
+        test = replace(self.test, duration=ticks * self.test.interval)
+        return replace(self, test=test)
+
     def tables(self) -> dict[str, Any]:
         """The plan as nested plain values, all defaults written out."""
         return {name: plain(getattr(self, name)) for name in TABLES}

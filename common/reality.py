@@ -7,6 +7,7 @@ report.
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,8 @@ from typing import Any
 from common.errors import PlanError
 from common.plan import Plan, Rig, from_tables
 from common.schema import fill, nearest
+
+Entry = tuple[str, Mapping[str, float]]  # name of an effect of the catalogue, and its parameters
 
 TRUE_TABLES = ("ground_motion", "structure", "column", "actuator", "table", "damper", "sensors")
 KNOWN = ("seed", "master", "slave", "link", "effect", *TRUE_TABLES)
@@ -30,6 +33,7 @@ class Reality:
     link: Rig = field(default_factory=Rig)
     base: Path = Path()
     hidden: frozenset[str] = frozenset()  # laboratories whose rig no recording may name
+    effects: tuple[Entry, ...] = ()  # laid over the emulated laboratories, in this order
 
 
 def as_planned(plan: Plan) -> Reality:
@@ -60,9 +64,6 @@ def from_reality(tables: dict[str, Any], plan: Plan, base: Path) -> Reality:
     for name in tables:
         if name not in KNOWN:
             raise PlanError(f"Unknown entry '{name}': {nearest(name, KNOWN)}")
-    if tables.get("effect"):
-        names = ", ".join(str(entry.get("name", "?")) for entry in tables["effect"])
-        raise PlanError(f"effects ({names}) cannot be laid over the emulated laboratories by this version.")
     seed = tables.get("seed", plan.test.seed)
     if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
         raise PlanError(f"seed is {seed!r}, but must be a whole number of at least 0.")
@@ -74,7 +75,25 @@ def from_reality(tables: dict[str, Any], plan: Plan, base: Path) -> Reality:
         link=rig({"link": {"rig": tables.get("link", {})}}, "link", Rig(), plan.base, base),
         base=base,
         hidden=frozenset(lab for lab in ("master", "slave") if "rig" in tables.get(lab, {})),
+        effects=entries(tables.get("effect", [])),
     )
+
+
+def entries(given: object) -> tuple[Entry, ...]:
+    """The effects of `[[effect]]` tables: a name and numbers; whether the catalogue knows them is seen later."""
+    if not isinstance(given, list) or not all(isinstance(entry, dict) for entry in given):
+        raise PlanError("effects are given as [[effect]] tables with a name and parameters.")
+    result = []
+    for entry in given:
+        name = entry.get("name")
+        if not isinstance(name, str):
+            raise PlanError(f"an [[effect]] has the name {name!r}: give a name of the catalogue.")
+        values = {key: value for key, value in entry.items() if key != "name"}
+        for key, value in values.items():
+            if not isinstance(value, int | float) or isinstance(value, bool):
+                raise PlanError(f"{key} of [[effect]] '{name}' is {value!r}, but must be a number.")
+        result.append((name, {key: float(value) for key, value in values.items()}))
+    return tuple(result)
 
 
 def true_plan(tables: dict[str, Any], plan: Plan) -> Plan:

@@ -16,8 +16,11 @@ from master.loop import MasterLoop
 from master.rig import ColumnLab
 from master.step import MasterStep
 from models import substructure
+from models.closed_loop import build_a
 from models.labs import column_lab, noise
 from models.registry import Array
+from models.realised import true_system
+from models.system import System
 
 
 def build_rig(reality: Reality) -> GuardedRig:
@@ -28,6 +31,9 @@ def build_rig(reality: Reality) -> GuardedRig:
         "seed": noise.lab_seed(reality.seed, noise.LAB_A),
     }
     if not rig.class_:
+        system = true_system(reality)
+        plan = system.plan
+        arguments |= {"effects": system.effects}
         arguments |= {name: schema.plain(getattr(plan, name)) for name in ("actuator", "column", "sensors")}
         return GuardedRig(ColumnLab(**arguments), "laboratory A", ColumnMeasurement)
     kind = find(rig.class_, reality.base, "[master.rig]")
@@ -37,16 +43,21 @@ def build_rig(reality: Reality) -> GuardedRig:
 
 def check(reality: Reality) -> None:
     """Raise InputError where the laboratory could not be built; nothing of it is constructed or moved."""
-    plan = reality.plan
-    MasterStep(plan, true_ground(reality))
-    column_lab.build(plan.test.interval, plan.actuator, plan.column)
+    master_step(reality)
+    build_a(true_system(reality))
     if reality.master.class_:
         find(reality.master.class_, reality.base, "[master.rig]")
 
 
-def true_ground(reality: Reality) -> Array:
+def master_step(reality: Reality) -> MasterStep:
+    """The master's computation for the building and the ground motion that really are."""
+    system = true_system(reality)
+    return MasterStep(system.plan, true_ground(system), system.effects.p_delta)
+
+
+def true_ground(system: System) -> Array:
     """Ground motion that really comes, as the master's kernel takes it."""
-    return substructure.ground_rows(reality.plan, substructure.motion(reality.plan))
+    return substructure.ground_rows(system.plan, substructure.motion(system.plan), system.effects.time_shift)
 
 
 def build_loop(
@@ -58,20 +69,18 @@ def build_loop(
     epoch_ns: int | None = None,
 ) -> MasterLoop:
     """The master's loop, its kernels compiled; session and epoch are drawn and read where none are given."""
-    ground = true_ground(reality)
-    warm_up(reality, ground)
+    warm_up(reality)
     return MasterLoop(
         setting,
         build_rig(reality),
-        MasterStep(reality.plan, ground),
+        master_step(reality),
         link,
         session=session if session is not None else secrets.randbelow(2**62) + 1,
         epoch_ns=epoch_ns if epoch_ns is not None else unix_ns(),
     )
 
 
-def warm_up(reality: Reality, ground: Array) -> None:
+def warm_up(reality: Reality) -> None:
     """Compile the kernels on arrays that are thrown away."""
-    plan = reality.plan
-    MasterStep(plan, ground)(0, 0.0, 0.0, 0.0)
-    column_lab.advance(*column_lab.build(plan.test.interval, plan.actuator, plan.column), 0.0)
+    master_step(reality)(0, 0.0, 0.0, 0.0)
+    column_lab.advance(*build_a(true_system(reality)), 0.0)

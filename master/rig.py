@@ -8,11 +8,13 @@ from typing import Any
 from common import schema
 from common.plan import Actuator, Column, Sensors
 from common.rig import ColumnCommand, ColumnMeasurement
-from models.labs import column_lab, noise
+from models.closed_loop import MEASURED_A
+from models.labs import column_lab, noise, readings
+from models.system import Effects
 
 
 class ColumnLab:
-    """The emulated laboratory; options are the plan's tables `actuator`, `column` and `sensors`."""
+    """The emulated laboratory; options are the plan's tables `actuator`, `column` and `sensors`, and effects."""
 
     def __init__(
         self,
@@ -21,13 +23,20 @@ class ColumnLab:
         actuator: Mapping[str, Any] | None = None,
         column: Mapping[str, Any] | None = None,
         sensors: Mapping[str, Any] | None = None,
+        effects: Effects | None = None,
     ) -> None:
+        more = effects or Effects()
+        levels = noise.levels_a(schema.fill(Sensors, sensors or {}, "sensors"))
         self._arrays = column_lab.build(
             interval,
             schema.fill(Actuator, actuator or {}, "actuator"),
             schema.fill(Column, column or {}, "column"),
+            more.actuator,
+            more.column,
         )
-        self._noise = noise.Noise(seed, noise.levels_a(schema.fill(Sensors, sensors or {}, "sensors")))
+        self._readings = readings.build(interval, MEASURED_A, more.sensors)
+        self._noise = noise.Noise(seed, readings.levels(MEASURED_A, levels, more.sensors))
+        self._interval, self._tick = interval, 0
         self._true = (0.0, 0.0)
         self._advance = column_lab.advance
 
@@ -36,8 +45,12 @@ class ColumnLab:
 
     def read(self) -> ColumnMeasurement:
         """Readings at the present tick, with the sensors' noise."""
-        error = self._noise.row()
-        return ColumnMeasurement(self._true[0] + error[0], self._true[1] + error[1])
+        error, true, sensors = self._noise.row(), self._true, self._readings
+        t = self._tick * self._interval
+        self._tick += 1
+        return ColumnMeasurement(
+            readings.step(*sensors, 0, true[0], error[0], t), readings.step(*sensors, 1, true[1], error[1], t)
+        )
 
     def write(self, command: ColumnCommand) -> None:
         """Move on by one interval, ramping to the command."""

@@ -36,8 +36,8 @@ class Outputs(NamedTuple):
 class MasterStep:
     """The numerical substructure, the compensator and the damper's control, moving on tick by tick."""
 
-    def __init__(self, plan: Plan, ground: Array) -> None:
-        self._arrays = substructure.build(plan, ground)
+    def __init__(self, plan: Plan, ground: Array, p_delta: float = 0.0) -> None:
+        self._arrays = substructure.build(plan, ground, p_delta)
         self._storeys = plan.storeys
         self._advance = substructure.advance
 

@@ -15,8 +15,9 @@ from common import signals as table
 from common.plan import Plan
 from models import compensators, substructure
 from models.compiled import jit
-from models.labs import column_lab, noise, table_lab
+from models.labs import column_lab, noise, readings, table_lab
 from models.registry import Array
+from models.system import Effects, System
 from models.substructure import (
     ACTUATOR_COMMAND,
     COLUMN_TARGET,
@@ -59,22 +60,21 @@ def on_time(ticks: int) -> Exchange:
 
 
 def simulate(
-    plan: Plan, ground: Array, *, seed: int | None = None, exchange: Exchange | None = None
+    plan: Plan,
+    ground: Array,
+    *,
+    effects: Effects | None = None,
+    seed: int | None = None,
+    exchange: Exchange | None = None,
 ) -> Rollout:
-    """Closed loop of the plan's nominal models over the whole test.
+    """Closed loop of the plan's models over the whole test, with effects laid over them where given.
 
     `ground` as `substructure.ground_rows` gives it. Without a `seed` the sensors are free of noise; with
-    one they read what the emulated laboratories read under that seed of the plan.
+    one they read what the emulated laboratories read under that seed of the plan. Of the link's effects
+    only the `exchange` counts: which message was used at which tick.
     """
-    ticks = plan.ticks
-    lab_a = column_lab.build(plan.test.interval, plan.actuator, plan.column)
-    lab_b = table_lab.build(plan.test.interval, plan.table, plan.damper)
-    sensors = plan.sensors
-    noise_a, noise_b = np.zeros((ticks, len(MEASURED_A))), np.zeros((ticks, len(MEASURED_B)))
-    if seed is not None:
-        noise_a = noise.Noise(noise.lab_seed(seed, noise.LAB_A), noise.levels_a(sensors)).rows(ticks)
-        noise_b = noise.Noise(noise.lab_seed(seed, noise.LAB_B), noise.levels_b(sensors)).rows(ticks)
-    master = substructure.build(plan, ground)
+    ticks, more = plan.ticks, effects or Effects()
+    master = substructure.build(plan, ground, more.p_delta)
     outputs = np.zeros((ticks, master.output.size))
     measured_a, measured_b, used = np.zeros((ticks, 2)), np.zeros((ticks, 4)), np.zeros(ticks)
     follow = plan.table.compensator
@@ -84,12 +84,13 @@ def simulate(
     written = np.zeros(ticks)
     filled = roll(
         *master,
-        *lab_a,
-        *lab_b,
+        *build_a(System(plan, more)),
+        *build_b(System(plan, more)),
         *compensator_b,
         *(exchange or on_time(ticks)),
-        noise_a,
-        noise_b,
+        *readings.build(plan.test.interval, MEASURED_A, more.sensors),
+        *readings.build(plan.test.interval, MEASURED_B, more.sensors),
+        *noises(System(plan, more), seed),
         outputs,
         measured_a,
         measured_b,
@@ -97,6 +98,33 @@ def simulate(
         written,
     )
     return Rollout(outputs, measured_a, measured_b, used, written, filled == ticks, filled)
+
+
+def build_a(system: System) -> column_lab.ColumnLab:
+    """Laboratory A of a system, at rest."""
+    plan, effects = system.plan, system.effects
+    return column_lab.build(
+        plan.test.interval, plan.actuator, plan.column, effects.actuator, effects.column
+    )
+
+
+def build_b(system: System) -> table_lab.TableLab:
+    """Laboratory B of a system, at rest."""
+    plan, effects = system.plan, system.effects
+    return table_lab.build(plan.test.interval, plan.table, plan.damper, effects.table, effects.damper)
+
+
+def noises(system: System, seed: int | None) -> tuple[Array, Array]:
+    """Noise of both laboratories' readings, (ticks, 2) and (ticks, 4); zero without a seed."""
+    ticks, sensors, more = system.plan.ticks, system.plan.sensors, system.effects.sensors
+    if seed is None:
+        return np.zeros((ticks, len(MEASURED_A))), np.zeros((ticks, len(MEASURED_B)))
+    a = readings.levels(MEASURED_A, noise.levels_a(sensors), more)
+    b = readings.levels(MEASURED_B, noise.levels_b(sensors), more)
+    return (
+        noise.Noise(noise.lab_seed(seed, noise.LAB_A), a).rows(ticks),
+        noise.Noise(noise.lab_seed(seed, noise.LAB_B), b).rows(ticks),
+    )
 
 
 @jit
@@ -116,16 +144,23 @@ def roll(
     target: Array,
     balance: Array,
     output: Array,
-    code_a: int,
     taps_a: Array,
     rows_a: Array,
-    specimen: Array,
+    lengths_a: Array,
+    limits_a: Array,
     history_a: Array,
-    memory_a: Array,
     state_a: Array,
+    specimen: int,
+    specimen_params: Array,
+    specimen_memory: Array,
+    specimen_effects: Array,
+    yielding: Array,
+    yielded: Array,
+    cell: Array,
     taps_b: Array,
     matrices: Array,
     spring: Array,
+    limits_b: Array,
     history_b: Array,
     state_b: Array,
     scratch: Array,
@@ -134,6 +169,10 @@ def roll(
     memory_c: Array,
     command: Index,
     feedback: Index,
+    sensors_a: Array,
+    sensed_a: Array,
+    sensors_b: Array,
+    sensed_b: Array,
     noise_a: Array,
     noise_b: Array,
     outputs: Array,
@@ -147,8 +186,9 @@ def roll(
     y, y_acceleration, stroke, damper_force, present = 0.0, 0.0, 0.0, 0.0, 0.0
     nothing, interval = np.zeros(outputs.shape[1]), scalars[substructure.INTERVAL]
     for tick in range(outputs.shape[0]):
-        measured_a[tick, 0] = displacement + noise_a[tick, 0]
-        measured_a[tick, 1] = force + noise_a[tick, 1]
+        t = tick * interval
+        measured_a[tick, 0] = readings.step(sensors_a, sensed_a, 0, displacement, noise_a[tick, 0], t)
+        measured_a[tick, 1] = readings.step(sensors_a, sensed_a, 1, force, noise_a[tick, 1], t)
         used[tick] = measured_b[feedback[tick], 3] if feedback[tick] >= 0 else 0.0
         substructure.advance(
             codes,
@@ -176,12 +216,25 @@ def roll(
         for place in range(output.size):
             outputs[tick, place] = output[place]
         displacement, force = column_lab.advance(
-            code_a, taps_a, rows_a, specimen, history_a, memory_a, state_a, output[ACTUATOR_COMMAND]
+            taps_a,
+            rows_a,
+            lengths_a,
+            limits_a,
+            history_a,
+            state_a,
+            specimen,
+            specimen_params,
+            specimen_memory,
+            specimen_effects,
+            yielding,
+            yielded,
+            cell,
+            output[ACTUATOR_COMMAND],
         )
-        measured_b[tick, 0] = y + noise_b[tick, 0]
-        measured_b[tick, 1] = y_acceleration + noise_b[tick, 1]
-        measured_b[tick, 2] = stroke + noise_b[tick, 2]
-        measured_b[tick, 3] = damper_force + noise_b[tick, 3]
+        measured_b[tick, 0] = readings.step(sensors_b, sensed_b, 0, y, noise_b[tick, 0], t)
+        measured_b[tick, 1] = readings.step(sensors_b, sensed_b, 1, y_acceleration, noise_b[tick, 1], t)
+        measured_b[tick, 2] = readings.step(sensors_b, sensed_b, 2, stroke, noise_b[tick, 2], t)
+        measured_b[tick, 3] = readings.step(sensors_b, sensed_b, 3, damper_force, noise_b[tick, 3], t)
         sent = command[tick]
         row = outputs[sent] if sent >= 0 else nothing
         written[tick] = compensators.step(
@@ -198,7 +251,15 @@ def roll(
         )
         present = row[TABLE_TARGET]
         y, y_acceleration, stroke, damper_force = table_lab.advance(
-            taps_b, matrices, spring, history_b, state_b, scratch, written[tick], row[DAMPER_COMMAND]
+            taps_b,
+            matrices,
+            spring,
+            limits_b,
+            history_b,
+            state_b,
+            scratch,
+            written[tick],
+            row[DAMPER_COMMAND],
         )
     return outputs.shape[0]
 

@@ -22,3 +22,9 @@ def jit(function: Function) -> Function:
     """
     compiled = numba.njit(cache=True, error_model="numpy", nogil=True, forceinline=True)
     return cast(Function, compiled(function))
+
+
+def jit_apart(function: Function) -> Function:
+    """Compile a kernel that is seldom needed by those that call it: it stays out of them, and they stay lean."""
+    compiled = numba.njit(cache=True, error_model="numpy", nogil=True)
+    return cast(Function, compiled(function))

@@ -25,7 +25,7 @@ Codes = NDArray[np.int64]
 
 # places in `codes` and `scalars`
 INTEGRATOR, SPECIMEN, COMPENSATOR, STOREY, FLOOR = range(5)
-INTERVAL, RATIO, REPRESENTS, FORCE_SCALE, MOTOR_GAIN, HIGH_PASS, HIGH_PASS_GAIN = range(7)
+INTERVAL, RATIO, REPRESENTS, FORCE_SCALE, MOTOR_GAIN, HIGH_PASS, HIGH_PASS_GAIN, P_DELTA = range(8)
 
 # places in the output row; one value per storey each from STOREYS on
 GROUND_ACCELERATION, COLUMN_TARGET, ACTUATOR_COMMAND = range(3)
@@ -54,8 +54,10 @@ class Substructure(NamedTuple):
     output: Array
 
 
-def build(plan: Plan, rows: Array) -> Substructure:
+def build(plan: Plan, rows: Array, p_delta: float = 0.0) -> Substructure:
     """The numerical side of a plan at rest; `rows` of the ground as `ground_rows` gives them.
+
+    `p_delta` is the stiffness (N/m, negative) that gravity adds to every storey.
 
     Raises:
         InputError: a model, method or parameter that the registries do not know.
@@ -79,6 +81,7 @@ def build(plan: Plan, rows: Array) -> Substructure:
         force_scale,
         motor_gain,
         *force_correction.coefficients(plan.compensator.force, plan.test.interval),
+        p_delta,
     ]
     n = plan.storeys
     return Substructure(
@@ -105,10 +108,20 @@ def motion(plan: Plan) -> GroundMotion:
     return load(plan.ground_motion.record, resolve(plan, ""))
 
 
-def ground_rows(plan: Plan, record: GroundMotion) -> Array:
-    """Scaled ground acceleration (m/s²) and displacement (m) at every tick and the test's end; (2, ticks + 1)."""
+def ground_rows(plan: Plan, record: GroundMotion, shift: float = 0.0) -> Array:
+    """Scaled ground acceleration (m/s²) and displacement (m) at every tick and the test's end; (2, ticks + 1).
+
+    With a `shift` (s) the motion comes that much later, and the ground is still before and after it.
+    """
     interval = plan.test.interval
-    return ground(record.scaled(plan.ground_motion.scale), interval, plan.ticks * interval)
+    rows = ground(record.scaled(plan.ground_motion.scale), interval, plan.ticks * interval)
+    return rows if shift == 0.0 else shifted(rows, shift / interval)
+
+
+def shifted(rows: Array, ticks: float) -> Array:
+    """Rows of the ground that come `ticks` later, by linear interpolation; the ends stay at their value."""
+    places = np.arange(rows.shape[1], dtype=np.float64)
+    return np.stack([np.interp(places - ticks, places, row) for row in rows])
 
 
 @jit
@@ -148,6 +161,8 @@ def advance(
     for i in range(n):
         drift = shear_building.storey_drift(state[NEXT_DISPLACEMENT], i)
         force = specimens.step(codes[SPECIMEN], column_params[i], column_memory[i], drift)
+        if scalars[P_DELTA] != 0.0:
+            force += scalars[P_DELTA] * drift
         output[STOREYS + 4 * n + i] = force
         if i == storey:
             force += scalars[REPRESENTS] * corrected

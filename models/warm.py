@@ -9,7 +9,7 @@ import numpy as np
 from common.plan import Plan
 from models import cache, compensators, substructure
 from models.closed_loop import simulate
-from models.labs import column_lab, table_lab
+from models.labs import column_lab, readings, table_lab
 
 
 def compile_all() -> None:
@@ -20,6 +20,7 @@ def compile_all() -> None:
     substructure.advance(*substructure.build(plan, ground), 0, 0.0, 0.0, 0.0)
     column_lab.advance(*column_lab.build(plan.test.interval, plan.actuator, plan.column), 0.0)
     table_lab.advance(*table_lab.build(plan.test.interval, plan.table, plan.damper), 0.0, 0.0)
+    readings.step(*readings.build(plan.test.interval, ("any",), {}), 0, 0.0, 0.0, 0.0)
     still = compensators.build("none", {}, plan.test.interval)
     compensators.step(*still, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, plan.test.interval)
     (cache.folder() / cache.READY).touch()

@@ -10,7 +10,9 @@ from common.mailbox import LinkModel
 from common.plugins import construct, find
 from common.reality import Reality
 from common.rig import GuardedRig, TableMeasurement
+from models.closed_loop import build_b
 from models.labs import noise, table_lab
+from models.realised import true_system
 from slave.loop import NO_COMMAND, SlaveLoop
 from slave.rig import TableLab
 from slave.step import SlaveStep
@@ -24,6 +26,9 @@ def build_rig(reality: Reality) -> GuardedRig:
         "seed": noise.lab_seed(reality.seed, noise.LAB_B),
     }
     if not rig.class_:
+        system = true_system(reality)
+        plan = system.plan
+        arguments |= {"effects": system.effects}
         arguments |= {name: schema.plain(getattr(plan, name)) for name in ("table", "damper", "sensors")}
         return GuardedRig(TableLab(**arguments), "laboratory B", TableMeasurement)
     kind = find(rig.class_, reality.base, "[slave.rig]")
@@ -33,7 +38,7 @@ def build_rig(reality: Reality) -> GuardedRig:
 
 def check(reality: Reality) -> None:
     """Raise InputError where the laboratory could not be built; nothing of it is constructed or moved."""
-    table_lab.build(reality.plan.test.interval, reality.plan.table, reality.plan.damper)
+    build_b(true_system(reality))
     SlaveStep(reality.plan)
     if reality.slave.class_:
         find(reality.slave.class_, reality.base, "[slave.rig]")
@@ -42,6 +47,6 @@ def check(reality: Reality) -> None:
 def build_loop(setting: Setting, reality: Reality, link: LinkModel) -> SlaveLoop:
     """The slave's loop, its kernels compiled."""
     plan = reality.plan
-    table_lab.advance(*table_lab.build(plan.test.interval, plan.table, plan.damper), 0.0, 0.0)
+    table_lab.advance(*build_b(true_system(reality)), 0.0, 0.0)
     SlaveStep(plan)(NO_COMMAND, TableMeasurement(0.0, 0.0, 0.0, 0.0))
     return SlaveLoop(setting, build_rig(reality), link)

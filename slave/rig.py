@@ -8,11 +8,13 @@ from typing import Any
 from common import schema
 from common.plan import Damper, Sensors, Table
 from common.rig import TableCommand, TableMeasurement
-from models.labs import noise, table_lab
+from models.closed_loop import MEASURED_B
+from models.labs import noise, readings, table_lab
+from models.system import Effects
 
 
 class TableLab:
-    """The emulated laboratory; options are the plan's tables `table`, `damper` and `sensors`."""
+    """The emulated laboratory; options are the plan's tables `table`, `damper` and `sensors`, and effects."""
 
     def __init__(
         self,
@@ -21,13 +23,20 @@ class TableLab:
         table: Mapping[str, Any] | None = None,
         damper: Mapping[str, Any] | None = None,
         sensors: Mapping[str, Any] | None = None,
+        effects: Effects | None = None,
     ) -> None:
+        more = effects or Effects()
+        levels = noise.levels_b(schema.fill(Sensors, sensors or {}, "sensors"))
         self._arrays = table_lab.build(
             interval,
             schema.fill(Table, table or {}, "table"),
             schema.fill(Damper, damper or {}, "damper"),
+            more.table,
+            more.damper,
         )
-        self._noise = noise.Noise(seed, noise.levels_b(schema.fill(Sensors, sensors or {}, "sensors")))
+        self._readings = readings.build(interval, MEASURED_B, more.sensors)
+        self._noise = noise.Noise(seed, readings.levels(MEASURED_B, levels, more.sensors))
+        self._interval, self._tick = interval, 0
         self._true = (0.0, 0.0, 0.0, 0.0)
         self._advance = table_lab.advance
 
@@ -36,9 +45,11 @@ class TableLab:
 
     def read(self) -> TableMeasurement:
         """Readings at the present tick, with the sensors' noise."""
-        error, true = self._noise.row(), self._true
+        error, true, sensors = self._noise.row(), self._true, self._readings
+        t = self._tick * self._interval
+        self._tick += 1
         return TableMeasurement(
-            true[0] + error[0], true[1] + error[1], true[2] + error[2], true[3] + error[3]
+            *(readings.step(*sensors, place, true[place], error[place], t) for place in range(len(true)))
         )
 
     def write(self, command: TableCommand) -> None:

@@ -163,7 +163,7 @@ def test_a_reality_changes_what_it_names(default_plan: Plan, tmp_path: Path) -> 
         ("[colum]\n", "did you mean column"),
         ("seed = -1\n", "seed is -1"),
         ("[structure]\nstiffness = 'a'\n", "must be a number"),
-        ("[[effect]]\nname = 'column.friction'\nforce = 900.0\n", "column.friction"),
+        ("[[effect]]\nforce = 900.0\n", "give a name"),
         ("[", "not valid TOML"),
     ],
 )

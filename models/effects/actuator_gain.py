@@ -1,0 +1,30 @@
+"""The actuator goes farther or less far than told: calibration of the servo loop.
+
+    T·ẏ + y = factor·K·u(t − L)
+
+Not to be confused with a wrong displacement reading (`sensor.column_displacement.gain`), under which the
+force per true displacement stays right but the force per reading does not.
+"""
+
+from __future__ import annotations
+
+from models.effects.effect import Effect, Parameter
+from models.system import System
+
+
+def apply(system: System, factor: float) -> System:
+    """Static gain multiplied by `factor`."""
+    return system.scaled("actuator", "gain", factor)
+
+
+EFFECT = Effect(
+    name="actuator.gain",
+    site="actuator",
+    kind="physics",
+    says="the actuator goes farther or less far than told",
+    parameters=(
+        Parameter("factor", "", null=1.0, least=0.2, most=3.0, sizes=(0.85, 0.93, 0.97, 1.03, 1.07, 1.15)),
+    ),
+    reference="T·ẏ + y = factor·K·u(t − L)",
+    apply=apply,
+)

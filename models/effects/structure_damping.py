@@ -1,0 +1,30 @@
+"""The numerical structure is damped more or less than believed.
+
+    C_true = factor · C, of every storey
+
+Not to be confused with a delay in the transfer system, which takes damping from the loop as c = −k·τ but
+shows between command and achieved displacement.
+"""
+
+from __future__ import annotations
+
+from models.effects.effect import Effect, Parameter
+from models.system import System
+
+
+def apply(system: System, factor: float) -> System:
+    """Storey dashpots multiplied by `factor`."""
+    return system.scaled("structure", "damping", factor)
+
+
+EFFECT = Effect(
+    name="structure.damping",
+    site="structure",
+    kind="physics",
+    says="the numerical dashpots are stronger or weaker",
+    parameters=(
+        Parameter("factor", "", null=1.0, least=0.0, most=20.0, sizes=(0.5, 0.75, 0.9, 1.1, 1.3, 1.7)),
+    ),
+    reference="M·ẍ + C·ẋ + f(x) = −M·z̈ with factor·C",
+    apply=apply,
+)

@@ -1,0 +1,205 @@
+"""One part alone: recorded inputs through its model, to the readings that model would have given.
+
+Reading k is taken before the command of tick k acts, as in the test.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from models import substructure
+from models.closed_loop import MEASURED_A, MEASURED_B, build_a, build_b
+from models.compiled import jit
+from models.labs import column_lab, readings, specimen, table_lab
+from models.registry import Array
+from models.system import System
+
+
+def laboratory_a(system: System, command: Array) -> Array:
+    """Readings (ticks, 2) of laboratory A without noise for actuator commands (ticks,) m, from rest."""
+    result = np.empty((command.size, len(MEASURED_A)))
+    interval = system.plan.test.interval
+    sensors = readings.build(interval, MEASURED_A, system.effects.sensors)
+    play_a(*build_a(system), *sensors, command, interval, result)
+    return result
+
+
+def laboratory_b(system: System, command: Array, motor: Array) -> Array:
+    """Readings (ticks, 4) of laboratory B without noise for table (m) and motor (N) commands, from rest."""
+    result = np.empty((command.size, len(MEASURED_B)))
+    interval = system.plan.test.interval
+    sensors = readings.build(interval, MEASURED_B, system.effects.sensors)
+    play_b(*build_b(system), *sensors, command, motor, interval, result)
+    return result
+
+
+def column(system: System, deformation: Array) -> Array:
+    """Force readings (ticks,) of the specimen without noise for its true deformation (ticks,) m at the ticks."""
+    result = np.empty(deformation.size)
+    interval, effects = system.plan.test.interval, system.effects
+    sensors = readings.build(interval, ("column_force",), effects.sensors)
+    steps = column_lab.substeps(interval) if specimen.needs_substeps(effects.column) else 1
+    parts = specimen.build(system.plan.column, effects.column)
+    play_column(*parts, *sensors, deformation, interval, steps, result)
+    return result
+
+
+def building(system: System, ground: Array, displacement: Array, force: Array, damper: Array) -> Array:
+    """Rows of `substructure` (ticks, 8 + 5·storeys) for the measurements (ticks,) that the master used."""
+    arrays = substructure.build(system.plan, ground, system.effects.p_delta)
+    result = np.zeros((force.size, arrays.output.size))
+    play_building(*arrays, displacement, force, damper, result)
+    return result
+
+
+@jit
+def play_a(
+    taps: Array,
+    rows: Array,
+    lengths: Array,
+    limits: Array,
+    history: Array,
+    state: Array,
+    code: int,
+    params: Array,
+    memory: Array,
+    effects: Array,
+    yielding: Array,
+    yielded: Array,
+    cell: Array,
+    sensors: Array,
+    sensed: Array,
+    command: Array,
+    interval: float,
+    result: Array,
+) -> None:
+    """Fill `result` (ticks, 2) from the commands."""
+    displacement, force = 0.0, 0.0
+    for tick in range(command.size):
+        t = tick * interval
+        result[tick, 0] = readings.step(sensors, sensed, 0, displacement, 0.0, t)
+        result[tick, 1] = readings.step(sensors, sensed, 1, force, 0.0, t)
+        displacement, force = column_lab.advance(
+            taps,
+            rows,
+            lengths,
+            limits,
+            history,
+            state,
+            code,
+            params,
+            memory,
+            effects,
+            yielding,
+            yielded,
+            cell,
+            command[tick],
+        )
+
+
+@jit
+def play_b(
+    taps: Array,
+    matrices: Array,
+    spring: Array,
+    limits: Array,
+    history: Array,
+    state: Array,
+    scratch: Array,
+    sensors: Array,
+    sensed: Array,
+    command: Array,
+    motor: Array,
+    interval: float,
+    result: Array,
+) -> None:
+    """Fill `result` (ticks, 4) from the commands."""
+    y, acceleration, stroke, force = 0.0, 0.0, 0.0, 0.0
+    for tick in range(command.size):
+        t = tick * interval
+        result[tick, 0] = readings.step(sensors, sensed, 0, y, 0.0, t)
+        result[tick, 1] = readings.step(sensors, sensed, 1, acceleration, 0.0, t)
+        result[tick, 2] = readings.step(sensors, sensed, 2, stroke, 0.0, t)
+        result[tick, 3] = readings.step(sensors, sensed, 3, force, 0.0, t)
+        y, acceleration, stroke, force = table_lab.advance(
+            taps, matrices, spring, limits, history, state, scratch, command[tick], motor[tick]
+        )
+
+
+@jit
+def play_column(
+    code: int,
+    params: Array,
+    memory: Array,
+    effects: Array,
+    yielding: Array,
+    yielded: Array,
+    cell: Array,
+    sensors: Array,
+    sensed: Array,
+    deformation: Array,
+    interval: float,
+    steps: int,
+    result: Array,
+) -> None:
+    """Fill `result` (ticks,) from the deformations, which move on straight lines between the ticks."""
+    before = deformation[0]
+    for tick in range(deformation.size):
+        force = 0.0
+        for i in range(steps):
+            share = (i + 1) / steps
+            reached = (1.0 - share) * before + share * deformation[tick]
+            force = specimen.force(
+                code, params, memory, effects, yielding, yielded, cell, reached, interval / steps
+            )
+        before = deformation[tick]
+        result[tick] = readings.step(sensors, sensed, 0, force, 0.0, tick * interval)
+
+
+@jit
+def play_building(
+    codes: substructure.Codes,
+    scalars: Array,
+    mass: Array,
+    coefficients: Array,
+    column_params: Array,
+    compensator_params: Array,
+    ground: Array,
+    state: Array,
+    column_memory: Array,
+    compensator_memory: Array,
+    recent: Array,
+    filtered: Array,
+    target: Array,
+    balance: Array,
+    output: Array,
+    displacement: Array,
+    force: Array,
+    damper: Array,
+    result: Array,
+) -> None:
+    """Fill `result` (ticks, 8 + 5·storeys) from the measurements."""
+    for tick in range(force.size):
+        substructure.advance(
+            codes,
+            scalars,
+            mass,
+            coefficients,
+            column_params,
+            compensator_params,
+            ground,
+            state,
+            column_memory,
+            compensator_memory,
+            recent,
+            filtered,
+            target,
+            balance,
+            output,
+            tick,
+            displacement[tick],
+            force[tick],
+            damper[tick],
+        )
+        for place in range(output.size):
+            result[tick, place] = output[place]

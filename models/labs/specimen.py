@@ -1,0 +1,136 @@
+"""The specimen in laboratory A as its load cell feels it: the column's model and what comes on top.
+
+    f = g(δ_max)·p(δ')·f_column(δ') + friction + c·δ̇ + m·δ̈,    δ' = δ outside the grip's gap
+
+with `f_column` the plan's model or, once it yields, that of Bouc and Wen in its place. Without effects
+the force is that of the plan's model to the last bit.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from common.plan import Column
+from models import specimens
+from models.compiled import jit, jit_apart
+from models.registry import Array
+from models.specimens import bouc_wen
+from models.system import ColumnEffects
+
+# places in `effects`
+PRESENT, STIFFNESS, YIELDS, DEGRADATION, PINCHING, PINCHING_WIDTH, PINCHING_HARDENING = range(7)
+FRICTION, PRESLIDING, VISCOUS, INERTIA, SLIP = range(7, 12)
+
+# places in `cell`
+DEFORMATION, RATE, LARGEST, SLIDER, LAST_STEP, REACTION = range(6)
+DEGRADED_AT = 2e-3  # m, deformation at which most of the loss of a degrading column has happened
+
+
+class Specimen(NamedTuple):
+    """Arrays of the specimen, in the order `force` takes them."""
+
+    code: int  # of the plan's model
+    params: Array
+    memory: Array
+    effects: Array
+    yielding: Array  # of Bouc and Wen's model
+    yielded: Array  # its memory
+    cell: Array  # what the effects remember
+
+
+def build(column: Column, effects: ColumnEffects | None = None) -> Specimen:
+    """Specimen at rest."""
+    more = effects or ColumnEffects()
+    code, params, memory = specimens.pack(column.model, stiffness=column.stiffness, **column.parameters)
+    yields = np.isfinite(more.yield_displacement)
+    values = [
+        float(more != ColumnEffects()),
+        column.stiffness,
+        float(yields),
+        more.degradation,
+        more.pinching,
+        more.pinching_width,
+        more.pinching_hardening,
+        more.friction,
+        more.presliding,
+        more.viscous,
+        more.inertia,
+        more.slip,
+    ]
+    limit = more.yield_displacement if yields else 1.0
+    yielding = np.array([column.stiffness, limit, more.hardening, more.exponent, 0.5, 0.5])
+    return Specimen(
+        code, params, memory, np.array(values), yielding, np.zeros(bouc_wen.STATE_SIZE), np.zeros(6)
+    )
+
+
+def needs_substeps(effects: ColumnEffects | None) -> bool:
+    """Whether rates count, so that an interval must be walked in short steps."""
+    more = effects or ColumnEffects()
+    return bool(more.viscous or more.inertia or more.friction)
+
+
+@jit
+def force(
+    code: int,
+    params: Array,
+    memory: Array,
+    effects: Array,
+    yielding: Array,
+    yielded: Array,
+    cell: Array,
+    deformation: float,
+    step: float,
+) -> float:
+    """Reading (N) at a deformation (m) reached from the last one within `step` s; the memories move on.
+
+    `cell[REACTION]` keeps the part that loads the piston: without the fixture's inertia and the viscous force.
+    """
+    if effects[PRESENT] == 0.0:
+        plain = specimens.step(code, params, memory, deformation)
+        cell[REACTION] = plain
+        return plain
+    return felt(code, params, memory, effects, yielding, yielded, cell, deformation, step)
+
+
+@jit_apart
+def felt(
+    code: int,
+    params: Array,
+    memory: Array,
+    effects: Array,
+    yielding: Array,
+    yielded: Array,
+    cell: Array,
+    deformation: float,
+    step: float,
+) -> float:
+    """The same with effects."""
+    half = 0.5 * effects[SLIP]
+    inside = min(max(deformation, -half), half)
+    within = deformation - inside
+    result = specimens.step(code, params, memory, within)
+    if effects[YIELDS] != 0.0:
+        result += bouc_wen.step(yielding, yielded, within) - effects[STIFFNESS] * within
+    cell[LARGEST] = max(cell[LARGEST], abs(within))
+    if effects[DEGRADATION] != 0.0:
+        result *= 1.0 - effects[DEGRADATION] * (1.0 - np.exp(-cell[LARGEST] / DEGRADED_AT))
+    if effects[PINCHING] != 0.0:
+        closed = np.exp(-((within / effects[PINCHING_WIDTH]) ** 2))
+        result *= 1.0 - effects[PINCHING] * closed + effects[PINCHING_HARDENING] * (1.0 - closed)
+    moved = deformation - cell[DEFORMATION]
+    if effects[FRICTION] != 0.0:
+        contact = effects[PRESLIDING]
+        cell[SLIDER] = min(max(cell[SLIDER] + moved, -contact), contact)
+        result += effects[FRICTION] * cell[SLIDER] / contact
+    cell[REACTION] = result
+    rate = moved / step
+    result += effects[VISCOUS] * rate
+    if effects[INERTIA] != 0.0 and cell[LAST_STEP] > 0.0:
+        result += effects[INERTIA] * (rate - cell[RATE]) / (0.5 * (step + cell[LAST_STEP]))
+    cell[DEFORMATION] = deformation
+    cell[RATE] = rate
+    cell[LAST_STEP] = step
+    return result

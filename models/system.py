@@ -1,0 +1,130 @@
+"""What the laboratories are: a plan's nominal models, and the unmodelled effects laid over them.
+
+With every effect at its null value a system is the plan alone, to the last bit.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from common.plan import Plan
+
+
+@dataclass(frozen=True)
+class ActuatorEffects:
+    """Laboratory A's transfer system, beyond a first-order lag with dead time."""
+
+    velocity_limit: float = math.inf  # m/s
+    backlash: float = 0.0  # m, whole play
+    compliance: float = 0.0  # m/N
+    deadband: float = 0.0  # m, whole band of the loop's error without flow
+
+
+@dataclass(frozen=True)
+class ColumnEffects:
+    """Laboratory A's specimen, beyond its plan's model."""
+
+    yield_displacement: float = math.inf  # m
+    hardening: float = 0.0
+    exponent: float = 2.0  # sharpness of the transition, Bouc-Wen's n
+    degradation: float = 0.0  # share of stiffness lost, once the largest deformation is well past the reference
+    pinching: float = 0.0
+    pinching_width: float = 1e-3  # m
+    pinching_hardening: float = 0.0
+    friction: float = 0.0  # N
+    presliding: float = 10e-6  # m, deformation of the friction's contact before it slides
+    viscous: float = 0.0  # N·s/m
+    inertia: float = 0.0  # kg
+    slip: float = 0.0  # m, whole gap
+
+
+@dataclass(frozen=True)
+class TableEffects:
+    """Laboratory B's shaking table, beyond second order with dead time."""
+
+    gain: float = 1.0
+    oil_frequency: float = math.inf  # Hz
+    oil_damping: float = 0.1
+    compliance: float = 0.0  # m/N
+    backlash: float = 0.0  # m, whole play
+    friction: float = 0.0  # m/s²: force over moving mass
+
+
+@dataclass(frozen=True)
+class DamperEffects:
+    """Laboratory B's active mass damper, beyond a spring, a dashpot and a lagging motor."""
+
+    gain: float = 1.0
+    friction: float = 0.0  # N
+    force_limit: float = math.inf  # N
+    stop_stroke: float = math.inf  # m
+    stop_stiffness: float = 0.0  # N/m
+
+
+@dataclass(frozen=True)
+class SensorEffects:
+    """One reading: `gain·lagged(value) + bias + drift·t`, noise added, then rounded to the step."""
+
+    gain: float = 1.0
+    bias: float = 0.0
+    drift: float = 0.0  # per s
+    lag: float = 0.0  # s
+    quantization: float = 0.0
+    noise: float = 0.0  # rms, beside the plan's
+
+
+@dataclass(frozen=True)
+class LinkEffects:
+    """The network between the laboratories, each direction alike."""
+
+    delay: float = 0.0  # s
+    jitter: float = 0.0  # s, standard deviation
+    loss: float = 0.0  # share of messages
+    burst: float = 1.0  # mean messages lost in a row
+
+
+@dataclass(frozen=True)
+class Effects:
+    """Everything that no plan describes; all null by default."""
+
+    time_shift: float = 0.0  # s, of the ground motion
+    p_delta: float = 0.0  # N/m, of every storey
+    actuator: ActuatorEffects = ActuatorEffects()
+    column: ColumnEffects = ColumnEffects()
+    table: TableEffects = TableEffects()
+    damper: DamperEffects = DamperEffects()
+    link: LinkEffects = LinkEffects()
+    sensors: dict[str, SensorEffects] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class System:
+    """A plan whose parameters may have moved, with effects."""
+
+    plan: Plan
+    effects: Effects = field(default_factory=Effects)
+
+    def scaled(self, table: str, name: str, factor: float) -> System:
+        """The system with one parameter of the plan, or each of its storeys, multiplied."""
+        part = getattr(self.plan, table)
+        value = getattr(part, name)
+        moved = tuple(factor * item for item in value) if isinstance(value, tuple) else factor * value
+        return self.moved(table, **{name: moved})
+
+    def moved(self, table: str, **values: Any) -> System:
+        """The system with parameters of one of the plan's tables replaced."""
+        part = replace(getattr(self.plan, table), **values)
+        return replace(self, plan=replace(self.plan, **{table: part}))
+
+    def laid(self, part: str, **values: float) -> System:
+        """The system with effects on one part replaced: a field of `Effects` that is a part itself."""
+        changed = replace(getattr(self.effects, part), **values)
+        return replace(self, effects=replace(self.effects, **{part: changed}))
+
+    def sensed(self, signal: str, **values: float) -> System:
+        """The system with the effects on one reading replaced."""
+        sensors = self.effects.sensors
+        changed = replace(sensors.get(signal, SensorEffects()), **values)
+        return replace(self, effects=replace(self.effects, sensors=sensors | {signal: changed}))
