@@ -23,6 +23,8 @@ VERBS = {
     "replay": "compute a recording's commands again and compare to the last bit",
     "compare": "compare two recordings or simulations signal by signal",
     "reproduce": "compute the seed paper's numbers and figures again",
+    "diagnose": "find the sim-to-real gap of a recording: where it lies, its cause, how far it closes",
+    "blind": "check the diagnosis on cases whose effect is withheld",
     "import": "make a recording of data of your own",
     "export": "write a recording as CSV, Parquet or MAT",
 }
@@ -71,6 +73,8 @@ EXAMPLES = {
     "replay": "rths replay runs/default-20260101-120000.mcap",
     "compare": "rths compare a.mcap b.mcap --tolerance 0",
     "reproduce": "rths reproduce -o runs/reproduce",
+    "diagnose": "rths diagnose runs/default-20260101-120000.mcap --html gap.html",
+    "blind": "rths blind --cases 300 --jobs 2 -o runs/blind",
     "import": "rths import drive.csv --map drive.toml -o drive.mcap",
     "export": "rths export runs/default-20260101-120000.mcap -o test.csv",
 }

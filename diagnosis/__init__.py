@@ -1,0 +1,1 @@
+"""Where a recording and its simulation part, which effect does it, and how far naming it closes the gap."""

@@ -1,0 +1,123 @@
+"""The diagnosis of a recording: commissioning, where, which, how far."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from common.errors import InputError
+from diagnosis import fitting, link, readings, report
+from diagnosis.fitting import Data, Values
+from diagnosis.ground import Ground
+from diagnosis.link import Finding
+from diagnosis.parts import Building, ColumnAlone, LaboratoryA, LaboratoryB, Part
+from diagnosis.readings import Reading
+from diagnosis.record import LEAST_TICKS, Record
+from diagnosis.scales import Scales
+from diagnosis.search import Searcher
+from diagnosis.verdict import Verdict, judge
+from models.effects import CATALOGUE
+from models.system import System
+
+
+@dataclass
+class Diagnosis:
+    """Everything that was found in a recording."""
+
+    record: Record
+    verdicts: list[Verdict] = field(default_factory=list)
+    readings: list[Reading] = field(default_factory=list)
+    link: list[Finding] = field(default_factory=list)
+    white: dict[str, float] = field(default_factory=dict)
+    warnings: list[str] = field(default_factory=list)
+
+    def system(self, sites: frozenset[str] | None = None) -> System:
+        """The plan with parameters moved inside their tolerances and the effects found, of some sites or of all."""
+        system = System(self.record.plan)
+        for verdict in self.verdicts:
+            fit = verdict.search.chosen
+            kept = {
+                name: values
+                for name, values in fit.values.items()
+                if sites is None or CATALOGUE[name].site in sites
+            }
+            system = laid(system, verdict, kept)
+        for reading in self.readings:
+            site = CATALOGUE[reading.effect].site
+            if sites is None or site in sites:
+                system = CATALOGUE[reading.effect].apply(system, **{reading.parameter: reading.value})
+        return system
+
+
+def laid(system: System, verdict: Verdict, values: Values) -> System:
+    """A system with a part's parameters moved and some of its effects laid over it."""
+    part, z = verdict.search.data.part, verdict.search.chosen.z
+    for nuisance, place in zip(part.nuisances, z, strict=True):
+        system = nuisance.moved(system, float(place))
+    for name, given in values.items():
+        system = CATALOGUE[name].apply(system, **given)
+    return system
+
+
+def diagnose(record: Record, validation: Sequence[Record] = ()) -> dict[str, Any]:
+    """The report on a recording (contract, section 8), as plain values.
+
+    Raises:
+        InputError: there is nothing in the recording that a model of the plan could be held against.
+    """
+    with threadpool_limits(limits=1, user_api="blas"):  # small matrices: more threads only wait for each other
+        found = examine(record)
+        return report.build(found, validation)
+
+
+def examine(record: Record) -> Diagnosis:
+    """Judge every part of a recording."""
+    found = Diagnosis(record)
+    if record.ticks < LEAST_TICKS:
+        return found
+    rounded = readings.steps(record)
+    parts = parts_of(record, found.warnings)
+    if not parts:
+        raise InputError(
+            "The recording holds no part's input and output together: "
+            "record at least actuator_command with column_displacement, or column_displacement with column_force, "
+            "or table_command or damper_command with a reading of that laboratory."
+        )
+    datas: list[Data] = []
+    for part in parts:
+        data = fitting.prepare(part, record, rounded)
+        datas.append(data)
+        shift = part.shift() if isinstance(part, Ground) else 0.0
+        found.verdicts.append(judge(Searcher(data, Scales(record, shift)).run()))
+    found.white = readings.levels(datas)
+    found.readings = readings.findings(record, found.white, rounded)
+    if record.run.has("master") and record.run.has("slave"):
+        account = link.account(record.run, record.plan.test.interval)
+        found.link = link.findings(account, record.plan.test.interval)
+    return found
+
+
+def parts_of(record: Record, warnings: list[str]) -> list[Part]:
+    """The parts whose inputs and outputs were recorded; what is missing is said."""
+    parts: list[Part] = []
+    if record.ground is not None and record.has("ground_acceleration"):
+        parts.append(Ground(record, record.ground))
+    needed = ("ground_acceleration", "displacement", "column_force", "column_displacement", "damper_force_used")
+    if record.has(*needed):
+        parts.append(Building(record))
+    if record.has("actuator_command") and (record.has("column_displacement") or record.has("column_force")):
+        parts.append(LaboratoryA(record))
+    elif record.has("column_displacement", "column_force"):
+        parts.append(ColumnAlone(record, record.signals["column_displacement"]))
+        warnings.append("actuator_command was not recorded: nothing can be said of the actuator.")
+    outputs = ("table_displacement", "table_acceleration", "damper_stroke", "damper_force")
+    if any(record.has(name) for name in outputs) and (record.has("table_command") or record.has("damper_command")):
+        parts.append(LaboratoryB(record))
+    missing = [name for name in ("column_displacement", "column_force", *outputs) if not record.has(name)]
+    if missing:
+        warnings.append(f"Not recorded: {', '.join(missing)}; what only they show cannot be decided.")
+    return [part for part in parts if np.any(part.measured)]

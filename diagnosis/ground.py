@@ -1,0 +1,42 @@
+"""The ground motion: what came against what the plan believes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from diagnosis.parts import Nuisance, of_sites
+from diagnosis.record import Record
+from models import substructure
+from models.registry import Array
+from models.system import System
+
+
+class Ground:
+    """The recorded ground acceleration against the plan's record."""
+
+    name = "ground"
+    exact = True
+    signals = ("ground_acceleration",)
+
+    def __init__(self, record: Record, believed: Array) -> None:
+        self._believed = believed[:, : record.ticks]
+        self._interval = record.plan.test.interval
+        self._scale = record.plan.ground_motion.scale
+        self.measured = record.signals["ground_acceleration"][:, None]
+        self.present = record.present["ground_acceleration"][:, None]
+        self.nuisances: tuple[Nuisance, ...] = ()
+        self.candidates = of_sites(("ground",))
+
+    def predict(self, system: System) -> Array:
+        """Ground acceleration."""
+        factor = system.plan.ground_motion.scale / self._scale if self._scale else 1.0
+        rows = substructure.shifted(self._believed, system.effects.time_shift / self._interval)
+        return factor * rows[0][:, None]
+
+    def shift(self) -> float:
+        """How much later (s) the motion came, by cross-correlation."""
+        size = 2 * self.measured.size
+        came = np.fft.rfft(self.measured[:, 0], size)
+        product = np.fft.irfft(came * np.conj(np.fft.rfft(self._believed[0], size)), size)
+        place = int(np.argmax(np.abs(product)))
+        return (place if place < size // 2 else place - size) * self._interval

@@ -1,0 +1,201 @@
+"""The pieces that a recording can be judged by, one after the other, each from its own recorded inputs.
+
+A piece is driven by commands that are known exactly, so what it predicts differs from what was read by
+the sensors' noise alone as long as its model is right. A gap in one piece does not spill into another.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from diagnosis.record import Mask, Record
+from models import effects
+from models.closed_loop import MEASURED_A, MEASURED_B
+from models.effects.effect import Effect
+from models.labs import replay
+from models.registry import Array
+from models.substructure import STOREYS
+from models.system import System
+
+EXACT = 1e-6  # share of a computed signal's rms below which a difference is rounding, not gap
+MODEL_ERROR = 1e-3  # share of a measured signal's rms that two good solutions of one model may differ by
+
+
+@dataclass(frozen=True)
+class Nuisance:
+    """A nominal parameter that may move within its tolerance."""
+
+    table: str
+    field: str
+    tolerance: float
+
+    @property
+    def name(self) -> str:
+        """The name in reports: part.parameter."""
+        return f"{self.table}.{self.field}"
+
+    def moved(self, system: System, z: float) -> System:
+        """The system with the parameter moved by `z` tolerances."""
+        return system if z == 0.0 else system.scaled(self.table, self.field, 1.0 + z * self.tolerance)
+
+
+class Part(Protocol):
+    """A piece of the test with its recorded inputs and outputs."""
+
+    name: str
+    signals: tuple[str, ...]
+    nuisances: tuple[Nuisance, ...]
+    candidates: tuple[Effect, ...]
+    measured: Array  # (ticks, signals)
+    present: Mask  # (ticks, signals)
+    exact: bool  # computed, not measured: free of noise
+
+    def predict(self, system: System) -> Array:
+        """What the piece would have given, without noise; (ticks, signals)."""
+
+
+def nuisances(record: Record, fields: tuple[tuple[str, str], ...]) -> tuple[Nuisance, ...]:
+    """Those of the parameters that can move: finite and not zero."""
+    known, result = record.plan.tolerances, []
+    for table, field in fields:
+        value = np.asarray(getattr(getattr(record.plan, table), field))
+        tolerance = known.parameters.get(f"{table}.{field}", known.default)
+        if tolerance > 0.0 and np.all(np.isfinite(value)) and np.all(value != 0.0):
+            result.append(Nuisance(table, field, tolerance))
+    return tuple(result)
+
+
+def outputs(record: Record, names: tuple[str, ...]) -> tuple[Array, Mask]:
+    """Recorded signals and where they are there; one that is absent is nowhere there."""
+    none = np.zeros(record.ticks)
+    values = [record.signals.get(name, none) for name in names]
+    there = [record.present.get(name, none.astype(bool)) for name in names]
+    return np.stack(values, axis=1), np.stack(there, axis=1)
+
+
+def of_sites(sites: tuple[str, ...]) -> tuple[Effect, ...]:
+    """The catalogue's effects on these sites that change a waveform; noise and rounding are seen directly."""
+    found = [effect for effect in effects.CATALOGUE.values() if effect.site in sites]
+    return tuple(
+        effect for effect in found if not effect.name.endswith((".noise", ".quantization"))
+    )
+
+
+class LaboratoryA:
+    """Actuator and column from the recorded actuator command."""
+
+    name = "laboratory A"
+    exact = False
+    signals = MEASURED_A
+
+    def __init__(self, record: Record, command: str = "actuator_command") -> None:
+        self._command = record.signals[command]
+        self.measured, self.present = outputs(record, MEASURED_A)
+        self.nuisances = nuisances(
+            record,
+            (
+                ("actuator", "gain"),
+                ("actuator", "delay"),
+                ("actuator", "time_constant"),
+                ("column", "stiffness"),
+            ),
+        )
+        sites = ["actuator", *(f"sensor.{name}" for name in MEASURED_A if record.has(name))]
+        self.candidates = of_sites((*sites, "column") if record.has("column_force") else tuple(sites))
+
+    def predict(self, system: System) -> Array:
+        """Readings of the laboratory."""
+        return replay.laboratory_a(system, self._command)
+
+
+class ColumnAlone:
+    """The column from its measured deformation, where no actuator command was recorded."""
+
+    name = "column"
+    exact = False
+    signals = ("column_force",)
+
+    def __init__(self, record: Record, deformation: Array) -> None:
+        self._deformation = deformation
+        self.measured, self.present = outputs(record, self.signals)
+        self.nuisances = nuisances(record, (("column", "stiffness"),))
+        self.candidates = of_sites(("column", "sensor.column_force"))
+
+    def predict(self, system: System) -> Array:
+        """Force readings."""
+        return replay.column(system, self._deformation)[:, None]
+
+
+class LaboratoryB:
+    """Table and damper from the recorded table and motor commands."""
+
+    name = "laboratory B"
+    exact = False
+    signals = MEASURED_B
+
+    def __init__(self, record: Record) -> None:
+        none = np.zeros(record.ticks)
+        self._command = record.signals.get("table_command", none)
+        self._motor = record.signals.get("damper_command", none)
+        self.measured, self.present = outputs(record, MEASURED_B)
+        self.nuisances = nuisances(
+            record,
+            (
+                ("table", "frequency"),
+                ("table", "damping_ratio"),
+                ("table", "delay"),
+                *DAMPER,
+            ),
+        )
+        sites = ["table", *(f"sensor.{name}" for name in MEASURED_B if record.has(name))]
+        with_damper = record.has("damper_stroke") or record.has("damper_force")
+        self.candidates = of_sites((*sites, "damper") if with_damper else tuple(sites))
+
+    def predict(self, system: System) -> Array:
+        """Readings of the laboratory."""
+        return replay.laboratory_b(system, self._command, self._motor)
+
+
+DAMPER = (
+    ("damper", "mass"),
+    ("damper", "stiffness"),
+    ("damper", "damping"),
+    ("damper", "motor_time_constant"),
+)
+
+
+class Building:
+    """The numerical substructure from the ground motion and the forces that the master used."""
+
+    name = "structure"
+    exact = True
+    signals = ("displacement", "velocity", "acceleration")
+
+    def __init__(self, record: Record) -> None:
+        self._inputs = tuple(
+            record.signals[name] for name in ("column_displacement", "column_force", "damper_force_used")
+        )
+        here = record.signals["ground_acceleration"]
+        self._ground = np.zeros((2, record.ticks + 1))
+        self._ground[0, :-1] = here
+        storeys = record.plan.storeys
+        self.signals = tuple(name for name in self.signals for _ in range(storeys))
+        columns = [
+            record.signals[name].reshape(record.ticks, -1)[:, i]
+            for name in ("displacement", "velocity", "acceleration")
+            for i in range(storeys)
+        ]
+        self.measured = np.stack(columns, axis=1)
+        self.present = np.repeat(record.present["displacement"][:, None], self.measured.shape[1], axis=1)
+        self.nuisances = nuisances(
+            record, (("structure", "mass"), ("structure", "stiffness"), ("structure", "damping"))
+        )
+        self.candidates = of_sites(("structure",))
+
+    def predict(self, system: System) -> Array:
+        """Displacement, velocity and acceleration of every storey."""
+        rows = replay.building(system, self._ground, *self._inputs)
+        return rows[:, STOREYS : STOREYS + self.measured.shape[1]]

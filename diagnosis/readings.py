@@ -1,0 +1,69 @@
+"""Noise and rounding of readings: seen in the samples themselves, not in what the parts do."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from diagnosis.fitting import Data
+from diagnosis.record import Record
+from diagnosis.signals.noise import quantum
+from models.closed_loop import MEASURED_A, MEASURED_B
+
+LOUDER = 2.5  # noise over what the plan and the other sensors' noise make expected
+LEAST = 2.0  # noise over the plan's, whatever the others do
+
+
+class Reading(NamedTuple):
+    """What was found on one sensor."""
+
+    effect: str
+    parameter: str
+    value: float
+    interval: tuple[float, float]
+    ratio: float  # of the added noise to the sensor's usual one
+
+
+def steps(record: Record) -> dict[str, float]:
+    """Step of every reading that is rounded to one."""
+    found = {}
+    for name in (*MEASURED_A, *MEASURED_B):
+        if record.has(name):
+            there = record.signals[name][record.present[name]]
+            if np.ptp(there) > 0.0 and (step := quantum(there)) > 0.0:
+                found[name] = step
+    return found
+
+
+def levels(searches: list[Data]) -> dict[str, float]:
+    """White noise of every reading, rms."""
+    return {
+        name: float(white)
+        for data in searches
+        if not data.part.exact
+        for name, white, there in zip(data.part.signals, data.white, data.part.present.T, strict=True)
+        if there.any()
+    }
+
+
+def findings(record: Record, white: dict[str, float], rounded: dict[str, float]) -> list[Reading]:
+    """Sensors that round coarsely, or are far noisier than planned and than the others."""
+    planned = {name: level for name, level in vars(record.plan.sensors).items() if level > 0.0}
+    plain = [name for name in white if name in planned and name not in rounded]
+    ratios = {name: white[name] / planned[name] for name in plain}
+    usual = max(float(np.median(list(ratios.values()))) if ratios else 1.0, 1e-3)
+    result = []
+    for name, step in rounded.items():
+        noise = planned.get(name, 0.0) * usual
+        if step > noise:
+            size = step / np.sqrt(12.0) / noise if noise > 0.0 else 0.0
+            result.append(Reading(f"sensor.{name}.quantization", "step", step, (step, step), size))
+    for name, ratio in ratios.items():
+        others = [value for key, value in ratios.items() if key != name]
+        expected = float(np.median(others)) if others else 1.0
+        if ratio > LOUDER * max(expected, 0.4) and ratio > LEAST:
+            value = float(np.sqrt(max(white[name] ** 2 - (expected * planned[name]) ** 2, 0.0)))
+            bounds = (0.97 * value, 1.03 * value)
+            result.append(Reading(f"sensor.{name}.noise", "rms", value, bounds, ratio / expected))
+    return result

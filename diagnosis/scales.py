@@ -1,0 +1,102 @@
+"""How large an effect might be in this recording: the catalogue's sizes, carried over from the default test.
+
+A width, a force or a velocity that is large in one laboratory is nothing in another, so sizes follow what
+the recording's signals reach.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from diagnosis.record import Record
+from models.effects.effect import Effect, Parameter
+
+USUAL = {  # what the default test reaches
+    ("a", "m"): 2.4e-3,
+    ("a", "N"): 30e3,
+    ("a", "m/s"): 0.035,
+    ("b", "m"): 20e-3,
+    ("b", "m/s²"): 1.0,
+    ("damper", "m"): 49e-3,
+    ("damper", "N"): 76.0,
+}
+SIGNAL = {
+    ("a", "m"): "column_displacement",
+    ("a", "N"): "column_force",
+    ("b", "m"): "table_displacement",
+    ("b", "m/s²"): "table_acceleration",
+    ("damper", "m"): "damper_stroke",
+    ("damper", "N"): "damper_force",
+}
+GROUP = {"actuator": "a", "column": "a", "table": "b", "damper": "damper"}
+SENSORS = {
+    "column_displacement": "a",
+    "column_force": "a",
+    "table_displacement": "b",
+    "table_acceleration": "b",
+    "damper_stroke": "damper",
+    "damper_force": "damper",
+}
+LIMITS = (0.25, 0.4, 0.55, 0.7, 0.85, 0.95)  # of what is reached: where a limit is looked for
+
+
+class Scales:
+    """Sizes of effects for one recording."""
+
+    def __init__(self, record: Record, shift: float = 0.0) -> None:
+        self._shift = shift
+        self._reached: dict[tuple[str, str], float] = {}
+        for key, name in SIGNAL.items():
+            if record.has(name):
+                self._reached[key] = float(np.max(np.abs(record.signals[name])))
+        if record.has("column_displacement"):
+            rate = np.diff(record.signals["column_displacement"][::8]) / (8 * record.plan.test.interval)
+            self._reached["a", "m/s"] = float(np.max(np.abs(rate), initial=0.0))
+        if record.has("damper_command"):
+            self.motor = float(np.max(np.abs(record.signals["damper_command"])))
+        else:
+            self.motor = 0.0
+
+    def group(self, effect: Effect) -> str:
+        """Which of the signals' scales an effect lives on."""
+        part, _, signal = effect.site.partition(".")
+        return SENSORS[signal] if part == "sensor" else GROUP.get(part, "")
+
+    def starts(self, effect: Effect) -> Iterator[dict[str, float]]:
+        """Parameters from which a search starts, from weak to strong."""
+        strength = [item for item in effect.parameters if not item.shape]
+        shapes = {item.name: item.default for item in effect.parameters if item.default is not None}
+        if len(strength) != 1:
+            return
+        (parameter,) = strength
+        for size in self.sizes(effect, parameter):
+            yield {**shapes, parameter.name: size}
+
+    def sizes(self, effect: Effect, parameter: Parameter) -> list[float]:
+        """Sizes of the parameter that counts."""
+        if effect.name == "ground.time_shift" and self._shift != 0.0:
+            return [self._shift]
+        key = (self.group(effect), parameter.unit)
+        reached = self._reached.get(key)
+        if effect.name == "damper.force_limit":
+            reached = self.motor or None
+        if np.isinf(parameter.null) and reached:
+            sizes = [share * reached for share in LIMITS]
+        elif reached and key in USUAL:
+            sizes = [size * reached / USUAL[key] for size in parameter.sizes]
+        else:
+            sizes = list(parameter.sizes)
+        if np.isfinite(parameter.null) and len(sizes) > 2:
+            sizes = sizes[1:-1:2] if len(sizes) > 4 else [sizes[1], sizes[-1]]
+        return [min(max(size, parameter.least), parameter.most) for size in sizes]
+
+    def stretched(self, effect: Effect, values: dict[str, float], share: float) -> dict[str, float]:
+        """The start moved to where a straight line from the null value promises most."""
+        result = dict(values)
+        for item in effect.parameters:
+            if not item.shape and np.isfinite(item.null) and share > 0.0:
+                moved = item.null + share * (values[item.name] - item.null)
+                result[item.name] = min(max(moved, item.least), item.most)
+        return result

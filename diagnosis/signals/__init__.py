@@ -1,0 +1,1 @@
+"""What signals and residuals say by themselves, before any model: noise, quantum, windows, bands, ceilings."""

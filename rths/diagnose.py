@@ -1,0 +1,83 @@
+"""`rths diagnose`: the sim-to-real gap of a recording: where it lies, which effect causes it, how far it closes."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from common import cli
+from common.errors import InputError
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of `diagnose`."""
+    parser.add_argument("file", type=Path, metavar="FILE", help="a recording (MCAP), whole or of one part")
+    parser.add_argument("--plan", metavar="PLAN", help="what the laboratories should be (default: the plan in FILE)")
+    parser.add_argument(
+        "--ideal",
+        action="store_true",
+        help="hold the test against the pure simulation: transfer systems that follow their targets at once",
+    )
+    parser.add_argument("--json", type=Path, metavar="OUT", help="write the report as JSON; - for standard output")
+    parser.add_argument("--html", type=Path, metavar="OUT", help="write the report as one HTML page")
+    parser.add_argument(
+        "--validate",
+        type=Path,
+        nargs="+",
+        default=[],
+        metavar="OTHER",
+        help="further recordings of the same laboratories, on which the shrinkage is judged",
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Diagnose and report; 0 whatever the verdict is."""
+    report = diagnose_file(args.file, plan=args.plan, validate=args.validate, against_ideal=args.ideal)
+    if args.html:
+        from rths.diagnosis_report import page
+
+        page.write(report, writable(args.html))
+    if args.json:
+        text = json.dumps(report, allow_nan=False) + "\n"
+        if str(args.json) == "-":
+            sys.stdout.write(text)
+            return 0
+        writable(args.json).write_text(text, encoding="utf-8")
+    from rths.diagnosis_report import terminal
+
+    sys.stdout.write(terminal.summary(report) + "\n")
+    return 0
+
+
+def writable(path: Path) -> Path:
+    """The path, if a file can be written there; raises InputError."""
+    try:
+        path.touch()
+    except OSError as error:
+        raise InputError(f"Cannot write {path}: {error.strerror}.") from None
+    return path
+
+
+def diagnose_file(
+    path: Path, *, plan: str | None = None, validate: Sequence[Path] = (), against_ideal: bool = False
+) -> dict[str, Any]:
+    """The report on a recording, as plain values that JSON can hold.
+
+    Raises:
+        InputError: a file cannot be read, or holds nothing to diagnose.
+    """
+    from common import plan as plans
+    from common.recording.reader import read
+    from diagnosis import record
+    from diagnosis.diagnose import diagnose
+
+    chosen = plans.load(cli.plan_path(plan)) if plan else None
+    own = record.build(read(path), chosen, against_ideal=against_ideal)
+    others = [record.build(read(other), chosen, against_ideal=against_ideal) for other in validate]
+    report = diagnose(own, others)
+    report.setdefault("details", {}).setdefault("test", {})["file"] = path.name
+    return report

@@ -1,0 +1,112 @@
+"""Numbers as a reader of the field expects them: SI prefixes, few digits, intervals in one unit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+MISSING = "–"
+PREFIXES = ((1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
+# how far up and down the prefixes of a unit go; other units take none
+RANGES = {
+    "m": (1e-9, 1.0),
+    "s": (1e-9, 1.0),
+    "m/s": (1e-3, 1.0),
+    "N": (1.0, 1e6),
+    "Hz": (1.0, 1e3),
+    "N/m": (1.0, 1e6),
+    "N·s/m": (1.0, 1e6),
+    "m/N": (1e-9, 1.0),
+}
+NO_UNIT = ("", "-", "–", "1")
+
+
+def known(value: object) -> bool:
+    """Whether a value is a finite number."""
+    return isinstance(value, int | float) and math.isfinite(value)
+
+
+def scale(size: float, unit: str) -> tuple[float, str]:
+    """Factor and unit in which a value of this size reads well."""
+    if unit in NO_UNIT:
+        return 1.0, ""
+    least, most = RANGES.get(unit, (1.0, 1.0))
+    fitting = [item for item in PREFIXES if least <= item[0] <= most]
+    found = next((item for item in fitting if abs(size) >= item[0]), fitting[-1] if size else (1.0, ""))
+    return 1.0 / found[0], found[1] + unit
+
+
+def decimals(size: float, width: float = 0.0) -> int:
+    """Decimals that show three digits of a value, and two of an interval's width."""
+    places = 2 - math.floor(math.log10(abs(size))) if size else 0
+    if width > 0.0:
+        places = max(places, 1 - math.floor(math.log10(1.001 * width)))
+    return min(max(places, 0), 5)
+
+
+def quantity(value: object, unit: str, bounds: Sequence[object] | None = None) -> str:
+    """A value with its unit, and its interval if there is one: `3.10 N (2.90 … 3.30)`."""
+    if not isinstance(value, int | float) or not math.isfinite(value):
+        return MISSING
+    ends = [float(end) for end in bounds or () if isinstance(end, int | float) and math.isfinite(end)]
+    factor, name = scale(max(map(abs, (value, *ends))), unit)
+    width = (ends[1] - ends[0]) * factor if len(ends) == 2 else 0.0
+    places = decimals(value * factor, width)
+    text = f"{value * factor:.{places}f} {name}".rstrip()
+    if bounds is None or len(bounds) != 2:
+        return text
+    lower, upper = (f"{end * factor:.{places}f}" if known(end) else "?" for end in map(as_float, bounds))
+    return f"{text} ({lower} … {upper})"
+
+
+def as_float(value: object) -> float:
+    """The number, NaN where there is none."""
+    return float(value) if isinstance(value, int | float) else math.nan
+
+
+def bare_percent(value: float) -> str:
+    """A share in percent with two digits, without the sign."""
+    hundredth = 100.0 * value
+    if abs(hundredth) >= 10.0 or hundredth == 0.0:
+        return f"{hundredth:.0f}"
+    return f"{hundredth:.1f}" if abs(hundredth) >= 1.0 else f"{hundredth:.2g}"
+
+
+def percent(value: object) -> str:
+    """A share in percent."""
+    number = as_float(value)
+    return f"{bare_percent(number)} %" if math.isfinite(number) else MISSING
+
+
+def probability(value: object) -> str:
+    """A probability in percent, never quite certain."""
+    number = as_float(value)
+    if not math.isfinite(number):
+        return MISSING
+    if number > 0.99:
+        return "> 99 %"
+    return "< 1 %" if number < 0.01 else f"{100.0 * number:.0f} %"
+
+
+def percent_interval(bounds: Sequence[object] | None) -> str:
+    """An interval of shares: `86 … 95 %`; nothing where it is unknown."""
+    if bounds is None or not all(map(known, bounds)) or len(bounds) != 2:
+        return ""
+    lower, upper = map(as_float, bounds)
+    return f"{100.0 * lower:.0f} … {100.0 * upper:.0f} %"
+
+
+def times(value: object) -> str:
+    """A ratio: `14×`."""
+    number = as_float(value)
+    if not math.isfinite(number):
+        return MISSING
+    return f"{number:.0f}×" if number >= 10.0 else f"{number:.1f}×"
+
+
+def span(bounds: Sequence[object] | None, unit: str) -> str:
+    """A stretch on an axis: `2.1–9.8 s`; nothing where it is unknown."""
+    if bounds is None or len(bounds) != 2 or not all(map(known, bounds)):
+        return ""
+    lower, upper = map(as_float, bounds)
+    return f"{lower:.3g}–{upper:.3g} {unit}"

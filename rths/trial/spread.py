@@ -1,0 +1,59 @@
+"""The same work on many items: one after the other, over processes, or over the machines of a Dask cluster."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, TypeVar
+
+from common.errors import InputError
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+def spread(
+    function: Callable[[Item], Result], items: Sequence[Item], jobs: int = 1, dask: str = ""
+) -> Iterator[Result]:
+    """Results as they come, in no order; `dask` is the address of a scheduler.
+
+    Raises:
+        InputError: a package that this needs is not there, or the scheduler cannot be reached.
+    """
+    if jobs == 1 and not dask:
+        yield from map(function, items)
+        return
+    joblib = needed("joblib", "--jobs")
+    with _backend(joblib, jobs, dask):
+        tasks = (joblib.delayed(function)(item) for item in items)
+        mode = "generator" if dask else "generator_unordered"
+        yield from joblib.Parallel(n_jobs=-1 if dask else jobs, return_as=mode)(tasks)
+
+
+def needed(package: str, option: str) -> Any:
+    """A package that only an option needs."""
+    try:
+        return importlib.import_module(package)
+    except ImportError:
+        name = package.partition(".")[0]
+        raise InputError(f"{option} needs the package {name}: install it, or leave the option out.") from None
+
+
+@contextlib.contextmanager
+def _backend(joblib: Any, jobs: int, dask: str) -> Iterator[None]:
+    if not dask:
+        loky = importlib.import_module("joblib.externals.loky")
+        try:
+            with joblib.parallel_config(backend="loky", n_jobs=jobs, inner_max_num_threads=1):
+                yield
+        finally:
+            loky.get_reusable_executor().shutdown(wait=True)  # it would wait for more work
+        return
+    distributed = needed("dask.distributed", "--dask")
+    try:
+        client = distributed.Client(dask, timeout="10s")
+    except (OSError, ValueError, TimeoutError) as error:
+        raise InputError(f"Cannot reach the Dask scheduler at {dask}: {error}.") from None
+    with client, joblib.parallel_config(backend="dask"):
+        yield

@@ -1,0 +1,460 @@
+"""Realistic reports, as a diagnosis would write them."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Report = dict[str, Any]
+Values = NDArray[np.float64]
+
+T = np.arange(2.0, 8.0, 0.004)
+RNG = np.random.default_rng(3)
+
+
+def listed(values: Values) -> list[float]:
+    return [float(value) for value in values]
+
+
+def noisy(values: Values, size: float) -> Values:
+    return values + size * RNG.standard_normal(values.size)
+
+
+def stroke(t: Values = T) -> Values:
+    found: Values = 0.045 * np.sin(2 * np.pi * 1.9 * t) * np.sin(0.5 * t) ** 2
+    return found
+
+
+def velocity(t: Values = T) -> Values:
+    found: Values = np.gradient(stroke(t), t)
+    return found
+
+
+def bare(status: str) -> Report:
+    """A report in which nothing was determined."""
+    return {
+        "version": 1,
+        "status": status,
+        "tolerances": {},
+        "gap": {"signals": {}, "overall": None, "overall_noise_floor": None},
+        "where": [],
+        "which": [],
+        "equivalent": [],
+        "how_far": {
+            "before": None,
+            "after": None,
+            "closed": None,
+            "closed_interval": None,
+            "noise_floor": None,
+            "judged_on": None,
+        },
+        "not_exercised": [],
+        "next_test": "",
+        "warnings": [],
+    }
+
+
+def gap(size: float) -> Report:
+    floors = {
+        "column_displacement": (0.3, 0.0021, 1.2e-4, "m"),
+        "column_force": (0.35, 0.0030, 1400.0, "N"),
+        "table_acceleration": (0.6, 0.0112, 0.11, "m/s²"),
+        "damper_force": (1.0, 0.0042, 6.4, "N"),
+        "damper_stroke": (0.8, 0.0001, 2.1e-3, "m"),
+        "table_displacement": (0.2, 0.0012, 1.1e-4, "m"),
+    }
+    return {
+        "signals": {
+            name: {"nrmse": size * part, "noise_floor": floor, "peak_error": size * 10 * peak, "unit": unit}
+            for name, (part, floor, peak, unit) in floors.items()
+        },
+        "overall": 0.7 * size,
+        "overall_noise_floor": 0.0061,
+    }
+
+
+def test_facts() -> Report:
+    return {
+        "name": "el_centro_10",
+        "duration": 40.0,
+        "interval": 0.002,
+        "ticks": 20000,
+        "file": "el_centro_10-2026-11-21.mcap",
+        "motion": "El Centro 1940 NS, 10 %",
+        "outcome": "completed",
+    }
+
+
+def part(site: str, strength: float, signals: list[Report]) -> Report:
+    centres = np.arange(0.5, 40.0, 1.0)
+    frequency = np.linspace(0.2, 20.0, 120)
+    peak = strength * np.exp(-(((frequency - 2.0) / 0.9) ** 2))
+    return {
+        "site": site,
+        "signals": signals,
+        "windows": {
+            "t": listed(centres),
+            "ratio": listed(1.0 + strength * np.exp(-centres / 8.0) * np.sin(centres) ** 2),
+        },
+        "bands": {
+            "frequency": listed(frequency),
+            "residual": listed(0.02 * (1.0 + peak) * (1.0 + 0.1 * RNG.random(frequency.size))),
+            "noise": [0.02] * frequency.size,
+        },
+        "amplitudes": {
+            "amplitude": [0.005, 0.01, 0.02, 0.03, 0.045],
+            "ratio": listed(1.0 + strength * np.array([1.0, 0.9, 0.6, 0.5, 0.4])),
+        },
+    }
+
+
+def signal(name: str, unit: str, true: Values, miss: Values, noise: float) -> Report:
+    measured = noisy(true, noise)
+    return {
+        "signal": name,
+        "unit": unit,
+        "residual_rms": float(np.sqrt(np.mean((measured - true + miss) ** 2))),
+        "noise_floor": noise,
+        "t": listed(T),
+        "measured": listed(measured),
+        "nominal": listed(true - miss),
+        "corrected": listed(true - 0.03 * miss),
+    }
+
+
+def parts() -> list[Report]:
+    friction = 3.1 * np.tanh(velocity() / 0.01)
+    force = 56.8 * stroke() + 60.0 * velocity() + friction
+    column = 30e3 * np.sin(2 * np.pi * 2.0 * T) * np.exp(-0.1 * T)
+    return [
+        part("damper", 14.0, [signal("damper_force", "N", force, friction, 0.2)]),
+        part("column", 0.5, [signal("column_force", "N", column, 0.002 * column, 100.0)]),
+        part("table", 0.2, []),
+    ]
+
+
+def curve() -> Report:
+    x = velocity()
+    y = 60.0 * x
+    friction = 3.1 * np.tanh(x / 0.01)
+    return {
+        "title": "Damper force against stroke velocity, spring force taken off",
+        "x": {"label": "stroke velocity, m/s", "values": listed(x)},
+        "y": {"label": "force, N"},
+        "measured": listed(noisy(y + friction, 0.2)),
+        "before": listed(y),
+        "after": listed(y + friction),
+    }
+
+
+def candidate(names: list[str], probability: float, score: float, **more: Any) -> Report:
+    return {
+        "effects": names,
+        "kind": "measurement" if all(name.startswith("sensor.") for name in names) else "physics",
+        "probability": probability,
+        "explained": 0.97 * probability**0.1,
+        "score": score,
+        "parameters": {},
+        "for": "the residual keeps its size while the stroke grows, and turns its sign with the velocity",
+        "against": "",
+        "on_bound": [],
+    } | more
+
+
+def value(number: float, lower: float, upper: float, unit: str) -> Report:
+    return {"value": number, "interval": [lower, upper], "unit": unit}
+
+
+def details() -> Report:
+    shape = np.sin(2 * np.pi * 2.0 * T) * np.exp(-0.1 * T)
+    friction = {"damper.friction": {"force": value(3.1, 2.9, 3.3, "N")}}
+    lag = {"damper.motor_lag": {"time_constant": value(0.0071, 0.0064, 0.0078, "s")}}
+    falsified = {"sensor.damper_force.gain": {"factor": value(1.08, 1.071, 1.089, "–")}}
+    return {
+        "test": test_facts(),
+        "parts": parts(),
+        "paths": {
+            "command": {
+                "delay": 0.0012,
+                "amplitude": 0.998,
+                "damping_points": -0.19,
+                "nominal_delay": 0.0004,
+                "nominal_damping_points": -0.06,
+            },
+            "force": {
+                "delay": 0.0,
+                "amplitude": 1.001,
+                "damping_points": 0.0,
+                "nominal_delay": 0.0,
+                "nominal_damping_points": 0.0,
+            },
+            "exchange": {
+                "delay": 0.0021,
+                "amplitude": 1.0,
+                "damping_points": -0.03,
+                "nominal_delay": 0.002,
+                "nominal_damping_points": -0.03,
+            },
+        },
+        "loop_shares": [
+            {"site": "damper", "shapley": 0.9, "interval": [0.85, 0.94], "first_in": 0.92, "last_out": 0.88},
+            {
+                "site": "actuator",
+                "shapley": 0.1,
+                "interval": [0.06, 0.15],
+                "first_in": 0.12,
+                "last_out": 0.08,
+            },
+        ],
+        "candidates": [
+            candidate(["damper.friction"], 0.97, 0.0, parameters=friction),
+            candidate(
+                ["damper.motor_lag", "damper.viscous"],
+                0.02,
+                -8.3,
+                parameters=lag | {"damper.viscous": {"factor": value(1.9, 1.6, 3.0, "–")}},
+                against="would grow with the frequency, which the residual does not",
+                on_bound=["factor"],
+            ),
+            candidate(["sensor.damper_force.gain"], 0.004, -31.0, parameters=falsified),
+        ],
+        "ceiling": [{"site": "damper", "flexible": 0.985, "catalogue": 0.971}],
+        "curves": [curve()],
+        "waterfall": [
+            {"label": "nominal models", "value": 0.041},
+            {"label": "parameters within tolerances", "value": 0.034},
+            {"label": "+ damper.friction", "value": 0.0071},
+            {"label": "noise floor", "value": 0.0061},
+        ],
+        "histories": [
+            {
+                "signal": "damper_force",
+                "unit": "N",
+                "t": listed(T),
+                "recorded": listed(noisy(76.0 * shape, 0.2)),
+                "before": listed(70.0 * np.roll(shape, 6)),
+                "after": listed(75.6 * shape),
+            },
+            {
+                "signal": "column_displacement",
+                "unit": "m",
+                "t": listed(T),
+                "recorded": listed(noisy(2.4e-3 * shape, 5e-6)),
+                "before": listed(2.3e-3 * shape),
+                "after": listed(2.398e-3 * shape),
+            },
+        ],
+        "next": [
+            {
+                "test": "rths bench damper, sweep at a fifth of the force",
+                "separation": 6.2,
+                "pair": ["damper.friction", "damper.motor_lag"],
+                "why": "friction is largest against the motion where the stroke is small",
+            }
+        ],
+        "remaining": {"overall": 0.0071, "where": [{"site": "actuator", "residual_to_noise": 1.6}]},
+    }
+
+
+def explained() -> Report:
+    return bare("explained") | {
+        "verdict": (
+            "91 % of the gap lies in the damper; best named cause: damper friction of 3.1 N (2.9 … 3.3), p > 99 %; "
+            "adding it shrinks the gap from 3.4 % to 0.71 % on held-out windows (noise floor 0.61 %)."
+        ),
+        "tolerances": {
+            "column.stiffness": {"factor": 1.011, "z": 0.55},
+            "actuator.delay": {"factor": 1.034, "z": 1.7},
+            "damper.mass": {"factor": 0.996, "z": -0.2},
+        },
+        "gap": gap(0.049),
+        "where": [
+            {
+                "site": "damper",
+                "share": 0.91,
+                "share_interval": [0.86, 0.95],
+                "residual_to_noise": 14.2,
+                "when": [[2.1, 9.8], [14.0, 16.5]],
+                "frequency_band": [1.5, 3.0],
+            },
+            {
+                "site": "actuator",
+                "share": 0.06,
+                "share_interval": [0.03, 0.09],
+                "residual_to_noise": 1.6,
+                "when": [],
+                "frequency_band": None,
+            },
+            {
+                "site": "sensor.column_force",
+                "share": 0.03,
+                "share_interval": [0.01, 0.05],
+                "residual_to_noise": 1.2,
+                "when": [],
+                "frequency_band": [0.0, 0.5],
+            },
+        ],
+        "which": [
+            {
+                "effects": ["damper.friction"],
+                "probability": 0.97,
+                "parameters": {"damper.friction": {"force": value(3.1, 2.9, 3.3, "N")}},
+                "held_out_score": 0.0,
+            },
+            {
+                "effects": ["damper.motor_lag", "damper.viscous"],
+                "probability": 0.02,
+                "parameters": {
+                    "damper.motor_lag": {"time_constant": value(0.0071, 0.0064, 0.0078, "s")},
+                    "damper.viscous": {"factor": value(1.9, 1.6, 3.0, "–")},
+                },
+                "held_out_score": -8.3,
+            },
+        ],
+        "equivalent": [["damper.friction", "table.friction"]],
+        "how_far": {
+            "before": 0.034,
+            "after": 0.0071,
+            "closed": 0.964,
+            "closed_interval": [0.94, 0.98],
+            "noise_floor": 0.0061,
+            "judged_on": "held-out time windows",
+        },
+        "not_exercised": ["damper.stroke_stop", "actuator.velocity_limit", "column.pinching"],
+        "next_test": "Run `rths bench damper` at a fifth of the force: friction then dominates, motor lag vanishes.",
+        "warnings": ["3 of 20000 ticks are missing from the recording."],
+        "details": details(),
+    }
+
+
+def no_gap() -> Report:
+    found = details()
+    kept = {name: found[name] for name in ("test", "paths")}
+    kept["parts"] = [part("damper", 0.05, []), part("column", 0.04, [])]
+    return bare("no_gap") | {
+        "tolerances": {"column.stiffness": {"factor": 1.004, "z": 0.2}},
+        "gap": gap(0.008),
+        "how_far": {
+            "before": 0.0062,
+            "after": 0.0062,
+            "closed": None,
+            "closed_interval": None,
+            "noise_floor": 0.0061,
+            "judged_on": "held-out time windows",
+        },
+        "details": kept,
+    }
+
+
+def unknown_effect() -> Report:
+    found = details()
+    spring = np.linspace(-0.04, 0.04, 200)
+    bump = 2.0 * np.sin(2 * np.pi * spring / 0.016)
+    found["candidates"] = [
+        candidate(["damper.stiffness"], 0.6, 0.0),
+        candidate(["damper.friction"], 0.4, -0.4),
+    ]
+    found["curves"], found["waterfall"] = [], found["waterfall"][:2] + found["waterfall"][-1:]
+    found["ceiling"] = [{"site": "damper", "flexible": 0.96, "catalogue": 0.22}]
+    found["unknown"] = {
+        "site": "damper",
+        "depends_on": [{"on": "displacement", "share": 0.83}, {"on": "velocity", "share": 0.09}],
+        "frequency": 7.6,
+        "amplitude": 2.0,
+        "unit": "N",
+        "curve": {
+            "title": "",
+            "x": {"label": "stroke, m", "values": listed(spring)},
+            "y": {"label": "force left over, N"},
+            "measured": listed(noisy(bump, 0.3)),
+            "before": [0.0] * spring.size,
+            "after": listed(bump),
+        },
+    }
+    return explained() | {
+        "status": "unknown_effect",
+        "verdict": "",
+        "which": [],
+        "equivalent": [],
+        "how_far": bare("")["how_far"]
+        | {"before": 0.034, "after": 0.029, "closed": 0.18, "noise_floor": 0.0061},
+        "details": found,
+    }
+
+
+def not_enough_data() -> Report:
+    """A bench recording that holds the column's signals only."""
+    column = signal("column_force", "N", 18e3 * np.sin(2 * np.pi * 0.5 * T), np.zeros(T.size), 100.0)
+    return bare("not_enough_data") | {
+        "gap": {
+            "signals": {
+                "column_force": {"nrmse": None, "noise_floor": 0.003, "peak_error": None, "unit": "N"},
+            },
+            "overall": None,
+            "overall_noise_floor": None,
+        },
+        "warnings": [
+            "The recording holds column_displacement and column_force only: 14 channels are absent."
+        ],
+        "next_test": "Record actuator_command too, or run `rths bench column`.",
+        "details": {
+            "test": {"name": "bench", "file": "column.mcap"},
+            "parts": [{"site": "column", "signals": [{**column, "nominal": [], "corrected": []}]}],
+        },
+    }
+
+
+def ambiguous() -> Report:
+    stiffness = {"column.stiffness": {"factor": value(0.941, 0.936, 0.946, "–")}}
+    compliance = {"actuator.compliance": {"compliance": value(4.7e-9, 4.1e-9, 5.3e-9, "m/N")}}
+    falsified = {"sensor.column_force.gain": {"factor": value(0.941, 0.936, 0.946, "–")}}
+    names = (
+        ("column.stiffness", stiffness, 0.45),
+        ("sensor.column_force.gain", falsified, 0.45),
+        ("actuator.compliance", compliance, 0.1),
+    )
+    return explained() | {
+        "status": "ambiguous",
+        "verdict": "",
+        "which": [
+            {"effects": [name], "probability": share, "parameters": given, "held_out_score": 0.0}
+            for name, given, share in names
+        ],
+        "where": [
+            {
+                "site": site,
+                "share": share,
+                "share_interval": [share - 0.2, share + 0.2],
+                "residual_to_noise": 8.0,
+                "when": [[0.0, 40.0]],
+                "frequency_band": [0.5, 5.0],
+            }
+            for site, share in (("column", 0.48), ("sensor.column_force", 0.42), ("actuator", 0.1))
+        ],
+        "equivalent": [["column.stiffness", "sensor.column_force.gain"]],
+        "not_exercised": [f"damper.effect_{place}" for place in range(40)],
+        "warnings": [
+            f"Warning {place} that is long enough to fill a line or two. " * 3 for place in range(6)
+        ],
+        "next_test": "Hang a known weight on the load cell: "
+        + "a static check tells gain from stiffness. " * 8,
+        "details": {},
+    }
+
+
+REPORTS = {
+    "explained": explained(),
+    "no_gap": no_gap(),
+    "unknown_effect": unknown_effect(),
+    "not_enough_data": not_enough_data(),
+    "ambiguous": ambiguous(),
+}
+
+
+def fresh(name: str) -> Report:
+    """A report of its own, as parsed from JSON."""
+    found: Report = json.loads(json.dumps(REPORTS[name]))
+    return found

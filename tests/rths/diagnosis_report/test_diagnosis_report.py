@@ -1,0 +1,272 @@
+"""The renderings of a diagnosis: schema, terminal and page, whole and with pieces missing."""
+
+from __future__ import annotations
+
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rths.diagnosis_report import pictures, wording
+from rths.diagnosis_report.page import page, write
+from rths.diagnosis_report.schema import schema
+from rths.diagnosis_report.terminal import summary
+from rths.diagnosis_report.values import percent, percent_interval, probability, quantity, span, times
+from tests.rths.diagnosis_report.reports import REPORTS, Report, bare, fresh
+
+VOID = {"meta", "br", "img"}
+SECTIONS = (
+    "gap",
+    "where",
+    "which",
+    "how-far",
+    "paths",
+    "tolerances",
+    "equivalent",
+    "not-exercised",
+    "next",
+    "warnings",
+    "reading",
+)
+
+
+class Balanced(HTMLParser):
+    """Fails where a tag is left open; gathers the text."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.words: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: Any) -> None:
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.words.append(data)
+
+
+def text_of(html: str) -> str:
+    parser = Balanced()
+    parser.feed(html)
+    assert parser.open == []
+    return " ".join(" ".join(parser.words).split())
+
+
+def validator() -> Any:
+    return pytest.importorskip("jsonschema").Draft202012Validator(schema())
+
+
+@pytest.mark.parametrize("name", REPORTS)
+def test_reports_fit_the_schema(name: str) -> None:
+    assert [error.message for error in validator().iter_errors(fresh(name))] == []
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"version": 2},
+        {"status": "fine"},
+        {"where": [{"site": "roof"}]},
+        {"equivalent": [["column.stiffness"]]},
+        {"extra": 1},
+        {"which": [{"effects": ["Damper"], "probability": 2.0, "parameters": {}, "held_out_score": 0}]},
+        {"details": {"candidates": [{"effects": ["damper.gain"], "kind": "magic", "probability": 1.0}]}},
+        {"details": {"paths": {"sideways": {}}}},
+    ],
+)
+def test_the_schema_refuses(change: Report) -> None:
+    assert not validator().is_valid(fresh("explained") | change)
+
+
+def test_the_schema_asks_for_every_key_of_the_contract() -> None:
+    assert set(bare("no_gap")) == set(schema()["required"])
+    assert {"verdict", "details"} == set(schema()["properties"]) - set(schema()["required"])
+
+
+@pytest.mark.parametrize("name", REPORTS)
+def test_the_terminal_shows_one_look(name: str) -> None:
+    lines = summary(fresh(name)).split("\n")
+    assert len(lines) <= 25
+    assert lines[0].startswith(wording.STATUS[name].upper())
+    assert all(len(line) <= 125 for line in lines)
+
+
+def test_the_terminal_says_what_matters() -> None:
+    text = summary(fresh("explained"))
+    for words in (
+        "91 % (86 … 95 %)",
+        "force 3.10 N (2.90 … 3.30)",
+        "3.4 % → 0.71 %, closed 96 % (94 … 98 %), noise floor 0.61 %",
+        "actuator.delay ×1.034 (z +1.7)",
+        "cannot tell damper friction from table friction",
+        "damper stroke stop",
+        "3 of 20000 ticks",
+    ):
+        assert words in text
+    assert "column.stiffness" not in text
+
+
+@pytest.mark.parametrize("name", REPORTS)
+def test_the_page_stands_alone(name: str, tmp_path: Path) -> None:
+    path = tmp_path / "report.html"
+    write(fresh(name), path)
+    html = path.read_text(encoding="utf-8")
+    text_of(html)
+    assert re.findall(r'<section id="([^"]+)"', html) == list(SECTIONS)
+    assert "<script" not in html
+    assert re.findall(r'(?:src|href)="(?!#|data:)', html) == []
+    assert set(re.findall(r"https?://[^\s\"<]+", html)) <= {
+        "http://www.w3.org/2000/svg",
+        "http://www.w3.org/1999/xlink",
+    }
+    assert re.search(r"\bnan\b|\bNone\b", html) is None
+
+
+def test_the_page_shows_every_picture_of_a_whole_report() -> None:
+    html = page(fresh("explained"))
+    assert html.count("<figure") == 13
+    assert (
+        html.index("Physics effects") < html.index("damper.motor_lag") < html.index("Measurement artefacts")
+    )
+    assert html.index("Measurement artefacts") < html.index("sensor.damper_force.gain")
+    for words in (
+        "On the bound of its range: factor.",
+        "Not told apart from table friction.",
+        "8.3 nats worse",
+    ):
+        assert words in html
+
+
+def test_pages_say_what_is_absent() -> None:
+    assert "No part leaves a residual above its noise" in page(fresh("no_gap"))
+    poor = text_of(page(fresh("not_enough_data")))
+    for words in (
+        "The gap could not be placed",
+        "No effect is named: the recording does not hold enough",
+        "How far the gap closes was not determined.",
+        "its prediction is not in this report",
+        "The paths' delays are not in this report.",
+        "No nominal parameter was moved.",
+    ):
+        assert words in poor
+    assert "An effect that the catalogue lacks" in page(fresh("unknown_effect"))
+    assert "is not in this report" in page(bare("unknown_effect"))
+
+
+def strings_replaced(piece: Any, text: str) -> Any:
+    """The piece with every free string replaced."""
+    if isinstance(piece, dict):
+        return {key: strings_replaced(value, text) for key, value in piece.items()}
+    if isinstance(piece, list):
+        return [strings_replaced(value, text) for value in piece]
+    return text if isinstance(piece, str) else piece
+
+
+@pytest.mark.parametrize("text", ["<script>alert(1)</script>", "\"'><b>", "$\\frac{$", "a & b -- >"])
+@pytest.mark.parametrize("name", ["explained", "unknown_effect"])
+def test_no_text_of_a_report_becomes_markup(name: str, text: str) -> None:
+    report = strings_replaced(fresh(name), text)
+    report["tolerances"] = {text: {"factor": 1.1, "z": 2.0}}
+    html = page(report)
+    assert text in re.sub(r"\s+", " ", text_of(html)) or "\n" in text
+    assert "<script" not in html
+    assert "<b>alert" not in html
+    assert summary(report)
+
+
+def pieces(piece: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    """Paths to every key below a report, series of numbers left out."""
+    if isinstance(piece, dict):
+        return [
+            found for key, value in piece.items() for found in ((*path, key), *pieces(value, (*path, key)))
+        ]
+    if isinstance(piece, list) and piece and isinstance(piece[0], dict):
+        return pieces(piece[0], (*path, 0))
+    return []
+
+
+def empty(report: Report, path: tuple[Any, ...]) -> None:
+    """Set one piece of a report to null, or to nothing of its kind."""
+    place: Any = report
+    for key in path[:-1]:
+        place = place[key]
+    found = place[path[-1]]
+    place[path[-1]] = type(found)() if isinstance(found, list | dict) else None
+
+
+@pytest.mark.parametrize("name", ["explained", "unknown_effect"])
+def test_every_piece_may_be_missing(name: str, monkeypatch: Any) -> None:
+    monkeypatch.setattr(pictures, "svg", lambda _canvas: "<svg></svg>")
+    for path in pieces(fresh(name)):
+        if path[-1] in ("site", "effects"):
+            continue
+        report = fresh(name)
+        report["details"] = {key: value for key, value in report["details"].items() if key in path[:2]}
+        empty(report, path)
+        text_of(page(report))
+        assert len(summary(report).split("\n")) <= 25
+
+
+def test_series_may_hold_gaps_and_differ_in_length() -> None:
+    report = fresh("explained")
+    part = report["details"]["parts"][0]
+    part["windows"]["ratio"][3:9] = [None] * 6
+    part["bands"]["noise"] = part["bands"]["noise"][:10]
+    part["signals"][0]["nominal"] = part["signals"][0]["nominal"][:50]
+    part["signals"][0]["measured"] = [None] * len(part["signals"][0]["t"])
+    report["details"]["parts"][1]["amplitudes"]["ratio"] = [None] * 5
+    text_of(page(report))
+
+
+def test_an_empty_report_has_a_page() -> None:
+    text_of(page({}))
+    assert "not determined" in summary({})
+
+
+def test_quantities_read_as_in_the_field() -> None:
+    assert quantity(0.0012, "m") == "1.20 mm"
+    assert quantity(5.3e-6, "m") == "5.30 µm"
+    assert quantity(18.75e6, "N/m") == "18.8 MN/m"
+    assert quantity(1400.0, "N", [1350.0, 1450.0]) == "1.40 kN (1.35 … 1.45)"
+    assert quantity(0.044, "s") == "44.0 ms"
+    assert quantity(1.011, "–", [1.009, 1.013]) == "1.0110 (1.0090 … 1.0130)"
+    assert quantity(4.7e-9, "m/N") == "4.70 nm/N"
+    assert quantity(0.0, "s") == "0 s"
+    assert quantity(3.0, "kg", [2.0, None]) == "3.00 kg (2.00 … ?)"
+    assert quantity(None, "m") == "–"
+    assert [percent(value) for value in (0.91, 0.034, 0.0012, 0.0, None)] == [
+        "91 %",
+        "3.4 %",
+        "0.12 %",
+        "0 %",
+        "–",
+    ]
+    assert [probability(value) for value in (0.999, 0.5, 0.001, None)] == ["> 99 %", "50 %", "< 1 %", "–"]
+    assert percent_interval([0.86, 0.95]) == "86 … 95 %"
+    assert percent_interval([None, 0.95]) == ""
+    assert [times(14.2), times(1.6), times(None)] == ["14×", "1.6×", "–"]
+    assert span([2.1, 9.8], "s") == "2.1–9.8 s"
+
+
+def test_names_become_words() -> None:
+    assert wording.effect("sensor.column_force.gain") == "gain of the column force sensor"
+    assert wording.effect("damper.stroke_stop") == "damper stroke stop"
+    assert wording.site("sensor.damper_force") == "damper force sensor"
+    assert wording.kind({"effects": ["sensor.damper_force.gain"]}) == "measurement"
+    assert wording.kind({"effects": ["sensor.damper_force.gain", "damper.gain"]}) == "physics"
+    assert wording.equivalent(["a.x", "b.y", "c.z"]).startswith(
+        "These signals cannot tell a x from b y or c z:"
+    )
+
+
+@pytest.mark.parametrize("status", wording.STATUS)
+def test_a_report_without_a_verdict_gets_one(status: str) -> None:
+    report = fresh("explained") | {"status": status, "verdict": ""}
+    assert wording.verdict(report).endswith(".")
+    assert "–" not in wording.verdict(report)

@@ -1,0 +1,197 @@
+"""The blind trial end to end with a stand-in for the diagnosis: what it is given, what comes out, what is refused."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import json
+import os
+import sys
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from common import cli
+from common.errors import InputError
+from common.recording.reader import read
+from models.effects import CATALOGUE
+from rths import blind
+from rths.trial import library as libraries
+from rths.trial.draw import Case, draw
+from rths.trial.judge import diagnose_all
+from rths.trial.library import Library
+from rths.trial.record import record, record_all
+from rths.trial.spread import spread
+
+HERE = "tests.rths.trial.test_blind"
+LIBRARY = Library(
+    {name: CATALOGUE[name] for name in ("damper.friction", "column.stiffness", "structure.mass")}, {}, {}
+)
+
+
+def no_gap(_path: Path) -> dict[str, Any]:
+    """A diagnosis that never sees a gap."""
+    return {"status": "no_gap", "where": [], "which": []}
+
+
+def spy(path: Path) -> dict[str, Any]:
+    """A diagnosis that tells what it could see."""
+    return {
+        "status": "no_gap",
+        "environment": dict(os.environ),
+        "words": sys.argv,
+        "beside": sorted(item.name for item in path.parent.iterdir()),
+        "there": [str(item) for item in Path.cwd().rglob("*") if item.is_file()],
+    }
+
+
+def broken(_path: Path) -> dict[str, Any]:
+    """A diagnosis that fails."""
+    raise ValueError("nothing works")
+
+
+@pytest.fixture(autouse=True)
+def _small(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(libraries, "shipped", lambda: LIBRARY)
+
+
+def cases(count: int, *only: str) -> list[Case]:
+    return draw(count, 3, "tune", duration=1.5, only=only, library=LIBRARY)
+
+
+def command(*words: str) -> int:
+    parser = argparse.ArgumentParser()
+    blind.add_arguments(parser)
+    return cli.guarded(lambda: blind.run(parser.parse_args(words)))
+
+
+def test_a_recording_says_nothing_of_what_it_hides(tmp_path: Path) -> None:
+    (case,) = cases(1, "catalogue")
+    found = record(case, tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == [found.name]
+    run = read(tmp_path / found.name)
+    plan = tomllib.loads(run.metadata["plan"]["toml"])
+    assert plan["column"]["stiffness"] == 12.5e6
+    assert plan["test"]["seed"] != case.seed
+    everything = repr((run.metadata, run.events))
+    assert not any(word in everything for word in ("effect", case.laid[0].name, str(case.seed)))
+    assert run.ticks("master") == 750
+
+
+def test_the_size_is_that_of_the_effect(tmp_path: Path) -> None:
+    made = draw(4, 3, "tune", duration=4.0, effects=["damper.friction"], only=["catalogue"], library=LIBRARY)
+    sizes = {case.laid[0].parameters["force"]: record(case, tmp_path).sizes[0] for case in made}
+    assert sizes[max(sizes)] > sizes[min(sizes)] > 0.0
+    (mass,) = draw(
+        1, 3, "tune", duration=2.0, effects=["structure.mass"], only=["catalogue"], library=LIBRARY
+    )
+    assert record(mass, tmp_path).sizes[0] > 1.0
+    (clean,) = cases(1, "clean")
+    assert record(clean, tmp_path).sizes == ()
+
+
+def test_the_diagnosing_process_sees_recordings_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("RTHS_TRUTH", "damper.friction")
+    found = {item.name for item in record_all(cases(2), tmp_path)}
+    done: list[str] = []
+    answers = diagnose_all(tmp_path, diagnosis=f"{HERE}:spy", done=done.append)
+    assert set(answers) == found == {f"{name}.mcap" for name in done}
+    for answer in answers.values():
+        assert answer.seconds > 0.0
+        assert answer.report["beside"] == sorted(found)
+        assert "RTHS_TRUTH" not in answer.report["environment"]
+        assert str(tmp_path) in answer.report["words"]
+        assert all("reports" in name or "complaints" in name for name in answer.report["there"])
+
+
+def test_a_failing_diagnosis_does_not_take_the_others_with_it(tmp_path: Path) -> None:
+    list(record_all(cases(2), tmp_path))
+    answers = diagnose_all(tmp_path, diagnosis=f"{HERE}:broken")
+    assert [item.report["error"] for item in answers.values()] == ["ValueError: nothing works"] * 2
+    with pytest.raises(InputError, match=r"diagnoses failed: There is no diagnosis 'rths\.nowhere:x'"):
+        diagnose_all(tmp_path, diagnosis="rths.nowhere:x")
+
+
+def test_the_command_scores_and_keeps(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code = command(
+        "--cases", "4", "--seed", "3", "--set", "tune", "--duration", "1.5", "--keep", "--json",
+        "--diagnosis", f"{HERE}:no_gap", "-o", str(tmp_path / "out"),
+    )  # fmt: skip
+    captured = capsys.readouterr()
+    found = json.loads(captured.out)
+    assert "recorded 4 of 4" in captured.err
+    assert "diagnosed 4 of 4" in captured.err
+    assert code == 1
+    assert json.loads((tmp_path / "out" / "results.json").read_text()) == found
+    assert (tmp_path / "out" / "index.html").stat().st_size > 10_000
+    assert [item["status"] for item in found["cases"]] == ["no_gap"] * 4
+    for item in found["cases"]:
+        folder = tmp_path / "out" / f"case-{item['index']:05d}"
+        truth = tomllib.loads((folder / "reality.toml").read_text())
+        assert [entry["name"] for entry in truth.get("effect", [])] == item["truth"]
+        assert read(folder / "recording.mcap").finished
+
+
+def test_the_command_passes_where_every_goal_is_met(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ("--cases", "2", "--only", "clean", "--duration", "1.5", "--diagnosis", f"{HERE}:no_gap")
+    assert command(*words, "-o", str(tmp_path)) == 0
+    out = capsys.readouterr().out
+    assert "clean laboratory: no gap" in out
+    assert "2 of 2 cases right" in out
+    assert command(*words[:-1], f"{HERE}:broken", "-o", str(tmp_path)) == 1
+    assert "ValueError: nothing works" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("--cases", "0"), "--cases is 0, but must be at least 1."),
+        (("--jobs", "0"), "--jobs is 0, but must be at least 1, or -1 for all processors."),
+        (("--duration", "0"), "--duration is 0.0, but must be between 1 and 600 s."),
+        (("--only", "clean,pears"), "Unknown 'pears': did you mean pair?"),
+        (("--effects", "damper.frictoin"), "Unknown 'damper.frictoin': did you mean damper.friction?"),
+    ],
+)
+def test_bad_usage_is_one_sentence(
+    words: tuple[str, ...], sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert command(*words, "-o", str(tmp_path)) == 2
+    assert capsys.readouterr().err == f"rths: {sentence}\n"
+
+
+def without(package: str) -> Callable[[str], Any]:
+    real = importlib.import_module
+
+    def load(name: str) -> Any:
+        if name.partition(".")[0] == package:
+            raise ImportError(name)
+        return real(name) if name != "joblib" else None
+
+    return load
+
+
+@pytest.mark.parametrize(
+    ("words", "package"), [(("--jobs", "2"), "joblib"), (("--dask", "tcp://127.0.0.1:1"), "dask")]
+)
+def test_a_missing_package_is_one_sentence(
+    words: tuple[str, ...],
+    package: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("rths.trial.spread.importlib.import_module", without(package))
+    assert command(*words, "-o", str(tmp_path)) == 2
+    assert capsys.readouterr().err == (
+        f"rths: {words[0]} needs the package {package}: install it, or leave the option out.\n"
+    )
+
+
+def test_work_is_spread_over_processes() -> None:
+    pytest.importorskip("joblib")
+    assert sorted(spread(abs, [-3, 2, -1], jobs=2)) == [1, 2, 3]

@@ -1,0 +1,163 @@
+"""Cases: the same for the same seed, two sets apart, truths inside tolerances, effects between their sizes."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from common import plan as plans
+from common import reality as realities
+from common.errors import InputError
+from models.effects.damper_friction import EFFECT as FRICTION
+from models.effects.effect import Effect, Parameter
+from models.system import System
+from rths.trial.draw import (
+    KINDS,
+    NOISE,
+    SHARES,
+    UNCERTAIN,
+    begin,
+    between,
+    distances,
+    draw,
+    draw_parameter,
+    peak_drift,
+)
+from rths.trial.library import Library, Stranger, family, laboratory, site_of
+
+
+def softer(system: System, factor: float) -> System:
+    return system.scaled("column", "stiffness", factor)
+
+
+FACTOR = Parameter("factor", "", null=1.0, least=0.1, most=10.0, sizes=(1.01, 1.05, 1.3))
+STIFFNESS = Effect("column.stiffness", "column", "physics", "", (FACTOR,), "", softer)
+LIBRARY = Library(
+    {"damper.friction": FRICTION, "column.stiffness": STIFFNESS},
+    {"damper.friction": ("lugre", "dahl")},
+    {"damper.cable": Stranger("damper", {"force": (1.0, 10.0)})},
+)
+
+
+def test_a_case_is_the_same_whatever_the_count() -> None:
+    few, many = draw(3, 5, "judge", library=LIBRARY), draw(12, 5, "judge", library=LIBRARY)
+    assert many[:3] == few
+    assert draw(1, 6, "judge", library=LIBRARY) != few[:1]
+
+
+def test_the_sets_are_disjoint() -> None:
+    judge, tune = draw(30, 5, "judge", library=LIBRARY), draw(30, 5, "tune", library=LIBRARY)
+    assert not {case.seed for case in judge} & {case.seed for case in tune}
+
+
+def test_what_is_not_asked_for_is_passed_over() -> None:
+    every = {case.index: case for case in draw(60, 2, "tune", library=LIBRARY)}
+    pairs = draw(2, 2, "tune", only=["pair"], library=LIBRARY)
+    assert pairs == [case for case in every.values() if case.kind == "pair"][:2]
+    named = draw(4, 2, "tune", effects=["damper.friction"], library=LIBRARY)
+    assert {item.name for case in named for item in case.laid} == {"damper.friction"}
+    assert all(case.laid for case in named)
+
+
+def test_kinds_come_in_their_shares() -> None:
+    drawn = [begin(index, 0, "judge", LIBRARY).kind for index in range(4000)]
+    for kind in KINDS:
+        assert drawn.count(kind) / 4000 == pytest.approx(SHARES[kind], abs=0.025)
+
+
+def test_truths_are_inside_the_tolerances_and_noise_is_common() -> None:
+    for case in draw(20, 3, "judge", library=LIBRARY):
+        for table, names in UNCERTAIN.items():
+            for name in names:
+                ratio = np.asarray(case.truths[table][name]) / np.asarray(case.plan[table][name])
+                assert np.all(np.abs(ratio - 1.0) <= 0.02)
+        factors = [level / case.plan["sensors"][name] for name, level in case.truths["sensors"].items()]
+        assert np.ptp(factors) < 1e-12
+        assert NOISE[0] <= factors[0] <= NOISE[1]
+
+
+def test_every_case_makes_a_plan_and_a_reality() -> None:
+    for case in draw(20, 4, "judge", duration=3.0, library=LIBRARY):
+        plan = plans.from_tables(case.plan, Path())
+        truth = realities.from_reality(case.reality(), plan, Path())
+        assert truth.seed == case.seed != plan.test.seed
+        assert plan.test.duration == 3.0
+        own = case.kind in ("formula", "unknown")
+        assert bool(truth.hidden) == own
+        silent = case.reality((), silent=True)
+        assert not any(silent["sensors"].values())
+        assert "effect" not in silent
+
+
+def test_the_independent_laboratory_has_the_true_parameters() -> None:
+    case = draw(1, 4, "judge", only=["formula"], library=LIBRARY)[0]
+    options = case.reality()["slave"]["rig"]["options"]
+    assert options["damper"]["mass"] == case.truths["damper"]["mass"]
+    assert options["damper"]["force_scale"] == case.plan["damper"]["force_scale"]
+    assert options["sensors"] == case.truths["sensors"]
+    assert options["effects"][0]["formula"] in ("lugre", "dahl")
+    assert case.reality((), silent=True)["slave"]["rig"]["options"]["effects"] == []
+
+
+def test_a_factor_goes_both_ways_between_its_sizes() -> None:
+    generator = np.random.default_rng(0)
+    values = np.array([draw_parameter(generator, FACTOR, strong=False) for _ in range(500)])
+    moves = np.abs(values - 1.0)
+    assert 0.3 < np.mean(values > 1.0) < 0.7
+    assert moves.min() >= 0.01 - 1e-9
+    assert moves.max() <= 0.3 + 1e-9
+    assert np.median(moves) == pytest.approx(math.sqrt(0.01 * 0.3), rel=0.25)
+    strong = [abs(draw_parameter(generator, FACTOR, strong=True) - 1.0) for _ in range(100)]
+    assert min(strong) >= math.sqrt(0.01 * 0.3) - 1e-9
+
+
+def test_a_force_has_one_side_and_a_limit_no_null() -> None:
+    generator = np.random.default_rng(0)
+    assert len(distances(FRICTION.parameters[0])) == 1
+    limit = Parameter("force", "N", null=math.inf, least=1.0, most=1e6, sizes=(200.0, 50.0))
+    values = [draw_parameter(generator, limit, strong=False) for _ in range(100)]
+    assert min(values) >= 50.0
+    assert max(values) <= 200.0
+    assert max(draw_parameter(generator, limit, strong=True) for _ in range(100)) <= 100.0
+    assert -3.0 <= between(generator, -1.0, -3.0) <= -1.0
+    assert -1.0 <= between(generator, -1.0, 3.0) <= 3.0
+
+
+def test_an_effect_inside_the_tolerances_is_no_gap() -> None:
+    cases = draw(150, 1, "judge", effects=["column.stiffness"], only=["catalogue"], library=LIBRARY)
+    assert {case.inside for case in cases} == {True, False}
+    for case in cases:
+        total = case.truths["column"]["stiffness"] * case.laid[0].parameters["factor"] / 12.5e6
+        assert case.inside == (abs(total - 1.0) <= 0.02)
+
+
+def test_unknown_names_and_empty_choices_are_refused() -> None:
+    with pytest.raises(InputError, match="did you mean clean"):
+        draw(1, 0, "judge", only=["cleen"], library=LIBRARY)
+    with pytest.raises(InputError, match=r"did you mean damper\.friction"):
+        draw(1, 0, "judge", effects=["damper.fricton"], library=LIBRARY)
+
+
+def test_nothing_is_found_where_there_is_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rths.trial.draw.PATIENCE", 200)
+    with pytest.raises(InputError, match="There is no case of kind clean with damper"):
+        draw(1, 0, "judge", only=["clean"], effects=["damper.friction"], library=LIBRARY)
+
+
+def test_the_drift_is_sensible() -> None:
+    assert peak_drift("el_centro_1940_ns", True) == pytest.approx(0.0489, rel=0.02)
+    for case in draw(10, 8, "judge", library=LIBRARY):
+        motion = case.plan["ground_motion"]
+        drift = motion["scale"] * peak_drift(motion["record"], case.plan["control"]["amd"])
+        assert 2.9e-3 < drift < 10.1e-3
+
+
+def test_names_say_where_an_effect_is() -> None:
+    assert site_of("sensor.column_force.gain") == "sensor.column_force"
+    assert site_of("table.delay") == "table"
+    assert family("sensor.column_force.gain") == family("sensor.damper_force.gain") == "sensor.gain"
+    assert laboratory("sensor.column_force") == laboratory("actuator") == "master"
+    assert laboratory("sensor.damper_force") == laboratory("damper") == "slave"

@@ -1,0 +1,200 @@
+"""Scoring: what counts as right, what as wrong and why, and the measures with their goals."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import pytest
+
+from rths.trial.draw import Case, Laid
+from rths.trial.judge import Answer
+from rths.trial.measures import (
+    binned,
+    by_size,
+    confusion,
+    confusion_by_site,
+    measures,
+    quantile,
+    rate,
+    reliability,
+    results,
+)
+from rths.trial.page import page
+from rths.trial.record import Recorded
+from rths.trial.scoring import Outcome, judge, judge_all, same
+
+SLIP = Laid("column.slip", "column", {"gap": 2e-4}, {"gap": 0.0})
+SOFT = Laid("column.stiffness", "column", {"factor": 0.9}, {"factor": 1.0})
+RUB = Laid("damper.friction", "damper", {"force": 3.0}, {"force": 0.0})
+CABLE = Laid("damper.cable", "damper", {"force": 1.0}, {})
+
+
+def case(kind: str, *laid: Laid, inside: bool = False, index: int = 0) -> Case:
+    return Case(index, kind, {"test": {"duration": 15.0}}, {}, 1, laid, inside)
+
+
+def said(status: str, *effects: str, site: str = "", probability: float = 0.9, **more: Any) -> dict[str, Any]:
+    report: dict[str, Any] = {"status": status, "where": [{"site": site}] if site else [], "which": []}
+    if effects:
+        report["which"] = [{"effects": list(effects), "probability": probability}]
+    return report | more
+
+
+def judged(what: Case, report: dict[str, Any], *sizes: float, seconds: float = 2.0) -> Outcome:
+    sizes = sizes or tuple(10.0 for _ in what.laid)
+    return judge(what, Recorded(what.index, "a.mcap", sizes, ""), Answer(report, seconds))
+
+
+def test_the_true_effect_at_its_site_is_right() -> None:
+    outcome = judged(case("catalogue", RUB), said("explained", "damper.friction", site="damper"))
+    assert outcome.right
+    assert outcome.named
+    assert outcome.located
+    assert not outcome.surplus
+    assert outcome.why == ""
+    assert outcome.seconds == 4.0
+
+
+def test_another_effect_is_wrong_and_the_reason_is_told() -> None:
+    outcome = judged(case("catalogue", RUB), said("explained", "column.slip", site="column"), 1.0)
+    assert not outcome.right
+    assert outcome.surplus
+    assert outcome.why == (
+        "says column.slip, not damper.friction; looks at column, not damper; residual to noise below 2"
+    )
+
+
+def test_an_effect_that_the_status_denies_is_not_named() -> None:
+    outcome = judged(case("catalogue", RUB), said("no_gap", "damper.friction", site="damper"))
+    assert not outcome.named
+    assert outcome.verdict == []
+    assert math.isnan(outcome.probability)
+
+
+def test_a_set_of_equivalents_counts_for_effect_and_site() -> None:
+    twin = "sensor.column_force.gain"
+    report = said("ambiguous", twin, site="sensor.column_force", equivalent=[["column.stiffness", twin]])
+    assert judged(case("catalogue", SOFT), report).right
+    report["equivalent"] = []
+    assert not judged(case("catalogue", SOFT), report).right
+    assert same("a", "a", [])
+    assert not same("a", "b", [{"a", "c"}, {"b", "c"}])
+
+
+def test_both_of_a_pair_must_stand_in_the_verdict() -> None:
+    both = said("explained", "damper.friction", "column.slip", site="column")
+    assert judged(case("pair", RUB, SLIP), both, 5.0, 3.0).right
+    assert judged(case("pair", RUB, SLIP), both, 5.0, 3.0).size == 3.0
+    one = judged(case("pair", RUB, SLIP), said("explained", "damper.friction", site="damper"))
+    assert not one.right
+    assert one.why == "says damper.friction, not damper.friction and column.slip"
+
+
+def test_a_clean_laboratory_has_no_gap() -> None:
+    assert judged(case("clean"), said("no_gap")).right
+    alarm = judged(case("clean"), said("explained", "column.slip", site="column"))
+    assert not alarm.right
+    assert alarm.surplus
+    assert alarm.why == "says column.slip, not no_gap"
+
+
+def test_an_effect_inside_the_tolerances_may_be_no_gap() -> None:
+    assert judged(case("catalogue", SOFT, inside=True), said("no_gap")).right
+    assert not judged(case("catalogue", SOFT, inside=True), said("no_gap")).visible
+    assert not judged(case("catalogue", SOFT), said("no_gap")).right
+
+
+def test_an_unknown_effect_is_said_to_be_unknown_at_its_site() -> None:
+    assert judged(case("unknown", CABLE), said("unknown_effect", site="damper")).right
+    assert judged(case("unknown", CABLE), said("partly_explained", "damper.friction", site="damper")).right
+    assert not judged(case("unknown", CABLE), said("unknown_effect", site="column")).right
+    assert not judged(case("unknown", CABLE), said("explained", "damper.friction", site="damper")).right
+
+
+def test_a_diagnosis_that_fails_is_wrong() -> None:
+    outcome = judged(case("catalogue", RUB), {"status": "error", "error": "ValueError: no"})
+    assert outcome.why == "ValueError: no"
+    missing = judge_all([case("clean", index=7)], {7: Recorded(7, "x.mcap", (), "")}, {})
+    assert [item.status for item in missing] == ["error"]
+
+
+def test_a_parameter_is_judged_by_its_distance_from_nothing() -> None:
+    report = said("explained", "column.stiffness", site="column")
+    report["which"][0]["parameters"] = {
+        "column.stiffness": {"factor": {"value": 0.91, "interval": [0.9, 0.92]}}
+    }
+    (one,) = judged(case("catalogue", SOFT), report).estimates
+    assert one.error == pytest.approx(0.1)
+    assert one.plain_error == pytest.approx(0.01 / 0.9)
+    assert one.inside is True
+    report["which"][0]["parameters"] = {"column.stiffness": {}}
+    assert judged(case("catalogue", SOFT), report).estimates[0].error == math.inf
+
+
+def some() -> list[Outcome]:
+    good = said("explained", "damper.friction", site="damper", probability=1.0, how_far={"closed": 0.97})
+    good["which"][0]["parameters"] = {"damper.friction": {"force": {"value": 3.03, "interval": [2.9, 3.1]}}}
+    return [
+        *(judged(case("catalogue", RUB, index=i), good) for i in range(19)),
+        judged(case("formula", SLIP, index=19), said("unknown_effect", site="column", how_far=None)),
+        judged(case("catalogue", SOFT, index=20), said("no_gap"), 0.3),
+        judged(case("pair", RUB, SLIP, index=21), said("explained", "column.slip", site="column")),
+        judged(case("clean", index=22), said("no_gap")),
+        judged(case("unknown", CABLE, index=23), said("unknown_effect", site="damper"), seconds=9.0),
+    ]
+
+
+def test_measures_pass_and_fail_against_their_goals() -> None:
+    table = {item.name: item for item in measures(some())}
+    first = table["right effect first"]
+    assert (first.value, first.count, first.passed, first.goal) == (0.95, 20, True, "≥ 95.0 %")
+    assert first.low < 0.8
+    assert 0.95 < first.high < 1.0
+    assert table["right site first"].value == 1.0
+    assert table["both of a pair"].passed is False
+    assert table["clean laboratory: no gap"].passed is True
+    assert table["parameter error, median"].value == pytest.approx(0.01)
+    assert table["shrinkage over the best possible, median"].value == pytest.approx(0.97)
+    assert table["right effect first, all sizes"].count == 21
+    assert table["right effect first, formula"].value == 0.0
+    assert table["abstention where there is an effect"].count == 22
+    assert table["stated intervals that hold the true parameter"].value == 1.0
+    assert table["time per 30 s of test, 95th percentile"].value == 4.0
+
+
+def test_nothing_is_passed_where_there_is_no_case() -> None:
+    assert rate("x", [], lambda _: True, 0.9).passed is None
+    assert quantile("x", [], least=0.9).passed is None
+    assert quantile("x", [1.0, math.nan, math.nan], least=0.9).passed is False
+    assert quantile("x", [0.01, math.nan, math.nan], most=0.9).passed is False
+    assert all(item.passed is None for item in measures([]))
+
+
+def test_matrices_hold_every_case_but_pairs() -> None:
+    matrix = confusion(some())
+    assert matrix["damper.friction"] == {"damper.friction": 19}
+    assert matrix["column.slip"] == {"unknown": 1}
+    assert matrix["column.stiffness"] == {"no gap": 1}
+    assert matrix["no gap"] == {"no gap": 1}
+    assert confusion_by_site(some())["none"] == {"none": 1}
+    assert sum(sum(row.values()) for row in confusion_by_site(some()).values()) == 23
+
+
+def test_bins_hold_every_value_once() -> None:
+    bins = binned([(0.0, True), (0.1, False), (1.0, True)], (0.0, 0.1, 0.5, 1.0))
+    assert [(item.count, item.share) for item in bins] == [(1, 1.0), (1, 0.0), (1, 1.0)]
+    assert sum(item.count for item in by_size(some())) == 21
+    assert sum(item.count for item in reliability(some())) == 20
+
+
+def test_results_are_json_and_the_page_stands_alone() -> None:
+    text = json.dumps(results(some()), allow_nan=False)
+    assert len(json.loads(text)["cases"]) == 24
+    shown = page(some(), "Made <here>.")
+    assert shown.count("data:image/png;base64,") == 4
+    assert "Made &lt;here&gt;." in shown
+    assert "says column.slip, not damper.friction and column.slip" in shown
+    assert "http" not in shown
+    assert page([], "").count("data:image/png") == 4
