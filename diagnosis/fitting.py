@@ -245,7 +245,7 @@ class Problem:
         columns = []
         _, high = self.bounds()
         for place in range(first, p.size if last is None else last):
-            step = 0.05 if place < self.count else 2e-3 * max(1.0, abs(p[place]))
+            step = 2e-3 if place < self.count else 2e-4 * max(1.0, abs(p[place]))
             if p[place] + step > high[place]:
                 step = -step
             moved = p.copy()

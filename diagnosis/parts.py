@@ -20,7 +20,7 @@ from models.registry import Array
 from models.substructure import STOREYS
 from models.system import System
 
-EXACT = 1e-6  # share of a computed signal's rms below which a difference is rounding, not gap
+EXACT = 1e-4  # share of a computed signal's rms below which a difference is rounding, not gap
 MODEL_ERROR = 1e-3  # share of a measured signal's rms that two good solutions of one model may differ by
 
 
