@@ -69,7 +69,9 @@ def diagnose(record: Record, validation: Sequence[Record] = ()) -> dict[str, Any
     Raises:
         InputError: there is nothing in the recording that a model of the plan could be held against.
     """
-    with threadpool_limits(limits=1, user_api="blas"):  # small matrices: more threads only wait for each other
+    with threadpool_limits(
+        limits=1, user_api="blas"
+    ):  # small matrices: more threads only wait for each other
         found = examine(record)
         return report.build(found, validation)
 
@@ -106,7 +108,13 @@ def parts_of(record: Record, warnings: list[str]) -> list[Part]:
     parts: list[Part] = []
     if record.ground is not None and record.has("ground_acceleration"):
         parts.append(Ground(record, record.ground))
-    needed = ("ground_acceleration", "displacement", "column_force", "column_displacement", "damper_force_used")
+    needed = (
+        "ground_acceleration",
+        "displacement",
+        "column_force",
+        "column_displacement",
+        "damper_force_used",
+    )
     if record.has(*needed):
         parts.append(Building(record))
     if record.has("actuator_command") and (record.has("column_displacement") or record.has("column_force")):
@@ -115,7 +123,9 @@ def parts_of(record: Record, warnings: list[str]) -> list[Part]:
         parts.append(ColumnAlone(record, record.signals["column_displacement"]))
         warnings.append("actuator_command was not recorded: nothing can be said of the actuator.")
     outputs = ("table_displacement", "table_acceleration", "damper_stroke", "damper_force")
-    if any(record.has(name) for name in outputs) and (record.has("table_command") or record.has("damper_command")):
+    if any(record.has(name) for name in outputs) and (
+        record.has("table_command") or record.has("damper_command")
+    ):
         parts.append(LaboratoryB(record))
     missing = [name for name in ("column_displacement", "column_force", *outputs) if not record.has(name)]
     if missing:

@@ -298,9 +298,7 @@ def moved(data: Data, fit: Fit, steps: int, slopes: Array | None, weights: Array
     p = np.clip(problem.place(fit.values, fit.z), low + 1e-9, high - 1e-9)
     if p.size:
         arguments: dict[str, Any] = {"bounds": (low, high), "x_scale": "jac", "ftol": 1e-6, "xtol": 1e-6}
-        p = least_squares(
-            problem.stacked, p, jac=problem.stacked_jacobian, max_nfev=steps, **arguments
-        ).x
+        p = least_squares(problem.stacked, p, jac=problem.stacked_jacobian, max_nfev=steps, **arguments).x
     return Fit(data, problem.values(p), p[: problem.count], problem.reduced(p))
 
 

@@ -96,7 +96,11 @@ def judge(found: Diagnosis, validation: Sequence[Record]) -> HowFar:
     nominal = bare(found, own)
     before, after = own.signals(frozenset()), own.signals(None)
     floors = own.floor()
-    gap_before, gap_after, floor = own.gap(before), own.gap(after), overall({k: floors.get(k, 0.0) for k in own.gap(after)})
+    gap_before, gap_after, floor = (
+        own.gap(before),
+        own.gap(after),
+        overall({k: floors.get(k, 0.0) for k in own.gap(after)}),
+    )
     traces = all_traces(found)
     gap = gap_entry(record, own, nominal, floors)
     summary = {
@@ -171,7 +175,9 @@ def closed_interval(
         row = []
         for simulated in (before, after):
             errors = [
-                own.record.signals[name][mask] - simulated[name][mask] if simulated is not None else own.record.signals[name][mask] * loop.DIVERGED
+                own.record.signals[name][mask] - simulated[name][mask]
+                if simulated is not None
+                else own.record.signals[name][mask] * loop.DIVERGED
                 for name in own.gap(simulated)
             ]
             row += [float(np.sum(error**2)) for error in errors]
@@ -224,7 +230,10 @@ def all_traces(found: Diagnosis) -> list[Trace]:
             result = [*(item for item in result if item.site != extra.site), extra]
     for reading in found.readings:
         site = CATALOGUE[reading.effect].site
-        result = [*(item for item in result if item.site != site), Trace(site, np.zeros(0), reading.ratio, "", 1.0)]
+        result = [
+            *(item for item in result if item.site != site),
+            Trace(site, np.zeros(0), reading.ratio, "", 1.0),
+        ]
     if found.link:
         result.append(Trace("link", np.zeros(0), max(item.z for item in found.link), "", 1.0))
     return result
@@ -245,7 +254,9 @@ def shares(own: Judge, traces: Sequence[Trace]) -> dict[str, tuple[float, float,
 
     everywhere = np.ones(own.record.ticks, dtype=bool)
     thirds = [everywhere] + [np.arange(own.record.ticks) * 3 // own.record.ticks == i for i in range(3)]
-    weights = [normalised(where.shapley(players, lambda subset, m=mask: value(m, subset)), traces) for mask in thirds]  # type: ignore[misc]
+    weights = [
+        normalised(where.shapley(players, lambda subset, m=mask: value(m, subset)), traces) for mask in thirds
+    ]  # type: ignore[misc]
     result = {}
     for site in sites:
         drawn = [item.get(site, 0.0) for item in weights]
@@ -253,9 +264,7 @@ def shares(own: Judge, traces: Sequence[Trace]) -> dict[str, tuple[float, float,
     return result
 
 
-def normalised(
-    found: Mapping[str, tuple[float, float, float]], traces: Sequence[Trace]
-) -> dict[str, float]:
+def normalised(found: Mapping[str, tuple[float, float, float]], traces: Sequence[Trace]) -> dict[str, float]:
     """Shares that sum to one; where the response does not show a site, its trace in its own part decides."""
     sizes = {site: max(share, 0.0) for site, (share, _, _) in found.items()}
     ratios = {trace.site: trace.ratio for trace in traces}

@@ -54,11 +54,15 @@ class Loop:
             there = self.record.present[name] if mask is None else self.record.present[name] & mask
             recorded = self.record.signals[name][there]
             level = float(np.sqrt(np.mean(recorded**2))) if recorded.size else 0.0
-            error = float(np.sqrt(np.mean((recorded - simulated[name][there]) ** 2))) if recorded.size else 0.0
+            error = (
+                float(np.sqrt(np.mean((recorded - simulated[name][there]) ** 2))) if recorded.size else 0.0
+            )
             result[name] = min(error / level, DIVERGED) if level > 0.0 else 0.0
         return result
 
-    def floor(self, system: System, levels: Mapping[str, float], mask: Mask | None = None) -> dict[str, float]:
+    def floor(
+        self, system: System, levels: Mapping[str, float], mask: Mask | None = None
+    ) -> dict[str, float]:
         """Gap that the sensors' noise alone makes: noisy simulations against one without noise."""
         quiet = self.simulate(system)
         noisy = System(noised(system, levels).plan, system.effects)

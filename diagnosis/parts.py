@@ -79,9 +79,7 @@ def outputs(record: Record, names: tuple[str, ...]) -> tuple[Array, Mask]:
 def of_sites(sites: tuple[str, ...]) -> tuple[Effect, ...]:
     """The catalogue's effects on these sites that change a waveform; noise and rounding are seen directly."""
     found = [effect for effect in effects.CATALOGUE.values() if effect.site in sites]
-    return tuple(
-        effect for effect in found if not effect.name.endswith((".noise", ".quantization"))
-    )
+    return tuple(effect for effect in found if not effect.name.endswith((".noise", ".quantization")))
 
 
 class LaboratoryA:

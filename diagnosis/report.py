@@ -112,7 +112,9 @@ def which(found: Diagnosis, status: str) -> list[dict[str, Any]]:
                 for key, item in values.items()
             }
             found.warnings += [
-                f"{key} of {name} lies at the end of its range." for key, item in values.items() if item.on_bound
+                f"{key} of {name} lies at the end of its range."
+                for key, item in values.items()
+                if item.on_bound
             ]
     for reading in found.readings:
         unit = CATALOGUE[reading.effect].parameters[0].unit
@@ -125,7 +127,11 @@ def which(found: Diagnosis, status: str) -> list[dict[str, Any]]:
             key: {"value": value, "interval": list(bounds), "unit": units[key]}
             for key, (value, bounds) in item.parameters.items()
         }
-    entries = [entry(effects, probability, parameters, 0.0)] if effects else [entry([], probability_none(found), {}, 0.0)]
+    entries = (
+        [entry(effects, probability, parameters, 0.0)]
+        if effects
+        else [entry([], probability_none(found), {}, 0.0)]
+    )
     for verdict in named:
         rest = [name for name in effects if name not in verdict.effects]
         for other, chance in verdict.others:
@@ -152,7 +158,11 @@ def unit_of(effect: str, parameter: str) -> str:
 def probability_none(found: Diagnosis) -> float:
     """How sure it is that nothing is there: the nearer a tolerance's edge, the less."""
     z = [abs(float(value)) for verdict in found.verdicts for value in verdict.search.chosen.z]
-    left = [item.ratio for verdict in found.verdicts for item in gaps(verdict.search.chosen, verdict.search.data.group)]
+    left = [
+        item.ratio
+        for verdict in found.verdicts
+        for item in gaps(verdict.search.chosen, verdict.search.data.group)
+    ]
     worst = max([0.0, *(value / 2.5 for value in z), *(value / 0.12 for value in left)])
     return float(1.0 - 0.3 * min(worst, 1.0) ** 4)
 

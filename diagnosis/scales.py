@@ -39,6 +39,7 @@ SENSORS = {
     "damper_stroke": "damper",
     "damper_force": "damper",
 }
+FARTHEST = 4.0  # times a usual size where a search still begins
 LIMITS = (0.25, 0.4, 0.55, 0.7, 0.85, 0.95)  # of what is reached: where a limit is looked for
 
 
@@ -92,11 +93,18 @@ class Scales:
             sizes = sizes[1:-1:2] if len(sizes) > 4 else [sizes[1], sizes[-1]]
         return [min(max(size, parameter.least), parameter.most) for size in sizes]
 
+    def stretch(self, effect: Effect) -> tuple[float, float]:
+        """How far a start may be stretched along a straight line from the null value, and mirrored."""
+        strength = [item for item in effect.parameters if not item.shape]
+        if any(np.isinf(item.null) for item in strength):
+            return 0.5, 1.5
+        return (-FARTHEST if all(item.least < item.null for item in strength) else 0.0), FARTHEST
+
     def stretched(self, effect: Effect, values: dict[str, float], share: float) -> dict[str, float]:
         """The start moved to where a straight line from the null value promises most."""
         result = dict(values)
         for item in effect.parameters:
-            if not item.shape and np.isfinite(item.null) and share > 0.0:
+            if not item.shape and np.isfinite(item.null) and share != 0.0:
                 moved = item.null + share * (values[item.name] - item.null)
                 result[item.name] = min(max(moved, item.least), item.most)
         return result

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from diagnosis import fitting
 from diagnosis.fitting import Data, Fit, Values, excess
@@ -64,6 +65,11 @@ def gaps(fit: Fit, group: int) -> list[Gap]:
     return [gap(column, group) for column in fit.reduced.T]
 
 
+def remaining(fit: Fit) -> float:
+    """Largest systematic residual over noise that a fit leaves."""
+    return max((item.ratio for item in gaps(fit, fit.data.group)), default=0.0)
+
+
 @dataclass(frozen=True)
 class Candidate:
     """An effect at the size where it promises most, over a present hypothesis."""
@@ -86,13 +92,58 @@ class Search:
     @property
     def left(self) -> float:
         """Largest systematic residual over noise that the chosen effects leave."""
-        return max((item.ratio for item in gaps(self.chosen, self.data.group)), default=0.0)
+        return remaining(self.chosen)
 
     @property
     def explained(self) -> float:
         """Share of the gap's energy that the chosen effects explain."""
         before = excess(self.commissioned)
         return 1.0 - excess(self.chosen) / before if before > 0.0 else 0.0
+
+
+class Plane:
+    """A fit's residuals as a linear function of its parameters, the nominal ones inside their bounds."""
+
+    def __init__(self, fit: Fit) -> None:
+        self.fit = fit
+        count, size = fit.z.size, fit.jacobian.shape[1]
+        self._basis, self._slopes = np.linalg.qr(fit.jacobian)
+        rest = fit.reduced.ravel()
+        self._here = self._basis.T @ rest
+        self._off = rest - self._basis @ self._here
+        self._prior = np.eye(count, size)
+        room = np.full(size, np.inf)
+        room[:count] = fitting.TOLERANCES + 1e-6
+        at = np.concatenate([fit.z, np.zeros(size - count)])
+        self._low, self._high = -room - at, room - at
+        self._alone = self._cost(np.zeros(size), 0.0, 0.0, (0.0, 1e-12))[0] if size else float(fit.cost)
+
+    def gain(self, change: Array, stretch: tuple[float, float]) -> tuple[float, float]:
+        """What residuals that move by a share of `change` (groups·signals,) gain at best, and that share."""
+        inside = self._basis.T @ change
+        outside = change - self._basis @ inside
+        size = float(np.linalg.norm(outside))
+        if size**2 < 1e-6 and float(inside @ inside) < 1e-6:
+            return -math.inf, 0.0
+        along = float(outside @ self._off) / size if size > 0.0 else 0.0
+        cost, share = self._cost(inside, size, along, stretch)
+        return self._alone - cost, share
+
+    def _cost(
+        self, inside: Array, size: float, along: float, stretch: tuple[float, float]
+    ) -> tuple[float, float]:
+        """Least cost over parameters and share, by a bounded linear fit of a few unknowns."""
+        count = self.fit.z.size
+        rows = [
+            np.column_stack([self._slopes, inside]),
+            np.append(np.zeros(inside.size), size)[None, :],
+            np.column_stack([self._prior, np.zeros(count)]),
+        ]
+        rest = np.concatenate([self._here, [along], self.fit.z])
+        low, high = np.append(self._low, stretch[0]), np.append(self._high, stretch[1])
+        found = lsq_linear(np.concatenate(rows), -rest, bounds=(low, high), method="bvls")
+        off = float(self._off @ self._off) - along**2
+        return 2.0 * float(found.cost) + off, float(found.x[-1])
 
 
 class Searcher:
@@ -131,45 +182,39 @@ class Searcher:
             return False
         if before is bare:
             return True
+        if prior > PRIOR_GAIN and data > -1.0 and remaining(before) < MATERIAL:
+            return True
         left, saved, whole = excess(before), excess(before) - excess(after), excess(bare)
-        return (saved > REST * left and saved > TRACE * whole) or (saved > HALF * left and saved > SHARE * whole)
+        return (saved > REST * left and saved > TRACE * whole) or (
+            saved > HALF * left and saved > SHARE * whole
+        )
 
     def screen(self, fit: Fit, effects: Iterable[Effect]) -> list[Candidate]:
         """What each effect could gain over a fit, best first."""
-        fit = self.near(fit)
-        count = fit.z.size
-        prior = np.zeros((count, fit.jacobian.shape[1]))
-        prior[:, :count] = np.eye(count)
-        ridge = 1e-6 * np.eye(fit.jacobian.shape[1])
-        basis = np.linalg.qr(np.concatenate([fit.jacobian, prior, ridge]))[0][: -ridge.shape[0] or None]
-        here = np.concatenate([fit.reduced.ravel(), fit.z])
-        rest = here - basis @ (basis.T @ here)
+        plane = Plane(self.near(fit))
 
         def look(effect: Effect) -> Candidate | None:
-            return self.look(effect, fit, basis, rest)
+            return self.look(effect, plane)
 
         found = [item for item in self.spread(look, effects) if item is not None]
         return sorted(found, key=lambda item: -item.gain)
 
-    def look(self, effect: Effect, fit: Fit, basis: Array, rest: Array) -> Candidate | None:
+    def look(self, effect: Effect, plane: Plane) -> Candidate | None:
         """The size of one effect that promises most."""
+        fit = plane.fit
         if effect.name in fit.names:
             return None
         best: Candidate | None = None
         for values in self.scales.starts(effect):
             moved = self.data.reduced(fitting.lay(self.data, fit.z, fit.values | {effect.name: values}))
-            change = np.concatenate([(moved - fit.reduced).ravel(), np.zeros(fit.z.size)])
-            change -= basis @ (basis.T @ change)
-            size = float(change @ change)
-            if size < 1e-6:
-                continue
-            share = min(max(-float(change @ rest) / size, 0.0), 3.0)
-            gain = -(2.0 * share * float(change @ rest) + share**2 * size)
+            gain, share = plane.gain((moved - fit.reduced).ravel(), self.scales.stretch(effect))
             if best is None or gain > best.gain:
                 best = Candidate(effect, self.scales.stretched(effect, values, share), gain)
         return best
 
-    def spread(self, function: Callable[[Effect], Candidate | None], items: Iterable[Effect]) -> list[Candidate | None]:
+    def spread(
+        self, function: Callable[[Effect], Candidate | None], items: Iterable[Effect]
+    ) -> list[Candidate | None]:
         """Apply over all items on a few threads: kernels release the interpreter's lock."""
         with ThreadPoolExecutor(WORKERS) as pool:
             return list(pool.map(function, items))
@@ -179,9 +224,13 @@ class Searcher:
         fits = self.all_extended(fit, screened, count)
         return fits[0] if fits else None
 
-    def all_extended(self, fit: Fit, screened: list[Candidate] | None = None, count: int = FITTED) -> list[Fit]:
+    def all_extended(
+        self, fit: Fit, screened: list[Candidate] | None = None, count: int = FITTED
+    ) -> list[Fit]:
         """Fits with one effect more, best first: all a few steps, the best of them to their end."""
-        promising = (screened if screened is not None else self.screen(fit, self.data.part.candidates))[:count]
+        promising = (screened if screened is not None else self.screen(fit, self.data.part.candidates))[
+            :count
+        ]
         near = self.near(fit)
         slopes = near.jacobian[:, : fit.z.size]
 
@@ -190,13 +239,16 @@ class Searcher:
             return fitting.fit(self.data, start, near.z, ROUGH, slopes, rounds=1)
 
         def fine(item: Fit) -> Fit:
-            return fitting.fit(self.data, item.values, np.clip(item.z, -NEAR, NEAR), STEPS, rounds=2)
+            start = np.clip(item.z, -NEAR, NEAR)
+            if self.data.part.exact:  # cheap, and free of noise: fits go to their end
+                return fitting.fit(self.data, item.values, start)
+            return fitting.fit(self.data, item.values, start, STEPS, rounds=2)
 
         with ThreadPoolExecutor(WORKERS) as pool:
             fits = sorted(pool.map(rough, promising), key=lambda item: item.cost)
             hopeful = [item for item in fits if excess(item) <= HOPELESS * excess(fits[0])][:FINE]
             fits = sorted([*pool.map(fine, hopeful), *fits[len(hopeful) :]], key=lambda item: item.cost)
-        if fits and any(item.ratio > MATERIAL for item in gaps(fits[0], self.data.group)):
+        if fits and remaining(fits[0]) > MATERIAL:
             fits[0] = fitting.fit(self.data, fits[0].values, fits[0].z)
         return fits
 
@@ -249,5 +301,3 @@ def exchanged_pair(chosen: Fit, other: Fit) -> tuple[str, str] | None:
     """The effect that was taken away and the one that came for it."""
     gone, come = set(chosen.names) - set(other.names), set(other.names) - set(chosen.names)
     return (gone.pop(), come.pop()) if len(gone) == len(come) == 1 else None
-
-

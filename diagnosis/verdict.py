@@ -83,7 +83,9 @@ def how_well(search: Search) -> Outcome:
 def certainty(search: Search) -> float:
     """How sure it is that there is an effect at all, beyond tolerances and chance."""
     before, after = search.commissioned, search.chosen
-    margin = max(before.prior - after.prior, 0.0) / PRIOR_GAIN + max(before.chi() - after.chi(), 0.0) / DATA_GAIN
+    margin = (
+        max(before.prior - after.prior, 0.0) / PRIOR_GAIN + max(before.chi() - after.chi(), 0.0) / DATA_GAIN
+    )
     return 1.0 - 0.5 * math.exp(-(margin - 1.0))
 
 

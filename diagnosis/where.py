@@ -62,7 +62,13 @@ def unexplained(data: Data, fit: Fit) -> Trace:
     left = [gap(column, data.group).ratio for column in fit.reduced.T]
     site = culprit(data, residual, left)
     kept = residual[:, int(np.argmax(left))]
-    return Trace(site, kept, max(left), data.part.signals[int(np.argmax(left))], float(data.sigma[int(np.argmax(left))]))
+    return Trace(
+        site,
+        kept,
+        max(left),
+        data.part.signals[int(np.argmax(left))],
+        float(data.sigma[int(np.argmax(left))]),
+    )
 
 
 def culprit(data: Data, residual: Array, left: Sequence[float]) -> str:
@@ -81,12 +87,16 @@ def culprit_a(data: Data, residual: Array, amount: dict[str, float]) -> str:
     if not data.part.present[:, 1].any():
         return "actuator"
     stiffness = data.system.plan.column.stiffness
-    implied = stiffness * residual[:, 0] * data.sigma[0] / data.sigma[1]  # force that a true motion would make
+    implied = (
+        stiffness * residual[:, 0] * data.sigma[0] / data.sigma[1]
+    )  # force that a true motion would make
     level = math.sqrt(float(np.mean(implied**2)))
     if displacement < SEEN:
         return "column"
     with_it = residual[:, 1] - implied
-    alone = math.sqrt(max(float(np.mean(with_it**2)) - 1.0 - (stiffness * data.sigma[0] / data.sigma[1]) ** 2, 0.0))
+    alone = math.sqrt(
+        max(float(np.mean(with_it**2)) - 1.0 - (stiffness * data.sigma[0] / data.sigma[1]) ** 2, 0.0)
+    )
     if force < SEEN and level > 2.0:
         return "sensor.column_displacement"
     return "actuator" if alone < max(force, displacement) else "column"
@@ -120,7 +130,9 @@ def hidden_in_displacement(data: Data, residual: Array) -> bool:
     return float(np.sqrt(np.mean(implied**2))) < data.sigma[0] * 0.5
 
 
-def shapley(players: Sequence[str], value: Callable[[frozenset[str]], float]) -> dict[str, tuple[float, float, float]]:
+def shapley(
+    players: Sequence[str], value: Callable[[frozenset[str]], float]
+) -> dict[str, tuple[float, float, float]]:
     """Shares of `value(all) − value(none)` per player: exact Shapley value, first in, last out.
 
     Over all subsets (Shapley 1953); for at most a few players.

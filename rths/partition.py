@@ -13,6 +13,7 @@ from models.excitation import Programme, join
 from models.excitation.pieces import sine
 from models.labs import column_lab
 from models.structures import shear_building
+from models.structures.partition import damping_lost, drift_direction, experimental_stiffness, matrices
 from rths.follower import Follower
 
 CYCLES = 12
@@ -45,15 +46,6 @@ def assess(plan: Plan) -> Partition:
     )
 
 
-def damping_lost(plan: Plan, path: indicators.FrequencyEvaluation) -> float:
-    """Damping ratio of the building's first mode that an amplitude and a delay of the column's path cost."""
-    modes = shear_building.modes(*matrices(plan))
-    omega = 2.0 * math.pi / float(modes.periods[0])
-    share = experimental_stiffness(plan) * float(drift_direction(plan) @ modes.shapes[:, 0]) ** 2
-    lost, _ = indicators.damping_equivalent(share, path.amplitude, path.delay, omega)
-    return indicators.damping_points(lost, 1.0, omega**2)
-
-
 def sentence(found: Partition) -> str:
     """What a user must know before the start."""
     if math.isinf(found.critical_delay):
@@ -68,30 +60,6 @@ def sentence(found: Partition) -> str:
         f"delay {found.delay * 1e3:+.1f} ms, amplitude {found.amplitude:.3f}, "
         f"{found.damping_points * 100.0:+.2f} points of damping lost"
     )
-
-
-def matrices(plan: Plan) -> tuple[Any, Any, Any]:
-    """Mass, damping and stiffness of the whole building, specimen included."""
-    structure = plan.structure
-    return shear_building.matrices(
-        np.array(structure.mass), np.array(structure.stiffness), np.array(structure.damping)
-    )
-
-
-def drift_direction(plan: Plan) -> Any:
-    """The specimen's storey drift as a row over the floors' displacements."""
-    storey = plan.column.storey - 1
-    direction = np.zeros(plan.storeys)
-    direction[storey] = 1.0
-    if storey > 0:
-        direction[storey - 1] = -1.0
-    return direction
-
-
-def experimental_stiffness(plan: Plan) -> float:
-    """Storey stiffness that comes from the laboratory, N/m."""
-    column = plan.column
-    return column.deformation_ratio * column.represents * column.stiffness
 
 
 def critical_delay_of(plan: Plan) -> float:

@@ -25,9 +25,9 @@ from common.recording.reader import Run, read
 from models import indicators, substructure
 from models.closed_loop import signals, simulate
 from models.registry import Array
+from models.structures.partition import experimental_stiffness
 from rths import benches, virtual
 from rths.benches import Order
-from rths.partition import experimental_stiffness
 
 GAINS = {"proportional": 1.93, "integral": 0.047, "derivative": 0.0}
 PID = Compensator("pid", GAINS)

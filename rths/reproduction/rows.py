@@ -11,8 +11,9 @@ from common.plan import Plan
 from common.recording.reader import Run
 from models import indicators
 from models.registry import Array
+from models.structures.partition import damping_lost
 from rths.identification import identify, segments
-from rths.partition import critical_delay_of, damping_lost
+from rths.partition import critical_delay_of
 from rths.reproduction.experiments import DELAYS, Evidence
 
 POINT = 100.0  # damping ratio in points of per cent

@@ -1,6 +1,6 @@
 """Laboratory A in short steps: servo loop of first order, clevis, column; classical Runge-Kutta.
 
-    T·ẏ = K·u(t − L) − y
+T·ẏ = K·u(t − L) − y
 """
 
 from __future__ import annotations
@@ -41,9 +41,7 @@ class Servo(NamedTuple):
 
 
 @jit
-def velocity(
-    p: Servo, stiffness: float, state: Array, wanted: float, piston: float, time: float
-) -> float:
+def velocity(p: Servo, stiffness: float, state: Array, wanted: float, piston: float, time: float) -> float:
     """Velocity (m/s) of the piston at `piston` m under the command `wanted` m.
 
     The load follows the specimen's first stiffness within a step. It takes the place of an error of the
@@ -61,9 +59,7 @@ def velocity(
 
 
 @jit
-def drive(
-    p: Servo, stiffness: float, state: Array, early: float, middle: float, late: float
-) -> float:
+def drive(p: Servo, stiffness: float, state: Array, early: float, middle: float, late: float) -> float:
     """Place of the piston (m) one step later under a command at its beginning, middle and end."""
     h, y, t = p.step, state[PISTON], state[TIME]
     a = velocity(p, stiffness, state, early, y, t)
@@ -75,7 +71,7 @@ def drive(
     state[SPOOL] = valve.spool(state[SPOOL], error, p.hysteresis)
     state[USED] = (state[USED] + abs(moved)) / (1.0 + h / valve.REFILL)
     state[TIME] = t + h
-    return y + moved
+    return float(y + moved)
 
 
 @jit
@@ -96,7 +92,7 @@ def clevis(p: Servo, stiffness: float, state: Array, piston: float) -> float:
     x = push / (rate + stiffness)
     if abs(x) > half:
         x = (push + math.copysign(contact * half, x)) / (rate + stiffness + contact)
-    return piston - x
+    return float(piston - x)
 
 
 @jit

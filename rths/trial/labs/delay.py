@@ -42,13 +42,13 @@ def before(past: Array, steps: float) -> float:
     earlier = later - 1
     if earlier < 1:
         earlier += past.size - 1
-    return (1.0 - share) * past[later] + share * past[earlier]
+    return float((1.0 - share) * past[later] + share * past[earlier])
 
 
 @jit
 def pade_output(state: Array, delay: float) -> float:
     """What the approximation gives now."""
-    return state[PADE_INPUT] - delay * state[PADE_RATE]
+    return float(state[PADE_INPUT] - delay * state[PADE_RATE])
 
 
 @jit

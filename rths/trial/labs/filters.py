@@ -50,4 +50,4 @@ def step_filter(kind: Array, state: Array, value: float, step: float) -> float:
             omega, math.sqrt(2.0) * omega, state[OUTPUT], state[RATE], state[INPUT], value, step
         )
     state[INPUT] = value
-    return state[OUTPUT]
+    return float(state[OUTPUT])

@@ -109,9 +109,7 @@ def power_law(coefficient: float, velocity: float) -> float:
 @jit
 def rub(p: Specimen, memory: Array, moved: float, velocity: float) -> float:
     """Friction (N) of the set-up after a move."""
-    memory[BRISTLE] = friction.after(
-        p.rubbing, memory[BRISTLE], moved, velocity, p.presliding, STICKING
-    )
+    memory[BRISTLE] = friction.after(p.rubbing, memory[BRISTLE], moved, velocity, p.presliding, STICKING)
     scale = RUBBING if p.rubbing == friction.TANH else STICKING
     micro = MICRO * p.presliding / 1e-5
     return p.friction * friction.share(p.rubbing, memory[BRISTLE], velocity, p.presliding, scale, micro)

@@ -17,7 +17,9 @@ UNLOADING = 0.4  # exponent of the unloading stiffness
 PLASTIC = 0.3  # share of plastic deformation at the yield force
 
 # places in `memory`
-DIRECTION, TURN, TURN_FORCE, START, START_FORCE, AIM, AIM_FORCE, SHARPNESS, TOP, BOTTOM, LAST, FORCE = range(12)
+DIRECTION, TURN, TURN_FORCE, START, START_FORCE, AIM, AIM_FORCE, SHARPNESS, TOP, BOTTOM, LAST, FORCE = range(
+    12
+)
 SIZE = 12
 
 
@@ -74,7 +76,7 @@ def menegotto_pinto(memory: Array, k: float, limit: float, b: float, n: float, x
     force = memory[START_FORCE] + (b * share + (1.0 - b) * bent) * (memory[AIM_FORCE] - memory[START_FORCE])
     if memory[TURN] == x:
         memory[TURN_FORCE] = force
-    return force
+    return float(force)
 
 
 @jit
@@ -111,7 +113,7 @@ def takeda(memory: Array, k: float, limit: float, b: float, x: float) -> float:
     memory[BOTTOM] = max(memory[BOTTOM], -x)
     memory[LAST] = x
     memory[FORCE] = way * force
-    return memory[FORCE]
+    return float(memory[FORCE])
 
 
 @jit
@@ -153,9 +155,7 @@ def ramberg_osgood(memory: Array, k: float, limit: float, b: float, n: float, x:
 
 
 @jit
-def force(
-    formula: float, memory: Array, k: float, limit: float, b: float, n: float, x: float
-) -> float:
+def force(formula: float, memory: Array, k: float, limit: float, b: float, n: float, x: float) -> float:
     """Force (N) at a deformation (m) under a formula; elastic where there is none."""
     if formula == MENEGOTTO_PINTO:
         return menegotto_pinto(memory, k, limit, b, n, x)

@@ -1,0 +1,85 @@
+"""Laboratories written differently from those that the diagnosis believes in, as plug-in rigs.
+
+They share no model with `models`: time is cut into steps of 0.1 ms with Runge-Kutta, and the effects of the
+catalogue have other formulas here. Effects whose names begin with `x.` are in no catalogue.
+"""
+
+from __future__ import annotations
+
+SIGNALS = (
+    "column_displacement",
+    "column_force",
+    "table_displacement",
+    "table_acceleration",
+    "damper_stroke",
+    "damper_force",
+)
+
+FORMULAS: dict[str, tuple[str, ...]] = {
+    "actuator.delay": ("pade",),
+    "actuator.velocity_limit": ("smooth", "orifice"),
+    "actuator.backlash": ("spring",),
+    "actuator.compliance": ("oil_column",),
+    "actuator.deadband": ("smooth",),
+    "column.yielding": ("menegotto_pinto", "takeda", "ramberg_osgood"),
+    "column.degradation": ("exponential", "linear"),
+    "column.pinching": ("lorentz", "sech"),
+    "column.friction": ("tanh", "dahl", "lugre"),
+    "column.viscous": ("power",),
+    "column.slip": ("smooth",),
+    "table.delay": ("pade",),
+    "table.payload": ("dynamic",),
+    "table.backlash": ("contact",),
+    "table.friction": ("tanh",),
+    "damper.friction": ("tanh", "dahl", "lugre"),
+    "damper.force_limit": ("smooth",),
+    "damper.stroke_stop": ("hertz", "linear"),
+    **{f"sensor.{signal}.lag": ("butterworth",) for signal in SIGNALS},
+}
+"""Formulas by effect of the catalogue, where they are others than the catalogue's."""
+
+PLAIN: tuple[str, ...] = (
+    "actuator.time_constant",
+    "actuator.gain",
+    "column.stiffness",
+    "column.inertia",
+    "table.bandwidth",
+    "table.gain",
+    "table.oil_column",
+    "damper.viscous",
+    "damper.stiffness",
+    "damper.mass",
+    "damper.gain",
+    "damper.motor_lag",
+    *(
+        f"sensor.{signal}.{kind}"
+        for signal in SIGNALS
+        for kind in ("gain", "bias", "drift", "quantization", "noise")
+    ),
+)
+"""Effects of the catalogue that these laboratories know in the textbook's formula, "plain"."""
+
+UNCATALOGUED: dict[str, tuple[str, tuple[str, ...], tuple[tuple[float, float], ...]]] = {
+    "x.actuator.ripple": ("actuator", ("amplitude", "frequency"), ((1e-5, 1.5e-4), (6.0, 25.0))),
+    "x.actuator.droop": ("actuator", ("loss",), ((0.01, 0.3),)),
+    "x.actuator.valve_hysteresis": ("actuator", ("width",), ((3e-5, 4e-4),)),
+    "x.column.hardening": ("column", ("stiffness",), ((3e10, 4e11),)),
+    "x.column.creep": ("column", ("share", "relaxation_time"), ((0.01, 0.15), (0.1, 5.0))),
+    "x.column.asymmetry": ("column", ("share",), ((0.01, 0.15),)),
+    "x.table.pitch": ("table", ("coupling", "frequency"), ((0.1, 0.5), (15.0, 5.0))),
+    "x.table.cam": ("table", ("amplitude", "period"), ((2e-5, 2e-4), (0.01, 0.04))),
+    "x.damper.cable_drag": ("damper", ("coefficient",), ((1.5, 20.0),)),
+    "x.damper.motor_constant": ("damper", ("rise",), ((0.02, 0.3),)),
+    "x.damper.cubic_spring": ("damper", ("stiffness",), ((5e3, 8e4),)),
+    "x.damper.appendage": ("damper", ("mass", "frequency"), ((0.15, 2.0), (8.0, 2.5))),
+    "x.sensor.column_force.saturation": ("sensor.column_force", ("limit",), ((2e5, 4e4),)),
+    "x.sensor.table_acceleration.saturation": ("sensor.table_acceleration", ("limit",), ((4.0, 1.2),)),
+    "x.sensor.table_acceleration.crosstalk": (
+        "sensor.table_acceleration",
+        ("coefficient",),
+        ((4e-4, 4e-3),),
+    ),
+    "x.sensor.column_force.missing": ("sensor.column_force", ("probability",), ((0.01, 0.3),)),
+    "x.sensor.damper_force.missing": ("sensor.damper_force", ("probability",), ((0.01, 0.3),)),
+}
+"""Effects in no catalogue: site, parameters, and for each of these its weak and strong value."""
