@@ -1,17 +1,38 @@
-"""The link plug-in that a reality names, one instance per receiving laboratory."""
+"""The link that a reality names or impairs, one instance per receiving laboratory."""
 
 from __future__ import annotations
 
+from common.errors import InputError
 from common.mailbox import LinkModel, PerfectLink
 from common.plugins import construct, find
 from common.reality import Reality
 
+IMPAIRED = "models.link.impaired:ImpairedLink"
+OPTIONS = {  # option of the emulated network behind each parameter of an effect
+    ("link.delay", "delay"): "delay",
+    ("link.jitter", "std"): "jitter",
+    ("link.loss", "probability"): "loss",
+    ("link.loss", "burst"): "burst",
+}
+
 
 def link_model(reality: Reality) -> LinkModel:
     """The impairment of one direction; raises InputError where the plug-in cannot be constructed."""
-    rig = reality.link
-    if not rig.class_:
+    rig, options = reality.link, impairment(reality)
+    if rig.class_ and options:
+        raise InputError("Effects on the link cannot be laid over the plug-in in [link]: leave one of them out.")
+    if not rig.class_ and not options:
         return PerfectLink()
-    kind = find(rig.class_, reality.base, "[link]")
-    model: LinkModel = construct(kind, {"seed": reality.seed} | rig.options, "[link]")
+    kind = find(rig.class_ or IMPAIRED, reality.base, "[link]")
+    model: LinkModel = construct(kind, {"seed": reality.seed} | (options or rig.options), "[link]")
     return model
+
+
+def impairment(reality: Reality) -> dict[str, float]:
+    """Options of the emulated network that the reality's effects ask for."""
+    return {
+        OPTIONS[name, key]: value
+        for name, values in reality.effects
+        for key, value in values.items()
+        if (name, key) in OPTIONS
+    }
