@@ -35,6 +35,12 @@ class Diagnosis:
     white: dict[str, float] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
 
+    def named(self, site: str) -> list[str]:
+        """The effects found at a site."""
+        names = [name for verdict in self.verdicts for name in verdict.effects]
+        names += [item.effect for item in self.readings] + [item.effect for item in self.link]
+        return [name for name in names if CATALOGUE[name].site == site]
+
     def system(self, sites: frozenset[str] | None = None) -> System:
         """The plan with parameters moved inside their tolerances and the effects found, of some sites or of all."""
         system = System(self.record.plan)

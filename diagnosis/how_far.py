@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -31,6 +32,9 @@ class HowFar:
     summary: dict[str, Any]
     traces: list[Trace]
     shares: dict[str, tuple[float, float, float]]
+    loop_shares: list[dict[str, Any]]
+    waterfall: list[dict[str, Any]]
+    histories: list[dict[str, Any]]
 
 
 class Judge:
@@ -96,13 +100,9 @@ def judge(found: Diagnosis, validation: Sequence[Record]) -> HowFar:
     nominal = bare(found, own)
     before, after = own.signals(frozenset()), own.signals(None)
     floors = own.floor()
-    gap_before, gap_after, floor = (
-        own.gap(before),
-        own.gap(after),
-        overall({k: floors.get(k, 0.0) for k in own.gap(after)}),
-    )
+    gap_before, gap_after = own.gap(before), own.gap(after)
+    floor = overall({name: floors.get(name, 0.0) for name in gap_after})
     traces = all_traces(found)
-    gap = gap_entry(record, own, nominal, floors)
     summary = {
         "nominal": overall(own.gap(nominal)),
         "before": overall(gap_before),
@@ -114,7 +114,57 @@ def judge(found: Diagnosis, validation: Sequence[Record]) -> HowFar:
     }
     if validation:
         summary |= validated(found, validation)
-    return HowFar(gap, summary, traces, shares(own, traces))
+    share, rows = shares(own, traces)
+    return HowFar(
+        gap_entry(record, own, nominal, floors),
+        summary,
+        traces,
+        share,
+        rows,
+        waterfall(own, traces, summary),
+        histories(own, before, after),
+    )
+
+
+def waterfall(own: Judge, traces: Sequence[Trace], summary: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The overall gap on withheld time after each step: nominal, tolerances, site by site, noise."""
+    steps = [
+        {"label": "nominal models", "value": summary["nominal"]},
+        {"label": "parameters within tolerances", "value": summary["before"]},
+    ]
+    taken: set[str] = set()
+    for trace in sorted(traces, key=lambda item: -item.ratio):
+        names = own.found.named(trace.site)
+        if names:
+            taken.add(trace.site)
+            value = overall(own.gap(own.signals(frozenset(taken))))
+            steps.append({"label": "+ " + ", ".join(names), "value": value})
+    return [*steps, {"label": "noise floor", "value": summary["noise_floor"]}]
+
+
+def histories(
+    own: Judge, before: Mapping[str, Array] | None, after: Mapping[str, Array] | None
+) -> list[dict[str, Any]]:
+    """Response signals recorded and simulated, in the seconds in which they differ most."""
+    from diagnosis.details import UNITS, numbers, strongest
+
+    if before is None or after is None:
+        return []
+    result = []
+    for name in own.gap(after):
+        recorded = own.record.signals[name]
+        shown = strongest(recorded - before[name], own.record.plan.test.interval)
+        result.append(
+            {
+                "signal": name,
+                "unit": UNITS.get(name, ""),
+                "t": numbers(own.record.time[shown]),
+                "recorded": numbers(recorded[shown]),
+                "before": numbers(before[name][shown]),
+                "after": numbers(after[name][shown]),
+            }
+        )
+    return result
 
 
 def held_out(record: Record) -> Mask:
@@ -239,11 +289,16 @@ def all_traces(found: Diagnosis) -> list[Trace]:
     return result
 
 
-def shares(own: Judge, traces: Sequence[Trace]) -> dict[str, tuple[float, float, float]]:
-    """Share of the response gap each site is responsible for, with an interval from blocks of time."""
+def shares(
+    own: Judge, traces: Sequence[Trace]
+) -> tuple[dict[str, tuple[float, float, float]], list[dict[str, Any]]]:
+    """Share of the response gap each site is responsible for, with an interval from thirds of the time.
+
+    Beside it the exact Shapley values, what each site takes away first, and what it takes away last.
+    """
     sites = [trace.site for trace in sorted(traces, key=lambda item: -item.ratio)]
-    if len(sites) == 1:
-        return {sites[0]: (1.0, 1.0, 1.0)}
+    if len(sites) < 2:
+        return {site: (1.0, 1.0, 1.0) for site in sites}, []
     players = sites[:PLAYERS]
     simulated: dict[frozenset[str], Mapping[str, Array] | None] = {}
 
@@ -252,16 +307,25 @@ def shares(own: Judge, traces: Sequence[Trace]) -> dict[str, tuple[float, float,
             simulated[subset] = own.signals(subset)
         return -overall(own.gap(simulated[subset], mask))
 
-    everywhere = np.ones(own.record.ticks, dtype=bool)
-    thirds = [everywhere] + [np.arange(own.record.ticks) * 3 // own.record.ticks == i for i in range(3)]
-    weights = [
-        normalised(where.shapley(players, lambda subset, m=mask: value(m, subset)), traces) for mask in thirds
-    ]  # type: ignore[misc]
+    ticks = np.arange(own.record.ticks)
+    masks = [ticks >= 0, *(ticks * 3 // own.record.ticks == third for third in range(3))]
+    found = [where.shapley(players, functools.partial(value, mask)) for mask in masks]
+    weights = [normalised(item, traces) for item in found]
     result = {}
     for site in sites:
         drawn = [item.get(site, 0.0) for item in weights]
         result[site] = (drawn[0], min(drawn), max(drawn))
-    return result
+    rows = [
+        {
+            "site": site,
+            "shapley": values[0],
+            "interval": [min(item[site][0] for item in found), max(item[site][0] for item in found)],
+            "first_in": values[1],
+            "last_out": values[2],
+        }
+        for site, values in found[0].items()
+    ]
+    return result, rows
 
 
 def normalised(found: Mapping[str, tuple[float, float, float]], traces: Sequence[Trace]) -> dict[str, float]:

@@ -156,12 +156,18 @@ def scattered(ages: Index, interval: float) -> list[Finding]:
             break
     delay, jitter, loss = best
     spread = 4.0 / math.sqrt(counts.sum())
-    names = (("link.jitter", "std", jitter), ("link.delay", "delay", delay), ("link.loss", "probability", loss))
+    names = (
+        ("link.jitter", "std", jitter),
+        ("link.delay", "delay", delay),
+        ("link.loss", "probability", loss),
+    )
     text = f"the age of messages scatters over {int(np.count_nonzero(counts))} ticks"
     found = []
     for effect, key, value in names:
         if value > 0.0:
-            wide = spread * max(value, jitter if key != "probability" else 0.0) + (spread if key == "probability" else 0.0)
+            wide = spread * max(value, jitter if key != "probability" else 0.0) + (
+                spread if key == "probability" else 0.0
+            )
             values = {key: (value, (max(value - wide, 0.0), value + wide))}
             if key == "probability":
                 values["burst"] = (1.0, (1.0, math.inf))
@@ -181,7 +187,9 @@ def fitted(
         return unlikely((delay, math.exp(p[0]), loss))  # type: ignore[no-any-return,operator]
 
     start = [math.log(max(mean, 0.1 * interval)), math.log(max(mean, 0.1 * interval)), -5.0]
-    found = minimize(cost, start, method="Nelder-Mead", options={"maxiter": 2000, "xatol": 1e-5, "fatol": 1e-4})
+    found = minimize(
+        cost, start, method="Nelder-Mead", options={"maxiter": 2000, "xatol": 1e-5, "fatol": 1e-4}
+    )
     p = found.x
     delay = math.exp(p[1]) if free[0] else 0.0
     loss = 1.0 / (1.0 + math.exp(-p[2])) if free[1] else 0.0
@@ -193,5 +201,7 @@ def exchange_of(run: Run, ticks: int) -> Exchange:
     result = []
     for topic, name in (("slave", "command_seq"), ("master", "damper_force_seq")):
         values, there = laid_out(run.columns[topic][name].astype(np.float64), run.sequences[topic], ticks)
-        result.append(np.minimum(np.where(there.cumsum() > 0, values, -1.0).astype(np.int64), np.arange(ticks)))
+        result.append(
+            np.minimum(np.where(there.cumsum() > 0, values, -1.0).astype(np.int64), np.arange(ticks))
+        )
     return Exchange(*result)

@@ -6,8 +6,9 @@ the sensors' noise alone as long as its model is right. A gap in one piece does 
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -68,6 +69,14 @@ def nuisances(record: Record, fields: tuple[tuple[str, str], ...]) -> tuple[Nuis
     return tuple(result)
 
 
+def with_fields(part: Any, fields: dict[str, Any]) -> Any:
+    """A copy of a part with some of its fields replaced."""
+    result = copy.copy(part)
+    for name, value in fields.items():
+        setattr(result, name, value)
+    return result
+
+
 def outputs(record: Record, names: tuple[str, ...]) -> tuple[Array, Mask]:
     """Recorded signals and where they are there; one that is absent is nowhere there."""
     none = np.zeros(record.ticks)
@@ -89,8 +98,11 @@ class LaboratoryA:
     exact = False
     signals = MEASURED_A
 
-    def __init__(self, record: Record, command: str = "actuator_command") -> None:
-        self._command = record.signals[command]
+    devices = {"actuator_command": "actuator"}
+    units = {"actuator_command": "m"}
+
+    def __init__(self, record: Record) -> None:
+        self.inputs = {"actuator_command": record.signals["actuator_command"]}
         self.measured, self.present = outputs(record, MEASURED_A)
         self.nuisances = nuisances(
             record,
@@ -106,7 +118,11 @@ class LaboratoryA:
 
     def predict(self, system: System) -> Array:
         """Readings of the laboratory."""
-        return replay.laboratory_a(system, self._command)
+        return replay.laboratory_a(system, self.inputs["actuator_command"])
+
+    def replaced(self, **fields: Any) -> LaboratoryA:
+        """The same laboratory in another test: other inputs, or other readings."""
+        return with_fields(self, fields)
 
 
 class ColumnAlone:
@@ -133,11 +149,12 @@ class LaboratoryB:
     name = "laboratory B"
     exact = False
     signals = MEASURED_B
+    devices = {"table_command": "table", "damper_command": "damper's motor"}
+    units = {"table_command": "m", "damper_command": "N"}
 
     def __init__(self, record: Record) -> None:
         none = np.zeros(record.ticks)
-        self._command = record.signals.get("table_command", none)
-        self._motor = record.signals.get("damper_command", none)
+        self.inputs = {name: record.signals.get(name, none) for name in self.devices}
         self.measured, self.present = outputs(record, MEASURED_B)
         self.nuisances = nuisances(
             record,
@@ -154,7 +171,13 @@ class LaboratoryB:
 
     def predict(self, system: System) -> Array:
         """Readings of the laboratory."""
-        return replay.laboratory_b(system, self._command, self._motor)
+        none = np.zeros(max(values.size for values in self.inputs.values()))
+        command, motor = (self.inputs.get(name, none) for name in self.devices)
+        return replay.laboratory_b(system, command, motor)
+
+    def replaced(self, **fields: Any) -> LaboratoryB:
+        """The same laboratory in another test: other inputs, or other readings."""
+        return with_fields(self, fields)
 
 
 DAMPER = (

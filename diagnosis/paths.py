@@ -42,9 +42,7 @@ def paths(record: Record, nominal: dict[str, Array] | None) -> dict[str, dict[st
     return result
 
 
-def measured(
-    record: Record, signals: dict[str, Array], start: str, end: str
-) -> FrequencyEvaluation | None:
+def measured(record: Record, signals: dict[str, Array], start: str, end: str) -> FrequencyEvaluation | None:
     """Amplitude and delay from one signal to another, None where they are not there; forces per stiffness."""
     if start not in signals or end not in signals or not record.has(start, end):
         return None

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from diagnosis import exercise, how_far, where
+from diagnosis import details, exercise, how_far, next_test, where
 from diagnosis.search import gaps
 from diagnosis.verdict import intervals
 from models.effects import CATALOGUE
@@ -26,21 +26,27 @@ def build(found: Diagnosis, validation: Sequence[Record]) -> dict[str, Any]:
     far = how_far.judge(found, validation)
     status = status_of(found)
     sites = sites_of(found, far)
-    result: dict[str, Any] = {
+    entries = which(found, status)
+    tests = next_test.choices(found)
+    evidence = details.details(found, far, entries)
+    evidence["next"] = [
+        {"test": item.test, "separation": item.separation, "pair": list(item.pair), "why": ""}
+        for item in tests[:5]
+    ]
+    return {
         "version": VERSION,
         "status": status,
-        "verdict": "",
         "tolerances": tolerances(found),
         "gap": far.gap,
         "where": sites,
-        "which": which(found, status),
+        "which": entries,
         "equivalent": [list(names) for verdict in found.verdicts for names in verdict.equivalent],
         "how_far": far.summary,
         "not_exercised": exercise.not_exercised(found),
-        "next_test": "",
+        "next_test": next_test.sentence(tests),
         "warnings": found.warnings,
+        "details": evidence,
     }
-    return result
 
 
 def status_of(found: Diagnosis) -> str:

@@ -79,5 +79,8 @@ def diagnose_file(
     own = record.build(read(path), chosen, against_ideal=against_ideal)
     others = [record.build(read(other), chosen, against_ideal=against_ideal) for other in validate]
     report = diagnose(own, others)
-    report.setdefault("details", {}).setdefault("test", {})["file"] = path.name
+    from rths.diagnosis_report import wording
+
+    report["details"]["test"]["file"] = path.name
+    report["verdict"] = wording.verdict(report)
     return report

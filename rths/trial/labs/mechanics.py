@@ -8,7 +8,7 @@ from rths.trial.labs.compiled import jit
 
 LINEAR, HERTZ = 1, 2  # formulas of the end stop
 REFERENCE = 2e-3  # m, depth at which both stops are equally strong
-RESTITUTION = 0.5  # s/m, damping of the contact over its force
+RESTITUTION = 1.5  # s/m, damping of the contact over its force, as of rubber
 CONTACT_FREQUENCY = 200.0  # Hz, of the platform on the flanks of its play
 FLANK, GUIDE = 0.7, 0.25  # damping ratios in contact and in the play
 

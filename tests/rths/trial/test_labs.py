@@ -226,7 +226,7 @@ def test_a_formula_moves_its_signals_and_no_others(name: str, formula: str) -> N
         if signal in CASES[name][2]:
             assert change == 0.0, signal
         else:
-            assert 0.0 < change < 2.0, signal
+            assert 0.0 < change < 4.0, signal  # stops throw the damper about
     assert max(changes(found).values()) > 2e-3
 
 
