@@ -32,6 +32,7 @@ class Diagnosis:
     verdicts: list[Verdict] = field(default_factory=list)
     readings: list[Reading] = field(default_factory=list)
     link: list[Finding] = field(default_factory=list)
+    held: dict[str, float] = field(default_factory=dict)  # sensors that repeat samples, and how many
     white: dict[str, float] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
 
@@ -103,6 +104,11 @@ def examine(record: Record) -> Diagnosis:
         found.verdicts.append(judge(Searcher(data, Scales(record, shift)).run()))
     found.white = readings.levels(datas)
     found.readings = readings.findings(record, found.white, rounded)
+    found.held = readings.held(record, rounded)
+    found.warnings += [
+        f"The sensor {name} repeats {100 * share:.2g} % of its samples to the last bit: it misses samples."
+        for name, share in found.held.items()
+    ]
     if record.run.has("master") and record.run.has("slave"):
         account = link.account(record.run, record.plan.test.interval)
         found.link = link.findings(account, record.plan.test.interval)

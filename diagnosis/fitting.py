@@ -30,8 +30,10 @@ AVERAGED = 0.008  # s, over which residuals are averaged
 BLOCK = 2.0  # s, of the blocks that are held out in turn
 HELD_OUT = (2, 4)  # of every five blocks, these
 COARSE = 3.0  # steps that count as noise where a reading is rounded to more than its noise
+SHORTEST, LONGEST = 6.0, 0.7  # of a beginning: seconds, and share of the test
 FAR = 1e6  # residual, in σ, of a hypothesis that diverges
 TOLERANCES = 3.0  # most that a nominal parameter is moved: beyond it the plan is wrong
+STEP, FINE_STEP = 0.4, 2e-3  # tolerances between differences: over the kinks of friction, or exactly
 ROUNDS = 4  # fits with the signals' weights renewed in between
 REUSED = 3  # iterations for which the slopes over the nominal parameters serve again
 
@@ -92,6 +94,17 @@ def prepare(part: Part, record: Record, steps: Mapping[str, float] | None = None
     rounded = np.array([(steps or {}).get(name, 0.0) for name in part.signals])
     rounding = np.where(rounded > 2.0 * white, COARSE * rounded, rounded / math.sqrt(12.0))
     return replace(data, sigma=np.sqrt(white**2 + least**2 + rounding**2), white=white)
+
+
+def beginning(data: Data, fit: Fit, share: float) -> Data:
+    """The beginning of a test, from rest, that holds a share of what a fit leaves; the whole test where that is long."""
+    energy = np.cumsum(np.sum(np.square(fit.reduced), axis=1))
+    groups = int(np.searchsorted(energy, share * energy[-1])) + 1
+    least = round(SHORTEST / (data.system.plan.test.interval * data.group))
+    groups = max(groups, least)
+    if groups > LONGEST * data.groups or data.part.exact:
+        return data
+    return replace(data, part=data.part.first(groups * data.group), train=data.train[:groups])
 
 
 def noise(residual: Array) -> Array:
@@ -207,6 +220,7 @@ class Problem:
         self.names = tuple(start)
         self.frees = tuple(item for name in start for item in free(CATALOGUE[name], start[name]))
         self.count = len(data.part.nuisances)
+        self._step = FINE_STEP if data.part.exact else STEP
         self._slopes = slopes
         self._uses = 0 if slopes is None else -1
 
@@ -245,7 +259,7 @@ class Problem:
         columns = []
         _, high = self.bounds()
         for place in range(first, p.size if last is None else last):
-            step = 2e-3 if place < self.count else 2e-4 * max(1.0, abs(p[place]))
+            step = self._step * (1.0 if place < self.count else 0.1 * max(1.0, abs(p[place])))
             if p[place] + step > high[place]:
                 step = -step
             moved = p.copy()

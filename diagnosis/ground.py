@@ -33,6 +33,10 @@ class Ground:
         rows = substructure.shifted(self._believed, system.effects.time_shift / self._interval)
         return factor * rows[0][:, None]
 
+    def first(self, ticks: int) -> Ground:
+        """Computed, and cheap: always the whole of it."""
+        return self
+
     def shift(self) -> float:
         """How much later (s) the motion came, by cross-correlation."""
         size = 2 * self.measured.size

@@ -284,6 +284,12 @@ def all_traces(found: Diagnosis) -> list[Trace]:
             *(item for item in result if item.site != site),
             Trace(site, np.zeros(0), reading.ratio, "", 1.0),
         ]
+    for name, share in found.held.items():
+        site = f"sensor.{name}"
+        result = [
+            *(item for item in result if item.site not in (site, "damper", "column", "table")),
+            Trace(site, np.zeros(0), share, "", 1.0),
+        ]
     if found.link:
         result.append(Trace("link", np.zeros(0), max(item.z for item in found.link), "", 1.0))
     return result

@@ -57,6 +57,9 @@ class Part(Protocol):
     def predict(self, system: System) -> Array:
         """What the piece would have given, without noise; (ticks, signals)."""
 
+    def first(self, ticks: int) -> Part:
+        """The piece over the first ticks only."""
+
 
 def nuisances(record: Record, fields: tuple[tuple[str, str], ...]) -> tuple[Nuisance, ...]:
     """Those of the parameters that can move: finite and not zero."""
@@ -67,6 +70,13 @@ def nuisances(record: Record, fields: tuple[tuple[str, str], ...]) -> tuple[Nuis
         if tolerance > 0.0 and np.all(np.isfinite(value)) and np.all(value != 0.0):
             result.append(Nuisance(table, field, tolerance))
     return tuple(result)
+
+
+def cut(part: Any, ticks: int, inputs: Any) -> Any:
+    """A copy of a part over its first ticks."""
+    return with_fields(
+        part, {"measured": part.measured[:ticks], "present": part.present[:ticks], "inputs": inputs}
+    )
 
 
 def with_fields(part: Any, fields: dict[str, Any]) -> Any:
@@ -120,6 +130,11 @@ class LaboratoryA:
         """Readings of the laboratory."""
         return replay.laboratory_a(system, self.inputs["actuator_command"])
 
+    def first(self, ticks: int) -> LaboratoryA:
+        """The laboratory over the first ticks."""
+        result: LaboratoryA = cut(self, ticks, {name: values[:ticks] for name, values in self.inputs.items()})
+        return result
+
     def replaced(self, **fields: Any) -> LaboratoryA:
         """The same laboratory in another test: other inputs, or other readings."""
         return with_fields(self, fields)
@@ -133,14 +148,19 @@ class ColumnAlone:
     signals = ("column_force",)
 
     def __init__(self, record: Record, deformation: Array) -> None:
-        self._deformation = deformation
+        self.inputs = deformation
         self.measured, self.present = outputs(record, self.signals)
         self.nuisances = nuisances(record, (("column", "stiffness"),))
         self.candidates = of_sites(("column", "sensor.column_force"))
 
     def predict(self, system: System) -> Array:
         """Force readings."""
-        return replay.column(system, self._deformation)[:, None]
+        return replay.column(system, self.inputs)[:, None]
+
+    def first(self, ticks: int) -> ColumnAlone:
+        """The column over the first ticks."""
+        result: ColumnAlone = cut(self, ticks, self.inputs[:ticks])
+        return result
 
 
 class LaboratoryB:
@@ -174,6 +194,11 @@ class LaboratoryB:
         none = np.zeros(max(values.size for values in self.inputs.values()))
         command, motor = (self.inputs.get(name, none) for name in self.devices)
         return replay.laboratory_b(system, command, motor)
+
+    def first(self, ticks: int) -> LaboratoryB:
+        """The laboratory over the first ticks."""
+        result: LaboratoryB = cut(self, ticks, {name: values[:ticks] for name, values in self.inputs.items()})
+        return result
 
     def replaced(self, **fields: Any) -> LaboratoryB:
         """The same laboratory in another test: other inputs, or other readings."""
@@ -220,3 +245,7 @@ class Building:
         """Displacement, velocity and acceleration of every storey."""
         rows = replay.building(system, self._ground, *self._inputs)
         return rows[:, STOREYS : STOREYS + self.measured.shape[1]]
+
+    def first(self, ticks: int) -> Building:
+        """Computed, and cheap: always the whole of it."""
+        return self

@@ -12,6 +12,7 @@ from diagnosis.signals.noise import quantum
 from models.closed_loop import MEASURED_A, MEASURED_B
 
 LOUDER = 2.5  # noise over what the plan and the other sensors' noise make expected
+REPEATED, STOOD = 1e-3, 0.5  # share of repeated samples: missed by the sensor, or a signal that stood still
 LEAST = 2.0  # noise over the plan's, whatever the others do
 
 
@@ -33,6 +34,18 @@ def steps(record: Record) -> dict[str, float]:
             there = record.signals[name][record.present[name]]
             if np.ptp(there) > 0.0 and (step := quantum(there)) > 0.0:
                 found[name] = step
+    return found
+
+
+def held(record: Record, rounded: dict[str, float]) -> dict[str, float]:
+    """Share of samples that repeat the one before to the last bit, of sensors whose noise rules that out."""
+    found = {}
+    for name in (*MEASURED_A, *MEASURED_B):
+        if record.has(name) and name not in rounded and np.ptp(record.signals[name]) > 0.0:
+            there = record.signals[name][record.present[name]]
+            share = float(np.mean(there[1:] == there[:-1]))
+            if REPEATED < share < STOOD:
+                found[name] = share
     return found
 
 

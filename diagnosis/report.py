@@ -55,7 +55,7 @@ def status_of(found: Diagnosis) -> str:
         return "not_enough_data"
     outcomes = {verdict.outcome for verdict in found.verdicts}
     named = any(verdict.effects for verdict in found.verdicts) or found.readings or found.link
-    if "unknown" in outcomes:
+    if "unknown" in outcomes or found.held:
         return "unknown_effect"
     if "partly" in outcomes:
         return "partly_explained"
@@ -107,6 +107,7 @@ def sites_of(found: Diagnosis, far: how_far.HowFar) -> list[dict[str, Any]]:
 def which(found: Diagnosis, status: str) -> list[dict[str, Any]]:
     """The verdict and what else might be, the most probable first."""
     named = [verdict for verdict in found.verdicts if verdict.effects]
+    open_ones = [verdict for verdict in found.verdicts if verdict.others]
     effects = [name for verdict in named for name in verdict.effects]
     effects += [reading.effect for reading in found.readings] + [item.effect for item in found.link]
     probability = float(np.prod([verdict.probability for verdict in named]))
@@ -138,7 +139,7 @@ def which(found: Diagnosis, status: str) -> list[dict[str, Any]]:
         if effects
         else [entry([], probability_none(found), {}, 0.0)]
     )
-    for verdict in named:
+    for verdict in open_ones:
         rest = [name for name in effects if name not in verdict.effects]
         for other, chance in verdict.others:
             values = {
@@ -149,7 +150,11 @@ def which(found: Diagnosis, status: str) -> list[dict[str, Any]]:
                 for name, given in other.values.items()
             }
             kept = {name: parameters[name] for name in rest}
-            share = probability / verdict.probability * chance if verdict.probability > 0.0 else 0.0
+            share = (
+                probability / verdict.probability * chance
+                if verdict.probability > 0.0 and verdict in named
+                else chance
+            )
             worse = 0.5 * (other.cost - verdict.search.chosen.cost)
             entries.append(entry([*other.names, *rest], share, kept | values, worse))
     head, tail = entries[0], sorted(entries[1:], key=lambda item: -item["probability"])

@@ -39,6 +39,7 @@ SENSORS = {
     "damper_stroke": "damper",
     "damper_force": "damper",
 }
+SMOOTH = 0.03  # of the largest velocity, where a friction may begin to fall off
 FARTHEST = 4.0  # times a usual size where a search still begins
 LIMITS = (0.25, 0.4, 0.55, 0.7, 0.85, 0.95)  # of what is reached: where a limit is looked for
 
@@ -55,6 +56,15 @@ class Scales:
         if record.has("column_displacement"):
             rate = np.diff(record.signals["column_displacement"][::8]) / (8 * record.plan.test.interval)
             self._reached["a", "m/s"] = float(np.max(np.abs(rate), initial=0.0))
+        self._velocities: dict[str, float] = {}
+        for group, name in (
+            ("a", "column_displacement"),
+            ("b", "table_displacement"),
+            ("damper", "damper_stroke"),
+        ):
+            if record.has(name):
+                steps = np.diff(record.signals[name][::8]) / (8 * record.plan.test.interval)
+                self._velocities[group] = float(np.max(np.abs(steps), initial=0.0)) or 0.05
         if record.has("damper_command"):
             self.motor = float(np.max(np.abs(record.signals["damper_command"])))
         else:
@@ -73,7 +83,21 @@ class Scales:
             return
         (parameter,) = strength
         for size in self.sizes(effect, parameter):
-            yield {**shapes, parameter.name: size}
+            for shape in self.forms(effect, shapes):
+                yield {**shape, parameter.name: size}
+
+    def forms(self, effect: Effect, shapes: dict[str, float]) -> list[dict[str, float]]:
+        """What an effect may look like: an end stop is soft or hard against the force at hand."""
+        if effect.name == "damper.stroke_stop" and (force := self._reached.get(("damper", "N"))):
+            soft = force / self._reached["damper", "m"]
+            return [{"stiffness": min(max(factor * soft, 200.0), 1e6)} for factor in (0.5, 5.0, 50.0)]
+        if effect.name.endswith(".friction"):  # Coulomb's, and one that a velocity makes smooth
+            return [shapes, shapes | {"velocity": SMOOTH * self.velocity(effect)}]
+        return [shapes]
+
+    def velocity(self, effect: Effect) -> float:
+        """Velocity that a part reaches, m/s."""
+        return self._velocities.get(self.group(effect), 0.05)
 
     def sizes(self, effect: Effect, parameter: Parameter) -> list[float]:
         """Sizes of the parameter that counts."""

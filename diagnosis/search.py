@@ -7,35 +7,36 @@ nominal parameters give way is read off a linear projection; the most promising 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
 from diagnosis import fitting
 from diagnosis.fitting import Data, Fit, Values, excess
 from diagnosis.scales import Scales
-from models.effects.effect import Effect
+from diagnosis.screening import WORKERS, Candidate, screen
 from models.registry import Array
 
 FITTED = 6  # candidates that are fitted in full at every step
 MOST = 3  # effects of one part
-WORKERS = 2
 LEVELS = (1, 4, 16)  # how many averaged samples are taken together to see what is slow
 MATERIAL = 0.12  # systematic residual over noise below which nobody would look for a cause
 PRIOR_GAIN, DATA_GAIN = 6.25, 25.0  # what an effect must save: of tolerances, of residuals
 REST = 0.85  # share of what is left that a further effect must explain,
+SUSPICIOUS = 8.0  # of Σ z²: nominal parameters that are all off together stand in for an effect
 TRACE = 2e-4  # and more than this share of the whole gap,
 HALF, SHARE = 0.5, 0.03  # or this share of what is left and this of the whole gap
 NEAR = 1.0  # tolerances from the nominal value where fits begin: what is further away stands in for an effect
 STEPS = 6  # steps between two weightings of a further fit
+LAST = 5  # steps over the whole test after those over its beginning
+MOSTLY = 0.7  # share of what a fit leaves that a beginning must hold
 ROUGH = 4  # steps of a first fit
 LOST = 100.0  # mean square residual in σ² from which on fitted nominal parameters mean nothing
 FINE = 3  # candidates fitted to their end,
 HOPELESS = 30.0  # as long as they leave no more than this times what the best one leaves
+CANCELLED = 4.0  # times the gap that one of several effects may make without being a makeshift
 TIED = 9.0  # cost by which hypotheses must differ to be told apart
 
 
@@ -71,15 +72,6 @@ def remaining(fit: Fit) -> float:
 
 
 @dataclass(frozen=True)
-class Candidate:
-    """An effect at the size where it promises most, over a present hypothesis."""
-
-    effect: Effect
-    values: dict[str, float]
-    gain: float
-
-
-@dataclass(frozen=True)
 class Search:
     """What was found in one part."""
 
@@ -87,7 +79,6 @@ class Search:
     commissioned: Fit  # no effect, parameters inside their tolerances
     chosen: Fit
     alternatives: tuple[Fit, ...]  # one effect exchanged for another each, best first
-    screened: tuple[Candidate, ...]  # over the commissioned part, best first
 
     @property
     def left(self) -> float:
@@ -101,51 +92,6 @@ class Search:
         return 1.0 - excess(self.chosen) / before if before > 0.0 else 0.0
 
 
-class Plane:
-    """A fit's residuals as a linear function of its parameters, the nominal ones inside their bounds."""
-
-    def __init__(self, fit: Fit) -> None:
-        self.fit = fit
-        count, size = fit.z.size, fit.jacobian.shape[1]
-        self._basis, self._slopes = np.linalg.qr(fit.jacobian)
-        rest = fit.reduced.ravel()
-        self._here = self._basis.T @ rest
-        self._off = rest - self._basis @ self._here
-        self._prior = np.eye(count, size)
-        room = np.full(size, np.inf)
-        room[:count] = fitting.TOLERANCES + 1e-6
-        at = np.concatenate([fit.z, np.zeros(size - count)])
-        self._low, self._high = -room - at, room - at
-        self._alone = self._cost(np.zeros(size), 0.0, 0.0, (0.0, 1e-12))[0] if size else float(fit.cost)
-
-    def gain(self, change: Array, stretch: tuple[float, float]) -> tuple[float, float]:
-        """What residuals that move by a share of `change` (groups·signals,) gain at best, and that share."""
-        inside = self._basis.T @ change
-        outside = change - self._basis @ inside
-        size = float(np.linalg.norm(outside))
-        if size**2 < 1e-6 and float(inside @ inside) < 1e-6:
-            return -math.inf, 0.0
-        along = float(outside @ self._off) / size if size > 0.0 else 0.0
-        cost, share = self._cost(inside, size, along, stretch)
-        return self._alone - cost, share
-
-    def _cost(
-        self, inside: Array, size: float, along: float, stretch: tuple[float, float]
-    ) -> tuple[float, float]:
-        """Least cost over parameters and share, by a bounded linear fit of a few unknowns."""
-        count = self.fit.z.size
-        rows = [
-            np.column_stack([self._slopes, inside]),
-            np.append(np.zeros(inside.size), size)[None, :],
-            np.column_stack([self._prior, np.zeros(count)]),
-        ]
-        rest = np.concatenate([self._here, [along], self.fit.z])
-        low, high = np.append(self._low, stretch[0]), np.append(self._high, stretch[1])
-        found = lsq_linear(np.concatenate(rows), -rest, bounds=(low, high), method="bvls")
-        off = float(self._off @ self._off) - along**2
-        return 2.0 * float(found.cost) + off, float(found.x[-1])
-
-
 class Searcher:
     """The search in one part."""
 
@@ -156,23 +102,28 @@ class Searcher:
         """Commission, select, exchange, prune, and fit what else might be."""
         commissioned = fitting.fit(self.data, {})
         if not self.is_gap(commissioned):
-            return Search(self.data, commissioned, commissioned, (), ())
-        screened = self.screen(commissioned, self.data.part.candidates)
-        first = self.all_extended(commissioned, screened)
-        chosen = commissioned
-        while len(chosen.names) < MOST and self.is_gap(chosen):
-            better = first[0] if chosen is commissioned else self.extended(chosen)
-            if better is None or not self.worth(commissioned, chosen, better):
+            return Search(self.data, commissioned, commissioned, ())
+        first = self.extended(commissioned)
+        chosen, better = commissioned, first
+        while better and self.worth(commissioned, chosen, better[0]):
+            chosen = self.exchanged(better[0]) if len(better[0].names) > 1 else better[0]
+            if len(chosen.names) >= MOST or self.enough(commissioned, chosen):
                 break
-            chosen = self.exchanged(better) if len(better.names) > 1 else better
+            better = self.extended(chosen)
         chosen = self.pruned(commissioned, chosen)
-        return Search(self.data, commissioned, chosen, self.alternatives(chosen, first), tuple(screened))
+        return Search(self.data, commissioned, chosen, self.alternatives(chosen, first))
+
+    def enough(self, bare: Fit, fit: Fit) -> bool:
+        """Whether nothing is left that a further effect could earn its place by."""
+        return not self.is_gap(fit) or (excess(fit) < TRACE * excess(bare) and fit.prior <= SUSPICIOUS)
 
     def is_gap(self, fit: Fit) -> bool:
         """Whether a fit leaves anything to explain: beyond noise, or beyond its tolerances."""
         found = gaps(fit, self.data.group)
         visible = any(item.ratio > MATERIAL and item.significance > 5.0 for item in found)
-        return visible or float(np.max(np.abs(fit.z), initial=0.0)) > math.sqrt(PRIOR_GAIN)
+        return (
+            visible or fit.prior > SUSPICIOUS or float(np.max(np.abs(fit.z), initial=0.0)) ** 2 > PRIOR_GAIN
+        )
 
     def worth(self, bare: Fit, before: Fit, after: Fit) -> bool:
         """Whether one more effect earns its place."""
@@ -184,79 +135,57 @@ class Searcher:
             return True
         if prior > PRIOR_GAIN and data > -1.0 and remaining(before) < MATERIAL:
             return True
+        if self.cancelling(bare, after):
+            return False
         left, saved, whole = excess(before), excess(before) - excess(after), excess(bare)
         return (saved > REST * left and saved > TRACE * whole) or (
             saved > HALF * left and saved > SHARE * whole
         )
 
-    def screen(self, fit: Fit, effects: Iterable[Effect]) -> list[Candidate]:
-        """What each effect could gain over a fit, best first."""
-        plane = Plane(self.near(fit))
+    def cancelling(self, bare: Fit, fit: Fit) -> bool:
+        """Whether effects of a fit do far more than the gap they explain, and undo each other."""
+        gap = max(float(np.max(np.mean(np.square(bare.reduced), axis=0))), 1.0)
+        for name in fit.names:
+            rest = {key: value for key, value in fit.values.items() if key != name}
+            change = fitting.at(self.data, rest, fit.z).reduced - fit.reduced
+            if float(np.max(np.mean(np.square(change), axis=0))) > CANCELLED**2 * gap:
+                return True
+        return False
 
-        def look(effect: Effect) -> Candidate | None:
-            return self.look(effect, plane)
+    def start(self, fit: Fit) -> Fit:
+        """A fit over the beginning of the test that holds most of what it leaves, nominal parameters moved back.
 
-        found = [item for item in self.spread(look, effects) if item is not None]
-        return sorted(found, key=lambda item: -item.gain)
+        Parameters that are far away stand in for an effect that is missing.
+        """
+        missed = float(np.max(np.mean(np.square(fit.reduced), axis=0)))
+        z = np.zeros(fit.z.size) if missed > LOST else np.clip(fit.z, -NEAR, NEAR)
+        return fitting.at(fitting.beginning(self.data, fit, MOSTLY), fit.values, z)
 
-    def look(self, effect: Effect, plane: Plane) -> Candidate | None:
-        """The size of one effect that promises most."""
-        fit = plane.fit
-        if effect.name in fit.names:
-            return None
-        best: Candidate | None = None
-        for values in self.scales.starts(effect):
-            moved = self.data.reduced(fitting.lay(self.data, fit.z, fit.values | {effect.name: values}))
-            gain, share = plane.gain((moved - fit.reduced).ravel(), self.scales.stretch(effect))
-            if best is None or gain > best.gain:
-                best = Candidate(effect, self.scales.stretched(effect, values, share), gain)
-        return best
-
-    def spread(
-        self, function: Callable[[Effect], Candidate | None], items: Iterable[Effect]
-    ) -> list[Candidate | None]:
-        """Apply over all items on a few threads: kernels release the interpreter's lock."""
-        with ThreadPoolExecutor(WORKERS) as pool:
-            return list(pool.map(function, items))
-
-    def extended(self, fit: Fit, screened: list[Candidate] | None = None, count: int = FITTED) -> Fit | None:
-        """The best fit with one effect more."""
-        fits = self.all_extended(fit, screened, count)
-        return fits[0] if fits else None
-
-    def all_extended(
-        self, fit: Fit, screened: list[Candidate] | None = None, count: int = FITTED
-    ) -> list[Fit]:
-        """Fits with one effect more, best first: all a few steps, the best of them to their end."""
-        promising = (screened if screened is not None else self.screen(fit, self.data.part.candidates))[
-            :count
-        ]
-        near = self.near(fit)
+    def extended(self, fit: Fit, count: int = FITTED) -> list[Fit]:
+        """Fits with one effect more, best first: all a few steps over a beginning, the best of them to their end."""
+        near = self.start(fit)
+        promising = screen(near, self.data.part.candidates, self.scales)[:count]
         slopes = near.jacobian[:, : fit.z.size]
 
         def rough(candidate: Candidate) -> Fit:
             start: Values = {**fit.values, candidate.effect.name: candidate.values}
-            return fitting.fit(self.data, start, near.z, ROUGH, slopes, rounds=1)
+            return fitting.fit(near.data, start, near.z, ROUGH, slopes, rounds=1)
 
         def fine(item: Fit) -> Fit:
-            start = np.clip(item.z, -NEAR, NEAR)
+            z = np.clip(item.z, -NEAR, NEAR)
             if self.data.part.exact:  # cheap, and free of noise: fits go to their end
-                return fitting.fit(self.data, item.values, start)
-            return fitting.fit(self.data, item.values, start, STEPS, rounds=2)
+                return fitting.fit(self.data, item.values, z)
+            better = fitting.fit(near.data, item.values, z, STEPS, rounds=2)
+            return fitting.fit(self.data, better.values, better.z, LAST, rounds=1)
 
         with ThreadPoolExecutor(WORKERS) as pool:
             fits = sorted(pool.map(rough, promising), key=lambda item: item.cost)
             hopeful = [item for item in fits if excess(item) <= HOPELESS * excess(fits[0])][:FINE]
-            fits = sorted([*pool.map(fine, hopeful), *fits[len(hopeful) :]], key=lambda item: item.cost)
+            rest = [fitting.at(self.data, item.values, item.z) for item in fits[len(hopeful) :]]
+            fits = sorted([*pool.map(fine, hopeful), *rest], key=lambda item: item.cost)
         if fits and remaining(fits[0]) > MATERIAL:
-            fits[0] = fitting.fit(self.data, fits[0].values, fits[0].z)
+            fits[0] = fitting.fit(self.data, fits[0].values, fits[0].z, STEPS, rounds=3)
         return fits
-
-    def near(self, fit: Fit) -> Fit:
-        """A fit with its nominal parameters moved back where they stand in for an effect that is missing."""
-        missed = float(np.max(np.mean(np.square(fit.reduced), axis=0)))
-        z = np.zeros(fit.z.size) if missed > LOST else np.clip(fit.z, -NEAR, NEAR)
-        return fitting.at(self.data, fit.values, z)
 
     def without(self, fit: Fit, name: str) -> Fit:
         """The fit again with one effect taken away."""
@@ -265,9 +194,9 @@ class Searcher:
     def exchanged(self, fit: Fit) -> Fit:
         """A better fit with one effect exchanged for another, if there is any."""
         for name in fit.names[:-1]:
-            other = self.extended(self.without(fit, name), count=3)
-            if other is not None and other.cost < fit.cost - TIED:
-                fit = other
+            others = self.extended(self.without(fit, name), count=3)
+            if others and others[0].cost < fit.cost - TIED:
+                fit = others[0]
         return fit
 
     def pruned(self, bare: Fit, fit: Fit) -> Fit:
@@ -287,7 +216,7 @@ class Searcher:
         result: list[Fit] = []
         for name in fit.names:
             base = self.without(fit, name)
-            result += [other for other in self.all_extended(base) if set(other.names) != set(fit.names)]
+            result += [other for other in self.extended(base) if set(other.names) != set(fit.names)]
         return tuple(sorted(result, key=lambda item: item.cost))
 
 

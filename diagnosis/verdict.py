@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -52,6 +52,8 @@ def judge(search: Search) -> Verdict:
         outcome: Outcome = "unknown" if search.left > MISSED else "none"
         return Verdict(search, outcome, 1.0, (), ())
     outcome = how_well(search)
+    if outcome == "unknown":
+        return unnamed(search)
     chosen = search.chosen
     noise = max(1.0, chosen.chi() / chosen.reduced.size)
     odds = [
@@ -68,6 +70,22 @@ def judge(search: Search) -> Verdict:
         if not yes
     )
     return Verdict(search, outcome, sure * named, others, equivalents(search))
+
+
+def unnamed(search: Search) -> Verdict:
+    """A gap that no effect explains by half: nothing is named, the nearest are listed."""
+    near = (search.chosen, *search.alternatives)
+    costs = np.array([fit.cost for fit in near])
+    odds = np.exp(
+        -np.clip(
+            (costs - costs.min()) / max(1.0, costs.min() / search.chosen.reduced.size) / (2.0 * TEMPERATURE),
+            0.0,
+            700.0,
+        )
+    )
+    chances = (1.0 - DOUBT["unknown"]) * odds / odds.sum()
+    bare = replace(search, chosen=search.commissioned)
+    return Verdict(bare, "unknown", DOUBT["unknown"], tuple(zip(near, map(float, chances), strict=True)), ())
 
 
 MISSED = 0.3  # systematic residual over noise that is unknown where no effect was found

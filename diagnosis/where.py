@@ -112,6 +112,8 @@ def culprit_b(data: Data, residual: Array, amount: dict[str, float]) -> str:
         return "table"
     if seen == {"table_acceleration"}:
         return "table" if hidden_in_displacement(data, residual) else "sensor.table_acceleration"
+    if seen == {"damper_force"}:  # a true force would have moved the mass, which is seen far more sharply
+        return "sensor.damper_force" if data.part.present[:, 2].any() else "damper"
     table = amount.get("table_acceleration", 0.0)
     damper = max(amount.get("damper_stroke", 0.0), amount.get("damper_force", 0.0))
     return "table" if table > damper else "damper"

@@ -35,6 +35,7 @@ class ColumnEffects:
     pinching_hardening: float = 0.0
     friction: float = 0.0  # N
     presliding: float = 10e-6  # m, deformation of the friction's contact before it slides
+    friction_velocity: float = 1e-6  # m/s, below which the friction falls off: F·tanh(|δ̇|/v)
     viscous: float = 0.0  # N·s/m
     inertia: float = 0.0  # kg
     slip: float = 0.0  # m, whole gap
@@ -50,6 +51,7 @@ class TableEffects:
     compliance: float = 0.0  # m/N
     backlash: float = 0.0  # m, whole play
     friction: float = 0.0  # m/s²: force over moving mass
+    friction_velocity: float = 1e-6  # m/s, below which it falls off
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,7 @@ class DamperEffects:
 
     gain: float = 1.0
     friction: float = 0.0  # N
+    friction_velocity: float = 1e-6  # m/s, below which it falls off
     force_limit: float = math.inf  # N
     stop_stroke: float = math.inf  # m
     stop_stiffness: float = 0.0  # N/m

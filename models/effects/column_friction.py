@@ -13,11 +13,11 @@ from models.effects.effect import Effect, Parameter
 from models.system import ColumnEffects, System
 
 
-def apply(system: System, force: float, presliding: float) -> System:
+def apply(system: System, force: float, presliding: float, velocity: float) -> System:
     """Friction of `force` N after `presliding` m; without it the shape leaves no trace."""
     if force == 0.0:
-        presliding = ColumnEffects.presliding
-    return system.laid("column", friction=force, presliding=presliding)
+        presliding, velocity = ColumnEffects.presliding, ColumnEffects.friction_velocity
+    return system.laid("column", friction=force, presliding=presliding, friction_velocity=velocity)
 
 
 EFFECT = Effect(
@@ -37,6 +37,17 @@ EFFECT = Effect(
             says="deformation before it slides, to one side",
             shape=True,
             default=1e-05,
+        ),
+        Parameter(
+            "velocity",
+            "m/s",
+            null=1e-06,
+            least=1e-06,
+            most=0.05,
+            sizes=(0.0003, 0.001, 0.003),
+            says="below which it falls off, F·tanh(|v|/velocity); at its least it is Coulomb's",
+            shape=True,
+            default=1e-06,
         ),
     ),
     reference="Armstrong-Hélouvry, Dupont, Canudas de Wit, Automatica 30 (1994) 1083-1138",

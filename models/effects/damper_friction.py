@@ -6,12 +6,14 @@ A force of constant size against the stroke's velocity; at rest it balances what
 from __future__ import annotations
 
 from models.effects.effect import Effect, Parameter
-from models.system import System
+from models.system import DamperEffects, System
 
 
-def apply(system: System, force: float) -> System:
+def apply(system: System, force: float, velocity: float) -> System:
     """Friction of `force` N between moving mass and table."""
-    return system.laid("damper", friction=force)
+    if force == 0.0:
+        velocity = DamperEffects.friction_velocity
+    return system.laid("damper", friction=force, friction_velocity=velocity)
 
 
 EFFECT = Effect(
@@ -19,7 +21,20 @@ EFFECT = Effect(
     site="damper",
     kind="physics",
     says="Coulomb friction of the guide rail",
-    parameters=(Parameter("force", "N", null=0.0, least=0.0, most=200.0, sizes=(0.3, 1.0, 3.0, 10.0)),),
+    parameters=(
+        Parameter("force", "N", null=0.0, least=0.0, most=200.0, sizes=(0.3, 1.0, 3.0, 10.0)),
+        Parameter(
+            "velocity",
+            "m/s",
+            null=1e-06,
+            least=1e-06,
+            most=0.05,
+            sizes=(0.0003, 0.001, 0.003),
+            says="below which it falls off, F·tanh(|v|/velocity); at its least it is Coulomb's",
+            shape=True,
+            default=1e-06,
+        ),
+    ),
     reference="Armstrong-Hélouvry, Dupont, Canudas de Wit, Automatica 30 (1994) 1083-1138",
     apply=apply,
 )

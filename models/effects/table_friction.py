@@ -9,12 +9,14 @@ size. Not to be confused with `table.backlash`: friction shows as spikes of acce
 from __future__ import annotations
 
 from models.effects.effect import Effect, Parameter
-from models.system import System
+from models.system import System, TableEffects
 
 
-def apply(system: System, acceleration: float) -> System:
+def apply(system: System, acceleration: float, velocity: float) -> System:
     """Friction force of `acceleration` m/s² times the moving mass."""
-    return system.laid("table", friction=acceleration)
+    if acceleration == 0.0:
+        velocity = TableEffects.friction_velocity
+    return system.laid("table", friction=acceleration, friction_velocity=velocity)
 
 
 EFFECT = Effect(
@@ -31,6 +33,17 @@ EFFECT = Effect(
             most=10.0,
             sizes=(0.03, 0.1, 0.3, 1.0),
             says="friction force over moving mass",
+        ),
+        Parameter(
+            "velocity",
+            "m/s",
+            null=1e-06,
+            least=1e-06,
+            most=0.05,
+            sizes=(0.0003, 0.001, 0.003),
+            says="below which it falls off, F·tanh(|v|/velocity); at its least it is Coulomb's",
+            shape=True,
+            default=1e-06,
         ),
     ),
     reference="Armstrong-Hélouvry, Dupont, Canudas de Wit, Automatica 30 (1994) 1083-1138",

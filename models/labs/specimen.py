@@ -21,7 +21,7 @@ from models.system import ColumnEffects
 
 # places in `effects`
 PRESENT, STIFFNESS, YIELDS, DEGRADATION, PINCHING, PINCHING_WIDTH, PINCHING_HARDENING = range(7)
-FRICTION, PRESLIDING, VISCOUS, INERTIA, SLIP = range(7, 12)
+FRICTION, PRESLIDING, VISCOUS, INERTIA, SLIP, FRICTION_VELOCITY = range(7, 13)
 
 # places in `cell`
 DEFORMATION, RATE, LARGEST, SLIDER, LAST_STEP, REACTION = range(6)
@@ -58,6 +58,7 @@ def build(column: Column, effects: ColumnEffects | None = None) -> Specimen:
         more.viscous,
         more.inertia,
         more.slip,
+        more.friction_velocity,
     ]
     limit = more.yield_displacement if yields else 1.0
     yielding = np.array([column.stiffness, limit, more.hardening, more.exponent, 0.5, 0.5])
@@ -121,12 +122,12 @@ def felt(
         closed = np.exp(-((within / effects[PINCHING_WIDTH]) ** 2))
         result *= 1.0 - effects[PINCHING] * closed + effects[PINCHING_HARDENING] * (1.0 - closed)
     moved = deformation - cell[DEFORMATION]
+    rate = moved / step
     if effects[FRICTION] != 0.0:
         contact = effects[PRESLIDING]
         cell[SLIDER] = min(max(cell[SLIDER] + moved, -contact), contact)
-        result += effects[FRICTION] * cell[SLIDER] / contact
+        result += effects[FRICTION] * cell[SLIDER] / contact * np.tanh(abs(rate) / effects[FRICTION_VELOCITY])
     cell[REACTION] = result
-    rate = moved / step
     result += effects[VISCOUS] * rate
     if effects[INERTIA] != 0.0 and cell[LAST_STEP] > 0.0:
         result += effects[INERTIA] * (rate - cell[RATE]) / (0.5 * (step + cell[LAST_STEP]))

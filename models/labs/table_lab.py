@@ -30,6 +30,7 @@ INPUTS = 5  # columns behind the states: command before and after, motor command
 
 # places in `limits`
 PRESENT, TABLE_GAIN, PLAY, TABLE_FRICTION, MOTOR_GAIN, FORCE_LIMIT, FRICTION, STOP, STOP_STIFFNESS = range(9)
+TABLE_VELOCITY, VELOCITY = 9, 10  # below which the frictions fall off
 
 
 class TableLab(NamedTuple):
@@ -68,6 +69,7 @@ def build(
     size = matrices.shape[1]
     limits = [float(present), on_table.gain, on_table.backlash, on_table.friction, on_damper.gain]
     limits += [on_damper.force_limit, on_damper.friction, on_damper.stop_stroke, on_damper.stop_stiffness]
+    limits += [on_table.friction_velocity, on_damper.friction_velocity]
     return TableLab(
         segments.taps,
         matrices,
@@ -151,9 +153,17 @@ def resist(matrix: Array, limits: Array, scratch: Array, size: int) -> None:
         scratch[rail] = limits[STOP_STIFFNESS] * (over if scratch[STROKE] > 0.0 else -over)
     if limits[TABLE_FRICTION] > 0.0:
         base = BASE_RATE if size > BASE else TABLE_RATE
-        scratch[drag] = stopping(matrix, scratch, base, drag, limits[TABLE_FRICTION])
+        most = limits[TABLE_FRICTION] * falling(scratch[base], limits[TABLE_VELOCITY])
+        scratch[drag] = stopping(matrix, scratch, base, drag, most)
     if limits[FRICTION] > 0.0:
-        scratch[rail] += stopping(matrix, scratch, STROKE_RATE, rail, limits[FRICTION])
+        most = limits[FRICTION] * falling(scratch[STROKE_RATE], limits[VELOCITY])
+        scratch[rail] += stopping(matrix, scratch, STROKE_RATE, rail, most)
+
+
+@jit
+def falling(rate: float, velocity: float) -> float:
+    """Share of a friction that is left at a rate (m/s) where it falls off below a velocity; none falls off at 1e-6."""
+    return 1.0 if velocity <= 1e-6 else np.tanh(abs(rate) / velocity)
 
 
 @jit
