@@ -27,6 +27,11 @@ class PerfectLink:
         return 0.0
 
 
+def ticks_late(extra: float, interval: float) -> int:
+    """How many ticks later a message is there for an extra delay (s)."""
+    return math.ceil(extra / interval - 1e-9) if extra > 0.0 else 0
+
+
 class Mailbox(Generic[Frame]):
     """Receiving end of one direction. `nominal` is how many ticks after its own a message is used."""
 
@@ -39,14 +44,14 @@ class Mailbox(Generic[Frame]):
         self.newest_seen = -1
         self._taken = -1
 
-    def put(self, seq: int, frame: Frame) -> None:
-        """Take in a message of the tick `seq` as it comes from the wire."""
+    def put(self, seq: int, frame: Frame) -> float | None:
+        """Take in a message of the tick `seq` as it comes from the wire; its extra delay (s), None for lost."""
         self.newest_seen = max(self.newest_seen, seq)
         extra = self._link.fate(self._direction, seq, seq * self._interval)
-        if extra is None:
-            return
-        ticks = math.ceil(extra / self._interval - 1e-9) if extra > 0.0 else 0
-        self._waiting.append((seq + self._nominal + ticks, seq, frame))
+        if extra is not None:
+            ticks = ticks_late(extra, self._interval)
+            self._waiting.append((seq + self._nominal + ticks, seq, frame))
+        return extra
 
     def take(self, tick: int) -> Frame | None:
         """The newest message that is there at this tick; None where there is none newer than the last."""

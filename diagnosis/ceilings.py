@@ -1,4 +1,4 @@
-"""The best that any model of a part could explain, against what the catalogue does explain; what the rest depends on."""
+"""The best that any model of a part could explain, against the catalogue; and what the rest depends on."""
 
 from __future__ import annotations
 

@@ -27,8 +27,9 @@ from models.registry import Array
 from models.system import System
 
 AVERAGED = 0.008  # s, over which residuals are averaged
-BLOCK = 2.0  # s, of the blocks that are held out in turn
+BLOCK = 1.0  # s, of the blocks that are held out in turn
 HELD_OUT = (2, 4)  # of every five blocks, these
+SHARPER = 0.9  # of the noise first found, from which on a lower one is believed
 COARSE = 3.0  # steps that count as noise where a reading is rounded to more than its noise
 SHORTEST, LONGEST = 6.0, 0.7  # of a beginning: seconds, and share of the test
 FAR = 1e6  # residual, in σ, of a hypothesis that diverges
@@ -49,7 +50,8 @@ class Data:
     sigma: Array  # (signals,) what a residual is measured by: noise, and what a good model may err by
     white: Array  # (signals,) the noise alone
     group: int  # ticks averaged
-    train: Mask  # (groups,)
+    train: Mask  # (groups,) fitted on; the others judge
+    rounded: Array  # (signals,) step that a reading is rounded to, 0 for none
 
     @property
     def groups(self) -> int:
@@ -85,19 +87,33 @@ def prepare(part: Part, record: Record, steps: Mapping[str, float] | None = None
     group = max(1, round(AVERAGED / interval))
     groups = part.measured.shape[0] // group
     block = max(1, round(BLOCK / (interval * group)))
-    train = ~np.isin((np.arange(groups) // block) % 5, HELD_OUT)
+    places = (np.arange(groups) // block) % 5
+    train = ~np.isin(places, HELD_OUT) if groups >= 5 * block else np.arange(groups) % 5 < min(HELD_OUT)
     ones = np.ones(part.measured.shape[1])
-    data = Data(part, system, ones, 0.0 * ones, group, train)
-    white = 0.0 * ones if part.exact else noise(data.residual(system))
-    level = np.sqrt(np.mean(np.square(part.measured), axis=0))
-    least = (EXACT if part.exact else MODEL_ERROR) * level + 1e-15
     rounded = np.array([(steps or {}).get(name, 0.0) for name in part.signals])
-    rounding = np.where(rounded > 2.0 * white, COARSE * rounded, rounded / math.sqrt(12.0))
+    data = Data(part, system, ones, 0.0 * ones, group, train, rounded)
+    return measured_by(data, 0.0 * ones if part.exact else noise(data.residual(system)))
+
+
+def measured_by(data: Data, white: Array) -> Data:
+    """The data with residuals in units of a noise (signals,)."""
+    level = np.sqrt(np.mean(np.square(data.part.measured), axis=0))
+    least = (EXACT if data.part.exact else MODEL_ERROR) * level + 1e-15
+    rounding = np.where(data.rounded > 2.0 * white, COARSE * data.rounded, data.rounded / math.sqrt(12.0))
     return replace(data, sigma=np.sqrt(white**2 + least**2 + rounding**2), white=white)
 
 
+def sharpened(fit: Fit) -> Data | None:
+    """The data with the noise that a better fit shows, None where it is that of before: kinks look like noise."""
+    data = fit.data
+    if data.part.exact:
+        return None
+    white = noise(data.residual(lay(data, fit.z, fit.values)))
+    return measured_by(data, white) if np.any(white < SHARPER * data.white) else None
+
+
 def beginning(data: Data, fit: Fit, share: float) -> Data:
-    """The beginning of a test, from rest, that holds a share of what a fit leaves; the whole test where that is long."""
+    """The beginning of a test that holds a share of what a fit leaves; the whole test where that is long."""
     energy = np.cumsum(np.sum(np.square(fit.reduced), axis=1))
     groups = int(np.searchsorted(energy, share * energy[-1])) + 1
     least = round(SHORTEST / (data.system.plan.test.interval * data.group))
@@ -153,6 +169,8 @@ def free(effect: Effect, values: Mapping[str, float]) -> list[Free]:
     result = []
     for parameter in effect.parameters:
         logarithmic = math.isinf(parameter.null) or (parameter.shape and parameter.least > 0.0)
+        if parameter.shape and parameter.default == parameter.least == values[parameter.name]:
+            continue  # a shape that is left out
         size = abs(values[parameter.name] - (0.0 if parameter.shape else parameter.null))
         scale = size if size > 0.0 and math.isfinite(size) else 1.0
         result.append(Free(effect.name, parameter, scale, logarithmic))
@@ -184,15 +202,16 @@ class Fit:
         """Σ z²."""
         return float(self.z @ self.z)
 
-    def chi(self, mask: Mask | None = None) -> float:
-        """Σ (residual/σ)² over some of the groups."""
-        chosen = self.reduced if mask is None else self.reduced[mask]
-        return float(np.sum(np.square(chosen)))
+    @property
+    def chi(self) -> float:
+        """Σ (residual/σ)² of the withheld groups, scaled to as many as there are."""
+        held = self.reduced[~self.data.train]
+        return float(np.mean(np.square(held))) * self.reduced.size
 
     @property
     def cost(self) -> float:
-        """Over all groups, with the prior."""
-        return self.chi() + self.prior
+        """What a hypothesis is ranked by: on withheld time, with the prior."""
+        return self.chi + self.prior
 
 
 def lay(data: Data, z: Array, values: Values) -> System:
@@ -216,7 +235,10 @@ class Problem:
         self, data: Data, start: Values, slopes: Array | None = None, weights: Array | None = None
     ) -> None:
         self.data = data
-        self._weights = np.tile(weights, data.groups) if weights is not None else 1.0
+        self._start = start
+        kept = int(np.sum(data.train))
+        self._weights = np.tile(weights, kept) if weights is not None else 1.0
+        self._train = np.repeat(data.train, data.sigma.size)
         self.names = tuple(start)
         self.frees = tuple(item for name in start for item in free(CATALOGUE[name], start[name]))
         self.count = len(data.part.nuisances)
@@ -231,7 +253,7 @@ class Problem:
 
     def values(self, p: Array) -> Values:
         """The effects' parameters at a place of the fit."""
-        result: Values = {name: {} for name in self.names}
+        result: Values = {name: dict(values) for name, values in self._start.items()}
         for item, place in zip(self.frees, p[self.count :], strict=True):
             value = item.outward(float(place))
             result[item.effect][item.parameter.name] = min(
@@ -245,7 +267,8 @@ class Problem:
 
     def stacked(self, p: Array) -> Array:
         """Residuals and prior in one vector."""
-        return np.concatenate([self.reduced(p).ravel() * self._weights, p[: self.count]])
+        fitted = self.reduced(p).ravel()[self._train]
+        return np.concatenate([fitted * self._weights, p[: self.count]])
 
     def bounds(self) -> tuple[Array, Array]:
         """Bounds of all that is moved."""
@@ -274,7 +297,8 @@ class Problem:
             self._slopes, self._uses = self.jacobian(p, here, last=self.count), REUSED
         self._uses -= 1
         slopes = np.concatenate([self._slopes, self.jacobian(p, here, first=self.count)], axis=1)
-        return np.concatenate([(slopes.T * self._weights).T, np.eye(self.count, p.size)])
+        fitted = (slopes[self._train].T * self._weights).T
+        return np.concatenate([fitted, np.eye(self.count, p.size)])
 
 
 def fit(
@@ -295,14 +319,14 @@ def fit(
     for _ in range(rounds):
         missed = np.maximum(1.0, np.mean(np.square(found.reduced), axis=0))
         before, found = found, moved(data, found, steps, slopes, 1.0 / np.sqrt(missed))
-        if before.chi() - found.chi() < 1.0 + 1e-3 * excess(found):
+        if before.chi - found.chi < 1.0 + 1e-3 * excess(found):
             break
     return found
 
 
 def excess(fit: Fit) -> float:
     """What a fit costs beyond noise."""
-    return max(0.0, fit.chi() - fit.reduced.size) + fit.prior
+    return max(0.0, fit.chi - fit.reduced.size) + fit.prior
 
 
 def moved(data: Data, fit: Fit, steps: int, slopes: Array | None, weights: Array) -> Fit:

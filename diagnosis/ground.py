@@ -16,7 +16,7 @@ class Ground:
 
     name = "ground"
     exact = True
-    signals = ("ground_acceleration",)
+    signals: tuple[str, ...] = ("ground_acceleration",)
 
     def __init__(self, record: Record, believed: Array) -> None:
         self._believed = believed[:, : record.ticks]

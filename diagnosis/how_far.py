@@ -59,7 +59,8 @@ class Judge:
 
     def open(self, sites: frozenset[str] | None) -> Mapping[str, Array]:
         """Each part's own prediction, where no loop was recorded."""
-        system, result = self.found.system(sites), {}
+        system = self.found.system(sites)
+        result: dict[str, Array] = {}
         for verdict in self.found.verdicts:
             part = verdict.search.data.part
             if not part.exact:

@@ -184,7 +184,7 @@ def fitted(
     def cost(p: NDArray[np.float64]) -> float:
         delay = math.exp(p[1]) if free[0] else 0.0
         loss = 1.0 / (1.0 + math.exp(-p[2])) if free[1] else 0.0
-        return unlikely((delay, math.exp(p[0]), loss))  # type: ignore[no-any-return,operator]
+        return unlikely((delay, math.exp(p[0]), loss))  # type: ignore[operator]
 
     start = [math.log(max(mean, 0.1 * interval)), math.log(max(mean, 0.1 * interval)), -5.0]
     found = minimize(

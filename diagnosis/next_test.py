@@ -48,7 +48,7 @@ def choices(found: Diagnosis) -> list[Choice]:
         for other in search.alternatives[:MOST]:
             pair = exchanged_pair(search.chosen, other)
             close = (other.cost - search.chosen.cost) < OPEN * max(
-                1.0, search.chosen.chi() / search.chosen.reduced.size
+                1.0, search.chosen.chi / search.chosen.reduced.size
             )
             if pair is not None and close:
                 result += [Choice(name, value, pair) for name, value in separations(search, other)]
@@ -93,11 +93,12 @@ def played(data: Data, truth: Array) -> Data:
 def menu(data: Data) -> list[tuple[str, Data]]:
     """Tests at hand in the part's laboratory: the same motion at other scales, sines, steps."""
     part = data.part
+    if not isinstance(part, LaboratoryA | LaboratoryB):
+        return []
     interval = data.system.plan.test.interval
     ticks = round(SECONDS / interval)
     t = np.arange(ticks) * interval
     tests: list[tuple[str, dict[str, Array]]] = []
-    assert isinstance(part, LaboratoryA | LaboratoryB)
     for key, device in part.devices.items():
         reached = float(np.max(np.abs(part.inputs[key]), initial=0.0)) or 1.0
         for factor in (0.5, 2.0):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
@@ -106,10 +106,10 @@ class LaboratoryA:
 
     name = "laboratory A"
     exact = False
-    signals = MEASURED_A
+    signals: tuple[str, ...] = MEASURED_A
 
-    devices = {"actuator_command": "actuator"}
-    units = {"actuator_command": "m"}
+    devices: ClassVar[dict[str, str]] = {"actuator_command": "actuator"}
+    units: ClassVar[dict[str, str]] = {"actuator_command": "m"}
 
     def __init__(self, record: Record) -> None:
         self.inputs = {"actuator_command": record.signals["actuator_command"]}
@@ -145,7 +145,7 @@ class ColumnAlone:
 
     name = "column"
     exact = False
-    signals = ("column_force",)
+    signals: tuple[str, ...] = ("column_force",)
 
     def __init__(self, record: Record, deformation: Array) -> None:
         self.inputs = deformation
@@ -168,9 +168,9 @@ class LaboratoryB:
 
     name = "laboratory B"
     exact = False
-    signals = MEASURED_B
-    devices = {"table_command": "table", "damper_command": "damper's motor"}
-    units = {"table_command": "m", "damper_command": "N"}
+    signals: tuple[str, ...] = MEASURED_B
+    devices: ClassVar[dict[str, str]] = {"table_command": "table", "damper_command": "damper's motor"}
+    units: ClassVar[dict[str, str]] = {"table_command": "m", "damper_command": "N"}
 
     def __init__(self, record: Record) -> None:
         none = np.zeros(record.ticks)
@@ -218,7 +218,7 @@ class Building:
 
     name = "structure"
     exact = True
-    signals = ("displacement", "velocity", "acceleration")
+    signals: tuple[str, ...] = ("displacement", "velocity", "acceleration")
 
     def __init__(self, record: Record) -> None:
         self._inputs = tuple(
@@ -228,7 +228,7 @@ class Building:
         self._ground = np.zeros((2, record.ticks + 1))
         self._ground[0, :-1] = here
         storeys = record.plan.storeys
-        self.signals = tuple(name for name in self.signals for _ in range(storeys))
+        self.signals = tuple(name for name in type(self).signals for _ in range(storeys))
         columns = [
             record.signals[name].reshape(record.ticks, -1)[:, i]
             for name in ("displacement", "velocity", "acceleration")

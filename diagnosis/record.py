@@ -39,7 +39,7 @@ class Record:
     @property
     def time(self) -> Array:
         """Time of each tick, s."""
-        return np.arange(self.ticks) * self.plan.test.interval
+        return np.arange(self.ticks, dtype=np.float64) * self.plan.test.interval
 
 
 def build(run: Run, plan: Plan | None = None, *, against_ideal: bool = False) -> Record:

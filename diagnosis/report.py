@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from diagnosis import details, exercise, how_far, next_test, where
-from diagnosis.search import gaps
-from diagnosis.verdict import intervals
-from models.effects import CATALOGUE
+from diagnosis.which import which
 
 if TYPE_CHECKING:
     from diagnosis.diagnose import Diagnosis
@@ -18,7 +16,6 @@ if TYPE_CHECKING:
 
 VERSION = 1
 STILL = 5.0  # rms of a signal over its noise below which it hardly moved
-MOST_OTHERS = 8  # alternatives listed
 
 
 def build(found: Diagnosis, validation: Sequence[Record]) -> dict[str, Any]:
@@ -26,7 +23,7 @@ def build(found: Diagnosis, validation: Sequence[Record]) -> dict[str, Any]:
     far = how_far.judge(found, validation)
     status = status_of(found)
     sites = sites_of(found, far)
-    entries = which(found, status)
+    entries = which(found)
     tests = next_test.choices(found)
     evidence = details.details(found, far, entries)
     evidence["next"] = [
@@ -88,7 +85,7 @@ def tolerances(found: Diagnosis) -> dict[str, dict[str, float]]:
 
 def sites_of(found: Diagnosis, far: how_far.HowFar) -> list[dict[str, Any]]:
     """Where the gap lies, the largest share first."""
-    entries = []
+    entries: list[dict[str, Any]] = []
     for trace in far.traces:
         entries.append(
             {
@@ -102,87 +99,3 @@ def sites_of(found: Diagnosis, far: how_far.HowFar) -> list[dict[str, Any]]:
         share, low, high = far.shares[entry["site"]]
         entry |= {"share": share, "share_interval": [low, high]}
     return sorted(entries, key=lambda entry: -entry["share"])
-
-
-def which(found: Diagnosis, status: str) -> list[dict[str, Any]]:
-    """The verdict and what else might be, the most probable first."""
-    named = [verdict for verdict in found.verdicts if verdict.effects]
-    open_ones = [verdict for verdict in found.verdicts if verdict.others]
-    effects = [name for verdict in named for name in verdict.effects]
-    effects += [reading.effect for reading in found.readings] + [item.effect for item in found.link]
-    probability = float(np.prod([verdict.probability for verdict in named]))
-    parameters: dict[str, Any] = {}
-    for verdict in named:
-        for name, values in intervals(verdict.search.chosen).items():
-            parameters[name] = {
-                key: {"value": item.value, "interval": [item.low, item.high], "unit": item.unit}
-                for key, item in values.items()
-            }
-            found.warnings += [
-                f"{key} of {name} lies at the end of its range."
-                for key, item in values.items()
-                if item.on_bound
-            ]
-    for reading in found.readings:
-        unit = CATALOGUE[reading.effect].parameters[0].unit
-        parameters[reading.effect] = {
-            reading.parameter: {"value": reading.value, "interval": list(reading.interval), "unit": unit}
-        }
-    for item in found.link:
-        units = {parameter.name: parameter.unit for parameter in CATALOGUE[item.effect].parameters}
-        parameters[item.effect] = {
-            key: {"value": value, "interval": list(bounds), "unit": units[key]}
-            for key, (value, bounds) in item.parameters.items()
-        }
-    entries = (
-        [entry(effects, probability, parameters, 0.0)]
-        if effects
-        else [entry([], probability_none(found), {}, 0.0)]
-    )
-    for verdict in open_ones:
-        rest = [name for name in effects if name not in verdict.effects]
-        for other, chance in verdict.others:
-            values = {
-                name: {
-                    key: {"value": value, "interval": [None, None], "unit": unit_of(name, key)}
-                    for key, value in given.items()
-                }
-                for name, given in other.values.items()
-            }
-            kept = {name: parameters[name] for name in rest}
-            share = (
-                probability / verdict.probability * chance
-                if verdict.probability > 0.0 and verdict in named
-                else chance
-            )
-            worse = 0.5 * (other.cost - verdict.search.chosen.cost)
-            entries.append(entry([*other.names, *rest], share, kept | values, worse))
-    head, tail = entries[0], sorted(entries[1:], key=lambda item: -item["probability"])
-    return [head, *tail[:MOST_OTHERS]]
-
-
-def unit_of(effect: str, parameter: str) -> str:
-    """Unit of an effect's parameter."""
-    return next(item.unit for item in CATALOGUE[effect].parameters if item.name == parameter)
-
-
-def probability_none(found: Diagnosis) -> float:
-    """How sure it is that nothing is there: the nearer a tolerance's edge, the less."""
-    z = [abs(float(value)) for verdict in found.verdicts for value in verdict.search.chosen.z]
-    left = [
-        item.ratio
-        for verdict in found.verdicts
-        for item in gaps(verdict.search.chosen, verdict.search.data.group)
-    ]
-    worst = max([0.0, *(value / 2.5 for value in z), *(value / 0.12 for value in left)])
-    return float(1.0 - 0.3 * min(worst, 1.0) ** 4)
-
-
-def entry(effects: list[str], probability: float, parameters: dict[str, Any], score: float) -> dict[str, Any]:
-    """One line of `which`."""
-    return {
-        "effects": effects,
-        "probability": probability,
-        "parameters": parameters,
-        "held_out_score": score,
-    }

@@ -75,8 +75,8 @@ class Scales:
         part, _, signal = effect.site.partition(".")
         return SENSORS[signal] if part == "sensor" else GROUP.get(part, "")
 
-    def starts(self, effect: Effect) -> Iterator[dict[str, float]]:
-        """Parameters from which a search starts, from weak to strong."""
+    def starts(self, effect: Effect) -> Iterator[tuple[tuple[float, ...], dict[str, float]]]:
+        """Parameters from which a search starts, from weak to strong, and the form that each belongs to."""
         strength = [item for item in effect.parameters if not item.shape]
         shapes = {item.name: item.default for item in effect.parameters if item.default is not None}
         if len(strength) != 1:
@@ -84,7 +84,8 @@ class Scales:
         (parameter,) = strength
         for size in self.sizes(effect, parameter):
             for shape in self.forms(effect, shapes):
-                yield {**shape, parameter.name: size}
+                form = tuple(shape.values()) if effect.name.endswith(".friction") else ()
+                yield form, {**shape, parameter.name: size}
 
     def forms(self, effect: Effect, shapes: dict[str, float]) -> list[dict[str, float]]:
         """What an effect may look like: an end stop is soft or hard against the force at hand."""

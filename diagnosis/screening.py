@@ -77,23 +77,22 @@ def screen(fit: Fit, effects: Iterable[Effect], scales: Scales) -> list[Candidat
     """What each effect could gain over a fit, best first."""
     plane = Plane(fit)
 
-    def best(effect: Effect) -> Candidate | None:
-        return look(effect, plane, scales)
-
     with ThreadPoolExecutor(WORKERS) as pool:
-        found = [item for item in pool.map(best, effects) if item is not None]
+        found = [
+            item for items in pool.map(lambda effect: look(effect, plane, scales), effects) for item in items
+        ]
     return sorted(found, key=lambda item: -item.gain)
 
 
-def look(effect: Effect, plane: Plane, scales: Scales) -> Candidate | None:
-    """The size of one effect that promises most, None for one that is there already."""
+def look(effect: Effect, plane: Plane, scales: Scales) -> list[Candidate]:
+    """Of every form of an effect the size that promises most; none of one that is there already."""
     fit = plane.fit
     if effect.name in fit.names:
-        return None
-    best: Candidate | None = None
-    for values in scales.starts(effect):
+        return []
+    best: dict[tuple[float, ...], Candidate] = {}
+    for form, values in scales.starts(effect):
         moved = fit.data.reduced(fitting.lay(fit.data, fit.z, fit.values | {effect.name: values}))
         gain, share = plane.gain((moved - fit.reduced).ravel(), scales.stretch(effect))
-        if best is None or gain > best.gain:
-            best = Candidate(effect, scales.stretched(effect, values, share), gain)
-    return best
+        if form not in best or gain > best[form].gain:
+            best[form] = Candidate(effect, scales.stretched(effect, values, share), gain)
+    return list(best.values())

@@ -107,6 +107,11 @@ class Searcher:
         chosen, better = commissioned, first
         while better and self.worth(commissioned, chosen, better[0]):
             chosen = self.exchanged(better[0]) if len(better[0].names) > 1 else better[0]
+            if (data := fitting.sharpened(chosen)) is not None:
+                self.data = data
+                commissioned, chosen, *first = (
+                    fitting.at(data, fit.values, fit.z) for fit in (commissioned, chosen, *first)
+                )
             if len(chosen.names) >= MOST or self.enough(commissioned, chosen):
                 break
             better = self.extended(chosen)
@@ -127,8 +132,8 @@ class Searcher:
 
     def worth(self, bare: Fit, before: Fit, after: Fit) -> bool:
         """Whether one more effect earns its place."""
-        noise = max(1.0, after.chi() / after.reduced.size)
-        prior, data = before.prior - after.prior, (before.chi() - after.chi()) / noise
+        noise = max(1.0, after.chi / after.reduced.size)
+        prior, data = before.prior - after.prior, (before.chi - after.chi) / noise
         if max(prior, 0.0) / PRIOR_GAIN + max(data, 0.0) / DATA_GAIN < 1.0 or prior + data <= 0.0:
             return False
         if before is bare:
@@ -222,7 +227,7 @@ class Searcher:
 
 def tied(search: Search, other: Fit) -> bool:
     """Whether the data cannot tell another fit from the chosen one."""
-    noise = max(1.0, search.chosen.chi() / search.chosen.reduced.size)
+    noise = max(1.0, search.chosen.chi / search.chosen.reduced.size)
     return (other.cost - search.chosen.cost) / noise < TIED
 
 

@@ -55,7 +55,7 @@ def judge(search: Search) -> Verdict:
     if outcome == "unknown":
         return unnamed(search)
     chosen = search.chosen
-    noise = max(1.0, chosen.chi() / chosen.reduced.size)
+    noise = max(1.0, chosen.chi / chosen.reduced.size)
     odds = [
         math.exp(-min(max((other.cost - chosen.cost) / noise, 0.0) / (2.0 * TEMPERATURE), 700.0))
         for other in search.alternatives
@@ -101,9 +101,7 @@ def how_well(search: Search) -> Outcome:
 def certainty(search: Search) -> float:
     """How sure it is that there is an effect at all, beyond tolerances and chance."""
     before, after = search.commissioned, search.chosen
-    margin = (
-        max(before.prior - after.prior, 0.0) / PRIOR_GAIN + max(before.chi() - after.chi(), 0.0) / DATA_GAIN
-    )
+    margin = max(before.prior - after.prior, 0.0) / PRIOR_GAIN + max(before.chi - after.chi, 0.0) / DATA_GAIN
     return 1.0 - 0.5 * math.exp(-(margin - 1.0))
 
 
@@ -122,7 +120,7 @@ def intervals(fit: Fit) -> dict[str, dict[str, Interval]]:
     count = fit.z.size
     problem = Problem(fit.data, fit.values)
     size = count + len(problem.frees)
-    noise = max(1.0, fit.chi() / fit.reduced.size)
+    noise = max(1.0, fit.chi / fit.reduced.size)
     information = fit.jacobian.T @ fit.jacobian / noise
     information[:count, :count] += np.eye(count)
     covariance = np.linalg.pinv(information + 1e-12 * np.trace(information) * np.eye(size))

@@ -103,8 +103,7 @@ class MasterLoop:
         if not self.lab.exchange.fresh(feedback.seq):
             return
         self.lab.heard_ns = received_ns
-        self._feedback.put(feedback.seq, feedback)
-        self._account.answer(feedback, received_ns)
+        self._account.answer(feedback, received_ns, self._feedback.put(feedback.seq, feedback))
 
     def _refused(self, reason: str) -> None:
         error = InputError(f"The slave refuses the test: {reason}")
@@ -318,7 +317,7 @@ class MasterLoop:
         if complaint := self._rig.disarm():
             self.lab.note("disarm", complaint, level="warning", tick=self.ticks)
         if self.ticks:
-            self._account.close(self.ticks - 1, self.lab.clock.now())
+            self._account.finish(self.ticks - 1, self.lab.clock.now())
 
     @property
     def left(self) -> bool:

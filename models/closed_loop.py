@@ -17,7 +17,6 @@ from models import compensators, substructure
 from models.compiled import jit
 from models.labs import column_lab, noise, readings, table_lab
 from models.registry import Array
-from models.system import Effects, System
 from models.substructure import (
     ACTUATOR_COMMAND,
     COLUMN_TARGET,
@@ -28,6 +27,7 @@ from models.substructure import (
     TABLE_TARGET,
     TABLE_VELOCITY,
 )
+from models.system import Effects, System
 
 Index = NDArray[np.int64]
 
@@ -103,9 +103,7 @@ def simulate(
 def build_a(system: System) -> column_lab.ColumnLab:
     """Laboratory A of a system, at rest."""
     plan, effects = system.plan, system.effects
-    return column_lab.build(
-        plan.test.interval, plan.actuator, plan.column, effects.actuator, effects.column
-    )
+    return column_lab.build(plan.test.interval, plan.actuator, plan.column, effects.actuator, effects.column)
 
 
 def build_b(system: System) -> table_lab.TableLab:

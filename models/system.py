@@ -29,7 +29,9 @@ class ColumnEffects:
     yield_displacement: float = math.inf  # m
     hardening: float = 0.0
     exponent: float = 2.0  # sharpness of the transition, Bouc-Wen's n
-    degradation: float = 0.0  # share of stiffness lost, once the largest deformation is well past the reference
+    degradation: float = (
+        0.0  # share of stiffness lost, once the largest deformation is well past the reference
+    )
     pinching: float = 0.0
     pinching_width: float = 1e-3  # m
     pinching_hardening: float = 0.0

@@ -16,13 +16,17 @@ from common.errors import InputError
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `diagnose`."""
     parser.add_argument("file", type=Path, metavar="FILE", help="a recording (MCAP), whole or of one part")
-    parser.add_argument("--plan", metavar="PLAN", help="what the laboratories should be (default: the plan in FILE)")
+    parser.add_argument(
+        "--plan", metavar="PLAN", help="what the laboratories should be (default: the plan in FILE)"
+    )
     parser.add_argument(
         "--ideal",
         action="store_true",
         help="hold the test against the pure simulation: transfer systems that follow their targets at once",
     )
-    parser.add_argument("--json", type=Path, metavar="OUT", help="write the report as JSON; - for standard output")
+    parser.add_argument(
+        "--json", type=Path, metavar="OUT", help="write the report as JSON; - for standard output"
+    )
     parser.add_argument("--html", type=Path, metavar="OUT", help="write the report as one HTML page")
     parser.add_argument(
         "--validate",

@@ -87,8 +87,9 @@ class SlaveLoop:
             return
         self.lab.heard_ns = received_ns
         self._shift_ns = command.shift_ns
-        self._received_ns[command.seq] = received_ns
-        self._commands.put(command.seq, command)
+        extra = self._commands.put(command.seq, command)
+        if extra is not None:
+            self._received_ns[command.seq] = received_ns + round(extra * 1e9)
 
     def _register(self, request: Register) -> None:
         lab = self.lab
@@ -188,11 +189,23 @@ class SlaveLoop:
 
     def _answer(self, tick: int, measured: TableMeasurement, wanted: TableCommand) -> None:
         lab, command = self.lab, self._command
-        received_ns = self._received_ns.pop(command.seq, 0) if command.seq == tick else 0
         sent_ns = lab.clock.now()
+        received_ns = self._told(command.seq, sent_ns)
         lab.endpoint.send(Feedback(lab.exchange.session, tick, command.seq, received_ns, sent_ns, *measured))
         if lab.recorder is not None:
             self._sample(tick, measured, wanted, sent_ns)
+
+    def _told(self, seq: int, now: int) -> int:
+        """When the command in force came, told once, by the first answer to it; 0 in later ones.
+
+        A delay counts from when a message would be used at best (contract, section 3), so that the stamp of one
+        with a delay of whole intervals can lie a little after its use: it came by then at the latest.
+        """
+        if seq not in self._received_ns:
+            return 0
+        received_ns = min(self._received_ns[seq], now)
+        self._received_ns = {later: stamp for later, stamp in self._received_ns.items() if later > seq}
+        return received_ns
 
     def _sample(self, tick: int, measured: TableMeasurement, wanted: TableCommand, sent_ns: int) -> None:
         lab, command = self.lab, self._command

@@ -37,7 +37,9 @@ class TableLab(NamedTuple):
     """Arrays of the laboratory, in the order `advance` takes them."""
 
     taps: Array  # of the delayed command
-    matrices: Array  # (m, n, n + 5): next state from state, command before and after, motor command, g, friction
+    matrices: (
+        Array  # (m, n, n + 5): next state from state, command before and after, motor command, g, friction
+    )
     spring: Array  # (stiffness N/m, dashpot N·s/m) of the damper
     limits: Array  # effects that no matrix holds
     history: Array  # table commands written, newest first

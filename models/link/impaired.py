@@ -1,53 +1,68 @@
-"""A link plug-in that delays, scatters and loses messages; each direction alike, with draws of its own.
+"""A link plug-in that delays, scatters and loses messages; both directions alike, each with draws of its own.
 
-A message's extra delay is `max(delay + n, 0)` with n normal. Losses follow the two-state chain of Gilbert (Bell Syst.
-Tech. J. 39 (1960) 1253): a run of lost messages is `burst` long on average, and the stationary share of lost ones
-is `loss`.
+    extra delay of a message = delay + g,    g ~ Gamma(1, jitter): mean and standard deviation are both `jitter`
+
+so that `delay` is the constant part, which no message beats. The Gamma law of shape one is the exponential: most
+messages come soon, some late (queues), none before its time. Messages may overtake each other.
+
+Losses follow the two-state chain of Gilbert (Bell Syst. Tech. J. 39 (1960) 1253-1265), every message lost in its bad
+state and none in the good one: the share `loss` of all messages is lost, in runs of `burst` on average. A run cannot
+be shorter than loss/(1 − loss), where every message between two runs stands alone.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from common.errors import InputError
+
 DIRECTIONS = {"command": 1, "feedback": 2}
-DRAWN = 1024  # messages drawn at once
+DRAWN = 256  # messages drawn at once: some ten microseconds
 
 
 class ImpairedLink:
-    """One laboratory's view of the network; messages are asked for in the order of their numbers."""
+    """The network of a test; what becomes of a message depends on seed, direction and number alone."""
 
     def __init__(
         self, seed: int, delay: float = 0.0, jitter: float = 0.0, loss: float = 0.0, burst: float = 1.0
     ) -> None:
+        if not (0.0 <= delay < np.inf and 0.0 <= jitter < np.inf):
+            raise InputError(
+                f"delay is {delay} s and jitter {jitter} s, but both must be at least 0 and finite."
+            )
+        if not (0.0 <= loss < 1.0 and 1.0 <= burst < np.inf):
+            raise InputError(f"loss is {loss} and burst {burst}, but must be in [0, 1) and at least 1.")
         self._delay, self._jitter = delay, jitter
-        leaving = 1.0 / max(burst, 1.0)
-        self._stay = 1.0 - leaving
-        self._enter = min(1.0, loss * leaving / (1.0 - loss)) if loss < 1.0 else 1.0
-        self._seed = seed
-        self._streams: dict[str, Stream] = {}
+        self._streams = {
+            direction: Losses(np.random.default_rng([seed, number]), loss, burst)
+            for direction, number in DIRECTIONS.items()
+        }
+        self._fates: dict[str, list[float | None]] = {direction: [] for direction in DIRECTIONS}
 
     def fate(self, direction: str, seq: int, t: float) -> float | None:
         """Seconds of extra delay of a message sent at test time `t`, None for lost."""
-        stream = self._streams.get(direction)
-        if stream is None:
-            stream = self._streams[direction] = Stream(self._seed, DIRECTIONS[direction])
-        chance, scatter = stream.draw()
-        stream.lost = chance < (self._stay if stream.lost else self._enter)
-        return None if stream.lost else max(self._delay + self._jitter * scatter, 0.0)
+        fates = self._fates[direction]
+        while len(fates) <= seq:
+            lost, scatter = self._streams[direction].draw()
+            delays = (self._delay + self._jitter * scatter).tolist()
+            fates += [None if gone else extra for gone, extra in zip(lost, delays, strict=True)]
+        return fates[seq]
 
 
-class Stream:
+class Losses:
     """The draws of one direction."""
 
-    def __init__(self, seed: int, direction: int) -> None:
-        self._generator = np.random.default_rng([seed, direction])
-        self._drawn: list[tuple[float, float]] = []
-        self.lost = False
+    def __init__(self, generator: np.random.Generator, loss: float, burst: float) -> None:
+        self._generator = generator
+        leave = 1.0 / max(burst, loss / (1.0 - loss))
+        self._stay = 1.0 - leave
+        self._enter = leave * loss / (1.0 - loss)
+        self._lost = bool(generator.random() < loss)
 
-    def draw(self) -> tuple[float, float]:
-        """A uniform and a normal number."""
-        if not self._drawn:
-            chances = self._generator.random(DRAWN).tolist()
-            scatters = self._generator.standard_normal(DRAWN).tolist()
-            self._drawn = list(zip(chances, scatters, strict=True))[::-1]
-        return self._drawn.pop()
+    def draw(self) -> tuple[list[bool], np.ndarray[tuple[int], np.dtype[np.float64]]]:
+        """Which of the next messages are lost, and the scatter of all, of mean and deviation one."""
+        lost = []
+        for chance in self._generator.random(DRAWN).tolist():
+            lost.append(self._lost)
+            self._lost = chance < (self._stay if self._lost else self._enter)
+        return lost, self._generator.standard_exponential(DRAWN)

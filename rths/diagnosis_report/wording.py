@@ -119,7 +119,7 @@ def verdict(report: Report) -> str:
     sentences = {
         "no_gap": f"No gap beyond noise and tolerances: {size}.",
         "not_enough_data": "This recording holds too little to place or name a gap.",
-        "unknown_effect": f"The gap of {size}{place(report)} is made by an effect that the catalogue lacks.",
+        "unknown_effect": f"The gap of {size}{place(report)} is made by something that the catalogue lacks.",
         "ambiguous": f"The gap of {size}{place(report)} has several causes that fit alike: {rivals(report)}.",
     }
     fallback = f"The gap of {size}{place(report)}: {cause(report)}."
@@ -131,7 +131,7 @@ def place(report: Report) -> str:
     sites = report.get("where") or []
     if not sites or not known(sites[0].get("share")) or sites[0]["share"] < DOMINANT:
         return ""
-    return f", {percent(sites[0]['share'])} of it at the {site(sites[0]['site'])},"
+    return f", {percent(sites[0]['share'])} of it at the {site(sites[0]['site'])}"
 
 
 def rivals(report: Report) -> str:
