@@ -2,7 +2,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: setup run test check benchmark clean
+.PHONY: setup run test check benchmark blind clean
 
 setup: $(READY)
 
@@ -28,6 +28,9 @@ test: check
 
 benchmark: setup
 	$(BIN)/python -m benchmarks
+
+blind: setup
+	$(BIN)/rths blind --cases 300 --jobs 2 -o runs/blind
 
 clean:
 	rm -rf .venv build runs *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

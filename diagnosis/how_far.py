@@ -305,7 +305,7 @@ def shares(
     """
     sites = [trace.site for trace in sorted(traces, key=lambda item: -item.ratio)]
     if len(sites) < 2:
-        return {site: (1.0, 1.0, 1.0) for site in sites}, []
+        return dict.fromkeys(sites, (1.0, 1.0, 1.0)), []
     players = sites[:PLAYERS]
     simulated: dict[frozenset[str], Mapping[str, Array] | None] = {}
 

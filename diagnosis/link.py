@@ -1,12 +1,12 @@
-"""The exchange between the laboratories, read off the numbers of the messages that were used, never off waveforms.
+"""The exchange between the laboratories, read off the messages' numbers and stamps, never off waveforms.
 
-At tick k a laboratory uses the newest message that is there. With independent extra delays the message
-that is j ticks old has not come yet with probability G(j), so ages a have P(age > a) = G(0)·G(1)·…·G(a), and
+Which message a tick used tells ages; stamps tell how long each message took, and which feedback never came:
 
-    G(j) = p + (1 − p)·Q((j·dt − delay)/σ)
+    command k first in force at the slave's tick m  →  feedback m is the answer to it  →  row k of the latency
+    topic holds that feedback's stamps, or none: then feedback m was lost
 
-with loss p, delay and jitter σ, Q the normal tail. Where every message that comes is equally old nothing
-scatters: what is missing then is lost, and its runs are the bursts.
+Ticks at which a laboratory was late itself, with those around them, are scheduling and do not count. A number that is
+never used tells of a loss only where no message can overtake another: in virtual time, all taking equally long. Without stamps only the ages are left (see `scattered`).
 """
 
 from __future__ import annotations
@@ -17,183 +17,432 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
-from scipy.special import ndtr
+from scipy.stats import beta
 
 from common.recording.reader import Run
 from diagnosis.record import Mask, laid_out
 from models.closed_loop import Exchange
+from models.registry import Array
 
 Index = NDArray[np.int64]
+Interval = tuple[float, float]
 
-LATE = 0.3  # of an interval: a tick that woke later than that says nothing of the network
-SPOILT = 2  # ticks after such a tick that say nothing either
-RARE = 3e-4  # share of old messages below which the link is as planned; of a run in real time ten times that
-STEADY = 0.98  # share of fresh messages of one age from which on nothing scatters
-WORTH = 8.0  # gain of twice the log-likelihood that a further parameter must bring
+LATE = 0.15  # of an interval: a laboratory that woke later was late, or waited in vain for a message on the wire
+SPOILT = 3  # ticks after such a tick that say nothing either
+STEADY = 0.98  # share of messages of one age from which on, beside a clock, they count as equally old
+LEAST_STAMPS = 20
+LEAST_LOST = 3  # messages, beside a real clock
+LEAST_SHARE = 0.005  # of messages lost where there are no stamps
+LEAST_OFF = 0.001  # share of messages off the usual age, without stamps, from which on delays scatter
+LEAST_OLD = 0.03  # share of old messages where there are no stamps, or of ticks off the usual age beside a real clock
+TINY = 1e-6  # s, what stamps in virtual time resolve
+REAL = 0.1  # of an interval: what stamps of a real clock resolve
+EDGE = 5  # last ticks, the answer to which may not have come
+SYMMETRIC = 0.5  # skewness below which the constant part of a delay is its mean, not its minimum
+CERTAIN = 1000.0  # largest z that is told
+WORTH = 10.0  # gain of twice the log-likelihood that a further parameter must bring
+DEPENDENT = 2.0  # ages of neighbouring ticks tell of the same messages: intervals are wider by this
 
 
 class Direction(NamedTuple):
-    """The messages of one direction that were used."""
+    """The messages of one direction."""
 
-    ages: Index  # (n,) ticks beyond the plan's, at ticks that count
-    fresh: Index  # (m,) the same of messages used for the first time
-    missing: list[int]  # lengths of runs of numbers that were never used
+    ages: Index  # ticks beyond the plan's, at the ticks that count
+    fresh: Index  # the same, of messages used for the first time
+    tried: Index  # numbers of the messages of which it is known whether they came
+    lost: Mask  # which of these never did
+    one_way: Array  # s, of messages whose stamps tell
+    selected: bool  # whether those are only the ones that were not overtaken
+    overtaken: int  # messages that came after a later one, as far as stamps tell
+
+    @property
+    def old_share(self) -> float:
+        """Share of ticks that held a message older than the plan's."""
+        return float(np.mean(self.ages > 0)) if self.ages.size else 0.0
+
+    @property
+    def usual(self) -> int:
+        """The commonest age of a message at its first use, ticks."""
+        return int(np.bincount(np.clip(self.fresh, 0, None)).argmax()) if self.fresh.size else 0
+
+    @property
+    def steady(self) -> float:
+        """Share of messages that had the usual age."""
+        return float(np.mean(self.fresh == self.usual)) if self.fresh.size else 1.0
 
 
-class Account(NamedTuple):
+class LinkAccount(NamedTuple):
     """Both directions, and how the ticks were paced."""
 
-    directions: tuple[Direction, ...]
-    real_time: bool
-    interval: float
+    command: Direction | None
+    feedback: Direction | None
+    virtual: bool  # virtual time: nobody was ever late
+    stamped: bool  # whether one-way times are known
+    bound: float  # s, largest error of the clocks' offset
+    late: int  # ticks at which a laboratory was late itself, counted apart
+    notes: tuple[str, ...]
+
+    @property
+    def directions(self) -> list[Direction]:
+        """Those that were recorded."""
+        return [item for item in (self.command, self.feedback) if item is not None]
 
 
 class Finding(NamedTuple):
     """An effect of the link."""
 
     effect: str
-    parameters: dict[str, tuple[float, tuple[float, float]]]
+    parameters: dict[str, tuple[float, Interval]]
     evidence: str
     z: float  # standard deviations above what the plan's link would show
 
 
-def account(run: Run, interval: float) -> Account:
-    """What a recording's message numbers say; needs the topics of master and slave."""
-    good, real_time = steady_ticks(run, interval)
-    pairs = (("slave", "command_seq", 0), ("master", "damper_force_seq", 1))
-    found = []
-    for topic, name, nominal in pairs:
+class Ticks(NamedTuple):
+    """What the account needs, laid out on the ticks."""
+
+    command: Index  # in force at the slave's tick
+    has_slave: Mask
+    feedback: Index  # used at the master's tick
+    has_master: Mask
+    rows: dict[str, Array]  # of the latency topic, empty without it
+    has_rows: Mask
+
+
+# -- account --------------------------------------------------------------------------------------
+
+
+def account(run: Run, interval: float) -> LinkAccount:
+    """What a recording says of its messages, ticks apart at which a laboratory was late itself."""
+    ticks = laid(run)
+    virtual = on_a_virtual_clock(ticks)
+    stamped = int(np.isfinite(ticks.rows.get("round_trip", np.zeros(0))).sum()) >= LEAST_STAMPS
+    late = late_ticks(ticks, interval)
+    good = ~spread(late, SPOILT)
+    command = feedback = None
+    if ticks.has_slave.any():
+        command = direction(ticks.command, ticks.has_slave & good, 0, exact=virtual)
+        command = commands(command, ticks, good, virtual=virtual) if stamped else command
+    if ticks.has_master.any():
+        feedback = direction(ticks.feedback, ticks.has_master & good, 1, exact=virtual)
+        feedback = feedbacks(feedback, ticks, good, virtual=virtual) if stamped else feedback
+    bounds = ticks.rows.get("clock_offset_bound", np.zeros(1))
+    count = int(late.sum())
+    note = f"{count} ticks at which a laboratory or the wire was late: scheduling, no effect of the link."
+    return LinkAccount(
+        command, feedback, virtual, stamped, float(np.nanmax(bounds)), count, (note,) if count else ()
+    )
+
+
+def commands(item: Direction, ticks: Ticks, good: Mask, *, virtual: bool) -> Direction:
+    """With stamps; beside a real clock a command may be unused because it came late, which is no loss."""
+    known = times(ticks, "command_one_way", good)
+    item = item._replace(one_way=known, selected=scatters(known))
+    return item if virtual and not item.selected else item._replace(tried=item.tried[:0], lost=item.lost[:0])
+
+
+def feedbacks(item: Direction, ticks: Ticks, good: Mask, *, virtual: bool) -> Direction:
+    """With stamps; answers tell losses where the ages do not."""
+    item = item._replace(one_way=times(ticks, "feedback_one_way", good), overtaken=overtaken(ticks))
+    if virtual and item.tried.size and not scatters(item.one_way):
+        return item
+    tried, lost = answers(ticks, good)
+    return item._replace(tried=tried, lost=lost)
+
+
+def laid(run: Run) -> Ticks:
+    """The topics on the ticks; what is missing is −1 or NaN."""
+    size = 1 + max((int(values.max()) for values in run.sequences.values() if values.size), default=0)
+
+    def column(topic: str, name: str) -> tuple[Array, Mask]:
+        values, there = np.full(size, np.nan), np.zeros(size, dtype=bool)
         if run.has(topic) and name in run.columns[topic]:
-            found.append(direction(run.sequences[topic], run.columns[topic][name], nominal, good))
-    return Account(tuple(found), real_time, interval)
+            places = run.sequences[topic]
+            values[places] = run.columns[topic][name]
+            there[places] = True
+        return values, there
+
+    command, has_slave = column("slave", "command_seq")
+    feedback, has_master = column("master", "damper_force_seq")
+    names = run.columns.get("latency", {}) if run.has("latency") else {}
+    rows = {name: column("latency", name)[0] for name in names}
+    whole = [np.where(np.isfinite(item), item, -1.0).astype(np.int64) for item in (command, feedback)]
+    return Ticks(whole[0], has_slave, whole[1], has_master, rows, column("latency", "seq")[1])
 
 
-def steady_ticks(run: Run, interval: float) -> tuple[Mask, bool]:
-    """Ticks at which both laboratories were in time, and whether there was a clock to be late by."""
-    ticks = 1 + max(int(values.max()) for values in run.sequences.values() if values.size)
-    good = np.ones(ticks, dtype=bool)
-    if not run.has("latency"):
-        return good, False
-    lateness = np.nan_to_num(run.columns["latency"]["wake_lateness"])
-    late = run.sequences["latency"][lateness > LATE * interval]
-    if "command_sent_ns" in run.columns["latency"]:
-        late = np.union1d(late, run.sequences["latency"][run.columns["latency"]["command_sent_ns"] == 0])
-    for after in range(SPOILT + 1):
-        good[np.clip(late + after, 0, ticks - 1)] = False
-    return good, bool(np.any(lateness != 0.0))
+def on_a_virtual_clock(ticks: Ticks) -> bool:
+    """Whether no tick was off its nominal time at all."""
+    lateness = ticks.rows.get("wake_lateness")
+    return lateness is not None and not np.any(np.nan_to_num(lateness))
 
 
-def direction(ticks: Index, used: NDArray[np.float64], nominal: int, good: Mask) -> Direction:
-    """Ages and holes of one direction; `used` is −1 until the first message has come."""
-    numbers = used.astype(np.int64)
-    there = (numbers >= 0) & good[ticks]
-    ages = (ticks - nominal - numbers)[there]
-    new = np.flatnonzero((np.diff(numbers, prepend=-1) > 0) & there)
-    steps = np.diff(numbers[np.flatnonzero(np.diff(numbers, prepend=-1) > 0)])
-    return Direction(ages, (ticks - nominal - numbers)[new], [int(step) - 1 for step in steps if step > 1])
+def late_ticks(ticks: Ticks, interval: float) -> Mask:
+    """Ticks that the master did not command, and those at which it woke late, unless that is the rule.
+
+    A delay or loss by a plug-in is none of the wire's, and is not waited for; the wire's own lateness is scheduling
+    as long as it is an exception.
+    """
+    held = ticks.rows.get("command_sent_ns", np.ones(ticks.command.size)) == 0
+    woke = ticks.rows.get("wake_lateness", np.zeros(held.size)) > LATE * interval
+    return held | woke if woke.mean() < 0.5 else held
 
 
-def findings(found: Account, interval: float) -> list[Finding]:
+def spread(late: Mask, after: int) -> Mask:
+    """The ticks of a mask, the one before and some after each."""
+    return np.convolve(late, np.ones(after + 2), "full")[1 : late.size + 1] > 0
+
+
+def direction(used: Index, there: Mask, nominal: int, *, exact: bool) -> Direction:
+    """Ages of one direction and, where all its messages are equally old, what never came."""
+    ages = np.arange(used.size) - nominal - used
+    first = np.diff(used, prepend=-1) > 0
+    counted = there & (used >= 0)
+    result = Direction(
+        ages[counted],
+        ages[counted & first],
+        np.zeros(0, dtype=np.int64),
+        np.zeros(0, dtype=bool),
+        np.zeros(0),
+        False,
+        0,
+    )
+    if result.steady < (1.0 if exact else STEADY):
+        return result
+    due = np.flatnonzero(there & (np.arange(used.size) >= nominal + result.usual))
+    return result._replace(tried=due - nominal - result.usual, lost=ages[due] != result.usual)
+
+
+def times(ticks: Ticks, name: str, good: Mask) -> Array:
+    """One-way times that are known, s."""
+    values = ticks.rows[name][good]
+    return values[np.isfinite(values)]
+
+
+def first_uses(ticks: Ticks) -> Index:
+    """The slave's ticks at which a command was in force for the first time, and that is certain."""
+    before = np.concatenate([[True], ticks.has_slave[:-1]])
+    first = (np.diff(ticks.command, prepend=-1) > 0) & ticks.has_slave & before
+    return np.flatnonzero(first[:-EDGE])
+
+
+def answers(ticks: Ticks, good: Mask) -> tuple[Index, Mask]:
+    """Feedbacks that answered a command first, and which of them never came."""
+    tried = first_uses(ticks)
+    tried = tried[ticks.has_rows[ticks.command[tried]] & good[tried]]
+    return tried, ~np.isfinite(ticks.rows["round_trip"][ticks.command[tried]])
+
+
+def scatters(times: Array) -> bool:
+    """Whether messages take different times, so that one may overtake another."""
+    return times.size > 0 and float(np.ptp(times)) > TINY
+
+
+def overtaken(ticks: Ticks) -> int:
+    """Feedbacks that came after a later one."""
+    came = ticks.rows.get("feedback_received_ns", np.zeros(0))
+    came = came[np.isfinite(came) & (came > 0)]
+    return int(np.sum(came[:-1] > np.minimum.accumulate(came[::-1])[::-1][1:]))
+
+
+# -- findings -------------------------------------------------------------------------------------
+
+
+def findings(found: LinkAccount, interval: float) -> list[Finding]:
     """Effects of the link with their parameters and intervals, none where it did what the plan says."""
-    ages = np.concatenate([item.ages for item in found.directions] or [np.zeros(0, dtype=np.int64)])
-    if ages.size == 0:
-        return []
-    old = float(np.mean(ages > 0))
-    if old < (10.0 if found.real_time else 1.0) * RARE:
-        return []
-    fresh = np.concatenate([item.fresh for item in found.directions])
-    usual = int(np.median(fresh))
-    if float(np.mean(fresh == usual)) >= STEADY:
-        return steady(found, usual, interval)
-    return scattered(ages, interval)
+    if found.stamped and found.feedback is not None:
+        result = [delayed(found, interval), jittered(found, interval), lossy(found)]
+    elif any(1.0 - item.steady > LEAST_OFF for item in found.directions):
+        return scattered(np.concatenate([item.ages for item in found.directions]), interval)
+    else:
+        result = [aged(found, interval), lossy(found)]
+    return [item for item in result if item is not None]
 
 
-def steady(found: Account, usual: int, interval: float) -> list[Finding]:
-    """Every message that comes takes equally long: a delay of whole ticks, and losses seen one by one."""
-    result = []
-    if usual > 0:
-        bounds = ((usual - 1) * interval, usual * interval)
-        text = f"every message is used {usual} ticks after its own"
-        result.append(Finding("link.delay", {"delay": (sum(bounds) / 2.0, bounds)}, text, float(100 * usual)))
-    lost = np.array([run for item in found.directions for run in item.missing], dtype=np.float64)
-    total = sum(item.ages.size for item in found.directions)
-    share = float(lost.sum()) / max(total, 1)
-    if share >= RARE * (10.0 if found.real_time else 1.0):
-        burst = float(lost.mean())
-        error = 1.96 * math.sqrt(share * (1.0 - share) * (2.0 * burst - 1.0) / total)
-        wide = 1.96 * float(lost.std()) / math.sqrt(lost.size)
-        values = {
-            "probability": (share, (max(share - error, 0.0), share + error)),
-            "burst": (burst, (max(burst - wide, 1.0), burst + wide)),
-        }
-        text = f"{lost.sum():.0f} messages of {total} were never used, those that came were on time"
-        result.append(Finding("link.loss", values, text, share / max(error / 1.96, 1e-12)))
-    return result
+def known(found: LinkAccount) -> list[Array]:
+    """One-way times of each direction."""
+    return [item.one_way for item in found.directions if item.one_way.size >= LEAST_STAMPS]
 
 
-def tail(p: tuple[float, float, float], ages: NDArray[np.float64], interval: float) -> NDArray[np.float64]:
-    """G(j) for delay (s), jitter (s) and loss."""
-    delay, jitter, loss = p
-    late = ndtr(-(ages * interval - delay) / max(jitter, 1e-9))
-    return np.clip(loss + (1.0 - loss) * late, 1e-9, 1.0 - 1e-9)
+def whole(found: LinkAccount) -> list[Array]:
+    """The same of directions of which not only the quick messages are known; of any where nothing scatters there."""
+    chosen = [item.one_way for item in found.directions if not item.selected and scatters(item.one_way)]
+    return chosen or known(found)
+
+
+def constant(times: Array) -> tuple[float, float]:
+    """The part of a delay that all messages have, and its error (two standard deviations), s.
+
+    The least time where the scatter is one-sided; its mean where it is symmetric, as of noise about a delay.
+    """
+    centred, spread = times - times.mean(), float(times.std())
+    if spread > TINY and float(np.mean(centred**3)) < SYMMETRIC * spread**3:
+        return float(times.mean()), 2.0 * spread / math.sqrt(times.size)
+    return float(times.min()) - spread / times.size, 4.0 * spread / times.size
+
+
+def delayed(found: LinkAccount, interval: float) -> Finding | None:
+    """A constant part of the one-way times that no link of the plan has."""
+    parts = [constant(item) for item in known(found)]
+    if not parts:
+        return None
+    value = float(np.mean([part for part, _ in parts]))
+    error = max(error for _, error in parts)
+    if found.virtual:
+        there = value > max(2.5 * error, TINY)
+    else:
+        quick = min(found.bound, 0.25 * interval)  # a network that the sync exchanges saw as well
+        old = max(float(np.median(item.fresh)) if item.fresh.size else 0.0 for item in found.directions)
+        there = old >= 1.0 and value - quick > max(2.5 * error, REAL * interval)
+        error += found.bound
+    if not there:
+        return None
+    bounds = (
+        max(min(part for part, _ in parts) - error, 0.0),
+        max(part for part, _ in parts) + error,
+    )
+    each = " and ".join(f"{1e3 * part:.3f} ms" for part, _ in parts)
+    text = f"no message takes less than {each} one way ({', '.join(ways(found))})"
+    return Finding("link.delay", {"delay": (value, bounds)}, text, certainty(value, error / 2.0))
+
+
+def ways(found: LinkAccount) -> list[str]:
+    """Each direction's median one-way time, in words."""
+    named = (("command", found.command), ("feedback", found.feedback))
+    return [
+        f"median {name} {1e3 * float(np.median(item.one_way)):.3f} ms"
+        for name, item in named
+        if item is not None and item.one_way.size
+    ]
+
+
+def jittered(found: LinkAccount, interval: float) -> Finding | None:
+    """Scatter of the one-way times."""
+    groups = [item - item.mean() for item in whole(found)]
+    centred = np.concatenate(groups or [np.zeros(1)])
+    value = float(centred.std())
+    if found.virtual:
+        there = value > TINY
+    else:
+        low, high = np.percentile(centred, [25.0, 75.0])
+        off = max(1.0 - item.steady for item in found.directions)
+        there = high - low > REAL * interval and off > LEAST_OLD
+    if not there:
+        return None
+    kurtosis = float(np.mean(centred**4)) / value**4
+    error = value * math.sqrt(max(kurtosis - 1.0, 0.1) / (4.0 * centred.size))
+    bounds = (max(value - 1.96 * error, 0.0), value + 1.96 * error)
+    late = sum(item.overtaken for item in found.directions)
+    text = f"one-way times scatter by {1e3 * value:.3f} ms, {late} feedbacks came after a later one"
+    return Finding("link.jitter", {"std": (value, bounds)}, text, certainty(value, error))
+
+
+def aged(found: LinkAccount, interval: float) -> Finding | None:
+    """A delay of which only the ticks are known."""
+    usual = [item.usual for item in found.directions]
+    if not usual or max(usual) == 0:
+        return None
+    bounds = (max(min(usual) - 1, 0) * interval, max(usual) * interval)
+    text = f"messages are used {' and '.join(map(str, usual))} ticks after their own; no stamps tell it closer"
+    return Finding("link.delay", {"delay": (sum(bounds) / 2.0, bounds)}, text, CERTAIN)
+
+
+def lossy(found: LinkAccount) -> Finding | None:
+    """Messages that never came, and their runs: a two-state chain."""
+    tried = sum(item.tried.size for item in found.directions)
+    lost = sum(int(item.lost.sum()) for item in found.directions)
+    least = 1 if found.virtual else LEAST_LOST
+    if lost < least or (not found.stamped and lost < LEAST_SHARE * tried):
+        return None
+    followed, ended = np.sum([runs(item) for item in found.directions], axis=0)
+    share, leave = lost / tried, max(ended, 0.5) / followed if followed else 1.0
+    memory = max(1.0 - leave - leave * share / max(1.0 - share, 1e-9), 0.0)
+    heavy = (1.0 - memory) / (1.0 + memory)  # of the messages count as independent
+    a, b = lost * heavy + 0.5, (tried - lost) * heavy + 0.5
+    low, high = beta.ppf((0.025, 0.975), a, b)
+    quick, slow = beta.ppf((0.975, 0.025), ended + 0.5, followed - ended + 0.5)
+    values = {
+        "probability": (share, (float(min(low, share)), float(max(high, share)))),
+        "burst": (1.0 / leave, (min(1.0 / quick, 1.0 / leave), max(1.0 / slow, 1.0 / leave))),
+    }
+    text = f"{lost} of {tried} messages never came"
+    return Finding("link.loss", values, text, certainty(math.sqrt(lost * heavy), 1.0))
+
+
+def runs(item: Direction) -> tuple[int, int]:
+    """Lost messages of which the next one's fate is known, and how many of those came."""
+    pairs = item.lost[:-1] & (np.diff(item.tried) == 1)
+    return int(pairs.sum()), int(np.sum(pairs & ~item.lost[1:]))
+
+
+def certainty(value: float, deviation: float) -> float:
+    """A value in its standard deviations, as far as is worth telling."""
+    return min(value / deviation, CERTAIN) if deviation > 0.0 else CERTAIN
+
+
+# -- ages alone -----------------------------------------------------------------------------------
 
 
 def scattered(ages: Index, interval: float) -> list[Finding]:
-    """Delay, jitter and loss from the ages' distribution, each kept where it is needed."""
+    """Delay, jitter and loss from the ages alone, delay and loss only where they are needed.
+
+    A message that is j ticks old has not come yet with the probability G(j) = p + (1 − p)·e^(−(j·dt − delay)/σ),
+    each on its own, so that P(age > a) = G(0)·G(1)·…·G(a).
+    """
+    if ages.size == 0:
+        return []
     counts = np.bincount(np.clip(ages, 0, None)).astype(np.float64)
-    places = np.arange(counts.size, dtype=np.float64)
-    beyond = counts.sum() - np.cumsum(counts)
-
-    def unlikely(p: tuple[float, float, float]) -> float:
-        g = tail(p, places, interval)
-        return -2.0 * float(np.sum(beyond * np.log(g) + counts * np.log1p(-g)))
-
-    best, cost = fitted(unlikely, (True, True), interval, counts)
-    for free in ((False, False), (True, False), (False, True)):
-        simpler, more = fitted(unlikely, free, interval, counts)
-        if more < cost + WORTH * (2 - sum(free)):
-            best, cost = simpler, more
-            break
-    delay, jitter, loss = best
-    spread = 4.0 / math.sqrt(counts.sum())
-    names = (
-        ("link.jitter", "std", jitter),
-        ("link.delay", "delay", delay),
-        ("link.loss", "probability", loss),
-    )
-    text = f"the age of messages scatters over {int(np.count_nonzero(counts))} ticks"
+    if counts[1:].sum() < LEAST_OLD * counts.sum():
+        return []
+    fits = {free: fitted(counts, interval, free) for free in ((), (1,), (2,), (1, 2))}
+    free = min(fits, key=lambda key: fits[key][1] + WORTH * len(key))
+    best, _, errors = fits[free]
+    text = f"the age of messages scatters over {int(np.count_nonzero(counts))} ticks; no stamps tell it closer"
+    names = (("link.jitter", "std", 0), ("link.delay", "delay", 1), ("link.loss", "probability", 2))
     found = []
-    for effect, key, value in names:
-        if value > 0.0:
-            wide = spread * max(value, jitter if key != "probability" else 0.0) + (
-                spread if key == "probability" else 0.0
-            )
-            values = {key: (value, (max(value - wide, 0.0), value + wide))}
+    for effect, key, place in names:
+        if place in (0, *free):
+            value, error = best[place], DEPENDENT * errors[place]
+            values = {key: (value, (max(value - 1.96 * error, 0.0), value + 1.96 * error))}
             if key == "probability":
                 values["burst"] = (1.0, (1.0, math.inf))
-            found.append(Finding(effect, values, text, value / wide * 2.0))
+            found.append(Finding(effect, values, text, certainty(value, error)))
     return found
 
 
+def unlikely(p: tuple[float, float, float], counts: Array, interval: float) -> float:
+    """−2·log-likelihood of the ages' counts under (jitter, delay, loss)."""
+    jitter, delay, loss = p
+    late = np.exp(-np.clip(np.arange(counts.size) * interval - delay, 0.0, None) / jitter)
+    waiting = np.clip(loss + (1.0 - loss) * late, 1e-9, 1.0 - 1e-9)
+    beyond = counts.sum() - np.cumsum(counts)
+    return -2.0 * float(np.sum(beyond * np.log(waiting) + counts * np.log1p(-waiting)))
+
+
 def fitted(
-    unlikely: object, free: tuple[bool, bool], interval: float, counts: NDArray[np.float64]
-) -> tuple[tuple[float, float, float], float]:
-    """Most likely (delay, jitter, loss) with delay and loss free or zero, and −2·log-likelihood there."""
+    counts: Array, interval: float, free: tuple[int, ...]
+) -> tuple[tuple[float, float, float], float, Array]:
+    """Most likely (jitter, delay, loss) with some of the last two free, −2·log-likelihood, standard deviations."""
     mean = float(counts @ np.arange(counts.size) / counts.sum()) * interval
+    start = np.log([max(mean, 0.2 * interval), max(mean / 2.0, 0.2 * interval), 0.01])
+    places = [0, *free]
 
-    def cost(p: NDArray[np.float64]) -> float:
-        delay = math.exp(p[1]) if free[0] else 0.0
-        loss = 1.0 / (1.0 + math.exp(-p[2])) if free[1] else 0.0
-        return unlikely((delay, math.exp(p[0]), loss))  # type: ignore[operator]
+    def parameters(x: Array) -> tuple[float, float, float]:
+        p = np.zeros(3)
+        p[places] = np.exp(np.clip(x, -25.0, 0.0))
+        return float(p[0]), float(p[1]), min(float(p[2]), 0.99)
 
-    start = [math.log(max(mean, 0.1 * interval)), math.log(max(mean, 0.1 * interval)), -5.0]
-    found = minimize(
-        cost, start, method="Nelder-Mead", options={"maxiter": 2000, "xatol": 1e-5, "fatol": 1e-4}
-    )
-    p = found.x
-    delay = math.exp(p[1]) if free[0] else 0.0
-    loss = 1.0 / (1.0 + math.exp(-p[2])) if free[1] else 0.0
-    return (delay, math.exp(p[0]), loss), float(found.fun)
+    def cost(x: Array) -> float:
+        return unlikely(parameters(x), counts, interval)
+
+    found = minimize(cost, start[places], method="Nelder-Mead", options={"xatol": 1e-6, "fatol": 1e-6})
+    best = parameters(found.x)
+    errors = np.zeros(3)
+    for place, axis in zip(places, np.eye(len(places)), strict=True):
+        bend = (cost(found.x + 0.02 * axis) - 2.0 * found.fun + cost(found.x - 0.02 * axis)) / 0.02**2
+        errors[place] = best[place] * math.sqrt(2.0 / max(bend, 1.0))
+    return best, float(found.fun), errors
+
+
+# -- exchange -------------------------------------------------------------------------------------
 
 
 def exchange_of(run: Run, ticks: int) -> Exchange:
@@ -201,7 +450,6 @@ def exchange_of(run: Run, ticks: int) -> Exchange:
     result = []
     for topic, name in (("slave", "command_seq"), ("master", "damper_force_seq")):
         values, there = laid_out(run.columns[topic][name].astype(np.float64), run.sequences[topic], ticks)
-        result.append(
-            np.minimum(np.where(there.cumsum() > 0, values, -1.0).astype(np.int64), np.arange(ticks))
-        )
+        known = np.where(there.cumsum() > 0, values, -1.0).astype(np.int64)
+        result.append(np.minimum(known, np.arange(ticks)))
     return Exchange(*result)

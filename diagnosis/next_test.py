@@ -115,11 +115,9 @@ def menu(data: Data) -> list[tuple[str, Data]]:
                 f"a sine of {frequency:g} Hz and {size:.3g} {part.units[key]} on the {device}, {SECONDS:g} s"
             )
             tests.append((text, {key: wave}))
+        slow = 2.0 * reached * np.sin(0.2 * math.pi * t)
         tests.append(
-            (
-                f"slow cycles (0.1 Hz, {2 * reached:.3g} {part.units[key]}) on the {device}",
-                {key: 2.0 * reached * np.sin(0.2 * math.pi * t)},
-            )
+            (f"slow cycles (0.1 Hz, {2 * reached:.3g} {part.units[key]}) on the {device}", {key: slow})
         )
     return [(name, replace(data, part=part.replaced(inputs=inputs))) for name, inputs in tests]
 
@@ -135,4 +133,5 @@ def sentence(found: list[Choice], describe: Callable[[str], str] = str) -> str:
             f"No motion at hand separates {first} from {second} (the best one by {best.separation:.1f} standard "
             "deviations): check the sensor or the part by itself, with a dead weight or a second sensor."
         )
-    return f"Run {best.test}: it separates {first} from {second} by {best.separation:.0f} standard deviations of the noise."
+    apart = f"it separates {first} from {second} by {best.separation:.0f} standard deviations of the noise"
+    return f"Run {best.test}: {apart}."

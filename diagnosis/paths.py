@@ -19,7 +19,7 @@ def paths(record: Record, nominal: dict[str, Array] | None) -> dict[str, dict[st
 
     The command path runs from the building's drift to the specimen's deformation, the force path from the deformation
     to the force that the master used, the exchange from the damper's force in its laboratory to its use.
-    Delay and amplitude by Guo's frequency evaluation index, the price in points of the first mode's damping.
+    Delay and amplitude by Guo's frequency evaluation index, the effect in points added to the first mode's damping.
     """
     result = {}
     for name, start, end in (
@@ -32,12 +32,12 @@ def paths(record: Record, nominal: dict[str, Array] | None) -> dict[str, dict[st
             continue
         entry: dict[str, Any] = {"delay": here.delay, "amplitude": here.amplitude}
         if name != "exchange":
-            entry["damping_points"] = 100.0 * damping_lost(record.plan, here)
+            entry["damping_points"] = -100.0 * damping_lost(record.plan, here)
         there = measured(record, nominal, start, end) if nominal else None
         if there is not None:
             entry["nominal_delay"] = there.delay
             if name != "exchange":
-                entry["nominal_damping_points"] = 100.0 * damping_lost(record.plan, there)
+                entry["nominal_damping_points"] = -100.0 * damping_lost(record.plan, there)
         result[name] = entry
     return result
 

@@ -15,7 +15,7 @@ from models.effects import CATALOGUE
 if TYPE_CHECKING:
     from diagnosis.diagnose import Diagnosis
 
-MOST_OTHERS = 8  # alternatives listed
+MOST_OTHERS = 5  # alternatives listed
 
 Parameters = dict[str, dict[str, dict[str, Any]]]
 

@@ -18,8 +18,8 @@ from master.step import MasterStep
 from models import substructure
 from models.closed_loop import build_a
 from models.labs import column_lab, noise
-from models.registry import Array
 from models.realised import true_system
+from models.registry import Array
 from models.system import System
 
 

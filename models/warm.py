@@ -9,7 +9,8 @@ import numpy as np
 from common.plan import Plan
 from models import cache, compensators, substructure
 from models.closed_loop import simulate
-from models.labs import column_lab, readings, table_lab
+from models.labs import column_lab, readings, replay, table_lab
+from models.system import System
 
 
 def compile_all() -> None:
@@ -17,12 +18,17 @@ def compile_all() -> None:
     plan = Plan().with_test(duration=0.01)
     ground = np.zeros((2, plan.ticks + 1))
     simulate(plan, ground)
+    still = np.zeros(plan.ticks)
+    replay.laboratory_a(System(plan), still)
+    replay.laboratory_b(System(plan), still, still)
+    replay.column(System(plan), still)
+    replay.building(System(plan), ground, still, still, still)
     substructure.advance(*substructure.build(plan, ground), 0, 0.0, 0.0, 0.0)
     column_lab.advance(*column_lab.build(plan.test.interval, plan.actuator, plan.column), 0.0)
     table_lab.advance(*table_lab.build(plan.test.interval, plan.table, plan.damper), 0.0, 0.0)
     readings.step(*readings.build(plan.test.interval, ("any",), {}), 0, 0.0, 0.0, 0.0)
-    still = compensators.build("none", {}, plan.test.interval)
-    compensators.step(*still, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, plan.test.interval)
+    none = compensators.build("none", {}, plan.test.interval)
+    compensators.step(*none, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, plan.test.interval)
     (cache.folder() / cache.READY).touch()
 
 

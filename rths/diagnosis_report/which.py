@@ -72,7 +72,7 @@ def worth(item: Candidate) -> str:
     score = item.get("score", item.get("held_out_score"))
     if known(score):
         behind = abs(as_float(score))
-        facts.append("best score" if behind < 0.05 else f"{behind:.1f} nats worse than the best")
+        facts.append("best score" if behind < 0.05 else f"{behind:.3g} nats worse than the best")
     return paragraph("; ".join(facts))
 
 

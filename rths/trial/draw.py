@@ -265,6 +265,8 @@ def draw_effect(generator: np.random.Generator, kind: str, name: str, library: L
         if item.sizes
     }
     nulls = {item.name: item.null for item in effect.parameters if not item.shape}
+    if formula:
+        values.pop("velocity" if name.endswith(".friction") else "", None)  # these laws bring their own
     return Laid(name, effect.site, values, nulls, formula)
 
 

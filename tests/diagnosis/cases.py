@@ -1,0 +1,128 @@
+"""Recordings of laboratories whose secrets are known, made in virtual time, each once per session."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from common import cli, plan, reality
+from common.errors import InterlockError, RthsError
+from common.plan import Plan
+from common.recording.reader import read
+from diagnosis import record
+from diagnosis.record import Record
+from models.effects import CATALOGUE
+from models.registry import Array
+from rths import virtual
+from rths.diagnose import diagnose_file
+
+SECONDS = 10.0
+JITTERED = (  # nominal parameters that no laboratory meets exactly
+    ("actuator", "delay"),
+    ("actuator", "time_constant"),
+    ("column", "stiffness"),
+    ("table", "frequency"),
+    ("table", "damping_ratio"),
+    ("damper", "stiffness"),
+    ("damper", "damping"),
+    ("damper", "mass"),
+)
+TOLERANCE = 0.02
+
+Effects = Mapping[str, Mapping[str, float]]
+
+
+def short(duration: float = SECONDS, **test: Any) -> Plan:
+    """The default plan, shorter."""
+    return plan.load(cli.plan_path(None)).with_test(duration=duration, **test)
+
+
+def jitter(seed: int) -> dict[str, float]:
+    """How far each nominal parameter is off, in tolerances."""
+    draws = np.random.default_rng(seed).normal(0.0, 0.7, len(JITTERED)).clip(-1.5, 1.5)
+    return {
+        f"{table}.{field}": float(draw) for (table, field), draw in zip(JITTERED, draws, strict=True)
+    }
+
+
+def tables(base: Plan, effects: Effects, off: Mapping[str, float], seed: int) -> dict[str, Any]:
+    """A reality as the tables of its file."""
+    result: dict[str, Any] = {"seed": seed}
+    for name, z in off.items():
+        table, field = name.split(".")
+        value = getattr(getattr(base, table), field)
+        result.setdefault(table, {})[field] = value * (1.0 + TOLERANCE * z)
+    result["effect"] = [{"name": name, **values} for name, values in effects.items()]
+    return result
+
+
+def play(base: Plan, given: Mapping[str, Any], path: Path) -> RthsError | None:
+    """Record the test of a plan in laboratories that are what `given` says; the error that ended it."""
+    true = reality.from_reality(dict(given), base, Path())
+    return virtual.run(virtual.assemble(base, true, path), lambda: "")
+
+
+class Cases:
+    """Recordings and reports, each made when it is asked for first."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._files: dict[Any, Path] = {}
+        self._reports: dict[Any, dict[str, Any]] = {}
+
+    def file(
+        self, effects: Effects | None = None, seed: int = 1, duration: float = SECONDS, scale: float = 0.1
+    ) -> Path:
+        """The recording of a case; `seed` draws noise and how far the nominal parameters are off, 0 for not."""
+        chosen = effects or {}
+        key = (repr(chosen), seed, duration, scale)
+        if key not in self._files:
+            path = self.folder / f"{len(self._files):03d}.mcap"
+            base = short(duration, scale=scale)
+            error = play(base, tables(base, chosen, jitter(seed) if seed else {}, seed), path)
+            assert error is None or isinstance(error, InterlockError)
+            self._files[key] = path
+        return self._files[key]
+
+    def record(self, effects: Effects | None = None, **options: Any) -> Record:
+        """The recording laid out."""
+        return record.build(read(self.file(effects, **options)))
+
+    def report(self, effects: Effects | None = None, **options: Any) -> dict[str, Any]:
+        """The diagnosis of a case."""
+        key = (repr(effects or {}), *sorted(options.items()))
+        if key not in self._reports:
+            self._reports[key] = diagnose_file(self.file(effects, **options))
+        return self._reports[key]
+
+
+def named(report: Mapping[str, Any]) -> list[str]:
+    """The effects of a verdict."""
+    return sorted(report["which"][0]["effects"])
+
+
+def counts_as(report: Mapping[str, Any], effect: str) -> bool:
+    """Whether a verdict names an effect, or one that these signals cannot tell from it."""
+    sets = [set(names) for names in report["equivalent"]]
+    return any(
+        name == effect or any({name, effect} <= names for names in sets) for name in named(report)
+    )
+
+
+def estimate(report: Mapping[str, Any], effect: str, parameter: str) -> float:
+    """The parameter that a verdict gives."""
+    return float(report["which"][0]["parameters"][effect][parameter]["value"])
+
+
+def away(effect: str, parameter: str, value: float) -> float:
+    """A parameter's distance from where the effect is not there."""
+    null = next(item.null for item in CATALOGUE[effect].parameters if item.name == parameter)
+    return value - null if np.isfinite(null) else value
+
+
+def white(seed: int, *shape: int) -> Array:
+    """White noise of rms one."""
+    return np.random.default_rng(seed).standard_normal(shape)

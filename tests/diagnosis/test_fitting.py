@@ -1,0 +1,197 @@
+"""Fits: what a laboratory's parameters are, its noise, slopes, and the beginning of a test."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from common.plan import Plan
+from common.recording.reader import read
+from diagnosis import fitting, record
+from diagnosis.fitting import Data, Fit
+from diagnosis.parts import Building, LaboratoryA, LaboratoryB, Part
+from models.effects import CATALOGUE
+from models.registry import Array
+from models.system import System
+from tests.diagnosis import cases as made
+from tests.diagnosis.cases import Cases, jitter, short, white
+
+PARTS: dict[str, type[Part]] = {"a": LaboratoryA, "b": LaboratoryB, "building": Building}
+
+
+def data_of(cases: Cases, kind: str, **options: float) -> Data:
+    """A part of a clean laboratory with jittered parameters."""
+    found = cases.record(**options)  # type: ignore[arg-type]
+    return fitting.prepare(PARTS[kind](found), found)  # type: ignore[call-arg]
+
+
+def at_nominal(data: Data) -> Fit:
+    """The nominal models, nothing fitted."""
+    return fitting.at(data, {}, np.zeros(len(data.part.nuisances)))
+
+
+def found_z(fit: Fit) -> dict[str, float]:
+    """Fitted parameters by name."""
+    return {item.name: float(z) for item, z in zip(fit.data.part.nuisances, fit.z, strict=True)}
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize(
+    ("kind", "sharp"),
+    [
+        ("a", {"column.stiffness": 0.1, "actuator.delay": 0.3, "actuator.time_constant": 0.3}),
+        ("b", {"table.frequency": 0.2, "table.damping_ratio": 0.3, "damper.stiffness": 0.2, "damper.mass": 0.3}),
+    ],
+)
+def test_commissioning_finds_what_the_laboratories_are(
+    cases: Cases, kind: str, sharp: Mapping[str, float], seed: int
+) -> None:
+    fit = fitting.fit(data_of(cases, kind, seed=seed), {})
+    wrong, found = jitter(seed), found_z(fit)
+    for name, near in sharp.items():
+        assert found[name] == pytest.approx(wrong[name], abs=near), name
+    assert fit.chi / fit.reduced.size == pytest.approx(1.0, abs=0.15)  # nothing is left but noise
+
+
+def test_commissioning_finds_what_the_building_is(tmp_path: Path) -> None:
+    off = {"structure.mass": 1.0, "structure.stiffness": -0.8, "structure.damping": 0.5}
+    base = short(6.0)
+    made.play(base, made.tables(base, {}, off, 1), tmp_path / "a.mcap")
+    whole = record.build(read(tmp_path / "a.mcap"))
+    fit = fitting.fit(fitting.prepare(Building(whole), whole), {})
+    assert found_z(fit) == pytest.approx(off, abs=0.3)
+    assert found_z(fit)["structure.stiffness"] - found_z(fit)["structure.mass"] == pytest.approx(-1.8, abs=0.2)
+
+
+def test_a_laboratory_that_is_as_planned_stays_there(cases: Cases) -> None:
+    for kind in ("a", "b"):
+        fit = fitting.fit(data_of(cases, kind, seed=0), {})
+        assert np.max(np.abs(fit.z)) < 0.3
+
+
+@pytest.mark.parametrize("kind", ["a", "b"])
+def test_the_noise_is_found(cases: Cases, kind: str, default_plan: Plan) -> None:
+    data = data_of(cases, kind)
+    planned = [getattr(default_plan.sensors, name) for name in data.part.signals]
+    assert data.white == pytest.approx(planned, rel=0.08)
+    assert np.all(data.sigma > data.white)
+    assert np.all(data.sigma < 2.5 * data.white)
+
+
+def test_noise_of_white_noise_over_anything_smooth() -> None:
+    t = np.arange(5000) * 0.002
+    smooth = np.stack([1e3 * np.sin(2 * np.pi * 3 * t), 50 * t**2], axis=1)
+    assert fitting.noise(smooth + 0.1 * white(0, 5000, 2)) == pytest.approx([0.1, 0.1], rel=0.05)
+    assert np.all(fitting.noise(smooth) < 1e-3)
+
+
+def test_residuals_of_white_noise_have_unit_variance(cases: Cases) -> None:
+    data = data_of(cases, "b")
+    part = data.part
+    assert isinstance(part, LaboratoryB)
+    noisy = part.predict(data.system) + data.sigma * white(3, *part.measured.shape)
+    again = dataclasses.replace(data, part=part.replaced(measured=noisy))
+    reduced = again.reduced(data.system)
+    assert np.mean(reduced**2, axis=0) == pytest.approx(np.ones(4), abs=0.15)
+
+
+def test_what_is_missing_does_not_count(cases: Cases) -> None:
+    data = data_of(cases, "a")
+    part = data.part
+    assert isinstance(part, LaboratoryA)
+    present = part.present.copy()
+    present[1000:2000, 1] = False
+    spoilt = part.measured.copy()
+    spoilt[1000:2000, 1] = 1e9
+    less = dataclasses.replace(data, part=part.replaced(measured=spoilt, present=present))
+    residual = less.residual(data.system)
+    assert not residual[1000:2000, 1].any()
+    assert np.array_equal(residual[:1000], data.residual(data.system)[:1000])
+
+
+def differences(fit: Fit, place: int, step: float) -> Array:
+    """A column of the jacobian by central differences."""
+    problem = fitting.Problem(fit.data, fit.values)
+    p = problem.place(fit.values, fit.z)
+    up, down = p.copy(), p.copy()
+    up[place] += step
+    down[place] -= step
+    return (problem.reduced(up) - problem.reduced(down)).ravel() / (2.0 * step)
+
+
+@pytest.mark.parametrize(
+    ("kind", "values"),
+    [
+        ("a", {}),
+        ("a", {"actuator.delay": {"delay": 0.004}}),
+        ("b", {"damper.viscous": {"factor": 1.5}}),
+        ("building", {"structure.damping": {"factor": 1.2}}),
+    ],
+)
+def test_slopes_are_those_of_finer_differences(cases: Cases, kind: str, values: fitting.Values) -> None:
+    data = data_of(cases, kind, duration=4.0)
+    fit = fitting.at(data, values, np.zeros(len(data.part.nuisances)))
+    assert fit.jacobian.shape == (fit.reduced.size, fit.z.size + len(values))
+    for place in range(fit.jacobian.shape[1]):
+        fine = differences(fit, place, 1e-3)
+        off = np.linalg.norm(fit.jacobian[:, place] - fine) / np.linalg.norm(fine)
+        assert off < 0.08, place
+
+
+def test_a_beginning_holds_most_of_what_is_left(cases: Cases) -> None:
+    data = data_of(cases, "a", duration=12.0)
+    fit = at_nominal(data)
+    early = np.zeros_like(fit.reduced)
+    early[: early.shape[0] // 3] = 1.0
+    part = fitting.beginning(data, dataclasses.replace(fit, reduced=early), 0.7)
+    assert part.groups * part.group * 0.002 == pytest.approx(fitting.SHORTEST)
+    assert part.train.size == part.groups
+    assert np.array_equal(part.part.measured, data.part.measured[: part.groups * part.group])
+    assert np.array_equal(part.part.predict(data.system), data.part.predict(data.system)[:3000])
+    late = fit.reduced * 0.0
+    late[-10:] = 1.0
+    assert fitting.beginning(data, dataclasses.replace(fit, reduced=late), 0.7) is data
+    short_ = data_of(cases, "a", duration=4.0)
+    assert fitting.beginning(short_, at_nominal(short_), 0.1) is short_
+
+
+def test_a_building_is_always_judged_whole(cases: Cases) -> None:
+    data = data_of(cases, "building", duration=12.0)
+    assert fitting.beginning(data, at_nominal(data), 0.01) is data
+
+
+def test_a_model_that_the_plan_cannot_have_is_far_off(cases: Cases) -> None:
+    data = data_of(cases, "a", duration=4.0)
+    wrong = System(dataclasses.replace(data.system.plan, column=None))  # type: ignore[arg-type]
+    with pytest.raises(AttributeError):
+        data.reduced(wrong)  # a mistake of ours is not taken for a bad hypothesis
+    diverging = data.system.moved("column", stiffness=math.inf)
+    assert np.max(np.abs(data.reduced(diverging))) == fitting.FAR
+
+
+@given(st.sampled_from(sorted(CATALOGUE)), st.floats(0.01, 0.99))
+def test_parameters_go_in_and_out_of_a_fit(name: str, share: float) -> None:
+    effect = CATALOGUE[name]
+    values = {item.name: item.sizes[0] if item.sizes else item.least for item in effect.parameters}
+    for item in fitting.free(effect, values):
+        low, high = item.bounds
+        assert low < high
+        place = item.inward(values[item.parameter.name])
+        assert item.outward(place) == pytest.approx(values[item.parameter.name], rel=1e-9, abs=1e-15)
+        if math.isfinite(low) and math.isfinite(high):
+            inside = low + share * (high - low)
+            assert item.inward(item.outward(inside)) == pytest.approx(inside, rel=1e-6, abs=1e-6)
+
+
+def test_withheld_time_is_in_blocks_of_a_second(cases: Cases) -> None:
+    data = data_of(cases, "a")
+    seconds = data.train[: 10 * 125].reshape(10, 125)
+    assert all(block.all() or not block.any() for block in seconds)
+    assert [bool(block[0]) for block in seconds] == [True, True, False, True, False] * 2

@@ -1,0 +1,101 @@
+"""Effects of every site are found in laboratories whose parameters are a little off, and nothing where nothing is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from diagnosis import fitting, search
+from diagnosis.parts import LaboratoryA
+from diagnosis.scales import Scales
+from diagnosis.search import Searcher
+from tests.diagnosis.cases import Cases, Effects, counts_as, estimate, named, white
+
+ALONE: list[tuple[str, dict[str, float], dict[str, float]]] = [  # effect, truth, relative error allowed
+    ("ground.scale", {"factor": 1.08}, {"factor": 0.005}),
+    ("structure.mass", {"factor": 1.1}, {"factor": 0.05}),
+    ("actuator.backlash", {"width": 2e-4}, {"width": 0.05}),
+    ("actuator.delay", {"delay": 6e-3}, {"delay": 0.1}),  # the plan's own delay is known to 0.28 ms only
+    ("column.friction", {"force": 900.0}, {"force": 0.05}),
+    ("column.yielding", {"yield_displacement": 1.2e-3, "hardening": 0.1}, {"yield_displacement": 0.05}),
+    ("table.gain", {"factor": 0.93}, {"factor": 0.01}),
+    ("damper.friction", {"force": 3.0}, {"force": 0.05}),
+    ("damper.viscous", {"factor": 1.5}, {"factor": 0.05}),
+    ("sensor.column_displacement.gain", {"factor": 1.08}, {"factor": 0.02}),
+]
+
+
+@pytest.mark.parametrize(("effect", "values", "near"), ALONE, ids=[name for name, _, _ in ALONE])
+def test_an_effect_is_found_with_its_size(
+    cases: Cases, effect: str, values: dict[str, float], near: dict[str, float]
+) -> None:
+    report = cases.report({effect: values})
+    assert counts_as(report, effect), named(report)
+    assert len(named(report)) == 1
+    assert report["status"] == "explained"
+    for name, error in near.items():
+        assert estimate(report, effect, name) == pytest.approx(values[name], rel=error)
+
+
+STOP: Effects = {"damper.stroke_stop": {"stroke": 0.044, "stiffness": 2000.0}}
+
+
+def test_an_end_stop_is_found_with_its_stroke(cases: Cases) -> None:
+    report = cases.report(STOP)
+    assert named(report) == ["damper.stroke_stop"]
+    assert estimate(report, "damper.stroke_stop", "stroke") == pytest.approx(0.044, rel=0.05)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2, 3])
+def test_a_clean_laboratory_is_left_in_peace(cases: Cases, seed: int) -> None:
+    report = cases.report(seed=seed)
+    assert report["status"] == "no_gap"
+    assert named(report) == []
+    assert report["where"] == report["equivalent"] == []
+    assert report["which"][0]["probability"] > 0.7
+    assert report["next_test"] == ""
+
+
+def test_two_effects_in_two_laboratories_are_both_found(cases: Cases) -> None:
+    report = cases.report({"column.friction": {"force": 900.0}, "damper.friction": {"force": 3.0}})
+    assert named(report) == ["column.friction", "damper.friction"]
+    assert estimate(report, "column.friction", "force") == pytest.approx(900.0, rel=0.05)
+    assert estimate(report, "damper.friction", "force") == pytest.approx(3.0, rel=0.05)
+
+
+def test_two_effects_in_one_laboratory_are_both_found(cases: Cases) -> None:
+    report = cases.report(
+        {"actuator.backlash": {"width": 3e-4}, "column.yielding": {"yield_displacement": 1.5e-3}}
+    )
+    assert named(report) == ["actuator.backlash", "column.yielding"]
+    assert estimate(report, "actuator.backlash", "width") == pytest.approx(3e-4, rel=0.05)
+
+
+@pytest.mark.parametrize("true", ["column.stiffness", "sensor.column_force.gain"])
+def test_what_these_signals_cannot_tell_apart_stands_together(cases: Cases, true: str) -> None:
+    report = cases.report({true: {"factor": 1.1}})
+    assert counts_as(report, true)
+    assert ["column.stiffness", "sensor.column_force.gain"] in [sorted(names) for names in report["equivalent"]]
+
+
+def test_the_gap_of_noise_is_none_and_that_of_a_trend_is_seen() -> None:
+    for seed in range(20):
+        assert search.gap(white(seed, 1250), 4).ratio < search.MATERIAL
+    slow = 2.0 * np.sin(np.linspace(0.0, 60.0, 1250))
+    found = search.gap(white(0, 1250) + slow, 4)
+    assert found.significance > 20.0
+    assert found.ratio == pytest.approx(np.sqrt(2.0) / np.sqrt(4.0), rel=0.15)  # rms over that of a single sample
+    assert search.gap(np.zeros(5), 4) == (0.0, 0.0)
+
+
+def test_a_search_says_what_it_explained(cases: Cases) -> None:
+    whole = cases.record({"column.friction": {"force": 900.0}})
+    data = fitting.prepare(LaboratoryA(whole), whole)
+    found = Searcher(data, Scales(whole)).run()
+    assert found.chosen.names == ("column.friction",)
+    assert found.explained > 0.99
+    assert found.left < search.MATERIAL
+    assert fitting.excess(found.chosen) < 0.01 * fitting.excess(found.commissioned)
+    costs = [item.cost for item in found.alternatives]
+    assert costs == sorted(costs)
+    assert costs[0] > found.chosen.cost + search.TIED

@@ -1,0 +1,83 @@
+"""Measurements of others, imported and diagnosed as `docs/real_data.md` describes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from common.recording.reader import read
+from rths import import_, tabular
+from rths.diagnose import diagnose_file
+from tests.helpers import ROOT
+
+EXAMPLES = ROOT / "examples" / "real_data"
+COLUMNS = ROOT / "tests" / "data" / "fiber_column"
+RATE = 128.982  # of the force rig, samples per second
+NOMINAL_LAG = 0.010  # s, of its plan
+
+
+def imported(data: Path, mapping: str, folder: Path) -> Path:
+    """A recording made of a data file."""
+    chosen = import_.load_map(EXAMPLES / f"{mapping}_map.toml")
+    t, values = import_.resampled(chosen, tabular.read(data), data)
+    path = folder / f"{mapping}.mcap"
+    import_.write(path, chosen, t, values, data.name)
+    return path
+
+
+def lag_by_correlation(command: Any, response: Any, interval: float, finer: int = 8) -> float:
+    """Shift at which the response resembles the command most, s."""
+    places = np.arange((command.size - 1) * finer) / finer
+    u, y = (np.interp(places, np.arange(command.size), values) for values in (command, response))
+    products = [float(np.mean(u[: u.size - k] * y[k:])) for k in range(10 * finer)]
+    return int(np.argmax(products)) * interval / finer
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
+    """The force rig's recording and the report on it."""
+    path = imported(EXAMPLES / "force_rig.csv", "force_rig", tmp_path_factory.mktemp("rig"))
+    return path, diagnose_file(path)
+
+
+def test_the_force_rig_is_found_slower_than_planned_by_what_cross_correlation_says(
+    rig: tuple[Path, dict[str, Any]],
+) -> None:
+    path, report = rig
+    signals = read(path).columns["master"]
+    interval = 1.0 / RATE
+    seen = lag_by_correlation(signals["actuator_command"], signals["column_displacement"], interval)
+    assert seen == pytest.approx(0.033, abs=1e-3)
+    verdict = report["which"][0]
+    assert verdict["effects"] == ["actuator.time_constant"]
+    factor = verdict["parameters"]["actuator.time_constant"]["factor"]["value"]
+    lag = factor * report["tolerances"]["actuator.time_constant"]["factor"] * NOMINAL_LAG
+    assert lag + interval == pytest.approx(seen, abs=3e-3)  # a command is reached one interval later
+
+
+def test_what_is_left_of_the_force_rigs_gap_is_said(rig: tuple[Path, dict[str, Any]]) -> None:
+    _, report = rig
+    far = report["how_far"]
+    assert report["status"] in ("partly_explained", "unknown_effect")
+    assert far["judged_on"] == "held-out time windows"
+    assert 5.0 * far["noise_floor"] < far["after"] < 0.025
+    assert report["where"][0]["site"] == "actuator"
+
+
+@pytest.mark.parametrize("name", ["4-D22", "8-D22"])
+def test_a_fibre_column_without_slip_yields(name: str, tmp_path: Path) -> None:
+    report = diagnose_file(imported(COLUMNS / f"column_{name}.csv", f"column_{name}", tmp_path))
+    assert report["which"][0]["effects"] == ["column.yielding"]
+    assert report["status"] == "partly_explained"
+    assert report["how_far"]["after"] < 0.35 * report["how_far"]["before"]
+
+
+@pytest.mark.parametrize("name", ["4-D22_bondslip", "8-D22_bondslip"])
+def test_a_fibre_column_with_slip_softens_with_the_drift_it_has_seen(name: str, tmp_path: Path) -> None:
+    report = diagnose_file(imported(COLUMNS / f"column_{name}.csv", f"column_{name}", tmp_path))
+    assert report["which"][0]["effects"] == ["column.degradation"]
+    assert report["status"] == "partly_explained"
+    assert report["how_far"]["after"] < 0.25 * report["how_far"]["before"]
