@@ -20,7 +20,9 @@ def link_model(reality: Reality) -> LinkModel:
     """The impairment of one direction; raises InputError where the plug-in cannot be constructed."""
     rig, options = reality.link, impairment(reality)
     if rig.class_ and options:
-        raise InputError("Effects on the link cannot be laid over the plug-in in [link]: leave one of them out.")
+        raise InputError(
+            "Effects on the link cannot be laid over the plug-in in [link]: leave one of them out."
+        )
     if not rig.class_ and not options:
         return PerfectLink()
     kind = find(rig.class_ or IMPAIRED, reality.base, "[link]")

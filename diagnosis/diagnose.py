@@ -23,6 +23,8 @@ from diagnosis.verdict import Verdict, judge
 from models.effects import CATALOGUE
 from models.system import System
 
+AGAINST = -0.7  # correlation from which on a sign is doubted
+
 
 @dataclass
 class Diagnosis:
@@ -100,6 +102,7 @@ def examine(record: Record) -> Diagnosis:
     for part in parts:
         data = fitting.prepare(part, record, rounded)
         datas.append(data)
+        found.warnings += reversed_signs(data)
         shift = part.shift() if isinstance(part, Ground) else 0.0
         found.verdicts.append(judge(Searcher(data, Scales(record, shift)).run()))
     found.white = readings.levels(datas)
@@ -113,6 +116,22 @@ def examine(record: Record) -> Diagnosis:
         account = link.account(record.run, record.plan.test.interval)
         found.link = link.findings(account, record.plan.test.interval)
     return found
+
+
+def reversed_signs(data: Data) -> list[str]:
+    """A sentence for each reading that runs against what the plan's model predicts."""
+    predicted = data.part.predict(data.system)
+    result = []
+    for name, there, read, said in zip(
+        data.part.signals, data.part.present.T, data.part.measured.T, predicted.T, strict=True
+    ):
+        if there.sum() < LEAST_TICKS or np.ptp(read[there]) == 0.0 or not np.ptp(said[there]) > 0.0:
+            continue
+        if np.corrcoef(read[there], said[there])[0, 1] < AGAINST:
+            result.append(
+                f"{name} runs against what the plan predicts: check its sign and that of the command."
+            )
+    return result
 
 
 def parts_of(record: Record, warnings: list[str]) -> list[Part]:

@@ -72,12 +72,15 @@ class Judge:
         chosen = self.mask if mask is None else mask
         if self.loop is not None:
             return self.loop.gap(simulated, chosen)
-        names = [name for name in RESPONSE if self.record.has(name) and name in (simulated or {})]
+        known = simulated or {}
+        names = [
+            name for name in RESPONSE if name in known and self.record.has(name) and np.ptp(known[name]) > 0.0
+        ]
         result = {}
-        for name in names or [name for name in (simulated or {}) if self.record.has(name)]:
+        for name in names or [name for name in known if self.record.has(name)]:
             there = self.record.present[name] & chosen
             recorded = self.record.signals[name][there]
-            error = recorded - (simulated or {})[name][there]
+            error = recorded - known[name][there]
             level = float(np.mean(recorded**2))
             result[name] = float(np.sqrt(np.mean(error**2) / level)) if level > 0.0 else 0.0
         return result

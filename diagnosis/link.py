@@ -5,8 +5,9 @@ Which message a tick used tells ages; stamps tell how long each message took, an
     command k first in force at the slave's tick m  →  feedback m is the answer to it  →  row k of the latency
     topic holds that feedback's stamps, or none: then feedback m was lost
 
-Ticks at which a laboratory was late itself, with those around them, are scheduling and do not count. A number that is
-never used tells of a loss only where no message can overtake another: in virtual time, all taking equally long. Without stamps only the ages are left (see `scattered`).
+Ticks at which a laboratory was late itself, with those around them, are scheduling and do not count. A number that
+is never used tells of a loss only where no message overtakes another: in virtual time, all taking equally long.
+Without stamps only the ages are left (see `scattered`).
 """
 
 from __future__ import annotations
@@ -27,14 +28,18 @@ from models.registry import Array
 Index = NDArray[np.int64]
 Interval = tuple[float, float]
 
-LATE = 0.15  # of an interval: a laboratory that woke later was late, or waited in vain for a message on the wire
+LATE = (
+    0.15  # of an interval: a laboratory that woke later was late, or waited in vain for a message on the wire
+)
 SPOILT = 3  # ticks after such a tick that say nothing either
 STEADY = 0.98  # share of messages of one age from which on, beside a clock, they count as equally old
 LEAST_STAMPS = 20
 LEAST_LOST = 3  # messages, beside a real clock
 LEAST_SHARE = 0.005  # of messages lost where there are no stamps
 LEAST_OFF = 0.001  # share of messages off the usual age, without stamps, from which on delays scatter
-LEAST_OLD = 0.03  # share of old messages where there are no stamps, or of ticks off the usual age beside a real clock
+LEAST_OLD = (
+    0.03  # share of old messages where there are no stamps, or of ticks off the usual age beside a real clock
+)
 TINY = 1e-6  # s, what stamps in virtual time resolve
 REAL = 0.1  # of an interval: what stamps of a real clock resolve
 EDGE = 5  # last ticks, the answer to which may not have come
@@ -166,7 +171,9 @@ def laid(run: Run) -> Ticks:
     names = run.columns.get("latency", {}) if run.has("latency") else {}
     rows = {name: column("latency", name)[0] for name in names}
     whole = [np.where(np.isfinite(item), item, -1.0).astype(np.int64) for item in (command, feedback)]
-    return Ticks(whole[0], has_slave, whole[1], has_master, rows, column("latency", "seq")[1])
+    has_rows = np.zeros(size, dtype=bool)
+    has_rows[run.sequences["latency"] if rows else []] = True
+    return Ticks(whole[0], has_slave, whole[1], has_master, rows, has_rows)
 
 
 def on_a_virtual_clock(ticks: Ticks) -> bool:
@@ -323,8 +330,8 @@ def jittered(found: LinkAccount, interval: float) -> Finding | None:
         there = value > TINY
     else:
         low, high = np.percentile(centred, [25.0, 75.0])
-        off = max(1.0 - item.steady for item in found.directions)
-        there = high - low > REAL * interval and off > LEAST_OLD
+        moved = any(item.usual > 0 or 1.0 - item.steady > LEAST_OLD for item in found.directions)
+        there = high - low > REAL * interval and moved
     if not there:
         return None
     kurtosis = float(np.mean(centred**4)) / value**4
@@ -341,7 +348,9 @@ def aged(found: LinkAccount, interval: float) -> Finding | None:
     if not usual or max(usual) == 0:
         return None
     bounds = (max(min(usual) - 1, 0) * interval, max(usual) * interval)
-    text = f"messages are used {' and '.join(map(str, usual))} ticks after their own; no stamps tell it closer"
+    text = (
+        f"messages are used {' and '.join(map(str, usual))} ticks after their own; no stamps tell it closer"
+    )
     return Finding("link.delay", {"delay": (sum(bounds) / 2.0, bounds)}, text, CERTAIN)
 
 
@@ -361,7 +370,10 @@ def lossy(found: LinkAccount) -> Finding | None:
     quick, slow = beta.ppf((0.975, 0.025), ended + 0.5, followed - ended + 0.5)
     values = {
         "probability": (share, (float(min(low, share)), float(max(high, share)))),
-        "burst": (1.0 / leave, (min(1.0 / quick, 1.0 / leave), max(1.0 / slow, 1.0 / leave))),
+        "burst": (
+            float(1.0 / leave),
+            (float(min(1.0 / quick, 1.0 / leave)), float(max(1.0 / slow, 1.0 / leave))),
+        ),
     }
     text = f"{lost} of {tried} messages never came"
     return Finding("link.loss", values, text, certainty(math.sqrt(lost * heavy), 1.0))
@@ -381,65 +393,91 @@ def certainty(value: float, deviation: float) -> float:
 # -- ages alone -----------------------------------------------------------------------------------
 
 
+class Guess(NamedTuple):
+    """A network as the ages alone see it."""
+
+    jitter: float  # s
+    delay: float = 0.0  # s
+    loss: float = 0.0
+    burst: float = 1.0
+
+
+FREE = {
+    "jitter": (0,),
+    "delay": (0, 1),
+    "loss": (0, 2, 3),
+    "all": (0, 1, 2, 3),
+}  # places of a guess that are fitted
+
+
 def scattered(ages: Index, interval: float) -> list[Finding]:
     """Delay, jitter and loss from the ages alone, delay and loss only where they are needed.
 
-    A message that is j ticks old has not come yet with the probability G(j) = p + (1 − p)·e^(−(j·dt − delay)/σ),
-    each on its own, so that P(age > a) = G(0)·G(1)·…·G(a).
+    A message is held at the age a where it has come and none of the a newer ones has: lost each, in runs, or not
+    come within its j ticks, which has the probability e^(−(j·dt − delay)/jitter).
     """
-    if ages.size == 0:
+    counts = np.bincount(np.clip(ages, 0, None)).astype(np.float64) if ages.size else np.zeros(1)
+    if counts[1:].sum() <= LEAST_OLD * counts.sum():
         return []
-    counts = np.bincount(np.clip(ages, 0, None)).astype(np.float64)
-    if counts[1:].sum() < LEAST_OLD * counts.sum():
-        return []
-    fits = {free: fitted(counts, interval, free) for free in ((), (1,), (2,), (1, 2))}
-    free = min(fits, key=lambda key: fits[key][1] + WORTH * len(key))
-    best, _, errors = fits[free]
-    text = f"the age of messages scatters over {int(np.count_nonzero(counts))} ticks; no stamps tell it closer"
-    names = (("link.jitter", "std", 0), ("link.delay", "delay", 1), ("link.loss", "probability", 2))
-    found = []
-    for effect, key, place in names:
-        if place in (0, *free):
-            value, error = best[place], DEPENDENT * errors[place]
-            values = {key: (value, (max(value - 1.96 * error, 0.0), value + 1.96 * error))}
-            if key == "probability":
-                values["burst"] = (1.0, (1.0, math.inf))
-            found.append(Finding(effect, values, text, certainty(value, error)))
+    fits = {name: fitted(counts, interval, places) for name, places in FREE.items()}
+    name = min(fits, key=lambda key: fits[key][1] + WORTH * len(FREE[key]))
+    best, _, errors = fits[name]
+    text = (
+        f"the age of messages scatters over {int(np.count_nonzero(counts))} ticks; no stamps tell it closer"
+    )
+
+    def told(place: int) -> tuple[float, Interval]:
+        value, wide = best[place], math.exp(1.96 * DEPENDENT * min(float(errors[place]), 10.0))
+        return value, (value / wide, value * wide)
+
+    found = [Finding("link.jitter", {"std": told(0)}, text, certainty(1.0, DEPENDENT * errors[0]))]
+    if 1 in FREE[name]:
+        found.append(Finding("link.delay", {"delay": told(1)}, text, certainty(1.0, DEPENDENT * errors[1])))
+    if 2 in FREE[name]:
+        burst, (low, high) = told(3)
+        values = {"probability": told(2), "burst": (burst, (max(low, 1.0), high))}
+        found.append(Finding("link.loss", values, text, certainty(1.0, DEPENDENT * errors[2])))
     return found
 
 
-def unlikely(p: tuple[float, float, float], counts: Array, interval: float) -> float:
-    """−2·log-likelihood of the ages' counts under (jitter, delay, loss)."""
-    jitter, delay, loss = p
-    late = np.exp(-np.clip(np.arange(counts.size) * interval - delay, 0.0, None) / jitter)
-    waiting = np.clip(loss + (1.0 - loss) * late, 1e-9, 1.0 - 1e-9)
-    beyond = counts.sum() - np.cumsum(counts)
-    return -2.0 * float(np.sum(beyond * np.log(waiting) + counts * np.log1p(-waiting)))
+def unlikely(guess: Guess, counts: Array, interval: float) -> float:
+    """−2·log-likelihood of the ages' counts."""
+    waiting = np.clip(np.arange(counts.size) * interval - guess.delay, 0.0, None)
+    late = np.exp(-waiting / guess.jitter).tolist()
+    leave = 1.0 / guess.burst
+    enter = min(leave * guess.loss / (1.0 - guess.loss), 1.0)
+    lost, came, before = guess.loss, 1.0 - guess.loss, 1.0
+    shares = []
+    for share in late:
+        came *= share  # sent, and not there yet
+        shares.append(max(before - lost - came, 1e-12))
+        before = lost + came
+        lost, came = lost * (1.0 - leave) + came * enter, lost * leave + came * (1.0 - enter)
+    return -2.0 * float(counts @ np.log(shares))
 
 
-def fitted(
-    counts: Array, interval: float, free: tuple[int, ...]
-) -> tuple[tuple[float, float, float], float, Array]:
-    """Most likely (jitter, delay, loss) with some of the last two free, −2·log-likelihood, standard deviations."""
+def fitted(counts: Array, interval: float, places: tuple[int, ...]) -> tuple[Guess, float, Array]:
+    """Most likely guess with some places free, −2·log-likelihood, and relative standard deviations."""
     mean = float(counts @ np.arange(counts.size) / counts.sum()) * interval
-    start = np.log([max(mean, 0.2 * interval), max(mean / 2.0, 0.2 * interval), 0.01])
-    places = [0, *free]
+    start = np.log([max(mean / 2.0, 0.2 * interval), max(mean / 2.0, 0.2 * interval), 0.01, 1.0])
 
-    def parameters(x: Array) -> tuple[float, float, float]:
-        p = np.zeros(3)
-        p[places] = np.exp(np.clip(x, -25.0, 0.0))
-        return float(p[0]), float(p[1]), min(float(p[2]), 0.99)
+    def guess(x: Array) -> Guess:
+        jitter, delay, loss, more = (
+            math.exp(min(max(float(x[places.index(place)]), -20.0), 5.0)) if place in places else 0.0
+            for place in range(4)
+        )
+        return Guess(jitter, delay, min(loss, 0.9), 1.0 + more)
 
     def cost(x: Array) -> float:
-        return unlikely(parameters(x), counts, interval)
+        return unlikely(guess(x), counts, interval)
 
-    found = minimize(cost, start[places], method="Nelder-Mead", options={"xatol": 1e-6, "fatol": 1e-6})
-    best = parameters(found.x)
-    errors = np.zeros(3)
-    for place, axis in zip(places, np.eye(len(places)), strict=True):
-        bend = (cost(found.x + 0.02 * axis) - 2.0 * found.fun + cost(found.x - 0.02 * axis)) / 0.02**2
-        errors[place] = best[place] * math.sqrt(2.0 / max(bend, 1.0))
-    return best, float(found.fun), errors
+    options = {"xatol": 1e-5, "fatol": 1e-5, "maxiter": 3000, "maxfev": 3000}
+    found = minimize(cost, start[list(places)], method="Nelder-Mead", options=options)
+    errors = np.zeros(4)
+    for place, axis in zip(places, 0.03 * np.eye(len(places)), strict=True):
+        bend = (cost(found.x + axis) - 2.0 * found.fun + cost(found.x - axis)) / 0.03**2
+        errors[place] = math.sqrt(2.0 / max(bend, 1e-3))
+    return guess(found.x), float(found.fun), errors
 
 
 # -- exchange -------------------------------------------------------------------------------------

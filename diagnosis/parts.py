@@ -22,6 +22,8 @@ from models.substructure import STOREYS
 from models.system import System
 
 EXACT = 1e-4  # share of a computed signal's rms below which a difference is rounding, not gap
+UNREST = 0.05  # share of its largest value from which on a first value is no rest
+PIECE, REACH = 1.0, 10  # s between beginnings of a free damper, ticks to each side that they are read from
 MODEL_ERROR = 1e-3  # share of a measured signal's rms that two good solutions of one model may differ by
 
 
@@ -113,6 +115,8 @@ class LaboratoryA:
 
     def __init__(self, record: Record) -> None:
         self.inputs = {"actuator_command": record.signals["actuator_command"]}
+        first, most = self.inputs["actuator_command"][0], np.max(np.abs(self.inputs["actuator_command"]))
+        self._start = float(first) if abs(first) > UNREST * most else 0.0
         self.measured, self.present = outputs(record, MEASURED_A)
         self.nuisances = nuisances(
             record,
@@ -128,7 +132,7 @@ class LaboratoryA:
 
     def predict(self, system: System) -> Array:
         """Readings of the laboratory."""
-        return replay.laboratory_a(system, self.inputs["actuator_command"])
+        return replay.laboratory_a(system, self.inputs["actuator_command"], self._start)
 
     def first(self, ticks: int) -> LaboratoryA:
         """The laboratory over the first ticks."""
@@ -176,16 +180,13 @@ class LaboratoryB:
         none = np.zeros(record.ticks)
         self.inputs = {name: record.signals.get(name, none) for name in self.devices}
         self.measured, self.present = outputs(record, MEASURED_B)
-        self.nuisances = nuisances(
-            record,
-            (
-                ("table", "frequency"),
-                ("table", "damping_ratio"),
-                ("table", "delay"),
-                *DAMPER,
-            ),
-        )
-        sites = ["table", *(f"sensor.{name}" for name in MEASURED_B if record.has(name))]
+        driven = record.has("table_command") and float(np.ptp(self.inputs["table_command"])) > 0.0
+        self.nuisances = nuisances(record, (*TABLE, *DAMPER) if driven else DAMPER)
+        moving = [
+            name for name, values in zip(MEASURED_B, self.measured.T, strict=True) if np.ptp(values) > 0.0
+        ]
+        sites = [f"sensor.{name}" for name in moving if record.has(name)] + (["table"] if driven else [])
+        self.anew = self.beginnings(record)
         with_damper = record.has("damper_stroke") or record.has("damper_force")
         self.candidates = of_sites((*sites, "damper") if with_damper else tuple(sites))
 
@@ -193,11 +194,33 @@ class LaboratoryB:
         """Readings of the laboratory."""
         none = np.zeros(max(values.size for values in self.inputs.values()))
         command, motor = (self.inputs.get(name, none) for name in self.devices)
-        return replay.laboratory_b(system, command, motor)
+        return replay.laboratory_b(system, command, motor, self.anew)
+
+    def beginnings(self, record: Record) -> Array | None:
+        """Ticks, strokes and rates from which a damper that nothing brings back is replayed anew.
+
+        Without a spring every error of force adds up to a drift for ever, so it is replayed piece by piece, each from
+        the measured motion. The same where a record does not begin at rest.
+        """
+        if not record.has("damper_stroke"):
+            return None
+        stroke, interval = record.signals["damper_stroke"], record.plan.test.interval
+        free = record.plan.damper.stiffness == 0.0
+        if not free and abs(stroke[0]) <= UNREST * float(np.max(np.abs(stroke))):
+            return None
+        length = max(4 * REACH, round(PIECE / interval)) if free else stroke.size
+        rows = []
+        for tick in range(0, stroke.size - 2 * REACH, length):
+            window = np.arange(max(0, tick - REACH), tick + REACH + 1)
+            cubic = np.polynomial.polynomial.polyfit((window - tick) * interval, stroke[window], 3)
+            rows.append((tick, cubic[0], cubic[1]))
+        return np.array(rows)
 
     def first(self, ticks: int) -> LaboratoryB:
         """The laboratory over the first ticks."""
         result: LaboratoryB = cut(self, ticks, {name: values[:ticks] for name, values in self.inputs.items()})
+        if self.anew is not None:
+            result.anew = self.anew[self.anew[:, 0] < ticks]
         return result
 
     def replaced(self, **fields: Any) -> LaboratoryB:
@@ -205,6 +228,11 @@ class LaboratoryB:
         return with_fields(self, fields)
 
 
+TABLE = (
+    ("table", "frequency"),
+    ("table", "damping_ratio"),
+    ("table", "delay"),
+)
 DAMPER = (
     ("damper", "mass"),
     ("damper", "stiffness"),

@@ -36,6 +36,7 @@ ROUGH = 4  # steps of a first fit
 LOST = 100.0  # mean square residual in σ² from which on fitted nominal parameters mean nothing
 FINE = 3  # candidates fitted to their end,
 HOPELESS = 30.0  # as long as they leave no more than this times what the best one leaves
+SEEN = 0.3  # trace over noise that an effect must leave to be named
 CANCELLED = 4.0  # times the gap that one of several effects may make without being a makeshift
 TIED = 9.0  # cost by which hypotheses must differ to be told apart
 
@@ -136,6 +137,8 @@ class Searcher:
         prior, data = before.prior - after.prior, (before.chi - after.chi) / noise
         if max(prior, 0.0) / PRIOR_GAIN + max(data, 0.0) / DATA_GAIN < 1.0 or prior + data <= 0.0:
             return False
+        if self.idle(after):
+            return False
         if before is bare:
             return True
         if prior > PRIOR_GAIN and data > -1.0 and remaining(before) < MATERIAL:
@@ -147,15 +150,23 @@ class Searcher:
             saved > HALF * left and saved > SHARE * whole
         )
 
+    def idle(self, fit: Fit) -> bool:
+        """Whether an effect of a fit does nothing that could be seen."""
+        return any(float(np.max(size)) < SEEN**2 * self.data.group for size in self.changes(fit))
+
+    def changes(self, fit: Fit) -> list[Array]:
+        """Mean square change (signals,) of the residuals without each effect, the rest as it is."""
+        result = []
+        for name in fit.names:
+            rest = {key: values for key, values in fit.values.items() if key != name}
+            change = fitting.at(self.data, rest, fit.z).reduced - fit.reduced
+            result.append(np.mean(np.square(change), axis=0))
+        return result
+
     def cancelling(self, bare: Fit, fit: Fit) -> bool:
         """Whether effects of a fit do far more than the gap they explain, and undo each other."""
         gap = max(float(np.max(np.mean(np.square(bare.reduced), axis=0))), 1.0)
-        for name in fit.names:
-            rest = {key: value for key, value in fit.values.items() if key != name}
-            change = fitting.at(self.data, rest, fit.z).reduced - fit.reduced
-            if float(np.max(np.mean(np.square(change), axis=0))) > CANCELLED**2 * gap:
-                return True
-        return False
+        return any(float(np.max(size)) > CANCELLED**2 * gap for size in self.changes(fit))
 
     def start(self, fit: Fit) -> Fit:
         """A fit over the beginning of the test that holds most of what it leaves, nominal parameters moved back.

@@ -9,13 +9,19 @@ from typing import Literal
 import numpy as np
 
 from diagnosis.fitting import Fit, Problem
-from diagnosis.search import DATA_GAIN, PRIOR_GAIN, Search, exchanged_pair, tied
+from diagnosis.search import DATA_GAIN, PRIOR_GAIN, Search, exchanged_pair, gaps, tied
+from models.registry import Array
 
 Outcome = Literal["none", "explained", "partly", "unknown"]
 
-LEFT, WELL, HALF = 0.5, 0.985, 0.5  # residual over noise, shares of energy explained
+LEFT, WELL, HALF = (
+    0.5,
+    0.15,
+    0.5,
+)  # residual over noise, share of a signal's that is left, of energy explained
 TEMPERATURE = 3.0  # by which score differences are divided before they are odds
-DOUBT = {"explained": 0.03, "partly": 0.35, "unknown": 0.8}  # that it is none of the catalogue
+DOUBT = {"explained": 0.02, "partly": 0.12, "unknown": 0.9}  # that it is none of the catalogue
+CORRELATED = 2.0  # s, longer than what a model leaves is correlated
 COVER = 1.96  # standard deviations of an interval
 
 
@@ -92,8 +98,15 @@ MISSED = 0.3  # systematic residual over noise that is unknown where no effect w
 
 
 def how_well(search: Search) -> Outcome:
-    """How much of the gap the chosen effects explain."""
-    if search.left < LEFT or search.explained > WELL:
+    """How much of the gap the chosen effects explain, in the signal in which they explain least."""
+    if search.left < LEFT:
+        return "explained"
+    group = search.data.group
+    before, after = gaps(search.commissioned, group), gaps(search.chosen, group)
+    worst = max(
+        new.ratio / max(old.ratio, LEFT) for old, new in zip(before, after, strict=True) if new.ratio >= LEFT
+    )
+    if worst < WELL:
         return "explained"
     return "partly" if search.explained > HALF else "unknown"
 
@@ -115,15 +128,33 @@ def equivalents(search: Search) -> tuple[tuple[str, ...], ...]:
     return tuple(tuple(names) for names in sets.values())
 
 
+def scatter(fit: Fit) -> Array:
+    """How much the gradient varies beyond white noise, from its sums over blocks (White 1980, Newey and West 1987).
+
+    What a model leaves comes and goes slowly, so samples are no independent witnesses.
+    """
+    groups, signals = fit.reduced.shape
+    block = max(1, round(CORRELATED / (fit.data.system.plan.test.interval * fit.data.group)))
+    count = groups // block
+    if count < 4:
+        return fit.jacobian.T @ fit.jacobian
+    slopes = fit.jacobian.reshape(groups, signals, -1)[: count * block]
+    steps = np.einsum("gs,gsp->gp", fit.reduced[: count * block], slopes)
+    sums = steps.reshape(count, block, -1).sum(axis=1)
+    seen: Array = sums.T @ sums - fit.jacobian.T @ fit.jacobian
+    values, vectors = np.linalg.eigh(0.5 * (seen + seen.T))
+    return (vectors * np.maximum(values, 0.0)) @ vectors.T
+
+
 def intervals(fit: Fit) -> dict[str, dict[str, Interval]]:
     """Parameters of a fit's effects with their 95 % intervals, from the curvature of its cost."""
     count = fit.z.size
     problem = Problem(fit.data, fit.values)
     size = count + len(problem.frees)
-    noise = max(1.0, fit.chi / fit.reduced.size)
-    information = fit.jacobian.T @ fit.jacobian / noise
+    information = fit.jacobian.T @ fit.jacobian
     information[:count, :count] += np.eye(count)
-    covariance = np.linalg.pinv(information + 1e-12 * np.trace(information) * np.eye(size))
+    inverse = np.linalg.pinv(information + 1e-12 * np.trace(information) * np.eye(size))
+    covariance = inverse + inverse @ scatter(fit) @ inverse
     result: dict[str, dict[str, Interval]] = {}
     low, high = problem.bounds()
     place = problem.place(fit.values, fit.z)

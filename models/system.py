@@ -64,6 +64,7 @@ class DamperEffects:
     friction: float = 0.0  # N
     friction_velocity: float = 1e-6  # m/s, below which it falls off
     force_limit: float = math.inf  # N
+    offset: float = 0.0  # N, a constant force on the moving mass
     stop_stroke: float = math.inf  # m
     stop_stiffness: float = 0.0  # N/m
 

@@ -31,6 +31,7 @@ from models.effects import (
     damper_gain,
     damper_mass,
     damper_motor_lag,
+    damper_offset,
     damper_stiffness,
     damper_stroke_stop,
     damper_viscous,
@@ -103,6 +104,7 @@ FILES = (
     damper_gain.EFFECT,
     damper_force_limit.EFFECT,
     damper_stroke_stop.EFFECT,
+    damper_offset.EFFECT,
 )
 
 READINGS = (

@@ -135,5 +135,5 @@ def loaded(limits: Array, servo: float, displacement: float, reaction: float) ->
     compliance, stiffness = limits[COMPLIANCE], limits[STIFFNESS]
     pushed = servo - compliance * (reaction - stiffness * displacement)
     wanted = pushed / (1.0 + compliance * stiffness)
-    half = 0.5 * limits[BACKLASH]
+    half = 0.5 * limits[BACKLASH] / (1.0 + compliance * stiffness)
     return min(max(displacement, wanted - half), wanted + half)

@@ -15,21 +15,32 @@ from models.registry import Array
 from models.system import System
 
 
-def laboratory_a(system: System, command: Array) -> Array:
-    """Readings (ticks, 2) of laboratory A without noise for actuator commands (ticks,) m, from rest."""
+def laboratory_a(system: System, command: Array, start: float = 0.0) -> Array:
+    """Readings (ticks, 2) of laboratory A without noise for actuator commands (ticks,) m.
+
+    From rest at a command of `start` m that has been there for long.
+    """
     result = np.empty((command.size, len(MEASURED_A)))
     interval = system.plan.test.interval
     sensors = readings.build(interval, MEASURED_A, system.effects.sensors)
-    play_a(*build_a(system), *sensors, command, interval, result)
+    lab = build_a(system)
+    if start != 0.0:
+        lab.history[:] = start
+        lab.state[: column_lab.FORCE] = system.plan.actuator.gain * start
+    play_a(*lab, *sensors, command, interval, result)
     return result
 
 
-def laboratory_b(system: System, command: Array, motor: Array) -> Array:
-    """Readings (ticks, 4) of laboratory B without noise for table (m) and motor (N) commands, from rest."""
+def laboratory_b(system: System, command: Array, motor: Array, anew: Array | None = None) -> Array:
+    """Readings (ticks, 4) of laboratory B without noise for table (m) and motor (N) commands, from rest.
+
+    `anew` (m, 3) are ticks, ascending, at which the damper begins anew with a stroke (m) and its rate (m/s).
+    """
     result = np.empty((command.size, len(MEASURED_B)))
     interval = system.plan.test.interval
     sensors = readings.build(interval, MEASURED_B, system.effects.sensors)
-    play_b(*build_b(system), *sensors, command, motor, interval, result)
+    begun = np.zeros((0, 3)) if anew is None else anew
+    play_b(*build_b(system), *sensors, command, motor, begun, interval, result)
     return result
 
 
@@ -74,7 +85,7 @@ def play_a(
     result: Array,
 ) -> None:
     """Fill `result` (ticks, 2) from the commands."""
-    displacement, force = 0.0, 0.0
+    displacement, force = state[column_lab.DISPLACEMENT], 0.0
     for tick in range(command.size):
         t = tick * interval
         result[tick, 0] = readings.step(sensors, sensed, 0, displacement, 0.0, t)
@@ -110,13 +121,20 @@ def play_b(
     sensed: Array,
     command: Array,
     motor: Array,
+    anew: Array,
     interval: float,
     result: Array,
 ) -> None:
     """Fill `result` (ticks, 4) from the commands."""
     y, acceleration, stroke, force = 0.0, 0.0, 0.0, 0.0
+    next_one = 0
     for tick in range(command.size):
         t = tick * interval
+        if next_one < anew.shape[0] and tick == int(anew[next_one, 0]):
+            stroke = anew[next_one, 1]
+            state[table_lab.STROKE] = stroke
+            state[table_lab.STROKE_RATE] = anew[next_one, 2]
+            next_one += 1
         result[tick, 0] = readings.step(sensors, sensed, 0, y, 0.0, t)
         result[tick, 1] = readings.step(sensors, sensed, 1, acceleration, 0.0, t)
         result[tick, 2] = readings.step(sensors, sensed, 2, stroke, 0.0, t)

@@ -126,7 +126,8 @@ def felt(
     if effects[FRICTION] != 0.0:
         contact = effects[PRESLIDING]
         cell[SLIDER] = min(max(cell[SLIDER] + moved, -contact), contact)
-        result += effects[FRICTION] * cell[SLIDER] / contact * np.tanh(abs(rate) / effects[FRICTION_VELOCITY])
+        left = 1.0 if effects[FRICTION_VELOCITY] <= 1e-6 else np.tanh(abs(rate) / effects[FRICTION_VELOCITY])
+        result += effects[FRICTION] * cell[SLIDER] / contact * left
     cell[REACTION] = result
     result += effects[VISCOUS] * rate
     if effects[INERTIA] != 0.0 and cell[LAST_STEP] > 0.0:

@@ -31,6 +31,8 @@ INPUTS = 5  # columns behind the states: command before and after, motor command
 # places in `limits`
 PRESENT, TABLE_GAIN, PLAY, TABLE_FRICTION, MOTOR_GAIN, FORCE_LIMIT, FRICTION, STOP, STOP_STIFFNESS = range(9)
 TABLE_VELOCITY, VELOCITY = 9, 10  # below which the frictions fall off
+OFFSET = 12
+IDEAL = 11  # interval (s) of a table that follows at once, 0 for any other
 
 
 class TableLab(NamedTuple):
@@ -44,7 +46,7 @@ class TableLab(NamedTuple):
     limits: Array  # effects that no matrix holds
     history: Array  # table commands written, newest first
     state: Array  # (n,), n = 6, or 8 with an oil column
-    scratch: Array  # (n + 6,), the last the command behind the play
+    scratch: Array  # (n + 7,), the last two the command behind the play and an ideal table's last velocity
 
 
 def build(
@@ -72,6 +74,7 @@ def build(
     limits = [float(present), on_table.gain, on_table.backlash, on_table.friction, on_damper.gain]
     limits += [on_damper.force_limit, on_damper.friction, on_damper.stop_stroke, on_damper.stop_stiffness]
     limits += [on_table.friction_velocity, on_damper.friction_velocity]
+    limits += [interval if math.isinf(table.frequency) else 0.0, on_damper.offset]
     return TableLab(
         segments.taps,
         matrices,
@@ -79,7 +82,7 @@ def build(
         np.array(limits),
         np.zeros(segments.memory),
         np.zeros(size),
-        np.zeros(size + INPUTS + 1),
+        np.zeros(size + INPUTS + 2),
     )
 
 
@@ -111,6 +114,7 @@ def advance(
     """
     size = state.size
     before, after, motor, rail, drag, played = size, size + 1, size + 2, size + 3, size + 4, size + 5
+    start = state[TABLE]
     present = limits[PRESENT] != 0.0
     scratch[motor] = motor_command
     scratch[rail] = 0.0
@@ -140,6 +144,12 @@ def advance(
             for column in range(size + INPUTS):
                 value += matrices[i, row, column] * scratch[column]
             state[row] = value
+    if (
+        limits[IDEAL] > 0.0
+    ):  # its velocity steps; what an accelerometer sees of that is the mean over the interval
+        velocity = (state[TABLE] - start) / limits[IDEAL]
+        state[ACCELERATION] = (velocity - scratch[played + 1]) / limits[IDEAL]
+        scratch[played + 1] = velocity
     force = spring[0] * state[STROKE] + spring[1] * state[STROKE_RATE] + scratch[rail] - state[MOTOR]
     return state[TABLE], state[ACCELERATION], state[STROKE], force
 
@@ -148,11 +158,11 @@ def advance(
 def resist(matrix: Array, limits: Array, scratch: Array, size: int) -> None:
     """Forces of a segment that oppose motion: table friction, then end stop and friction of the damper."""
     rail, drag = size + 3, size + 4
-    scratch[rail] = 0.0
+    scratch[rail] = -limits[OFFSET]
     scratch[drag] = 0.0
     over = abs(scratch[STROKE]) - limits[STOP]
     if over > 0.0:
-        scratch[rail] = limits[STOP_STIFFNESS] * (over if scratch[STROKE] > 0.0 else -over)
+        scratch[rail] += limits[STOP_STIFFNESS] * (over if scratch[STROKE] > 0.0 else -over)
     if limits[TABLE_FRICTION] > 0.0:
         base = BASE_RATE if size > BASE else TABLE_RATE
         most = limits[TABLE_FRICTION] * falling(scratch[base], limits[TABLE_VELOCITY])
@@ -172,7 +182,7 @@ def falling(rate: float, velocity: float) -> float:
 def stopping(matrix: Array, scratch: Array, rate: int, place: int, most: float) -> float:
     """What must be added to input `place` so that state `rate` is zero at the segment's end, up to `most`."""
     free = 0.0
-    for column in range(scratch.size - 1):
+    for column in range(scratch.size - 2):
         free += matrix[rate, column] * scratch[column]
     return min(max(-free / matrix[rate, place], -most), most)
 

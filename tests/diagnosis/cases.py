@@ -43,9 +43,7 @@ def short(duration: float = SECONDS, **test: Any) -> Plan:
 def jitter(seed: int) -> dict[str, float]:
     """How far each nominal parameter is off, in tolerances."""
     draws = np.random.default_rng(seed).normal(0.0, 0.7, len(JITTERED)).clip(-1.5, 1.5)
-    return {
-        f"{table}.{field}": float(draw) for (table, field), draw in zip(JITTERED, draws, strict=True)
-    }
+    return {f"{table}.{field}": float(draw) for (table, field), draw in zip(JITTERED, draws, strict=True)}
 
 
 def tables(base: Plan, effects: Effects, off: Mapping[str, float], seed: int) -> dict[str, Any]:
@@ -53,8 +51,8 @@ def tables(base: Plan, effects: Effects, off: Mapping[str, float], seed: int) ->
     result: dict[str, Any] = {"seed": seed}
     for name, z in off.items():
         table, field = name.split(".")
-        value = getattr(getattr(base, table), field)
-        result.setdefault(table, {})[field] = value * (1.0 + TOLERANCE * z)
+        value = np.asarray(getattr(getattr(base, table), field)) * (1.0 + TOLERANCE * z)
+        result.setdefault(table, {})[field] = value.tolist()
     result["effect"] = [{"name": name, **values} for name, values in effects.items()]
     return result
 
@@ -107,9 +105,7 @@ def named(report: Mapping[str, Any]) -> list[str]:
 def counts_as(report: Mapping[str, Any], effect: str) -> bool:
     """Whether a verdict names an effect, or one that these signals cannot tell from it."""
     sets = [set(names) for names in report["equivalent"]]
-    return any(
-        name == effect or any({name, effect} <= names for names in sets) for name in named(report)
-    )
+    return any(name == effect or any({name, effect} <= names for names in sets) for name in named(report))
 
 
 def estimate(report: Mapping[str, Any], effect: str, parameter: str) -> float:

@@ -16,7 +16,7 @@ from common.plan import Plan
 from common.recording.reader import read
 from diagnosis import fitting, record
 from diagnosis.fitting import Data, Fit
-from diagnosis.parts import Building, LaboratoryA, LaboratoryB, Part
+from diagnosis.parts import MODEL_ERROR, Building, LaboratoryA, LaboratoryB, Part
 from models.effects import CATALOGUE
 from models.registry import Array
 from models.system import System
@@ -47,7 +47,16 @@ def found_z(fit: Fit) -> dict[str, float]:
     ("kind", "sharp"),
     [
         ("a", {"column.stiffness": 0.1, "actuator.delay": 0.3, "actuator.time_constant": 0.3}),
-        ("b", {"table.frequency": 0.2, "table.damping_ratio": 0.3, "damper.stiffness": 0.2, "damper.mass": 0.3}),
+        (
+            "b",
+            {
+                "table.frequency": 0.3,
+                "table.damping_ratio": 0.3,
+                "damper.stiffness": 0.1,
+                "damper.mass": 0.1,
+                "damper.damping": 0.1,
+            },
+        ),
     ],
 )
 def test_commissioning_finds_what_the_laboratories_are(
@@ -57,7 +66,7 @@ def test_commissioning_finds_what_the_laboratories_are(
     wrong, found = jitter(seed), found_z(fit)
     for name, near in sharp.items():
         assert found[name] == pytest.approx(wrong[name], abs=near), name
-    assert fit.chi / fit.reduced.size == pytest.approx(1.0, abs=0.15)  # nothing is left but noise
+    assert 0.5 < fit.chi / fit.reduced.size < 1.15  # nothing is left but noise, of which σ holds more
 
 
 def test_commissioning_finds_what_the_building_is(tmp_path: Path) -> None:
@@ -67,7 +76,9 @@ def test_commissioning_finds_what_the_building_is(tmp_path: Path) -> None:
     whole = record.build(read(tmp_path / "a.mcap"))
     fit = fitting.fit(fitting.prepare(Building(whole), whole), {})
     assert found_z(fit) == pytest.approx(off, abs=0.3)
-    assert found_z(fit)["structure.stiffness"] - found_z(fit)["structure.mass"] == pytest.approx(-1.8, abs=0.2)
+    assert found_z(fit)["structure.stiffness"] - found_z(fit)["structure.mass"] == pytest.approx(
+        -1.8, abs=0.2
+    )
 
 
 def test_a_laboratory_that_is_as_planned_stays_there(cases: Cases) -> None:
@@ -82,7 +93,8 @@ def test_the_noise_is_found(cases: Cases, kind: str, default_plan: Plan) -> None
     planned = [getattr(default_plan.sensors, name) for name in data.part.signals]
     assert data.white == pytest.approx(planned, rel=0.08)
     assert np.all(data.sigma > data.white)
-    assert np.all(data.sigma < 2.5 * data.white)
+    level = np.sqrt(np.mean(data.part.measured**2, axis=0))
+    assert np.all(data.sigma <= data.white + 1.01 * MODEL_ERROR * level)
 
 
 def test_noise_of_white_noise_over_anything_smooth() -> None:
@@ -142,7 +154,7 @@ def test_slopes_are_those_of_finer_differences(cases: Cases, kind: str, values: 
     for place in range(fit.jacobian.shape[1]):
         fine = differences(fit, place, 1e-3)
         off = np.linalg.norm(fit.jacobian[:, place] - fine) / np.linalg.norm(fine)
-        assert off < 0.08, place
+        assert off < 0.12, place
 
 
 def test_a_beginning_holds_most_of_what_is_left(cases: Cases) -> None:

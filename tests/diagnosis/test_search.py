@@ -75,7 +75,9 @@ def test_two_effects_in_one_laboratory_are_both_found(cases: Cases) -> None:
 def test_what_these_signals_cannot_tell_apart_stands_together(cases: Cases, true: str) -> None:
     report = cases.report({true: {"factor": 1.1}})
     assert counts_as(report, true)
-    assert ["column.stiffness", "sensor.column_force.gain"] in [sorted(names) for names in report["equivalent"]]
+    assert ["column.stiffness", "sensor.column_force.gain"] in [
+        sorted(names) for names in report["equivalent"]
+    ]
 
 
 def test_the_gap_of_noise_is_none_and_that_of_a_trend_is_seen() -> None:
@@ -84,7 +86,9 @@ def test_the_gap_of_noise_is_none_and_that_of_a_trend_is_seen() -> None:
     slow = 2.0 * np.sin(np.linspace(0.0, 60.0, 1250))
     found = search.gap(white(0, 1250) + slow, 4)
     assert found.significance > 20.0
-    assert found.ratio == pytest.approx(np.sqrt(2.0) / np.sqrt(4.0), rel=0.15)  # rms over that of a single sample
+    assert found.ratio == pytest.approx(
+        np.sqrt(2.0) / np.sqrt(4.0), rel=0.15
+    )  # rms over that of a single sample
     assert search.gap(np.zeros(5), 4) == (0.0, 0.0)
 
 

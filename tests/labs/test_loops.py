@@ -405,6 +405,38 @@ def test_clocks_that_differ_and_drift_apart_do_not_shift_the_laboratories(
     assert bench.slave._shift_ns == pytest.approx(gain * 4e9, abs=0.8e6)
 
 
+class OneWay:
+    """Every feedback five milliseconds late, no command."""
+
+    def __init__(self, seed: int) -> None:
+        self.seed = seed
+
+    def fate(self, direction: str, seq: int, t: float) -> float | None:
+        return 0.005 if direction == "feedback" else 0.0
+
+
+def test_a_plug_ins_delay_is_in_the_stamps_and_not_in_the_clocks_offset(
+    short_plan: Plan, tmp_path: Path, monkeypatch: Any
+) -> None:
+    monkeypatch.setattr("common.links.find", lambda *_: OneWay)
+    real = dataclasses.replace(reality.as_planned(short_plan), link=Rig("x:OneWay"))
+    path = tmp_path / "one_way.mcap"
+    bench = virtual.assemble(short_plan, real, path)
+    endpoint = bench.endpoints["slave"]
+    assert isinstance(endpoint, MemoryEndpoint)
+    bench.slave.lab.clock = endpoint.clock = SkewedClock(bench.clock, 0.0)
+    bench.slave.lab.heard_ns = endpoint.clock.now()
+    assert virtual.run(bench, lambda: "") is None
+    latency = read(path).columns["latency"]
+    assert latency["seq"].tolist() == list(range(short_plan.ticks))
+    assert np.all(latency["clock_offset"] == 1.0)
+    assert np.allclose(latency["command_one_way"], 0.0, atol=1e-9)
+    assert np.allclose(latency["feedback_one_way"], 0.005, atol=1e-9)
+    assert np.allclose(latency["round_trip"], 0.005, atol=1e-9)
+    assert np.all(latency["feedback_received_ns"] - latency["command_sent_ns"] == 5_000_000)
+    assert np.all(latency["deadline_missed"])  # the answer was not there for the next tick
+
+
 def test_early_stop_by_the_user_is_orderly(short_plan: Plan, tmp_path: Path) -> None:
     path = tmp_path / "stopped.mcap"
     bench = virtual.assemble(short_plan, reality.as_planned(short_plan), path)

@@ -67,6 +67,7 @@ ROWS = {  # parameters and their units, as users write them in a reality
     "damper.gain": {"factor": ""},
     "damper.force_limit": {"force": "N"},
     "damper.stroke_stop": {"stroke": "m", "stiffness": "N/m"},
+    "damper.offset": {"force": "N"},
 }
 for signal, unit in SIGNALS.items():
     ROWS |= {

@@ -21,7 +21,9 @@ def fates(link: ImpairedLink, direction: str, count: int = TICKS) -> list[float 
     return [link.fate(direction, seq, seq * DT) for seq in range(count)]
 
 
-@pytest.mark.parametrize(("jitter", "loss", "burst"), [(0.0002, 0.01, 1.0), (0.005, 0.05, 8.0), (0.001, 0.6, 1.0)])
+@pytest.mark.parametrize(
+    ("jitter", "loss", "burst"), [(0.0002, 0.01, 1.0), (0.005, 0.05, 8.0), (0.001, 0.6, 1.0)]
+)
 def test_delays_and_losses_are_as_asked_for(jitter: float, loss: float, burst: float) -> None:
     found = fates(ImpairedLink(3, delay=0.004, jitter=jitter, loss=loss, burst=burst), "command")
     came = np.array([fate for fate in found if fate is not None])

@@ -1,0 +1,87 @@
+"""Sensors that round, are noisy or miss samples are seen in the samples themselves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from common.recording.reader import read
+from diagnosis import fitting, readings, record
+from diagnosis.parts import LaboratoryA, LaboratoryB
+from diagnosis.readings import Reading
+from diagnosis.record import Record
+from tests.diagnosis.cases import Cases, named
+
+
+def found_in(whole: Record) -> list[Reading]:
+    """Findings as a diagnosis makes them."""
+    steps = readings.steps(whole)
+    datas = [fitting.prepare(kind(whole), whole, steps) for kind in (LaboratoryA, LaboratoryB)]
+    return readings.findings(whole, readings.levels(datas), steps)
+
+
+@pytest.mark.parametrize(
+    ("signal", "step"),
+    [("damper_force", 2.0), ("column_displacement", 5e-5), ("column_force", 1000.0), ("damper_stroke", 1e-4)],
+)
+def test_rounding_is_found_with_its_step(cases: Cases, signal: str, step: float) -> None:
+    (found,) = found_in(cases.record({f"sensor.{signal}.quantization": {"step": step}}, duration=8.0))
+    assert found.effect == f"sensor.{signal}.quantization"
+    assert found.value == pytest.approx(step, rel=1e-9)
+    assert found.ratio > 1.0
+
+
+def test_rounding_far_below_the_noise_is_no_finding(cases: Cases) -> None:
+    whole = cases.record({"sensor.column_force.quantization": {"step": 1.0}}, duration=8.0)
+    assert readings.steps(whole) == {"column_force": pytest.approx(1.0)}
+    assert found_in(whole) == []
+
+
+@pytest.mark.parametrize(
+    ("signal", "rms"), [("column_force", 500.0), ("damper_stroke", 2e-5), ("table_acceleration", 0.05)]
+)
+def test_noise_is_found_with_its_size(cases: Cases, signal: str, rms: float) -> None:
+    (found,) = found_in(cases.record({f"sensor.{signal}.noise": {"rms": rms}}, duration=8.0))
+    assert found.effect == f"sensor.{signal}.noise"
+    assert found.value == pytest.approx(rms, rel=0.05)
+    assert found.interval[0] < found.value < found.interval[1]
+
+
+def test_sensors_as_planned_are_left_in_peace(cases: Cases) -> None:
+    for seed in (0, 1, 2):
+        whole = cases.record(seed=seed, duration=8.0)
+        assert readings.steps(whole) == {}
+        assert found_in(whole) == []
+        assert readings.held(whole, {}) == {}
+
+
+def test_sensors_that_are_all_noisier_than_planned_are_not_blamed(cases: Cases) -> None:
+    whole = cases.record(duration=8.0)
+    datas = [fitting.prepare(kind(whole), whole) for kind in (LaboratoryA, LaboratoryB)]
+    loud = {name: 1.9 * level for name, level in readings.levels(datas).items()}
+    assert readings.findings(whole, loud, {}) == []
+
+
+def test_repeated_samples_are_counted(cases: Cases) -> None:
+    run = read(cases.file(duration=8.0))
+    force = run.columns["slave"]["damper_force"].copy()
+    missed = np.arange(100, 4000, 100)
+    force[missed] = force[missed - 1]
+    run.columns["slave"]["damper_force"] = force
+    found = readings.held(record.build(run), {})
+    assert set(found) == {"damper_force"}
+    assert found["damper_force"] == pytest.approx(missed.size / 4000, rel=0.01)
+
+
+def test_a_sensor_that_stands_still_has_missed_nothing(cases: Cases) -> None:
+    run = read(cases.file(duration=8.0))
+    run.columns["slave"]["damper_force"] = np.zeros(4000)
+    assert readings.held(record.build(run), {}) == {}
+
+
+def test_noise_and_rounding_stand_in_the_report(cases: Cases) -> None:
+    report = cases.report({"sensor.column_force.noise": {"rms": 500.0}}, duration=8.0)
+    assert named(report) == ["sensor.column_force.noise"]
+    assert [site["site"] for site in report["where"]] == ["sensor.column_force"]
+    rounded = cases.report({"sensor.damper_force.quantization": {"step": 2.0}}, duration=8.0)
+    assert named(rounded) == ["sensor.damper_force.quantization"]

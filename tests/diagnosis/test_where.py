@@ -1,0 +1,131 @@
+"""Shares of a gap, and the sites that residuals speak for."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from diagnosis import fitting, where
+from diagnosis.fitting import Data
+from diagnosis.parts import Building, LaboratoryA, LaboratoryB
+from diagnosis.where import Trace
+from models.registry import Array
+from tests.diagnosis.cases import Cases, white
+
+PLAYERS = ("actuator", "column", "table", "damper", "link")
+WORTH = st.floats(-1e3, 1e3)
+
+
+def subsets(count: int) -> list[frozenset[str]]:
+    """All sets of the first players."""
+    return [
+        frozenset(names)
+        for size in range(count + 1)
+        for names in itertools.combinations(PLAYERS[:count], size)
+    ]
+
+
+@st.composite
+def games(draw: st.DrawFn) -> tuple[tuple[str, ...], Mapping[frozenset[str], float]]:
+    """Players, and what every set of them is worth."""
+    count = draw(st.integers(1, 4))
+    return PLAYERS[:count], {subset: draw(WORTH) for subset in subsets(count)}
+
+
+@given(games())
+def test_shares_sum_to_the_total(game: tuple[tuple[str, ...], Mapping[frozenset[str], float]]) -> None:
+    players, worth = game
+    found = where.shapley(players, worth.__getitem__)
+    total = worth[frozenset(players)] - worth[frozenset()]
+    assert sum(share for share, _, _ in found.values()) == pytest.approx(total, abs=1e-6)
+
+
+@given(games())
+def test_the_order_of_players_does_not_matter(
+    game: tuple[tuple[str, ...], Mapping[frozenset[str], float]],
+) -> None:
+    players, worth = game
+    one, other = (where.shapley(order, worth.__getitem__) for order in (players, players[::-1]))
+    for name in players:
+        assert one[name] == pytest.approx(other[name], abs=1e-6)
+
+
+@given(st.lists(WORTH, min_size=5, max_size=5))
+def test_players_that_do_the_same_get_the_same(by_size: list[float]) -> None:
+    found = where.shapley(PLAYERS[:4], lambda subset: by_size[len(subset)])
+    shares = [share for share, _, _ in found.values()]
+    assert shares == pytest.approx([shares[0]] * 4, abs=1e-6)
+
+
+@given(st.lists(WORTH, min_size=5, max_size=5), WORTH)
+def test_of_sites_that_add_up_each_has_what_it_brings(values: list[float], none: float) -> None:
+    alone = dict(zip(PLAYERS, values, strict=True))
+    found = where.shapley(PLAYERS, lambda subset: none + sum(alone[name] for name in subset))
+    for name, (share, first, last) in found.items():
+        assert share == pytest.approx(alone[name], abs=1e-6)
+        assert first == pytest.approx(share, abs=1e-6)
+        assert last == pytest.approx(share, abs=1e-6)
+
+
+def test_a_site_that_does_nothing_gets_nothing() -> None:
+    found = where.shapley(PLAYERS[:3], lambda subset: float(len(subset - {"table"}) ** 2))
+    assert found["table"] == (0.0, 0.0, 0.0)
+    assert found["column"] == found["actuator"] == (2.0, 1.0, 3.0)
+
+
+SITES = {
+    "column": ("a", {"column.friction": {"force": 900.0}}),
+    "actuator": ("a", {"actuator.backlash": {"width": 3e-4}}),
+    "damper": ("b", {"damper.friction": {"force": 3.0}}),
+    "table": ("b", {"table.gain": {"factor": 0.93}}),
+    "sensor.table_acceleration": ("b", {"sensor.table_acceleration.gain": {"factor": 1.2}}),
+    "sensor.damper_force": ("b", {"sensor.damper_force.gain": {"factor": 1.2}}),
+    "sensor.column_displacement": ("a", {"sensor.column_displacement.bias": {"offset": 1e-4}}),
+    "structure": ("building", {"structure.damping": {"factor": 1.3}}),
+}
+PARTS = {"a": LaboratoryA, "b": LaboratoryB, "building": Building}
+
+
+def spoilt(cases: Cases, kind: str, effects: fitting.Values) -> Data:
+    """A part whose readings show effects, with noise."""
+    whole = cases.record(duration=8.0)
+    data = fitting.prepare(PARTS[kind](whole), whole)
+    truth = data.part.predict(fitting.lay(data, np.zeros(len(data.part.nuisances)), effects))
+    data.part.measured = truth + data.white * white(5, *truth.shape)
+    return data
+
+
+@pytest.mark.parametrize("site", SITES)
+def test_what_no_effect_explains_is_placed_by_the_signals_that_show_it(cases: Cases, site: str) -> None:
+    kind, effects = SITES[site]
+    data = spoilt(cases, kind, effects)
+    trace = where.unexplained(data, fitting.at(data, {}, np.zeros(len(data.part.nuisances))))
+    assert trace.site == site
+    assert trace.ratio > 0.3
+    assert trace.series.shape == (4000,)
+
+
+@pytest.mark.parametrize("site", SITES)
+def test_the_trace_of_an_effect_is_what_it_changes(cases: Cases, site: str) -> None:
+    kind, effects = SITES[site]
+    data = spoilt(cases, kind, effects)
+    (trace,) = where.traces(data, fitting.at(data, effects, np.zeros(len(data.part.nuisances))))
+    assert trace.site == site
+    assert trace.ratio == pytest.approx(float(np.sqrt(np.mean(trace.series**2))))
+    assert trace.ratio > 1.0
+    assert trace.signal in data.part.signals
+
+
+def test_when_and_at_which_frequency(cases: Cases) -> None:
+    whole = cases.record(duration=8.0)
+    t = whole.time
+    burst: Array = np.where((t >= 2.0) & (t < 5.0), 10.0, 0.0) * np.sin(2.0 * np.pi * 4.0 * t)
+    trace = Trace("damper", burst, 6.0, "damper_force", 1.0)
+    assert where.when(trace, whole) == [[2.0, 5.0]]
+    low, high = where.frequencies(trace, whole)
+    assert 3.0 < low < 4.0 < high < 5.0

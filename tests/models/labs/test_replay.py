@@ -1,0 +1,176 @@
+"""One part alone under a recorded input gives the readings that the whole test had."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from common.plan import Plan
+from models import substructure
+from models.closed_loop import Rollout, signals, simulate
+from models.effects import CATALOGUE, lay
+from models.effects.effect import Effect
+from models.labs import replay
+from models.system import ColumnEffects, Effects, System
+
+Array = NDArray[np.float64]
+
+EACH = pytest.mark.parametrize("effect", CATALOGUE.values(), ids=list(CATALOGUE))
+MOTOR = substructure.DAMPER_COMMAND
+COMMAND = substructure.ACTUATOR_COMMAND
+IN_SHORT_STEPS = ("viscous", "friction", "inertia")  # of the column: rates count
+
+
+@pytest.fixture(scope="module")
+def plan(default_plan: Plan) -> Plan:
+    return default_plan.with_test(duration=3.0)
+
+
+def ground(system: System) -> Array:
+    motion = substructure.motion(system.plan)
+    return substructure.ground_rows(system.plan, motion, system.effects.time_shift)
+
+
+def rollout(system: System) -> Rollout:
+    return simulate(system.plan, ground(system), effects=system.effects)
+
+
+def strong(effect: Effect) -> dict[str, float]:
+    """The strongest size, the shape at its default."""
+    item = next(item for item in effect.parameters if not item.shape)
+    null = 0.0 if math.isinf(item.null) else item.null
+    sizes = sorted(item.sizes, key=lambda size: abs(size - null))
+    return {item.name: sizes[0] if math.isinf(item.null) else sizes[-1]}
+
+
+@EACH
+def test_each_laboratory_alone_reads_to_the_bit_what_it_read_in_the_loop(effect: Effect, plan: Plan) -> None:
+    system = lay(System(plan), [(effect.name, strong(effect))])
+    found = rollout(system)
+    assert found.finite
+    a = replay.laboratory_a(system, found.outputs[:, COMMAND].copy())
+    b = replay.laboratory_b(system, found.table_command, found.outputs[:, MOTOR].copy())
+    assert a.tobytes() == found.measured_a.tobytes()
+    assert b.tobytes() == found.measured_b.tobytes()
+
+
+@EACH
+def test_the_building_alone_computes_what_it_computed_in_the_loop(effect: Effect, plan: Plan) -> None:
+    system = lay(System(plan), [(effect.name, strong(effect))])
+    found = rollout(system)
+    displacement, force = found.measured_a.T.copy()
+    got = replay.building(system, ground(system), displacement, force, found.damper_force_used)
+    assert got.tobytes() == found.outputs.tobytes()
+
+
+def test_a_building_of_three_storeys_too(plan: Plan) -> None:
+    tables = {"mass": (1.6e5,) * 3, "stiffness": (9e7,) * 3, "damping": (4e5,) * 3}
+    system = System(plan).moved("structure", **tables).moved("column", storey=2).moved("damper", floor=3)
+    system = lay(system, [("structure.p_delta", {"stiffness": -1e6}), ("ground.time_shift", {"shift": 0.01})])
+    found = rollout(system)
+    displacement, force = found.measured_a.T.copy()
+    got = replay.building(system, ground(system), displacement, force, found.damper_force_used)
+    assert got.tobytes() == found.outputs.tobytes()
+
+
+def rest(system: System, force: Array, displacement: Array) -> float:
+    """Rms of what the specimen's force has beyond that of the plan's linear model."""
+    return float(np.std(force - system.plan.column.stiffness * displacement))
+
+
+@pytest.mark.parametrize(
+    "name",
+    [name for name in CATALOGUE if name.startswith("column.") and name.split(".")[1] not in IN_SHORT_STEPS],
+)
+def test_the_specimen_alone_feels_what_it_felt_in_the_loop(name: str, plan: Plan) -> None:
+    """Where only the deformation counts, to rounding."""
+    system = lay(System(plan), [(name, strong(CATALOGUE[name]))])
+    found = rollout(system)
+    displacement, force = found.measured_a.T.copy()
+    got = replay.column(system, displacement)
+    assert np.allclose(got, force, rtol=1e-9, atol=1e-6 * np.max(np.abs(force)))
+
+
+@pytest.mark.parametrize(
+    ("effects", "share"),
+    [
+        (ColumnEffects(viscous=40e3), 0.02),
+        (ColumnEffects(friction=900.0), 0.02),
+        (ColumnEffects(friction=900.0, friction_velocity=0.003), 0.02),
+        pytest.param(
+            ColumnEffects(inertia=2000.0),
+            0.2,
+            marks=pytest.mark.xfail(
+                strict=True, reason="straight lines between ticks have no acceleration there"
+            ),
+        ),
+    ],
+    ids=["viscous", "friction", "falling friction", "inertia"],
+)
+def test_the_specimen_alone_with_rates_from_the_ticks(
+    effects: ColumnEffects, share: float, plan: Plan
+) -> None:
+    """Rates come from straight lines between the ticks: near what the servo loop's finer motion gave."""
+    system = System(plan, Effects(column=effects))
+    found = rollout(system)
+    displacement, force = found.measured_a.T.copy()
+    got = replay.column(system, displacement)
+    assert np.std(got - force) < share * rest(system, force, displacement)
+
+
+def test_the_specimen_alone_reads_through_its_load_cell(plan: Plan) -> None:
+    system = lay(
+        System(plan),
+        [
+            ("sensor.column_force.gain", {"factor": 1.07}),
+            ("sensor.column_force.lag", {"time_constant": 0.008}),
+            ("sensor.column_force.bias", {"offset": 300.0}),
+            ("sensor.column_force.drift", {"rate": 30.0}),
+            ("sensor.column_force.quantization", {"step": 100.0}),
+        ],
+    )
+    found = rollout(system)
+    got = replay.column(system, found.measured_a[:, 0].copy())
+    # the loop's deformation is that of the ticks too, so rounding to a step can differ by rounding only
+    assert np.mean(got == found.measured_a[:, 1]) > 0.999
+    assert np.max(np.abs(got - found.measured_a[:, 1])) <= 100.0 + 1e-6
+
+
+def test_a_laboratory_that_begins_at_a_command_stays_there(plan: Plan) -> None:
+    got = replay.laboratory_a(System(plan), np.full(50, 2e-3), 2e-3)
+    assert np.allclose(got[:, 0], 2e-3, rtol=1e-12)
+    assert np.allclose(got[1:, 1], 12.5e6 * 2e-3, rtol=1e-12)
+
+
+@pytest.mark.parametrize("tick", [0, 40])
+def test_a_damper_that_begins_anew_swings_freely_from_there(tick: int, plan: Plan) -> None:
+    anew, none = np.array([[tick, 0.03, 0.1]]), np.zeros(800)
+    got = replay.laboratory_b(System(plan), none, none, anew)[:, 2]
+    assert not got[:tick].any()
+    natural, rate = math.sqrt(56.8 / 16.0), 6.0 / 32.0
+    damped, t = math.sqrt(natural**2 - rate**2), plan.test.interval * np.arange(800 - tick)
+    swing = 0.03 * np.cos(damped * t) + (0.1 + rate * 0.03) / damped * np.sin(damped * t)
+    assert np.allclose(got[tick:], np.exp(-rate * t) * swing, atol=1e-12)
+
+
+def test_the_noise_alone_lies_between_a_noisy_loop_and_its_replay(plan: Plan) -> None:
+    found = simulate(plan, ground(System(plan)), seed=8)
+    system = System(plan)
+    a = replay.laboratory_a(system, found.outputs[:, COMMAND].copy())
+    b = replay.laboratory_b(system, found.table_command, found.outputs[:, MOTOR].copy())
+    nominal = signals(plan, found)
+    for name, truth in (
+        ("column_displacement", a[:, 0]),
+        ("column_force", a[:, 1]),
+        ("table_displacement", b[:, 0]),
+        ("table_acceleration", b[:, 1]),
+        ("damper_stroke", b[:, 2]),
+        ("damper_force", b[:, 3]),
+    ):
+        residual = nominal[name] - truth
+        assert residual.std() == pytest.approx(getattr(plan.sensors, name), rel=0.06), name
+        neighbours = np.corrcoef(residual[1:], residual[:-1])[0, 1]
+        assert abs(neighbours) < 4.0 / math.sqrt(residual.size), name
