@@ -27,6 +27,7 @@ PRIOR_GAIN, DATA_GAIN = 6.25, 25.0  # what an effect must save: of tolerances, o
 REST = 0.85  # share of what is left that a further effect must explain,
 SUSPICIOUS = 8.0  # of Σ z²: nominal parameters that are all off together stand in for an effect
 TRACE = 2e-4  # and more than this share of the whole gap,
+LOUD, STEP_OF_REST, STEP_OF_WHOLE = 10.0, 0.4, 0.01  # the same where much more than noise is left
 HALF, SHARE = 0.5, 0.03  # or this share of what is left and this of the whole gap
 NEAR = 1.0  # tolerances from the nominal value where fits begin: what is further away stands in for an effect
 STEPS = 6  # steps between two weightings of a further fit
@@ -146,6 +147,8 @@ class Searcher:
         if self.cancelling(bare, after):
             return False
         left, saved, whole = excess(before), excess(before) - excess(after), excess(bare)
+        if remaining(before) > LOUD:  # far from any noise a model may well be refined in small steps
+            return saved > STEP_OF_REST * left and saved > STEP_OF_WHOLE * whole
         return (saved > REST * left and saved > TRACE * whole) or (
             saved > HALF * left and saved > SHARE * whole
         )

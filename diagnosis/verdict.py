@@ -19,6 +19,7 @@ LEFT, WELL, HALF = (
     0.15,
     0.5,
 )  # residual over noise, share of a signal's that is left, of energy explained
+SMALL = 0.05  # of a signal's rms that may be left where a gap is called explained
 TEMPERATURE = 3.0  # by which score differences are divided before they are odds
 DOUBT = {"explained": 0.02, "partly": 0.12, "unknown": 0.9}  # that it is none of the catalogue
 CORRELATED = 2.0  # s, longer than what a model leaves is correlated
@@ -106,7 +107,13 @@ def how_well(search: Search) -> Outcome:
     worst = max(
         new.ratio / max(old.ratio, LEFT) for old, new in zip(before, after, strict=True) if new.ratio >= LEFT
     )
-    if worst < WELL:
+    level = np.sqrt(np.mean(np.square(search.data.part.measured), axis=0))
+    left = max(
+        new.ratio * sigma / size
+        for new, sigma, size in zip(after, search.data.sigma, level, strict=True)
+        if size > 0.0
+    )
+    if worst < WELL and left < SMALL:
         return "explained"
     return "partly" if search.explained > HALF else "unknown"
 

@@ -17,7 +17,7 @@ from master.rig import ColumnLab
 from master.step import MasterStep
 from models import substructure
 from models.closed_loop import build_a
-from models.labs import column_lab, noise
+from models.labs import column_lab, noise, readings
 from models.realised import true_system
 from models.registry import Array
 from models.system import System
@@ -84,3 +84,4 @@ def warm_up(reality: Reality) -> None:
     """Compile the kernels on arrays that are thrown away."""
     master_step(reality)(0, 0.0, 0.0, 0.0)
     column_lab.advance(*build_a(true_system(reality)), 0.0)
+    readings.step(*readings.build(reality.plan.test.interval, ("any",), {}), 0, 0.0, 0.0, 0.0)

@@ -11,7 +11,7 @@ from common.plugins import construct, find
 from common.reality import Reality
 from common.rig import GuardedRig, TableMeasurement
 from models.closed_loop import build_b
-from models.labs import noise, table_lab
+from models.labs import noise, readings, table_lab
 from models.realised import true_system
 from slave.loop import NO_COMMAND, SlaveLoop
 from slave.rig import TableLab
@@ -48,5 +48,6 @@ def build_loop(setting: Setting, reality: Reality, link: LinkModel) -> SlaveLoop
     """The slave's loop, its kernels compiled."""
     plan = reality.plan
     table_lab.advance(*build_b(true_system(reality)), 0.0, 0.0)
+    readings.step(*readings.build(plan.test.interval, ("any",), {}), 0, 0.0, 0.0, 0.0)
     SlaveStep(plan)(NO_COMMAND, TableMeasurement(0.0, 0.0, 0.0, 0.0))
     return SlaveLoop(setting, build_rig(reality), link)

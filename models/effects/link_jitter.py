@@ -1,8 +1,8 @@
 """Messages take varying times.
 
-    delay of a message = max(delay + n, 0),    n random with mean 0 and standard deviation std
+    delay of a message = delay + n,    n exponential: mean and standard deviation are std
 
-with the delay of `link.delay`, each direction alike. What counts is how many intervals a message is late.
+with the delay of `link.delay`, which no message beats, each direction alike. What counts is how many intervals a message is late.
 Not to be confused with noise of the damper's force: the age of each message tells them apart.
 """
 
@@ -33,6 +33,6 @@ EFFECT = Effect(
             says="standard deviation",
         ),
     ),
-    reference="delay of a message = max(delay + n, 0), n of standard deviation std",
+    reference="delay of a message = delay + n, n exponential of standard deviation std",
     apply=apply,
 )

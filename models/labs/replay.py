@@ -26,7 +26,11 @@ def laboratory_a(system: System, command: Array, start: float = 0.0) -> Array:
     lab = build_a(system)
     if start != 0.0:
         lab.history[:] = start
-        lab.state[: column_lab.FORCE] = system.plan.actuator.gain * start
+        there = system.plan.actuator.gain * start
+        lab.state[: column_lab.FORCE] = there
+        parts = (lab.code, lab.params, lab.memory, lab.effects, lab.yielding, lab.yielded, lab.cell)
+        lab.state[column_lab.FORCE] = specimen.force(*parts, there, interval)
+        lab.cell[specimen.RATE] = lab.cell[specimen.LAST_STEP] = 0.0
     play_a(*lab, *sensors, command, interval, result)
     return result
 
@@ -85,7 +89,7 @@ def play_a(
     result: Array,
 ) -> None:
     """Fill `result` (ticks, 2) from the commands."""
-    displacement, force = state[column_lab.DISPLACEMENT], 0.0
+    displacement, force = state[column_lab.DISPLACEMENT], state[column_lab.FORCE]
     for tick in range(command.size):
         t = tick * interval
         result[tick, 0] = readings.step(sensors, sensed, 0, displacement, 0.0, t)

@@ -160,9 +160,10 @@ def resist(matrix: Array, limits: Array, scratch: Array, size: int) -> None:
     rail, drag = size + 3, size + 4
     scratch[rail] = -limits[OFFSET]
     scratch[drag] = 0.0
-    over = abs(scratch[STROKE]) - limits[STOP]
-    if over > 0.0:
-        scratch[rail] += limits[STOP_STIFFNESS] * (over if scratch[STROKE] > 0.0 else -over)
+    middle = scratch[STROKE] + 0.5 * matrix[STROKE, STROKE_RATE] * scratch[STROKE_RATE]
+    over = abs(middle) - limits[STOP]
+    if over > 0.0:  # at the segment's middle, which keeps the energy of a bounce
+        scratch[rail] += limits[STOP_STIFFNESS] * (over if middle > 0.0 else -over)
     if limits[TABLE_FRICTION] > 0.0:
         base = BASE_RATE if size > BASE else TABLE_RATE
         most = limits[TABLE_FRICTION] * falling(scratch[base], limits[TABLE_VELOCITY])

@@ -14,6 +14,7 @@ from diagnosis import fitting, where
 from diagnosis.fitting import Data
 from diagnosis.parts import Building, LaboratoryA, LaboratoryB
 from diagnosis.where import Trace
+from models.effects import CATALOGUE, checked, lay
 from models.registry import Array
 from tests.diagnosis.cases import Cases, white
 
@@ -78,7 +79,7 @@ def test_a_site_that_does_nothing_gets_nothing() -> None:
     assert found["column"] == found["actuator"] == (2.0, 1.0, 3.0)
 
 
-SITES = {
+SITES: dict[str, tuple[str, fitting.Values]] = {
     "column": ("a", {"column.friction": {"force": 900.0}}),
     "actuator": ("a", {"actuator.backlash": {"width": 3e-4}}),
     "damper": ("b", {"damper.friction": {"force": 3.0}}),
@@ -95,7 +96,7 @@ def spoilt(cases: Cases, kind: str, effects: fitting.Values) -> Data:
     """A part whose readings show effects, with noise."""
     whole = cases.record(duration=8.0)
     data = fitting.prepare(PARTS[kind](whole), whole)
-    truth = data.part.predict(fitting.lay(data, np.zeros(len(data.part.nuisances)), effects))
+    truth = data.part.predict(lay(data.system, tuple(effects.items())))
     data.part.measured = truth + data.white * white(5, *truth.shape)
     return data
 
@@ -114,7 +115,8 @@ def test_what_no_effect_explains_is_placed_by_the_signals_that_show_it(cases: Ca
 def test_the_trace_of_an_effect_is_what_it_changes(cases: Cases, site: str) -> None:
     kind, effects = SITES[site]
     data = spoilt(cases, kind, effects)
-    (trace,) = where.traces(data, fitting.at(data, effects, np.zeros(len(data.part.nuisances))))
+    whole = {name: checked(CATALOGUE[name], values) for name, values in effects.items()}
+    (trace,) = where.traces(data, fitting.at(data, whole, np.zeros(len(data.part.nuisances))))
     assert trace.site == site
     assert trace.ratio == pytest.approx(float(np.sqrt(np.mean(trace.series**2))))
     assert trace.ratio > 1.0

@@ -1,0 +1,96 @@
+"""The test that tells candidates apart, and silence where there is nothing to tell."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from diagnosis import fitting, next_test
+from diagnosis.fitting import Data, Values
+from diagnosis.next_test import Choice
+from diagnosis.parts import LaboratoryA
+from models.effects import CATALOGUE, checked
+from tests.diagnosis.cases import Cases
+
+
+def laboratory(cases: Cases) -> Data:
+    """A clean laboratory A."""
+    whole = cases.record(duration=8.0)
+    return fitting.prepare(LaboratoryA(whole), whole)
+
+
+def hypothesis(data: Data, effect: str, **given: float) -> fitting.Fit:
+    """One effect at given parameters."""
+    values: Values = {effect: checked(CATALOGUE[effect], given)}
+    return fitting.at(data, values, np.zeros(len(data.part.nuisances)))
+
+
+def scaled(data: Data, factor: float) -> Data:
+    """The same motion at another scale."""
+    part = data.part
+    assert isinstance(part, LaboratoryA)
+    inputs = {name: factor * values for name, values in part.inputs.items()}
+    return dataclasses.replace(data, part=part.replaced(inputs=inputs))
+
+
+def test_larger_motion_separates_what_depends_on_amplitude(cases: Cases) -> None:
+    data = laboratory(cases)
+    yielding = hypothesis(data, "column.yielding", yield_displacement=2e-3)
+    softer = hypothesis(data, "column.stiffness", factor=0.95)
+    apart = [next_test.separation(scaled(data, factor), yielding, softer) for factor in (0.25, 0.5, 1.0, 2.0)]
+    assert apart == sorted(apart)
+    assert apart[-1] > 10.0 * apart[0]
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+def test_no_motion_separates_a_stiffness_from_a_gain(cases: Cases, factor: float) -> None:
+    data = laboratory(cases)
+    stiffer = hypothesis(data, "column.stiffness", factor=1.1)
+    gain = hypothesis(data, "sensor.column_force.gain", factor=1.1)
+    assert next_test.separation(scaled(data, factor), stiffer, gain) < 1.0
+
+
+def test_a_hypothesis_is_not_separated_from_itself(cases: Cases) -> None:
+    data = laboratory(cases)
+    one = hypothesis(data, "column.friction", force=900.0)
+    assert next_test.separation(data, one, one) < 1e-6
+
+
+def test_the_menu_stays_within_what_was_reached_or_says_so(cases: Cases) -> None:
+    data = laboratory(cases)
+    part = data.part
+    assert isinstance(part, LaboratoryA)
+    largest = float(np.max(np.abs(part.inputs["actuator_command"])))
+    tests = next_test.menu(data)
+    names = [name for name, _ in tests]
+    assert len(set(names)) == len(names) == 6
+    for _, item in tests:
+        assert isinstance(item.part, LaboratoryA)
+        assert float(np.max(np.abs(item.part.inputs["actuator_command"]))) <= 2.0 * largest * (1 + 1e-9)
+    assert part.inputs["actuator_command"] is not None  # the recording's own are as they were
+
+
+def test_what_is_explained_and_unambiguous_needs_no_test(cases: Cases) -> None:
+    report = cases.report({"column.friction": {"force": 900.0}})
+    assert report["equivalent"] == []
+    assert report["next_test"] == ""
+    assert report["details"]["next"] == []
+
+
+def test_what_no_motion_separates_asks_for_a_look_at_the_sensor(cases: Cases) -> None:
+    report = cases.report({"column.stiffness": {"factor": 1.1}})
+    assert "check the sensor" in report["next_test"]
+    assert "No motion at hand separates" in report["next_test"]
+    assert report["details"]["next"][0]["separation"] < next_test.ENOUGH
+
+
+def test_the_advice_in_words() -> None:
+    assert next_test.sentence([]) == ""
+    best = Choice("a sine", 12.4, ("column.slip", "column.pinching"))
+    other = Choice("slow cycles", 2.0, ("column.slip", "column.friction"))
+    assert next_test.sentence([best, other]) == (
+        "Run a sine: it separates column.slip from column.pinching by 12 standard deviations of the noise."
+    )
+    assert next_test.sentence([other], str.upper).startswith("No motion at hand separates COLUMN.SLIP")

@@ -1,0 +1,118 @@
+"""The report as a whole: its schema, its sums, its honesty, and that it is the same every time."""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rths.diagnose import diagnose_file
+from rths.diagnosis_report import page
+from rths.diagnosis_report.schema import schema
+from tests.diagnosis.cases import Cases, Effects
+
+KINDS: dict[str, Effects] = {
+    "clean": {},
+    "one": {"column.friction": {"force": 900.0}},
+    "two": {"column.friction": {"force": 900.0}, "damper.friction": {"force": 3.0}},
+    "tied": {"column.stiffness": {"factor": 1.1}},
+    "link": {"link.delay": {"delay": 0.004}},
+    "reading": {"sensor.damper_force.quantization": {"step": 2.0}},
+}
+SECONDS = {"link": 8.0, "reading": 8.0}
+
+
+def report_of(cases: Cases, kind: str) -> dict[str, Any]:
+    """The report of a kind of case."""
+    return cases.report(KINDS[kind], duration=SECONDS.get(kind, 10.0))
+
+
+def numbers(value: Any) -> Iterator[float]:
+    """All floats within plain values."""
+    if isinstance(value, dict):
+        for item in value.values():
+            yield from numbers(item)
+    elif isinstance(value, list):
+        for item in value:
+            yield from numbers(item)
+    elif isinstance(value, float):
+        yield value
+    else:
+        assert value is None or type(value) in (int, str, bool), type(value)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_report_is_whole(cases: Cases, kind: str) -> None:
+    report = report_of(cases, kind)
+    keeps_to_its_schema(report)
+    adds_up(report)
+    shows_on_a_page(report)
+
+
+def keeps_to_its_schema(report: dict[str, Any]) -> None:
+    """Plain values without NaN, as published."""
+    jsonschema = pytest.importorskip("jsonschema")
+    text = json.dumps(report, allow_nan=False)
+    assert json.loads(text) == report
+    jsonschema.Draft202012Validator(schema()).validate(json.loads(text))
+    assert all(map(math.isfinite, numbers(report)))
+
+
+def adds_up(report: dict[str, Any]) -> None:
+    """Shares sum to one; probabilities are sorted and no more than one."""
+    shares = [entry["share"] for entry in report["where"]]
+    assert shares == sorted(shares, reverse=True)
+    assert sum(shares) == pytest.approx(1.0 if shares else 0.0)
+    sites = [entry["site"] for entry in report["where"]]
+    assert len(set(sites)) == len(sites)
+    others = [entry["probability"] for entry in report["which"][1:]]
+    assert others == sorted(others, reverse=True)
+    assert report["which"][0]["probability"] >= max(others, default=0.0)
+    assert sum(others) + report["which"][0]["probability"] <= 1.0 + 1e-9
+    for entry in report["which"]:
+        assert set(entry["effects"]) == set(entry["parameters"])
+    assert report["which"][0]["held_out_score"] == 0.0
+
+
+def shows_on_a_page(report: dict[str, Any]) -> None:
+    """One page that loads nothing, the same every time."""
+    text = page.page(report)
+    assert page.page(json.loads(json.dumps(report))) == text
+    assert text.startswith("<!doctype html>")
+    assert text.rstrip().endswith("</html>")
+    assert "nan" not in text.lower().replace("nano", "")
+    assert not any(word in text for word in ('src="http', 'href="http', "@import", "<script src"))
+
+
+def test_a_report_says_nothing_of_the_case_but_the_files_name(cases: Cases, tmp_path: Path) -> None:
+    original, report = cases.file(KINDS["one"]), report_of(cases, "one")
+    renamed = tmp_path / "sensor.damper_force.gain-seed-77.mcap"
+    shutil.copyfile(original, renamed)
+    again = diagnose_file(renamed)
+    assert again["details"]["test"].pop("file") == renamed.name
+    assert report["details"]["test"]["file"] == original.name
+    less = json.loads(json.dumps(report))
+    less["details"]["test"].pop("file")
+    assert json.dumps(again) == json.dumps(less)  # to the last byte, and the same in a second run
+    for text in (json.dumps(less), page.page(report).replace(original.name, "")):
+        assert str(cases.folder) not in text
+        assert str(original) not in text
+        assert "reality" not in text.lower()
+        assert "seed" not in text.lower()
+
+
+def test_what_was_diagnosed_before_does_not_matter(cases: Cases) -> None:
+    first = diagnose_file(cases.file(KINDS["reading"], duration=8.0))
+    diagnose_file(cases.file(KINDS["link"], duration=8.0))
+    assert json.dumps(diagnose_file(cases.file(KINDS["reading"], duration=8.0))) == json.dumps(first)
+
+
+def test_what_could_not_have_appeared_is_listed_and_not_named(cases: Cases) -> None:
+    report = report_of(cases, "one")
+    assert not set(report["not_exercised"]) & set(report["which"][0]["effects"])
+    assert len(set(report["not_exercised"])) == len(report["not_exercised"])

@@ -1,0 +1,34 @@
+"""A fixed part of the blind trial, as users run it: real recordings, the diagnosis in a process of its own."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+HOME = Path(__file__).resolve().parents[2]
+CASES = 12
+
+
+def test_the_diagnosis_meets_withheld_effects(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "rths", "blind", "--cases", str(CASES), "--duration", "20"]
+    command += ["--jobs", "2", "--seed", "7", "-o", str(tmp_path / "trial"), "--json"]
+    done = subprocess.run(
+        command,
+        capture_output=True,
+        text=True,
+        cwd=HOME,
+        env={**os.environ, "PYTHONPATH": str(HOME)},
+        timeout=500,
+    )
+    assert done.returncode in (0, 1), done.stderr
+    result = json.loads(done.stdout)
+    cases = result["cases"]
+    assert len(cases) == CASES
+    plain = [case for case in cases if case["kind"] in ("catalogue", "formula") and case["size"] >= 2.0]
+    assert plain
+    assert all(case["named"] for case in plain)
+    assert all(case["status"] == "no_gap" for case in cases if case["kind"] == "clean")
+    assert (tmp_path / "trial" / "index.html").exists()
