@@ -41,6 +41,7 @@ SENSORS = {
 }
 SMOOTH = 0.03  # of the largest velocity, where a friction may begin to fall off
 FARTHEST = 4.0  # times a usual size where a search still begins
+LAGS = (6.0, 26.0)  # factors where the plan believes in no lag: 5 and 25 ms
 LIMITS = (0.25, 0.4, 0.55, 0.7, 0.85, 0.95)  # of what is reached: where a limit is looked for
 
 
@@ -49,6 +50,7 @@ class Scales:
 
     def __init__(self, record: Record, shift: float = 0.0) -> None:
         self._shift = shift
+        self._quick = record.plan.actuator.time_constant == 0.0
         self._reached: dict[tuple[str, str], float] = {}
         for key, name in SIGNAL.items():
             if record.has(name):
@@ -104,6 +106,8 @@ class Scales:
         """Sizes of the parameter that counts."""
         if effect.name == "ground.time_shift" and self._shift != 0.0:
             return [self._shift]
+        if effect.name == "actuator.time_constant" and self._quick:
+            return list(LAGS)
         key = (self.group(effect), parameter.unit)
         reached = self._reached.get(key)
         if effect.name == "damper.force_limit":

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +17,7 @@ from diagnosis import fitting
 from diagnosis.fitting import Data, Fit, Values, excess
 from diagnosis.scales import Scales
 from diagnosis.screening import WORKERS, Candidate, screen
+from models.effects import CATALOGUE
 from models.registry import Array
 
 FITTED = 6  # candidates that are fitted in full at every step
@@ -118,7 +119,7 @@ class Searcher:
                 break
             better = self.extended(chosen)
         chosen = self.pruned(commissioned, chosen)
-        return Search(self.data, commissioned, chosen, self.alternatives(chosen, first))
+        return physical(Search(self.data, commissioned, chosen, self.alternatives(chosen, first)))
 
     def enough(self, bare: Fit, fit: Fit) -> bool:
         """Whether nothing is left that a further effect could earn its place by."""
@@ -138,20 +139,11 @@ class Searcher:
         prior, data = before.prior - after.prior, (before.chi - after.chi) / noise
         if max(prior, 0.0) / PRIOR_GAIN + max(data, 0.0) / DATA_GAIN < 1.0 or prior + data <= 0.0:
             return False
-        if self.idle(after):
-            return False
-        if before is bare:
-            return True
+        if before is bare or self.idle(after):
+            return not self.idle(after)
         if prior > PRIOR_GAIN and data > -1.0 and remaining(before) < MATERIAL:
             return True
-        if self.cancelling(bare, after):
-            return False
-        left, saved, whole = excess(before), excess(before) - excess(after), excess(bare)
-        if remaining(before) > LOUD:  # far from any noise a model may well be refined in small steps
-            return saved > STEP_OF_REST * left and saved > STEP_OF_WHOLE * whole
-        return (saved > REST * left and saved > TRACE * whole) or (
-            saved > HALF * left and saved > SHARE * whole
-        )
+        return not self.cancelling(bare, after) and refines(bare, before, after)
 
     def idle(self, fit: Fit) -> bool:
         """Whether an effect of a fit does nothing that could be seen."""
@@ -239,10 +231,29 @@ class Searcher:
         return tuple(sorted(result, key=lambda item: item.cost))
 
 
+def refines(bare: Fit, before: Fit, after: Fit) -> bool:
+    """Whether a further effect takes away enough of what is left, and of the whole gap."""
+    left, saved, whole = excess(before), excess(before) - excess(after), excess(bare)
+    if remaining(before) > LOUD:  # far from any noise a model may well be refined in small steps
+        return saved > STEP_OF_REST * left and saved > STEP_OF_WHOLE * whole
+    return (saved > REST * left and saved > TRACE * whole) or (saved > HALF * left and saved > SHARE * whole)
+
+
 def tied(search: Search, other: Fit) -> bool:
     """Whether the data cannot tell another fit from the chosen one."""
     noise = max(1.0, search.chosen.chi / search.chosen.reduced.size)
     return (other.cost - search.chosen.cost) / noise < TIED
+
+
+def physical(search: Search) -> Search:
+    """The search with a machine's effect in front where the data cannot tell it from a sensor's."""
+    measured = sum(CATALOGUE[name].kind == "measurement" for name in search.chosen.names)
+    for other in search.alternatives:
+        artefacts = sum(CATALOGUE[name].kind == "measurement" for name in other.names)
+        if artefacts < measured and len(other.names) == len(search.chosen.names) and tied(search, other):
+            rest = [search.chosen, *(item for item in search.alternatives if item is not other)]
+            return replace(search, chosen=other, alternatives=tuple(rest))
+    return search
 
 
 def exchanged_pair(chosen: Fit, other: Fit) -> tuple[str, str] | None:

@@ -2,7 +2,8 @@
 
     factor·T·ẏ + y = K·u(t − L)
 
-Nothing changes where the plan has T = 0. Not to be confused with `actuator.delay`: at low frequency both
+Where the plan believes in no lag at all, the factor counts as if it believed in one of 1 ms and the lag is
+`(factor − 1)·1 ms`. Not to be confused with `actuator.delay`: at low frequency both
 are a delay; only the lag loses amplitude as the frequency rises.
 """
 
@@ -14,8 +15,12 @@ from models.system import System
 
 def apply(system: System, factor: float) -> System:
     """Time constant multiplied by `factor`."""
-    return system.scaled("actuator", "time_constant", factor)
+    believed = system.plan.actuator.time_constant
+    lag = believed + (factor - 1.0) * (believed or LEAST_LAG)
+    return system if factor == 1.0 else system.moved("actuator", time_constant=max(lag, 0.0))
 
+
+LEAST_LAG = 1e-3  # s
 
 EFFECT = Effect(
     name="actuator.time_constant",
@@ -23,7 +28,7 @@ EFFECT = Effect(
     kind="physics",
     says="the servo loop is slower or faster",
     parameters=(
-        Parameter("factor", "", null=1.0, least=0.1, most=10.0, sizes=(0.7, 0.85, 0.94, 1.06, 1.15, 1.3)),
+        Parameter("factor", "", null=1.0, least=0.1, most=100.0, sizes=(0.7, 0.85, 0.94, 1.06, 1.15, 1.3)),
     ),
     reference="factor·T·ẏ + y = K·u(t − L)",
     apply=apply,

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from common.errors import InputError
-from common.recording.reader import Run, read
+from common.recording.reader import GROUND, Run, read
 from diagnosis import record
 from diagnosis.diagnose import parts_of
 from tests.diagnosis.cases import Cases, short
@@ -26,7 +27,7 @@ def without(run: Run, topic: str, *names: str) -> Run:
     return run
 
 
-def kept(run: Run, topic: str, rows: np.ndarray) -> Run:  # type: ignore[type-arg]
+def kept(run: Run, topic: str, rows: NDArray[np.int64]) -> Run:
     """The recording with some messages of a topic only."""
     run.columns[topic] = {name: values[rows] for name, values in run.columns[topic].items()}
     run.sequences[topic] = run.sequences[topic][rows]
@@ -136,8 +137,8 @@ def test_another_plan_believes_in_another_motion(cases: Cases) -> None:
 
 def test_a_longer_recording_than_its_ground_goes_on_with_the_last_value(cases: Cases) -> None:
     run = run_of(cases)
-    rows = np.frombuffer(run.attachments[record.GROUND], dtype="<f8").reshape(2, -1)[:, :3000]
-    run.attachments[record.GROUND] = rows.tobytes()
+    rows = np.frombuffer(run.attachments[GROUND], dtype="<f8").reshape(2, -1)[:, :3000]
+    run.attachments[GROUND] = rows.tobytes()
     found = record.build(run).ground
     assert found is not None
     assert found.shape == (2, 5001)

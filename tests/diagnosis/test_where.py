@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import pytest
@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from diagnosis import fitting, where
 from diagnosis.fitting import Data
-from diagnosis.parts import Building, LaboratoryA, LaboratoryB
+from diagnosis.parts import Building, LaboratoryA, LaboratoryB, Part
+from diagnosis.record import Record
 from diagnosis.where import Trace
 from models.effects import CATALOGUE, checked, lay
 from models.registry import Array
@@ -89,7 +90,7 @@ SITES: dict[str, tuple[str, fitting.Values]] = {
     "sensor.column_displacement": ("a", {"sensor.column_displacement.bias": {"offset": 1e-4}}),
     "structure": ("building", {"structure.damping": {"factor": 1.3}}),
 }
-PARTS = {"a": LaboratoryA, "b": LaboratoryB, "building": Building}
+PARTS: dict[str, Callable[[Record], Part]] = {"a": LaboratoryA, "b": LaboratoryB, "building": Building}
 
 
 def spoilt(cases: Cases, kind: str, effects: fitting.Values) -> Data:
