@@ -10,6 +10,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from common.errors import InputError
+from common.plan import Plan
 from diagnosis import fitting, link, readings, report
 from diagnosis.fitting import Data, Values
 from diagnosis.ground import Ground
@@ -23,6 +24,7 @@ from diagnosis.verdict import Verdict, judge
 from models.effects import CATALOGUE
 from models.system import System
 
+SHORTEST = 0.5  # s of a test that anything can be said of
 AGAINST = -0.7  # correlation from which on a sign is doubted
 
 
@@ -44,9 +46,14 @@ class Diagnosis:
         names += [item.effect for item in self.readings] + [item.effect for item in self.link]
         return [name for name in names if CATALOGUE[name].site == site]
 
-    def system(self, sites: frozenset[str] | None = None) -> System:
-        """The plan with parameters moved inside their tolerances and the effects found, of some sites or of all."""
-        system = System(self.record.plan)
+    def system(
+        self, sites: frozenset[str] | None = None, plan: Plan | None = None, *, noisy: bool = True
+    ) -> System:
+        """A plan with parameters moved inside their tolerances and the effects found, of some sites or of all.
+
+        The recording's own plan where none is given; without added noise of sensors where not `noisy`.
+        """
+        system = System(plan or self.record.plan)
         for verdict in self.verdicts:
             fit = verdict.search.chosen
             kept = {
@@ -57,7 +64,7 @@ class Diagnosis:
             system = laid(system, verdict, kept)
         for reading in self.readings:
             site = CATALOGUE[reading.effect].site
-            if sites is None or site in sites:
+            if (sites is None or site in sites) and (noisy or not reading.effect.endswith(".noise")):
                 system = CATALOGUE[reading.effect].apply(system, **{reading.parameter: reading.value})
         return system
 
@@ -88,8 +95,13 @@ def diagnose(record: Record, validation: Sequence[Record] = ()) -> dict[str, Any
 def examine(record: Record) -> Diagnosis:
     """Judge every part of a recording."""
     found = Diagnosis(record)
-    if record.ticks < LEAST_TICKS:
+    if record.ticks < LEAST_TICKS or record.ticks * record.plan.test.interval < SHORTEST:
         return found
+    if record.other_plan:
+        found.warnings.append(
+            "The plan given asks for another structure, compensation or control than the recording's own: "
+            "the response gap holds that as well."
+        )
     rounded = readings.steps(record)
     parts = parts_of(record, found.warnings)
     if not parts:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from diagnosis.diagnose import Diagnosis
     from diagnosis.record import Mask, Record
 
+QUIET = 0.2  # noise over a signal's rms from which on a part alone is not judged by it
 PLAYERS = 6  # sites among which shares are computed exactly
 DRAWS = 200  # of the bootstrap
 
@@ -50,7 +51,7 @@ class Judge:
 
     def signals(self, sites: frozenset[str] | None) -> Mapping[str, Array] | None:
         """Simulated response with the effects of some sites, of all where None."""
-        system = self.found.system(sites)
+        system = self.found.system(sites, self.record.plan)
         if self.loop is not None:
             linked = bool(self.found.link) and (sites is None or "link" in sites)
             moved = loop.noised(system, {}) if system.plan is self.record.plan else system
@@ -73,9 +74,7 @@ class Judge:
         if self.loop is not None:
             return self.loop.gap(simulated, chosen)
         known = simulated or {}
-        names = [
-            name for name in RESPONSE if name in known and self.record.has(name) and np.ptp(known[name]) > 0.0
-        ]
+        names = [name for name in RESPONSE if name in known and self.record.has(name) and self.moves(name)]
         result = {}
         for name in names or [name for name in known if self.record.has(name)]:
             there = self.record.present[name] & chosen
@@ -85,13 +84,20 @@ class Judge:
             result[name] = float(np.sqrt(np.mean(error**2) / level)) if level > 0.0 else 0.0
         return result
 
+    def moves(self, name: str) -> bool:
+        """Whether a signal stands well out of its noise."""
+        level = float(np.sqrt(np.mean(self.record.signals[name] ** 2)))
+        return level > 0.0 and self.found.white.get(name, 0.0) < QUIET * level
+
     def floor(self) -> dict[str, float]:
         """Gap that noise alone makes."""
         if self.loop is not None:
-            return self.loop.floor(self.found.system(), self.found.white, self.mask)
+            system = self.found.system(plan=self.record.plan, noisy=False)
+            return self.loop.floor(system, self.found.white, self.mask)
         result = {}
         for name, white in self.found.white.items():
-            level = float(np.mean(self.record.signals[name] ** 2))
+            there = self.record.present[name] & self.mask
+            level = float(np.mean(self.record.signals[name][there] ** 2)) if there.any() else 0.0
             result[name] = white / float(np.sqrt(level)) if level > 0.0 else 0.0
         return result
 
@@ -181,7 +187,7 @@ def bare(found: Diagnosis, own: Judge) -> Mapping[str, Array] | None:
     from models.system import System
 
     if own.loop is not None:
-        return own.loop.simulate(System(found.record.plan), linked=False)
+        return own.loop.simulate(System(own.record.plan), linked=False)
     return {
         name: series
         for verdict in found.verdicts

@@ -86,7 +86,8 @@ def played(data: Data, truth: Array) -> Data:
     """The data of a test that has given `truth`."""
     part = data.part
     if isinstance(part, LaboratoryA | LaboratoryB):
-        part = part.replaced(measured=truth, present=np.ones(truth.shape, dtype=bool))
+        read = np.broadcast_to(part.present.any(axis=0), truth.shape).copy()
+        part = part.replaced(measured=np.where(read, truth, 0.0), present=read)
     return replace(data, part=part)
 
 

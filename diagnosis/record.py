@@ -31,6 +31,7 @@ class Record:
     signals: dict[str, Array]
     present: dict[str, Mask]
     ground: Array | None  # (2, ticks + 1) as the plan believes it, None where it is not known
+    other_plan: bool = False  # whether the building or its control were other than this plan's
 
     def has(self, *names: str) -> bool:
         """Whether all these signals are there for most of the test."""
@@ -69,13 +70,15 @@ def build(run: Run, plan: Plan | None = None, *, against_ideal: bool = False) ->
             if not np.issubdtype(values.dtype, np.number):
                 continue
             signals[name], present[name] = laid_out(np.asarray(values, dtype=np.float64), places, ticks)
+    tables = ("structure", "compensator", "control", "column")
+    other = own is not None and any(getattr(own, name) != getattr(chosen, name) for name in tables)
     if against_ideal:
         chosen = ideal(chosen)
         for command, target in (("actuator_command", "column_target"), ("table_command", "table_target")):
             if target in signals:
                 signals[command], present[command] = wanted(signals, present, target)
     known = plan is None or (own is not None and own.ground_motion == plan.ground_motion)
-    return Record(chosen, run, ticks, signals, present, believed_ground(run, chosen, ticks, known))
+    return Record(chosen, run, ticks, signals, present, believed_ground(run, chosen, ticks, known), other)
 
 
 def wanted(signals: dict[str, Array], present: dict[str, Mask], target: str) -> tuple[Array, Mask]:

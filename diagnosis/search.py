@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from diagnosis import fitting
+from diagnosis import contact, fitting
 from diagnosis.fitting import Data, Fit, Values, excess
 from diagnosis.scales import Scales
 from diagnosis.screening import WORKERS, Candidate, screen
@@ -196,7 +196,23 @@ class Searcher:
             fits = sorted([*pool.map(fine, hopeful), *rest], key=lambda item: item.cost)
         if fits and remaining(fits[0]) > MATERIAL:
             fits[0] = fitting.fit(self.data, fits[0].values, fits[0].z, STEPS, rounds=3)
-        return fits
+        return self.with_stop(fit, fits)
+
+    def with_stop(self, fit: Fit, fits: list[Fit]) -> list[Fit]:
+        """The fits, and one with an end stop where all the others miss loudly."""
+        known = {effect.name for effect in self.data.part.candidates}
+        if (
+            not fits
+            or remaining(fits[0]) < LOUD
+            or contact.EFFECT in fit.names
+            or contact.EFFECT not in known
+        ):
+            return fits
+        found = contact.stopped(self.data, fit)
+        rest = [item for item in fits if contact.EFFECT not in item.names]
+        if found is None or found.cost > min(item.cost for item in fits):
+            return fits
+        return sorted([found, *rest], key=lambda item: item.cost)
 
     def without(self, fit: Fit, name: str) -> Fit:
         """The fit again with one effect taken away."""

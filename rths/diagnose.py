@@ -40,17 +40,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Diagnose and report; 0 whatever the verdict is."""
+    for path in (args.html, args.json):
+        if path and str(path) != "-":
+            writable(path)
     report = diagnose_file(args.file, plan=args.plan, validate=args.validate, against_ideal=args.ideal)
     if args.html:
         from rths.diagnosis_report import page
 
-        page.write(report, writable(args.html))
+        page.write(report, args.html)
     if args.json:
         text = json.dumps(report, allow_nan=False) + "\n"
         if str(args.json) == "-":
             sys.stdout.write(text)
             return 0
-        writable(args.json).write_text(text, encoding="utf-8")
+        args.json.write_text(text, encoding="utf-8")
     from rths.diagnosis_report import terminal
 
     sys.stdout.write(terminal.summary(report) + "\n")
@@ -59,6 +62,8 @@ def run(args: argparse.Namespace) -> int:
 
 def writable(path: Path) -> Path:
     """The path, if a file can be written there; raises InputError."""
+    if path.is_dir():
+        raise InputError(f"Cannot write {path}: it is a folder; give the name of a file.")
     try:
         path.touch()
     except OSError as error:

@@ -69,9 +69,6 @@ def test_shares_of_two_sites_sum_to_one(cases: Cases) -> None:
     assert sum(row["shapley"] for row in rows) == pytest.approx(closed - report["how_far"]["after"], rel=0.35)
 
 
-@pytest.mark.xfail(
-    reason="found.system() keeps the scale of the diagnosed test: Judge must lay it over its own plan"
-)
 def test_another_recording_of_the_laboratories_judges(cases: Cases) -> None:
     effects = FOUND["column"]
     other = cases.file(effects, scale=0.15, duration=8.0)
@@ -110,12 +107,7 @@ def test_without_a_loop_the_parts_are_judged_by_themselves(cases: Cases) -> None
 @pytest.mark.parametrize(
     "effects",
     [
-        pytest.param(
-            {"sensor.column_force.noise": {"rms": 500.0}},
-            marks=pytest.mark.xfail(
-                reason="the floor adds the effect's noise to the measured one, which holds it"
-            ),
-        ),
+        {"sensor.column_force.noise": {"rms": 500.0}},
         {"sensor.damper_force.quantization": {"step": 2.0}},
     ],
     ids=["noise", "rounding"],

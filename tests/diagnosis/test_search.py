@@ -40,7 +40,6 @@ def test_an_effect_is_found_with_its_size(
 STOP: Effects = {"damper.stroke_stop": {"stroke": 0.04, "stiffness": 2000.0}}
 
 
-@pytest.mark.xfail(strict=False, reason="fits of an end stop end in local minima")
 def test_an_end_stop_is_found_with_its_stroke(cases: Cases) -> None:
     report = cases.report(STOP)
     assert named(report) == ["damper.stroke_stop"]
