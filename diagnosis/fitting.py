@@ -319,7 +319,7 @@ def fit(
     for _ in range(rounds):
         missed = np.maximum(1.0, np.mean(np.square(found.reduced), axis=0))
         before, found = found, moved(data, found, steps, slopes, 1.0 / np.sqrt(missed))
-        if before.chi - found.chi < 1.0 + 1e-3 * excess(found):
+        if abs(before.chi - found.chi) < 1.0 + 1e-3 * excess(found):
             break
     return found
 

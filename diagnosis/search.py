@@ -185,13 +185,14 @@ class Searcher:
         def fine(item: Fit) -> Fit:
             z = np.clip(item.z, -NEAR, NEAR)
             if self.data.part.exact:  # cheap, and free of noise: fits go to their end
-                return fitting.fit(self.data, item.values, z)
+                return fitting.fit(self.data, item.values, z, rounds=8)
             better = fitting.fit(near.data, item.values, z, STEPS, rounds=2)
             return fitting.fit(self.data, better.values, better.z, LAST, rounds=1)
 
         with ThreadPoolExecutor(WORKERS) as pool:
             fits = sorted(pool.map(rough, promising), key=lambda item: item.cost)
             hopeful = [item for item in fits if excess(item) <= HOPELESS * excess(fits[0])][:FINE]
+            hopeful = fits if self.data.part.exact else hopeful
             rest = [fitting.at(self.data, item.values, item.z) for item in fits[len(hopeful) :]]
             fits = sorted([*pool.map(fine, hopeful), *rest], key=lambda item: item.cost)
         if fits and remaining(fits[0]) > MATERIAL:

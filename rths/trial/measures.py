@@ -136,7 +136,11 @@ def further(outcomes: Sequence[Outcome]) -> list[Measure]:
         rate(f"right effect first, {name}", [i for i in kind(outcomes, name) if i.visible], lambda i: i.named)
         for name in ("catalogue", "formula")
     ]
+    strange = [item for item in kind(outcomes, "unknown") if item.visible]
+    pairs = [item for item in kind(outcomes, "pair") if item.visible]
     return [
+        rate("unknown effect that is visible: said so, site right", strange, lambda item: item.right),
+        rate("both of a pair whose strongest is visible", pairs, lambda item: item.named),
         *by_kind,
         rate("right effect first, all sizes", singles, lambda item: item.named),
         rate("right site first, all sizes", singles, lambda item: item.located),
