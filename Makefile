@@ -24,7 +24,8 @@ check: setup
 	$(BIN)/mypy
 
 test: check
-	$(BIN)/pytest
+	$(BIN)/pytest -n 2 --ignore=tests/system
+	$(BIN)/pytest tests/system
 
 benchmark: setup
 	$(BIN)/python -m benchmarks

@@ -1,0 +1,78 @@
+"""A drive without a spring, imported: friction and a constant force found although its replay from rest would drift."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from rths.diagnose import diagnose_file
+from rths.import_ import add_arguments, run
+
+Array = NDArray[np.float64]
+MASS, DASHPOT, FRICTION, OFFSET = 95.0, 200.0, 20.0, 3.0
+INTERVAL, SUBSTEPS, SECONDS, PERIOD = 0.002, 20, 12.0, 5.0
+
+
+def wanted(t: float) -> float:
+    """Point to point and back, 0.1 m, with rests between."""
+    place = (t % PERIOD) / PERIOD
+    share = min(max((place if place < 0.5 else place - 0.5) / 0.4, 0.0), 1.0)
+    smooth = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+    return 0.1 * (smooth if place < 0.5 else 1.0 - smooth)
+
+
+def drive() -> tuple[Array, Array]:
+    """Motor force N and position m in closed position control, by small explicit steps with sticking."""
+    count = round(SECONDS / INTERVAL)
+    force, position = np.empty(count), np.empty(count)
+    x, v, h = 0.0, 0.0, INTERVAL / SUBSTEPS
+    for k in range(count):
+        position[k] = x
+        force[k] = 38880.0 * (wanted(k * INTERVAL) - x) - 1944.0 * v
+        for _ in range(SUBSTEPS):
+            push = force[k] - DASHPOT * v + OFFSET
+            if abs(v) < 1e-9 and abs(push) < FRICTION:
+                v = 0.0
+                continue
+            against = np.sign(v) if abs(v) >= 1e-9 else np.sign(push)
+            after = v + h * (push - FRICTION * against) / MASS
+            v = 0.0 if v * after < 0.0 else float(after)
+            x += h * v
+    return force, position + 1e-6 * np.random.default_rng(3).standard_normal(count)
+
+
+def test_friction_of_a_drive_without_a_spring(tmp_path: Path) -> None:
+    import argparse
+
+    force, position = drive()
+    np.savetxt(
+        tmp_path / "drive.csv", np.column_stack([force, position]), delimiter=",", header="F,q", comments=""
+    )
+    (tmp_path / "drive.toml").write_text(
+        f'[test]\nname = "drive"\ninterval = {INTERVAL}\n'
+        f"[damper]\nmass = {MASS}\nstiffness = 0.0\ndamping = {DASHPOT}\nmotor_time_constant = 0.0\n"
+        "[sensors]\ndamper_stroke = 1e-6\n"
+    )
+    (tmp_path / "map.toml").write_text(
+        f'plan = "drive.toml"\nrate = {1.0 / INTERVAL}\n[signals]\n'
+        'damper_command = { column = "F" }\ndamper_stroke = { column = "q" }\ntable_acceleration = { value = 0.0 }\n'
+    )
+    parser = argparse.ArgumentParser()
+    add_arguments(parser)
+    words = [
+        str(tmp_path / "drive.csv"),
+        "--map",
+        str(tmp_path / "map.toml"),
+        "-o",
+        str(tmp_path / "drive.mcap"),
+    ]
+    assert run(parser.parse_args(words)) == 0
+    report = diagnose_file(tmp_path / "drive.mcap")
+    first = report["which"][0]
+    assert set(first["effects"]) == {"damper.friction", "damper.offset"}
+    assert first["parameters"]["damper.friction"]["force"]["value"] == pytest.approx(FRICTION, rel=0.02)
+    assert first["parameters"]["damper.offset"]["force"]["value"] == pytest.approx(OFFSET, rel=0.05)
+    assert report["where"][0]["site"] == "damper"
