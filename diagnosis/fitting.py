@@ -84,15 +84,21 @@ def prepare(part: Part, record: Record, steps: Mapping[str, float] | None = None
     """
     system = System(record.plan)
     interval = record.plan.test.interval
-    group = max(1, round(AVERAGED / interval))
-    groups = part.measured.shape[0] // group
-    block = max(1, round(BLOCK / (interval * group)))
-    places = (np.arange(groups) // block) % 5
-    train = ~np.isin(places, HELD_OUT) if groups >= 5 * block else np.arange(groups) % 5 < min(HELD_OUT)
+    group, train = withheld(part.measured.shape[0], interval)
     ones = np.ones(part.measured.shape[1])
     rounded = np.array([(steps or {}).get(name, 0.0) for name in part.signals])
     data = Data(part, system, ones, 0.0 * ones, group, train, rounded)
     return measured_by(data, 0.0 * ones if part.exact else noise(data.residual(system)))
+
+
+def withheld(ticks: int, interval: float) -> tuple[int, Mask]:
+    """How many ticks are averaged, and which of the averaged samples (groups,) fits may see: blocks in turn."""
+    group = max(1, round(AVERAGED / interval))
+    groups = ticks // group
+    block = max(1, round(BLOCK / (interval * group)))
+    if groups < 5 * block:
+        return group, np.arange(groups) % 5 < min(HELD_OUT)
+    return group, ~np.isin((np.arange(groups) // block) % 5, HELD_OUT)
 
 
 def measured_by(data: Data, white: Array) -> Data:

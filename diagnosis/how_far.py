@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from diagnosis import link, loop, where
+from diagnosis import fitting, link, loop, where
 from diagnosis.loop import RESPONSE, UNIT, Loop, closed_share, overall
-from diagnosis.signals import blocks
 from diagnosis.where import Trace
 from models.effects import CATALOGUE
 from models.registry import Array
@@ -178,8 +177,11 @@ def histories(
 
 
 def held_out(record: Record) -> Mask:
-    """Ticks that no fit is judged by."""
-    return blocks.split(record.ticks, record.plan.test.interval)[1]
+    """Ticks that no fit has seen."""
+    group, train = fitting.withheld(record.ticks, record.plan.test.interval)
+    mask = np.zeros(record.ticks, dtype=bool)
+    mask[: train.size * group] = np.repeat(~train, group)
+    return mask
 
 
 def bare(found: Diagnosis, own: Judge) -> Mapping[str, Array] | None:

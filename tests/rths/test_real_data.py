@@ -67,17 +67,9 @@ def test_what_is_left_of_the_force_rigs_gap_is_said(rig: tuple[Path, dict[str, A
     assert report["where"][0]["site"] == "actuator"
 
 
-@pytest.mark.parametrize("name", ["4-D22", "8-D22"])
-def test_a_fibre_column_without_slip_yields(name: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["4-D22", "8-D22", "4-D22_bondslip", "8-D22_bondslip"])
+def test_a_fibre_column_yields_and_softens_with_the_drift_it_has_seen(name: str, tmp_path: Path) -> None:
     report = diagnose_file(imported(COLUMNS / f"column_{name}.csv", f"column_{name}", tmp_path))
-    assert report["which"][0]["effects"] == ["column.yielding"]
+    assert set(report["which"][0]["effects"]) == {"column.yielding", "column.degradation"}
     assert report["status"] == "partly_explained"
-    assert report["how_far"]["after"] < 0.35 * report["how_far"]["before"]
-
-
-@pytest.mark.parametrize("name", ["4-D22_bondslip", "8-D22_bondslip"])
-def test_a_fibre_column_with_slip_softens_with_the_drift_it_has_seen(name: str, tmp_path: Path) -> None:
-    report = diagnose_file(imported(COLUMNS / f"column_{name}.csv", f"column_{name}", tmp_path))
-    assert report["which"][0]["effects"] == ["column.degradation"]
-    assert report["status"] == "partly_explained"
-    assert report["how_far"]["after"] < 0.25 * report["how_far"]["before"]
+    assert report["how_far"]["after"] < 0.15 * report["how_far"]["before"]
