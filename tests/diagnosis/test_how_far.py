@@ -114,7 +114,7 @@ def test_without_a_loop_the_parts_are_judged_by_themselves(cases: Cases) -> None
 )
 def test_a_falsified_reading_counts_once_in_the_noise_floor(cases: Cases, effects: Effects) -> None:
     far: dict[str, Any] = cases.report(effects, duration=8.0)["how_far"]
-    assert far["after"] == pytest.approx(far["noise_floor"], rel=0.08)
+    assert far["after"] == pytest.approx(far["noise_floor"], rel=0.15)  # counted twice it is 0.26
 
 
 def test_withheld_time_is_a_good_part_of_the_test(cases: Cases) -> None:
