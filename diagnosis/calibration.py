@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from statistics import NormalDist
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import optimize
 
 from common.errors import InputError
 from models.registry import Array
@@ -96,34 +94,3 @@ def paired(probabilities: Array, correct: ArrayLike) -> tuple[Array, Array]:
     if not np.all((stated >= 0.0) & (stated <= 1.0)):
         raise InputError("A probability lies outside 0 to 1.")
     return stated, came
-
-
-def temperature(scores: Sequence[Array], truth: Sequence[int]) -> float:
-    """The κ that makes the truth of many cases most likely under `softmax(−Δ/(2κ))`.
-
-    `scores[i]` (candidates,) costs of case i in units of −2·ln L, `truth[i]` the place of the true one. A
-    bound of `COOLEST` to `HOTTEST` is returned where the likelihood has no maximum between.
-
-    Source: temperature scaling, Guo, Pleiss, Sun and Weinberger, ICML (2017).
-
-    Raises:
-        InputError: no cases, or scores and truths that do not fit.
-    """
-    if not scores or len(scores) != len(truth):
-        raise InputError(f"{len(scores)} cases with {len(truth)} truths give no temperature.")
-    if any(not 0 <= place < len(case) for case, place in zip(scores, truth, strict=True)):
-        raise InputError("A truth is no candidate of its case.")
-    halves = np.full((len(scores), max(map(len, scores))), -np.inf)  # where a case has fewer candidates
-    for row, case in zip(halves, scores, strict=True):
-        row[: len(case)] = 0.5 * (np.min(case) - np.asarray(case))
-    true = halves[np.arange(len(scores)), list(truth)]
-
-    def surprise(logarithm: float) -> float:
-        inverse = math.exp(-logarithm)
-        return float(np.sum(np.log(np.sum(np.exp(halves * inverse), axis=1)) - true * inverse))
-
-    grid = np.linspace(math.log(COOLEST), math.log(HOTTEST), 61)
-    best = int(np.argmin([surprise(x) for x in grid.tolist()]))
-    ends = (float(grid[max(best - 1, 0)]), float(grid[min(best + 1, 60)]))
-    fit = optimize.minimize_scalar(surprise, bounds=ends, method="bounded", options={"xatol": 1e-6})
-    return math.exp(float(fit.x))

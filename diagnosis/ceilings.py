@@ -10,7 +10,7 @@ from common.errors import InputError
 from diagnosis import fitting, where
 from diagnosis.parts import LaboratoryA, LaboratoryB
 from diagnosis.search import Search, gaps
-from diagnosis.signals import blocks, windows
+from diagnosis.signals import windows
 from diagnosis.signals.ceiling import ceiling, depends_on
 from models.registry import Array
 
@@ -73,12 +73,12 @@ def flexible_share(found: Diagnosis, search: Search) -> float | None:
     columns = inputs_of(found, search)
     if not columns:
         return None
-    train, held = blocks.split(residual.size, interval)
+    held = fitting.withheld_ticks(residual.size, interval)
     try:
         return ceiling(
             np.column_stack(list(columns.values())),
             residual,
-            train,
+            ~held,
             held,
             float(search.data.sigma[place]),
             interval,

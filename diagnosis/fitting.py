@@ -101,6 +101,14 @@ def withheld(ticks: int, interval: float) -> tuple[int, Mask]:
     return group, ~np.isin((np.arange(groups) // block) % 5, HELD_OUT)
 
 
+def withheld_ticks(ticks: int, interval: float) -> Mask:
+    """Ticks (ticks,) that no fit sees."""
+    group, train = withheld(ticks, interval)
+    mask = np.zeros(ticks, dtype=bool)
+    mask[: train.size * group] = np.repeat(~train, group)
+    return mask
+
+
 def measured_by(data: Data, white: Array) -> Data:
     """The data with residuals in units of a noise (signals,)."""
     level = np.sqrt(np.mean(np.square(data.part.measured), axis=0))

@@ -178,10 +178,7 @@ def histories(
 
 def held_out(record: Record) -> Mask:
     """Ticks that no fit has seen."""
-    group, train = fitting.withheld(record.ticks, record.plan.test.interval)
-    mask = np.zeros(record.ticks, dtype=bool)
-    mask[: train.size * group] = np.repeat(~train, group)
-    return mask
+    return fitting.withheld_ticks(record.ticks, record.plan.test.interval)
 
 
 def bare(found: Diagnosis, own: Judge) -> Mapping[str, Array] | None:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from common.errors import InputError
-from diagnosis.signals.blocks import Mask
+from diagnosis.record import Mask
 from diagnosis.signals.features import features
 from diagnosis.signals.systematic import systematic_rms
 from models.indicators.checks import checked

@@ -10,7 +10,6 @@ from scipy import stats
 
 from common.errors import InputError
 from diagnosis import calibration
-from models.registry import Array
 
 
 @given(st.integers(1, 500), st.floats(0.0, 1.0), st.floats(0.5, 0.999))
@@ -27,10 +26,6 @@ def test_no_cases_are_refused() -> None:
         calibration.brier(np.array([]), np.array([]))
     with pytest.raises(InputError):
         calibration.brier(np.array([1.1]), np.array([1.0]))
-    with pytest.raises(InputError):
-        calibration.temperature([], [])
-    with pytest.raises(InputError):
-        calibration.temperature([np.zeros(2)], [2])
 
 
 def test_known_errors() -> None:
@@ -49,24 +44,3 @@ def test_calibrated_probabilities_have_little_error() -> None:
     stated = random.random(20_000)
     assert calibration.expected_calibration_error(stated, random.random(20_000) < stated) < 0.02
     assert calibration.expected_calibration_error(stated, random.random(20_000) < stated**2) > 0.1
-
-
-def drawn(kappa: float) -> tuple[list[Array], list[int]]:
-    """Costs of 2 to 5 candidates, and truths drawn from softmax(−Δ/(2κ))."""
-    random = np.random.default_rng(1)
-    costs = [random.exponential(8.0 * kappa, random.integers(2, 6)) for _ in range(4000)]
-    truths = []
-    for case in costs:
-        weight = np.exp(-0.5 * (case - case.min()) / kappa)
-        truths.append(int(random.choice(case.size, p=weight / weight.sum())))
-    return costs, truths
-
-
-@pytest.mark.parametrize("kappa", [0.3, 1.0, 20.0])
-def test_temperature_is_found(kappa: float) -> None:
-    assert calibration.temperature(*drawn(kappa)) == pytest.approx(kappa, rel=0.1)
-
-
-def test_temperature_at_its_bounds() -> None:
-    assert calibration.temperature([np.array([0.0, 9.0])], [0]) < 1.0
-    assert calibration.temperature([np.array([0.0, 9.0])], [1]) > 1e5
