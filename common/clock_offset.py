@@ -1,35 +1,143 @@
-"""The offset between two clocks from exchanges of time stamps.
+"""The offset between two clocks from exchanges of time stamps: a line for its value, an interval for its error.
 
 Each exchange gives four stamps: t1 sent and t4 received by one clock, t2 received and t3 sent by the
-other. Offset `((t2 − t1) + (t3 − t4))/2` is wrong by at most half the round trip `(t4 − t1) − (t3 − t2)`
-(RFC 5905), so the exchange with the shortest round trip of a recent window is believed.
+other. With the round trip r = (t4 − t1) − (t3 − t2) the offset m = ((t2 − t1) + (t3 − t4))/2 at the time
+(t1 + t4)/2 is wrong by at most h = r/2 (RFC 5905), and by drift (t4 − t1)/2 more where the clocks drift apart.
+
+Bound: the offset lies in m ± h at each exchange, and wanders off by `MAX_DRIFT` at most, so it lies in all
+those intervals at once, each widened by `MAX_DRIFT` times its age (Marzullo's intersection with the dispersion of
+RFC 5905). One interval carries all of them from time to time. No straight line is assumed.
+
+Value: the exchange with the shortest round trip of each block (the clock filter of RFC 5905) is a point of a
+straight line, fitted by least squares. Its weight 1/(1 + 4 (h − h₀)/h₀)², h₀ the shortest h, falls with what the
+exchange waited in queues (Veitch, Ridoux and Korada 2009), so a congested second does not tilt the line; the
+delay that all have in common weighs nothing, it shifts the line and does not tilt it (Moon, Skelly and Towsley
+1999). The slope is held to zero by a ridge as strong as one point wrong by h₀ against a drift of
+`MAX_DRIFT`, until the window is long enough to tell a drift from delays. A value outside the interval is
+moved to its edge.
+
+What cannot be known: an asymmetry of the two directions looks like an offset. Half of it is in the value, and the
+bound holds it: no bound can fall below half the sum of the shortest delays there and back, and this one does not.
 """
 
 from __future__ import annotations
 
+import math
 from collections import deque
+from typing import NamedTuple
+
+MAX_DRIFT = 200e-6  # ns per ns: two crystals of 100 ppm each
+RESOLUTION = 1.0  # ns: of the four stamps together
+QUEUED = 4.0  # a minimum that waited h₀/4 more than the best one counts a quarter
+
+
+class Minimum(NamedTuple):
+    """The exchange of a block with the shortest round trip; `time` and `offset` relative to the first one's, ns."""
+
+    time: float
+    offset: float
+    reach: float  # largest error of the offset
 
 
 class ClockOffset:
-    """Estimate of (other clock − own clock), ns, and its bound; the newest `blocks` of `length` exchanges count."""
+    """Estimate of (other clock − own clock), ns, from the minima of the newest `blocks` of `length` exchanges each.
 
-    def __init__(self, *, length: int = 50, blocks: int = 10) -> None:
+    Before the first exchange offset and bound are 0; in the first block the shortest exchange so far is believed.
+    """
+
+    def __init__(self, *, length: int = 50, blocks: int = 20) -> None:
         self._length = length
-        self._minima: deque[tuple[int, int]] = deque(maxlen=blocks)
-        self._in_block = length
-        self.offset = 0  # other clock minus own clock, ns
-        self.bound = 0  # largest error of it, ns: half the shortest round trip; asymmetry cannot be seen
+        self._minima: deque[Minimum] = deque(maxlen=blocks)
+        self._best = Minimum(0.0, 0.0, 0.0)  # of the present block
+        self._shortest = math.inf
+        self._in_block = 0
+        self._newest = 0
+        # stamps of months in ns do not fit a float: floats are relative to the first exchange
+        self._origin: tuple[int, int] | None = None  # own time, offset
+        self._centre, self._level, self._slope = 0.0, 0.0, 0.0  # the line: level at centre
+        self._seen, self._low, self._high = 0.0, -math.inf, math.inf  # the interval at the time `seen`
+
+    @property
+    def offset(self) -> int:
+        """Other clock minus own clock when the newest exchange came back, ns."""
+        return self.at(self._newest)
+
+    @property
+    def bound(self) -> int:
+        """Largest possible error of `offset`, ns."""
+        return self.bound_at(self._newest)
+
+    @property
+    def drift(self) -> float:
+        """Slope of the line, ns per ns; 0 before two blocks are complete."""
+        return self._slope
+
+    def at(self, now_ns: int) -> int:
+        """Other clock minus own clock at a time of the own clock, ns."""
+        if self._origin is None:
+            return 0
+        start, first = self._origin
+        now = now_ns - start
+        value = self._level + self._slope * (now - self._centre)
+        wander = MAX_DRIFT * abs(now - self._seen)
+        return first + round(min(max(value, self._low - wander), self._high + wander))
+
+    def bound_at(self, now_ns: int) -> int:
+        """Largest possible error of `at`, ns; grows by `MAX_DRIFT` and the slope until the next minimum is seen.
+
+        It holds for any drift within ± `MAX_DRIFT`, a changing one too. Where the intervals contradict each other,
+        because a clock ran faster or was set, the newest one alone is believed.
+        """
+        if self._origin is None:
+            return 0
+        start, first = self._origin
+        wander = MAX_DRIFT * abs(now_ns - start - self._seen)
+        value = self.at(now_ns) - first
+        return math.ceil(max(self._high - value, value - self._low) + wander)
 
     def add(self, t1: int, t2: int, t3: int, t4: int) -> None:
-        """Take in one exchange."""
-        pair = ((t4 - t1) - (t3 - t2), ((t2 - t1) + (t3 - t4)) // 2)
+        """Take in one exchange; stamps in ns."""
+        self._newest = t4
+        trip = (t4 - t1) - (t3 - t2)
+        if trip < self._shortest:
+            self._shortest = trip
+            self._keep(t1, t2, t3, t4)
         self._in_block += 1
-        if self._in_block > self._length:
-            self._minima.append(pair)
-            self._in_block = 1
-        elif pair < self._minima[-1]:
-            self._minima[-1] = pair
-        else:
-            return
-        shortest, self.offset = min(self._minima)
-        self.bound = max(shortest, 0) // 2
+        if self._in_block >= self._length:
+            self._minima.append(self._best)
+            self._shortest, self._in_block = math.inf, 0
+            self._fit()
+
+    def _keep(self, t1: int, t2: int, t3: int, t4: int) -> None:
+        """The best exchange of its block so far."""
+        if self._origin is None:
+            self._origin = ((t1 + t4) // 2, (t2 - t1 + t3 - t4) // 2)
+        start, first = self._origin
+        trip = (t4 - t1) - (t3 - t2)
+        reach = max(trip + MAX_DRIFT * (t4 - t1), 0.0) / 2 + RESOLUTION
+        self._best = Minimum((t1 + t4 - 2 * start) / 2, (t2 - t1 + t3 - t4 - 2 * first) / 2, reach)
+        self._narrow(*self._best)
+        if not self._minima:
+            self._centre, self._level = self._best.time, self._best.offset
+
+    def _narrow(self, time: float, offset: float, reach: float) -> None:
+        """Intersect the interval, brought to `time`, with that of an exchange."""
+        wander = MAX_DRIFT * abs(time - self._seen)
+        low, high = max(offset - reach, self._low - wander), min(offset + reach, self._high + wander)
+        if low > high:
+            low, high = offset - reach, offset + reach
+        self._seen, self._low, self._high = time, low, high
+
+    def _fit(self) -> None:
+        """The line through the minima."""
+        least = min(item.reach for item in self._minima)
+        weights = [(1.0 + QUEUED * (item.reach / least - 1.0)) ** -2 for item in self._minima]
+        total = sum(weights)
+        pairs = list(zip(weights, self._minima, strict=True))
+        centre = sum(weight * item.time for weight, item in pairs) / total
+        level = sum(weight * item.offset for weight, item in pairs) / total
+        spread, product = (least / MAX_DRIFT) ** 2, 0.0
+        for weight, (time, offset, _) in pairs:
+            spread += weight * (time - centre) ** 2
+            product += weight * (time - centre) * (offset - level)
+        self._centre, self._level, self._slope = centre, level, product / spread

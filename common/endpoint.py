@@ -6,6 +6,7 @@ from collections import Counter
 from typing import NamedTuple, Protocol
 
 from common import codec
+from common.clock import MonotonicClock
 from common.messages import Command, Feedback, Finished, Message, Samples
 from common.transport import CONTROL, SAMPLES, TICK, Transport
 
@@ -26,8 +27,8 @@ class Endpoint(Protocol):
     def enter(self, session: int) -> None:
         """Take part in a session: what is sent from now on belongs to it."""
 
-    def send(self, message: Message) -> None:
-        """Hand a message to the link; never blocks."""
+    def send(self, message: Message) -> int:
+        """Hand a message to the link; never blocks. When it was encoded and handed over, own clock, ns."""
 
     def receive(self, timeout: float = 0.0) -> Received | None:
         """The next message, waiting at most `timeout` s for it; None where there is none."""
@@ -41,6 +42,7 @@ class FrameEndpoint:
 
     def __init__(self, transport: Transport, plan_digest: str) -> None:
         self._transport = transport
+        self._clock = MonotonicClock()
         self._digest = plan_digest
         self._open_key = codec.session_key(0, plan_digest)
         self._key = self._open_key
@@ -50,11 +52,14 @@ class FrameEndpoint:
         """Use the key of a session for what is sent from now on; frames before it are still understood."""
         self._key = codec.session_key(session, self._digest)
 
-    def send(self, message: Message) -> None:
-        """Hand a message to the link."""
+    def send(self, message: Message) -> int:
+        """Hand a message to the link; when it was encoded, ns."""
         channel = CHANNELS.get(type(message), CONTROL)
         key = self._key if channel != CONTROL else self._open_key
-        self._transport.send(channel, codec.encode(message, key))
+        frame = codec.encode(message, key)
+        encoded_ns = self._clock.now()
+        self._transport.send(channel, frame)
+        return encoded_ns
 
     def receive(self, timeout: float = 0.0) -> Received | None:
         """The next valid message, waiting at most `timeout` s for a frame; None where there is none."""

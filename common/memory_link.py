@@ -40,13 +40,14 @@ class MemoryEndpoint:
     def enter(self, session: int) -> None:
         """Memory needs no key."""
 
-    def send(self, message: Message) -> None:
-        """Put a message into the queue of every role that hears it."""
+    def send(self, message: Message) -> int:
+        """Put a message into the queue of every role that hears it; the present time, ns."""
         kind = type(message)
         if kind not in self._hearers:
             self._hearers[kind] = self._hub.hearers(self._role, kind)
         for hearer in self._hearers[kind]:
             hearer.arrive(message, self._role)
+        return self.clock.now()
 
     def arrive(self, message: Message, role: str) -> None:
         """Take in what a role has sent."""

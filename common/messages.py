@@ -92,8 +92,11 @@ class Feedback(NamedTuple):
 
     session: int
     seq: int
-    command_seq: int
-    command_received_ns: int
+    command_seq: int  # in force
+    command_received_ns: int  # when it came, delay of a link plug-in included; told once, 0 afterwards
+    heard_seq: int  # newest command that came over the wire, in force or not yet; -1 for none
+    heard_ns: int  # when that one came
+    started_ns: int  # start of the tick: the measurements are of this moment
     sent_ns: int
     table_displacement: float
     table_acceleration: float

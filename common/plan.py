@@ -15,7 +15,7 @@ import tomli_w
 from common.errors import PlanError
 from common.schema import Storeys, fill, key, nearest, plain
 
-PROTOCOL_VERSION = 1
+PROTOCOL_VERSION = 2
 
 
 @dataclass(frozen=True)

@@ -76,21 +76,28 @@ SLAVE = (
 LATENCY = (
     SEQ,
     Signal("wake_lateness", "s", "start of the tick after its nominal time"),
-    Signal("compute_time", "s", "from the start of the tick's work to the command handed to the link"),
+    Signal("compute_time", "s", "from the start of the tick's work to the command's values"),
     Signal("command_one_way", "s", "command from the master to the slave"),
-    Signal("slave_time", "s", "from the command's arrival to the feedback handed to the link"),
-    Signal("feedback_one_way", "s", "feedback from the slave to the master"),
+    Signal("slave_time", "s", "from the command's arrival to the feedback sent"),
+    Signal("feedback_one_way", "s", "feedback from the slave to the master, its encoding included"),
     Signal("round_trip", "s", "from the command handed to the link to its feedback received"),
     Signal("clock_offset", "s", "slave clock minus master clock, estimated"),
     Signal("clock_offset_bound", "s", "largest possible error of that estimate"),
     Signal("deadline_missed", "", "the tick's work or its answer came too late for the next tick", Kind.FLAG),
+    Signal("encode_time", "s", "from the command's values to its frame handed to the link"),
+    Signal("slave_compute_time", "s", "of the slave's time, from the start of its tick on"),
+    Signal("decode_time", "s", "from the feedback's arrival in the process to its values in the loop"),
+    Signal(
+        "age_at_use", "s", "age of the feedback that the tick used, from its measurement to the tick's start"
+    ),
     Signal("tick_ns", "ns", "nominal time of the tick, master clock", Kind.STAMP),
     Signal("wake_ns", "ns", "start of the tick, master clock", Kind.STAMP),
     Signal("command_sent_ns", "ns", "command handed to the link, master clock", Kind.STAMP),
     Signal("command_received_ns", "ns", "command received, slave clock", Kind.STAMP),
-    Signal("feedback_sent_ns", "ns", "feedback handed to the link, slave clock", Kind.STAMP),
+    Signal("slave_started_ns", "ns", "start of the slave's tick, slave clock", Kind.STAMP),
+    Signal("feedback_sent_ns", "ns", "feedback sent, slave clock", Kind.STAMP),
     Signal("feedback_received_ns", "ns", "feedback received, master clock", Kind.STAMP),
-    Signal("feedback_used_ns", "ns", "feedback used by the next tick, master clock", Kind.STAMP),
+    Signal("feedback_used_ns", "ns", "start of the next tick, which can use it, master clock", Kind.STAMP),
 )
 
 EVENT = (

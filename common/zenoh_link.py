@@ -8,11 +8,13 @@ network is congested: a late frame is worth nothing, and a blocked loop would be
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import json
 import re
 import socket
 import time
 from collections.abc import Callable
+from threading import get_ident
 
 import zenoh
 
@@ -105,7 +107,10 @@ class ZenohLink:
             for channel in (TICK, CONTROL, SAMPLES)
         }
         self._subscribers = [
-            self._session.declare_subscriber(f"{PREFIX}/{test}/{other}/{channel}", self._hear(other, channel))
+            self._session.declare_subscriber(
+                f"{PREFIX}/{test}/{other}/{channel}",
+                zenoh.handlers.Callback(self._hear(other, channel), indirect=False),
+            )
             for other, channel in HEARD[role]
         ]
 
@@ -122,9 +127,14 @@ class ZenohLink:
     def _hear(self, role: str, channel: str) -> Callable[[zenoh.Sample], None]:
         put = self._packets.put
         now = time.monotonic_ns
+        attached: set[int] = set()
 
         def heard(sample: zenoh.Sample) -> None:
-            put(Packet(role, channel, sample.payload.to_bytes(), now()))
+            received_ns = now()
+            put(Packet(role, channel, sample.payload.to_bytes(), received_ns))
+            if get_ident() not in attached:
+                attached.add(get_ident())
+                stay_attached()
 
         return heard
 
@@ -140,6 +150,15 @@ class ZenohLink:
         """Leave the link; without it, zenoh's threads would keep the process alive."""
         with contextlib.suppress(zenoh.ZError):  # a peer that is gone cannot be said goodbye to
             self._session.close()  # type: ignore[no-untyped-call]
+
+
+def stay_attached() -> None:
+    """Let the interpreter keep what it knows of the calling thread, one of zenoh's, until the process ends.
+
+    Called by a thread that Python did not start, it would make and drop a thread state with every frame, which costs
+    more than the rest of the call.
+    """
+    ctypes.pythonapi.PyGILState_Ensure()
 
 
 def listenable() -> str:

@@ -4,13 +4,15 @@ The row of a tick follows its command: to the slave, in force there at once or s
 first feedback that names it. The row is written when that feedback is there, at best as the next tick begins, or when
 a feedback names a later command: then this one was lost, overtaken or never sent, and its segments are NaN,
 its stamps 0. A delay of a link plug-in is part of the stamps, as if the network were that slow; the clocks'
-offset is estimated without it, by exchanges that were not delayed at all.
+offset is estimated without it, by the command that the slave heard last and the moment when it did.
 """
 
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from common.clock_offset import ClockOffset
 from common.laboratory import Laboratory
@@ -26,11 +28,14 @@ class Row:
 
     tick: int
     wake_ns: int
-    sent_ns: int
+    ready_ns: int  # the command's values are there
+    sent_ns: int  # its frame was handed to the link
+    age: float  # s, of the feedback that the tick used
     used_ns: int = 0
     missed: bool = False
     feedback: Feedback | None = None
     received_ns: int = 0
+    taken_ns: int = 0  # the feedback's values are in the loop
     extra: float = 0.0  # s, of a link plug-in on the feedback
 
 
@@ -41,29 +46,40 @@ class Account:
         self._lab = lab
         self._offset = offset
         self._rows: dict[int, Row] = {}
+        self._on_the_way: deque[tuple[int, int]] = (
+            deque()
+        )  # commands that the slave has not heard: tick, sent_ns
         self._named = -1  # newest command that a feedback has named
         self.sync_sent_ns = 0
         self.first_offset = 0
         self.missed = 0
         self.round_trip = NAN
 
-    def open(self, tick: int, wake_ns: int, sent_ns: int) -> None:
-        """The tick's command is out."""
-        self._rows[tick] = Row(tick, wake_ns, sent_ns)
+    def open(self, tick: int, wake_ns: int, ready_ns: int, sent_ns: int, used: Feedback) -> None:
+        """The tick's command is out; stamps in ns, the command's 0 where none went."""
+        age = (wake_ns + self._offset.at(wake_ns) - used.started_ns) * 1e-9 if used.seq >= 0 else NAN
+        self._rows[tick] = Row(tick, wake_ns, ready_ns, sent_ns, age)
+        if sent_ns:
+            self._on_the_way.append((tick, sent_ns))
 
-    def answer(self, feedback: Feedback, received_ns: int, extra: float | None) -> None:
+    def answer(self, feedback: Feedback, received_ns: int, taken_ns: int, extra: float | None) -> None:
         """A feedback came, delayed by a link plug-in where `extra` (s) is positive, lost by it where None."""
+        self._compare_clocks(feedback, received_ns)
         self._named = max(self._named, feedback.command_seq)
         row = self._rows.get(feedback.command_seq)
-        if row is None or not feedback.command_received_ns:
-            return
-        if feedback.seq == row.tick:  # a command in force at its own tick was not delayed by a plug-in
-            self._offset.add(row.sent_ns, feedback.command_received_ns, feedback.sent_ns, received_ns)
-        if extra is None:
+        if row is None or not feedback.command_received_ns or extra is None:
             return
         row.feedback, row.extra = feedback, extra
         row.received_ns = received_ns + round(extra * 1e9)
+        row.taken_ns = taken_ns + round(extra * 1e9)
         self.round_trip = (row.received_ns - row.sent_ns) * 1e-9
+
+    def _compare_clocks(self, feedback: Feedback, received_ns: int) -> None:
+        """Each command that the slave has heard gives one exchange of stamps."""
+        while self._on_the_way and self._on_the_way[0][0] <= feedback.heard_seq:
+            tick, sent_ns = self._on_the_way.popleft()
+            if tick == feedback.heard_seq:
+                self._offset.add(sent_ns, feedback.heard_ns, feedback.sent_ns, received_ns)
 
     def close(self, tick: int, used_ns: int) -> None:
         """The next tick begins: judge `tick`, and write what is complete."""
@@ -97,39 +113,70 @@ class Account:
                 self._record(row, now)
 
     def _record(self, row: Row, now: int) -> None:
-        lab = self._lab
-        segments, stamps = self._segments(row)
-        at = lab.tick_ns(row.tick)
+        lab, sent = self._lab, row.sent_ns != 0
+        at, offset = lab.tick_ns(row.tick), self._offset.at(row.wake_ns)
+        answered = segments(row, offset) if row.feedback is not None else UNANSWERED
         values = (
             row.tick,
             (row.wake_ns - at) * 1e-9,
-            (row.sent_ns - row.wake_ns) * 1e-9 if row.sent_ns else NAN,
-            *segments,
-            self._offset.offset * 1e-9,
-            self._offset.bound * 1e-9,
+            (row.ready_ns - row.wake_ns) * 1e-9 if sent else NAN,
+            answered.command_one_way,
+            answered.slave_time,
+            answered.feedback_one_way,
+            answered.round_trip,
+            offset * 1e-9,
+            self._offset.bound_at(row.wake_ns) * 1e-9,
             row.missed,
+            (row.sent_ns - row.ready_ns) * 1e-9 if sent else NAN,
+            answered.slave_compute_time,
+            answered.decode_time,
+            row.age,
             at,
             row.wake_ns,
             row.sent_ns,
-            *stamps,
+            *answered.stamps,
             row.used_ns,
         )
         log_ns = lab.epoch_ns + row.tick * lab.interval_ns
         lab.outlet.add("latency", log_ns, lab.epoch_ns + now - lab.start_ns, values)
 
-    def _segments(self, row: Row) -> tuple[tuple[float, float, float, float], tuple[int, int, int]]:
-        feedback = row.feedback
-        if feedback is None:
-            return (NAN, NAN, NAN, NAN), (0, 0, 0)
-        offset = self._offset.offset
-        segments = (
-            (feedback.command_received_ns - offset - row.sent_ns) * 1e-9,
-            (feedback.sent_ns - feedback.command_received_ns) * 1e-9,
-            (row.received_ns - feedback.sent_ns + offset) * 1e-9,
-            (row.received_ns - row.sent_ns) * 1e-9,
-        )
-        return segments, (feedback.command_received_ns, feedback.sent_ns, row.received_ns)
-
     def progress(self) -> dict[str, float]:
         """Newest round trip (s) and the count of missed deadlines."""
         return {"round_trip": self.round_trip, "missed": float(self.missed)}
+
+
+class Segments(NamedTuple):
+    """What an answered tick adds to its row; times in s, stamps in ns as they were read."""
+
+    command_one_way: float = NAN
+    slave_time: float = NAN
+    slave_compute_time: float = NAN
+    feedback_one_way: float = NAN
+    round_trip: float = NAN
+    decode_time: float = NAN
+    stamps: tuple[int, int, int, int] = (
+        0,
+        0,
+        0,
+        0,
+    )  # command received, slave started, feedback sent, received
+
+
+UNANSWERED = Segments()
+
+
+def segments(row: Row, offset: int) -> Segments:
+    """The segments of an answered tick; `offset` (ns) is the slave's clock minus the master's."""
+    feedback = row.feedback
+    assert feedback is not None  # noqa: S101 - the caller has looked
+    stamps = (feedback.command_received_ns, feedback.started_ns, feedback.sent_ns, row.received_ns)
+    received, started, sent, back = stamps
+    return Segments(
+        command_one_way=(received - offset - row.sent_ns) * 1e-9,
+        slave_time=(sent - received) * 1e-9,
+        slave_compute_time=(sent - started) * 1e-9,
+        feedback_one_way=(back - sent + offset) * 1e-9,
+        round_trip=(back - row.sent_ns) * 1e-9,
+        decode_time=(row.taken_ns - back) * 1e-9,
+        stamps=stamps,
+    )

@@ -35,10 +35,11 @@ from master.limits import MasterLimits
 from master.step import MasterStep, Outputs
 
 SYNC_EXCHANGES = 200
+OFFSET_BLOCK, OFFSET_BLOCKS = 250, 40  # exchanges: the best of half a second each, twenty seconds of them
 LEAD_NS = 250_000_000  # from the agreement on the start to the start
 
 
-NO_FEEDBACK = Feedback(0, -1, -1, 0, 0, 0.0, 0.0, 0.0, 0.0)
+NO_FEEDBACK = Feedback(0, -1, -1, 0, -1, 0, 0, 0, 0.0, 0.0, 0.0, 0.0)
 
 NOTHING_SENT = (0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -62,7 +63,7 @@ class MasterLoop:
         self._step = step
         self._limits = MasterLimits(plan.limits, plan.storeys)
         self._feedback: Mailbox[Feedback] = Mailbox(link, "feedback", plan.test.interval, nominal=1)
-        self._offset = ClockOffset()
+        self._offset = ClockOffset(length=OFFSET_BLOCK, blocks=OFFSET_BLOCKS)
         self._account = Account(self.lab, self._offset)
         self._used = NO_FEEDBACK
         self._command = 0.0
@@ -103,7 +104,8 @@ class MasterLoop:
         if not self.lab.exchange.fresh(feedback.seq):
             return
         self.lab.heard_ns = received_ns
-        self._account.answer(feedback, received_ns, self._feedback.put(feedback.seq, feedback))
+        extra = self._feedback.put(feedback.seq, feedback)
+        self._account.answer(feedback, received_ns, self.lab.clock.now(), extra)
 
     def _refused(self, reason: str) -> None:
         error = InputError(f"The slave refuses the test: {reason}")
@@ -204,8 +206,9 @@ class MasterLoop:
         if not lab.start_ns:
             lab.start_ns = now + LEAD_NS
             lab.epoch_ns = lab.start_ns + self._wall_ns
-            self._account.first_offset = self._offset.offset
-        lab.endpoint.send(Start(lab.exchange.session, lab.start_ns + self._offset.offset, lab.epoch_ns))
+            self._account.first_offset = self._offset.at(lab.start_ns)
+        there = lab.start_ns + self._account.first_offset
+        lab.endpoint.send(Start(lab.exchange.session, there, lab.epoch_ns))
 
     # -- ticks ------------------------------------------------------------------------------------
 
@@ -233,8 +236,8 @@ class MasterLoop:
         except RigError as error:
             self._trip(error, "rig", tick)
             return
-        sent = 0 if held or violation else self._send(tick)
-        self._account.open(tick, wake, sent)
+        ready, sent = (0, 0) if held or violation else self._send(tick)
+        self._account.open(tick, wake, ready, sent, self._used)
         if lab.recorder is not None:
             self._sample(tick, measured, outputs, sent)
         self.ticks = tick + 1
@@ -243,11 +246,12 @@ class MasterLoop:
             self._trip(InterlockError(violation), "limit", tick)
         self._watch(tick, wake)
 
-    def _send(self, tick: int) -> int:
-        shift = self._offset.offset - self._account.first_offset
-        now = self.lab.clock.now()
-        self.lab.endpoint.send(Command(self.lab.exchange.session, tick, now, shift, *self._sent))
-        return now
+    def _send(self, tick: int) -> tuple[int, int]:
+        """Send the tick's command; when its values were ready, and when its frame was handed to the link, ns."""
+        lab = self.lab
+        now = lab.clock.now()
+        shift = self._offset.at(now) - self._account.first_offset
+        return now, lab.endpoint.send(Command(lab.exchange.session, tick, now, shift, *self._sent))
 
     def _sample(self, tick: int, measured: tuple[float, float], outputs: Outputs, sent_ns: int) -> None:
         lab, used = self.lab, self._used

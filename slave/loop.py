@@ -35,6 +35,7 @@ from slave.limits import SlaveLimits
 from slave.step import SlaveStep
 
 NO_COMMAND = Command(0, -1, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NOTHING_HEARD = (-1, 0)
 
 
 class SlaveLoop:
@@ -46,6 +47,7 @@ class SlaveLoop:
         self._limits = SlaveLimits(setting.plan.limits)
         self._commands: Mailbox[Command] = Mailbox(link, "command", setting.plan.test.interval, nominal=0)
         self._received_ns: dict[int, int] = {}
+        self._heard = NOTHING_HEARD  # number and arrival of the newest command
         self._step = SlaveStep(setting.plan)
         self._command = NO_COMMAND
         self._shift_ns = 0
@@ -86,6 +88,7 @@ class SlaveLoop:
         if not self.lab.exchange.fresh(command.seq):
             return
         self.lab.heard_ns = received_ns
+        self._heard = (command.seq, received_ns)
         self._shift_ns = command.shift_ns
         extra = self._commands.put(command.seq, command)
         if extra is not None:
@@ -180,18 +183,29 @@ class SlaveLoop:
         except RigError as error:
             lab.fail(Event.TRIP, error, code="rig", tick=tick)
             return
-        self._answer(tick, measured, wanted)
+        self._answer(tick, now, measured, wanted)
         self.ticks = tick + 1
         if violation:
             lab.fail(Event.TRIP, InterlockError(violation), code="limit", tick=tick)
         elif now - lab.heard_ns > lab.plan.link.loss_timeout * 1e9:
             lab.lost("The master", lab.plan.link.loss_timeout, tick)
 
-    def _answer(self, tick: int, measured: TableMeasurement, wanted: TableCommand) -> None:
+    def _answer(self, tick: int, started_ns: int, measured: TableMeasurement, wanted: TableCommand) -> None:
         lab, command = self.lab, self._command
+        received_ns = self._told(command.seq, started_ns)
         sent_ns = lab.clock.now()
-        received_ns = self._told(command.seq, sent_ns)
-        lab.endpoint.send(Feedback(lab.exchange.session, tick, command.seq, received_ns, sent_ns, *measured))
+        lab.endpoint.send(
+            Feedback(
+                lab.exchange.session,
+                tick,
+                command.seq,
+                received_ns,
+                *self._heard,
+                started_ns,
+                sent_ns,
+                *measured,
+            )
+        )
         if lab.recorder is not None:
             self._sample(tick, measured, wanted, sent_ns)
 

@@ -117,6 +117,6 @@ def test_before_a_session_all_understand_each_other() -> None:
 
 
 def test_a_frame_each_way_stays_small() -> None:
-    feedback = Feedback(2**62, 10**6, 10**6, 2**60, 2**60, 0.1, 0.2, 0.3, 0.4)
+    feedback = Feedback(2**62, 10**6, 10**6, 2**60, 10**6, 2**60, 2**60, 2**60, 0.1, 0.2, 0.3, 0.4)
     assert len(encode(feedback, KEY)) < 128
     assert len(encode(COMMAND._replace(session=2**62), KEY)) < 128

@@ -334,14 +334,14 @@ def test_repeated_and_outdated_feedback_is_not_used(bench: Bench) -> None:
     session = bench.master.lab.exchange.session
     used = bench.master._used
     for seq in (used.seq, used.seq - 5):
-        bench.master.take(Feedback(session, seq, seq, 0, 0, 0.0, 0.0, 0.0, 999.0), 0)
+        bench.master.take(Feedback(session, seq, seq, 0, -1, 0, 0, 0, 0.0, 0.0, 0.0, 999.0), 0)
     bench.clock.sleep_until(bench.master.lab.tick_ns(100))
     bench.master.tick(100)
     assert bench.master._used.damper_force != 999.0
 
 
 def test_feedback_of_another_session_is_not_used(bench: Bench) -> None:
-    bench.master.take(Feedback(12345, 99, 99, 0, 0, 0.0, 0.0, 0.0, 999.0), 0)
+    bench.master.take(Feedback(12345, 99, 99, 0, -1, 0, 0, 0, 0.0, 0.0, 0.0, 999.0), 0)
     bench.clock.sleep_until(bench.master.lab.tick_ns(100))
     bench.master.tick(100)
     assert bench.master._used.damper_force != 999.0
