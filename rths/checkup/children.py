@@ -1,0 +1,84 @@
+"""The processes that a check starts: out of reach of the terminal, and gone with it whatever happens."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from common import realtime
+from common.bare_loop import BareLoop
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+GRACE = 3.0  # s, for a child to say its last words after its time
+
+
+@contextlib.contextmanager
+def child(*words: str) -> Iterator[subprocess.Popen[str]]:
+    """A process of the exchange; its standard input ends with the context, and it too, one way or the other."""
+    process = subprocess.Popen(
+        [sys.executable, "-P", "-m", "rths.checkup.exchange", *words],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+        for pipe in (process.stdin, process.stdout, process.stderr):
+            if pipe is not None:
+                pipe.close()
+
+
+def exchange(interval_ns: int, until_ns: int, mode: str) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Let two processes exchange frames until a time of the monotonic clock; what the master was granted, and found.
+
+    `error` in the latter says why it found nothing.
+    """
+    from common.zenoh_link import listenable
+
+    endpoint = listenable()
+    words = [endpoint, "--rt", mode, "--interval-ns", str(interval_ns), "--until-ns", str(until_ns)]
+    places = [[] if place is None else ["--processor", str(place)] for place in realtime.assign(2)]
+    with (
+        child("master", *words, *places[0]) as master,
+        child("slave", *words, *places[1]),
+        contextlib.suppress(subprocess.TimeoutExpired, ValueError),
+    ):
+        # not `communicate`, which ends the child's standard input; what it says fits into the pipes
+        master.wait(timeout=max(until_ns - time.monotonic_ns(), 0) / 1e9 + GRACE)
+        said, complaint = (pipe.read() if pipe else "" for pipe in (master.stdout, master.stderr))
+        granted, *found = map(json.loads, said.splitlines()) if said else [{}]
+        if found:
+            return granted, found[0]
+        reason = complaint.strip().splitlines()[-1:] or ["it said nothing"]
+        return granted, {"error": reason[0].removeprefix("rths: ")}
+    return {}, {"error": "the process did not end in time"}
+
+
+def wake_ups(interval_ns: int, until: float, priority: int, processor: int) -> dict[str, dict[str, float]]:
+    """Bare loops side by side until a time of the monotonic clock: an ordinary one, and one at a priority above 0.
+
+    Side by side, so that both see the same moments of the host.
+    """
+    loops = {"ordinary": BareLoop()}
+    try:
+        loops["ordinary"].spawn(interval_ns, 0, -1)
+        if priority:
+            loops["fifo"] = BareLoop()
+            loops["fifo"].spawn(interval_ns, priority, processor)
+        time.sleep(max(0.0, until - time.monotonic()))
+    finally:
+        found = {name: loop.stop() for name, loop in loops.items()}
+    return found

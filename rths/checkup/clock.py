@@ -1,0 +1,85 @@
+"""The clocks of this machine: how fine, how dear to read, how they run, and whether somebody sets them right."""
+
+from __future__ import annotations
+
+import ctypes
+import itertools
+import sys
+import time
+
+READS = 2000
+STA_UNSYNC = 0x0040
+UNSET = 16_000_000  # µs; the kernel's own words for an error it has never been told
+
+
+class Timex(ctypes.Structure):
+    """The kernel's struct timex; padded generously."""
+
+    _fields_ = (
+        ("modes", ctypes.c_uint),
+        ("offset", ctypes.c_long),
+        ("freq", ctypes.c_long),
+        ("maxerror", ctypes.c_long),
+        ("esterror", ctypes.c_long),
+        ("status", ctypes.c_int),
+        ("rest", ctypes.c_long * 32),
+    )
+
+
+class ClockWatch:
+    """Compares the clocks between its start and `values()`."""
+
+    def __init__(self) -> None:
+        self._before = readings()
+
+    def values(self) -> dict[str, float | bool]:
+        """Resolution and cost of the monotonic clock, how it and the wall clock ran, s; what the kernel says."""
+        after = readings()
+        monotonic, wall, raw = (b - a for a, b in zip(self._before, after, strict=True))
+        return {
+            **fineness(),
+            "wall_step": (wall - monotonic) / 1e9,
+            "slew": (monotonic - raw) / max(raw, 1),
+            **synchronisation(),
+        }
+
+
+def readings() -> tuple[int, int, int]:
+    """Monotonic, wall and raw monotonic clock at one moment, ns: the closest together of a few attempts."""
+    found: list[tuple[int, tuple[int, int, int]]] = []
+    for _ in range(20):
+        before = raw_ns()
+        monotonic, wall = time.monotonic_ns(), time.time_ns()
+        after = raw_ns()
+        found.append((after - before, (monotonic, wall, (before + after) // 2)))
+    return min(found)[1]
+
+
+def raw_ns() -> int:
+    """The clock that nobody sets right, ns; the monotonic one where there is none such."""
+    if sys.platform == "linux":
+        return time.clock_gettime_ns(time.CLOCK_MONOTONIC_RAW)
+    return time.monotonic_ns()
+
+
+def fineness() -> dict[str, float]:
+    """Smallest step that the monotonic clock was seen to take, and the time it takes to read it, s."""
+    times = [time.monotonic_ns() for _ in range(READS)]
+    steps = [b - a for a, b in itertools.pairwise(times) if b > a]
+    return {
+        "resolution": min(steps, default=times[-1] - times[0]) / 1e9,
+        "read_time": (times[-1] - times[0]) / (READS - 1) / 1e9,
+    }
+
+
+def synchronisation() -> dict[str, float | bool]:
+    """Whether the kernel says that NTP or PTP sets its clock right, and to what error, s; empty if it is silent."""
+    if sys.platform != "linux":
+        return {}
+    timex = Timex()
+    if ctypes.CDLL(None, use_errno=True).adjtimex(ctypes.byref(timex)) < 0:
+        return {}
+    found: dict[str, float | bool] = {"synchronised": not timex.status & STA_UNSYNC}
+    if timex.esterror < UNSET:
+        found["estimated_error"] = timex.esterror * 1e-6
+    return found

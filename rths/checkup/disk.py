@@ -1,0 +1,69 @@
+"""The place of recordings: whether it can be written, how fast, how long it takes to be safe, how much it holds.
+
+What is written stands in a file without a name: whatever ends the check, nothing is left.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+from common.errors import InputError
+
+PIECE = 100_000  # bytes, what a recorder writes at most in one flush: 1 MB/s
+PACE = 0.1  # s, from flush to flush
+
+
+def nearest(folder: Path) -> Path:
+    """The folder itself, or the nearest one above it that exists; raises InputError where a file is in the way."""
+    place = folder.absolute()
+    while not there(place):
+        place = place.parent
+    if not place.is_dir():
+        raise InputError(f"'{place}' is a file: give the folder of the recordings with -o.")
+    return place
+
+
+def there(place: Path) -> bool:
+    """Whether a file or folder is there, as far as this user may know."""
+    try:
+        return place.exists()
+    except PermissionError:
+        return False
+
+
+def measure(folder: Path, until: float) -> dict[str, Any]:
+    """Write like a recorder that has every flush on the disk, until a time of the monotonic clock; times in s.
+
+    `error` says why it could not be done.
+    """
+    found: dict[str, Any] = {"folder": str(folder)}
+    try:
+        found["free"] = shutil.disk_usage(folder).free
+        with tempfile.TemporaryFile(dir=folder, buffering=0) as file:
+            syncs, spent = write(file.fileno(), until)
+    except OSError as error:
+        return found | {"error": error.strerror or str(error)}
+    return found | {
+        "syncs": len(syncs),
+        "worst_sync": max(syncs),
+        "median_sync": sorted(syncs)[len(syncs) // 2],
+        "rate": len(syncs) * PIECE / max(spent, 1e-9),
+    }
+
+
+def write(descriptor: int, until: float) -> tuple[list[float], float]:
+    """Write a piece per pace, once at least; how long each took to be on the disk, and all together, s."""
+    piece = os.urandom(PIECE)  # a disk that compresses gains nothing
+    times: list[float] = []
+    while not times or time.monotonic() < until:
+        began = time.monotonic()
+        os.write(descriptor, piece)
+        (os.fdatasync if hasattr(os, "fdatasync") else os.fsync)(descriptor)
+        times.append(time.monotonic() - began)
+        time.sleep(max(0.0, min(began + PACE, until) - time.monotonic()))
+    return times, sum(times)

@@ -1,0 +1,221 @@
+"""What the findings of `rths doctor` mean: a check passes or fails, and all together become one sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+# One tick in a thousand that uses a force one interval (2 ms) too old is 2 µs of delay on average, which costs
+# a structure like the default one 0.0003 points of damping.
+LATE_SHARE = 1e-3
+ROOM = 1.0  # of the interval, for waking up and the round trip, each at its 99.9th percentile
+CLOCK_STEP = 0.01  # of the interval: finer than this nothing is judged
+WORST_SYNC = 1.0  # s; a recording that is cut off may lose its last second, no more
+RATE = 1e6  # bytes/s, above what a recorder writes
+FREE = 1_000_000_000  # bytes, a quarter of an hour of recording
+STOLEN_SHARE = (
+    0.01  # of the processors' time; above, the check says more about the host than about this machine
+)
+
+TIMING = ("wake-up", "wake-up + round trip", "late exchanges", "clock")
+
+
+class Check(NamedTuple):
+    """One thing that a test needs."""
+
+    name: str
+    found: str
+    needed: str
+    passed: bool
+    advice: str  # a sentence, for where it failed
+
+
+class Verdict(NamedTuple):
+    """All checks in one sentence."""
+
+    state: str  # holds, mostly, fails, not judged
+    sentence: str
+    passed: bool
+
+
+def checks(report: dict[str, Any]) -> list[Check]:
+    """Every check whose part could be measured, or failed to be."""
+    parts: tuple[Callable[[dict[str, Any]], Iterator[Check]], ...] = (
+        of_realtime,
+        of_wake_up,
+        of_round_trip,
+        of_clock,
+        of_disk,
+        of_host,
+    )
+    return [check for part in parts for check in part(report)]
+
+
+def of_realtime(report: dict[str, Any]) -> Iterator[Check]:
+    """Whether all that was insisted on was granted."""
+    missing = report["realtime"].get("missing", [])
+    if report["rt"] == "on":
+        yield Check("real time", f"{len(missing)} missing", "all", not missing, " ".join(missing))
+
+
+def judged(report: dict[str, Any]) -> tuple[str, dict[str, float]]:
+    """The bare loop that stands for a test's processes, and what it found."""
+    loops: dict[str, dict[str, float]] = report["wake_up"]
+    name = "fifo" if "fifo" in loops else "ordinary"
+    return name, loops[name]
+
+
+def remedy(report: dict[str, Any]) -> str:
+    """What to do where the timing does not suffice, the same for every check that says so."""
+    steps = ["end other programs", "give this machine more processors", "or lengthen the interval"]
+    if report["rt"] == "off":
+        steps.insert(0, "try it with --rt auto")
+    elif report["realtime"].get("missing"):
+        steps.insert(0, "get what real time lacks")
+    host = "; a host that stalls it leaves no trace here but this" if "hypervisor" in report["facts"] else ""
+    return f"The interval is not kept: {', '.join(steps)}{host}."
+
+
+def of_wake_up(report: dict[str, Any]) -> Iterator[Check]:
+    """How many intervals a process that does nothing else misses."""
+    name, found = judged(report)
+    if not found:
+        yield Check(
+            "wake-up", "none", "a loop", False, "The bare timing loop failed: see whether python runs."
+        )
+        return
+    share = found["late"] / max(found["ticks"] + found["late"], 1)
+    yield Check(
+        "wake-up",
+        f"{share * 100:.3f} % late ({name})",
+        f"< {LATE_SHARE * 100:g} %",
+        share < LATE_SHARE,
+        remedy(report),
+    )
+
+
+def of_round_trip(report: dict[str, Any]) -> Iterator[Check]:
+    """Whether command and feedback fit into the interval."""
+    found, interval = report["round_trip"], report["interval"]
+    if "error" in found or not found["round_trip"]:
+        reason = found.get("error", "no command was answered").rstrip(".")
+        yield Check(
+            "late exchanges", "none", "an exchange", False, f"The exchange over zenoh failed: {reason}."
+        )
+        return
+    _, loop = judged(report)
+    if loop:
+        together = loop["p99.9"] + found["round_trip"]["p99.9"]
+        yield Check(
+            "wake-up + round trip",
+            f"{together * 1e3:.3f} ms (p99.9)",
+            f"< {ROOM * interval * 1e3:g} ms",
+            together < ROOM * interval,
+            remedy(report),
+        )
+    share = found["late"] / max(found["exchanges"], 1)
+    yield Check(
+        "late exchanges",
+        f"{found['late']} of {found['exchanges']}",
+        f"< {LATE_SHARE * 100:g} %",
+        found["exchanges"] > 0 and share < LATE_SHARE,
+        remedy(report),
+    )
+
+
+def of_clock(report: dict[str, Any]) -> Iterator[Check]:
+    """Whether the clock can tell the times that matter."""
+    step = max(report["clock"]["resolution"], report["clock"]["read_time"])
+    source = report["facts"].get("clocksource", "unknown")
+    yield Check(
+        "clock",
+        f"{step * 1e9:.0f} ns ({source})",
+        f"< {CLOCK_STEP * report['interval'] * 1e6:g} µs",
+        step < CLOCK_STEP * report["interval"],
+        f"The clock '{source}' is too coarse or too slow: choose tsc or kvm-clock (kernel option clocksource=).",
+    )
+
+
+def of_disk(report: dict[str, Any]) -> Iterator[Check]:
+    """Whether a recording can be kept where it is to go."""
+    found = report["disk"]
+    folder = found["folder"]
+    if "error" in found:
+        advice = f"Nothing can be written to '{folder}' ({found['error']}): choose another folder with -o."
+        yield Check("disk", found["error"], "to be written", False, advice)
+    else:
+        slow = f"The disk of '{folder}' is too slow: choose another folder with -o, on a local disk."
+        worst, rate = found["worst_sync"], found["rate"]
+        yield Check("disk, worst sync", f"{worst:.3f} s", f"< {WORST_SYNC:g} s", worst < WORST_SYNC, slow)
+        yield Check("disk, rate", f"{rate / 1e6:.1f} MB/s", f"> {RATE / 1e6:g} MB/s", rate > RATE, slow)
+    if "free" in found:
+        full = f"The disk of '{folder}' is nearly full: free some of it, or choose another folder with -o."
+        free = found["free"]
+        yield Check("disk, free", f"{free / 1e9:.1f} GB", f"> {FREE / 1e9:g} GB", free > FREE, full)
+
+
+def of_host(report: dict[str, Any]) -> Iterator[Check]:
+    """Whether the processors were this machine's own while the check ran."""
+    share = report["machine"].get("stolen_share")
+    if share is not None:
+        yield Check(
+            "stolen time",
+            f"{share * 100:.2f} %",
+            f"< {STOLEN_SHARE * 100:g} %",
+            share < STOLEN_SHARE,
+            "The host gives the processors to others: try again later, or ask it for processors of your own.",
+        )
+
+
+def notes(report: dict[str, Any]) -> list[str]:
+    """What no check fails for and is worth knowing."""
+    found = list(report["realtime"].get("missing", [])) if report["rt"] == "auto" else []
+    found += [
+        f"Another program runs at a real-time priority: {rival}; end it, or give it a processor of its own."
+        for rival in report["rivals"]
+    ]
+    if report["clock"].get("synchronised") is False:
+        found.append(
+            "The wall clock is not synchronised: dates in recordings may be off (a test keeps its own time); "
+            "start chrony or ptp4l."
+        )
+    governor = report["facts"].get("governor", "performance")
+    if governor != "performance":
+        found.append(f"The processors' governor is '{governor}': 'cpupower frequency-set -g performance'.")
+    if report["machine"].get("throttled"):
+        found.append("A quota of the control group held processes back: lift it (docker --cpus, cpu.max).")
+    return found
+
+
+def verdict(report: dict[str, Any], found: list[Check]) -> Verdict:
+    """One sentence for all checks."""
+    name = f"{report['interval'] * 1e3:g} ms"
+    failed = [check for check in found if not check.passed]
+    timing = [check for check in failed if check.name in TIMING]
+    if any(check.name == "stolen time" for check in failed):
+        share = report["machine"]["stolen_share"] * 100
+        anyway = "was not kept" if timing else "was kept all the same"
+        return Verdict(
+            "not judged",
+            f"{name} is not judged: the host took {share:.1f} % of the processors' time, and the interval {anyway}.",
+            False,
+        )
+    if timing:
+        what = "; ".join(f"{check.name} {check.found}, needed {check.needed}" for check in timing)
+        return Verdict("fails", f"{name} will not hold here: {what}.", False)
+    state, reason = outlook(report)
+    held = "will hold" if state == "holds" else "will mostly hold"
+    but = f"; but {failed[0].name} failed: {failed[0].found}, needed {failed[0].needed}" if failed else ""
+    return Verdict(state, f"{name} {held} here: {reason}{but}.", not failed)
+
+
+def outlook(report: dict[str, Any]) -> tuple[str, str]:
+    """Where the timing suffices: how surely, and why."""
+    found = report["round_trip"]
+    together = judged(report)[1]["p99.9"] + found["round_trip"]["p99.9"]
+    fits = f"waking up and the round trip take {together * 1e3:.2f} ms in all but one interval of a thousand"
+    if found["late"]:
+        return "mostly", f"{fits}, yet {found['late']} of {found['exchanges']} exchanges were late"
+    if judged(report)[0] != "fifo":
+        return "mostly", f"{fits}, but without a real-time priority any other load may break that"
+    return "holds", fits
