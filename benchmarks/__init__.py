@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from benchmarks import closed_loop, codec, loops, recorder, start
+from benchmarks import closed_loop, codec, exchange, loops, real_time, recorder, scale, start
 from benchmarks.result import Figure
 
 BENCHMARKS: dict[str, Callable[[], list[Figure]]] = {
+    "exchange": exchange.run,
+    "real_time": real_time.run,
     "closed_loop": closed_loop.run,
     "loops": loops.run,
-    "codec": codec.run,
+    "scale": scale.run,
     "recorder": recorder.run,
+    "codec": codec.run,
     "start": start.run,
 }

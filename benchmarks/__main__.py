@@ -28,14 +28,19 @@ def machine() -> dict[str, str]:
     }
 
 
+def number(value: object) -> str:
+    """A figure's number as the tables have it."""
+    return "–" if value is None else f"{value:,.4g}" if isinstance(value, float) else str(value)
+
+
 def row(figure: Figure) -> list[str]:
     """One line of the table."""
     met = {None: "", True: "met", False: "missed"}[figure.met]
     ratio = "" if figure.ratio is None else f"{figure.ratio:.3g} × {figure.peer}"
     return [
         figure.name,
-        f"{figure.best:,.4g}",
-        f"{figure.median:,.4g}",
+        number(figure.best),
+        number(figure.median),
         figure.unit,
         figure.target,
         met,
@@ -57,9 +62,17 @@ def main() -> int:
     sys.stdout.write(", ".join(f"{name} {value}" for name, value in host.items()) + "\n\n")
     rows = [["figure", "best", "median", "unit", "target", "", "ratio of medians"]]
     table(rows + [row(figure) for found in figures.values() for figure in found])
+    for figure in (each for several in figures.values() for each in several if each.points):
+        sys.stdout.write(f"\n{figure.name}, all points\n")
+        table(
+            [
+                list(figure.points[0]),
+                *([number(value) for value in point.values()] for point in figure.points),
+            ]
+        )
     args.json.parent.mkdir(parents=True, exist_ok=True)
     plain = {name: [figure._asdict() for figure in found] for name, found in figures.items()}
-    args.json.write_text(json.dumps({"machine": host, "figures": plain}, indent=1))
+    args.json.write_text(json.dumps({"machine": host, "figures": plain}, indent=1, allow_nan=False))
     sys.stdout.write(f"\nwritten to {args.json}\n")
     return 0
 

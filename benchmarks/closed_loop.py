@@ -1,4 +1,4 @@
-"""Control steps per second of the compiled closed loop, beside the same building in plain Python."""
+"""Control steps per second of the compiled closed loop, beside plain Python and beside OpenSeesPy."""
 
 from __future__ import annotations
 
@@ -7,13 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 
+from benchmarks import loops, opensees_peer
+from benchmarks.opensees_peer import Answer, Case
 from benchmarks.result import Figure, rate_figure, rates
-from common.plan import Control, Plan, ideal
+from common.plan import Control, Plan, Recording, ideal
 from models import substructure
 from models.closed_loop import signals, simulate
 from models.registry import Array
 
 TARGET = 5e6
+SAME = 1e-3  # of the peak: what another method may differ by
 
 
 def plain_python(plan: Plan, ground: Array) -> list[float]:
@@ -30,33 +33,71 @@ def plain_python(plan: Plan, ground: Array) -> list[float]:
     return found
 
 
-def run() -> list[Figure]:
-    """The default test without and with noise; the ideal test beside plain Python, with their difference."""
-    plan = Plan()
-    ground = substructure.ground_rows(plan, substructure.motion(plan))
-    peer = statistics.median(rates(lambda: len(plain_python(plan, ground))))
-    bare = replace(ideal(plan), control=Control(amd=False))
-    x = signals(bare, simulate(bare, ground))["displacement"]
-    difference = float(np.max(np.abs(x - plain_python(plan, ground))) / np.max(np.abs(x)))
-    words = "central difference of the building alone in plain Python"
+def bare(plan: Plan) -> Plan:
+    """The plan without damper, its transfer systems ideal: what the building alone must give too."""
+    return replace(ideal(plan), control=Control(amd=False))
+
+
+def difference(name: str, x: Array, theirs: Array) -> Figure:
+    """Largest difference between two responses (m) over the peak of the first."""
+    found = float(np.max(np.abs(x - theirs)) / np.max(np.abs(x)))
+    return Figure(name, "of the peak", found, found, f"≤ {SAME:g}", found <= SAME)
+
+
+def case_of(plan: Plan, ground: Array) -> Case:
+    """The plan's one storey, specimen included, for OpenSeesPy."""
+    structure = plan.structure
+    return Case(
+        structure.mass[0],
+        structure.stiffness[0],
+        structure.damping[0],
+        plan.test.interval,
+        ground[0, :-1].tolist(),
+    )
+
+
+def opensees(answer: Answer | str, x: Array, compiled: float, objects: float) -> list[Figure]:
+    """OpenSeesPy's rates over ours, `compiled` and through `objects` (steps/s), and its distance from `x` (m)."""
+    if isinstance(answer, str):
+        return [Figure(f"OpenSeesPy: not installed here ({answer[:60]})", "", None, None)]
+    theirs = np.array([0.0, *answer.displacement[:-1]])  # its first is of the end of the first interval
     return [
         rate_figure(
-            "compiled closed loop",
+            f"OpenSeesPy {answer.version}, building alone, all in one call",
             "steps/s",
-            rates(lambda: simulate(plan, ground).ticks),
-            least=TARGET,
-            peer=words,
-            beside=peer,
+            answer.at_once,
+            peer="our compiled closed loop, laboratories included",
+            beside=compiled,
         ),
         rate_figure(
-            "compiled closed loop with noise", "steps/s", rates(lambda: simulate(plan, ground, seed=1).ticks)
+            f"OpenSeesPy {answer.version}, building alone, read step by step",
+            "steps/s",
+            answer.by_step,
+            peer="our loops, with laboratories, noise and protocol",
+            beside=objects,
         ),
-        Figure(
-            "difference from that peer, ideal test",
-            "of the peak",
-            difference,
-            difference,
-            "≤ 0.001",
-            difference <= 1e-3,
+        difference("difference from OpenSeesPy, ideal test", x, theirs),
+    ]
+
+
+def run() -> list[Figure]:
+    """The default test without and with noise; the ideal test beside plain Python and OpenSeesPy."""
+    plan, alone = Plan(), bare(Plan())
+    ground = substructure.ground_rows(plan, substructure.motion(plan))
+    peer = statistics.median(rates(lambda: len(plain_python(plan, ground))))
+    compiled = rates(lambda: simulate(plan, ground).ticks)
+    noisy = rates(lambda: simulate(plan, ground, seed=1).ticks)
+    objects = loops.played(replace(plan, recording=Recording(required=False)), lambda: None)
+    x = signals(alone, simulate(alone, ground))["displacement"]
+    words = "central difference of the building alone in plain Python"
+    return [
+        rate_figure("compiled closed loop", "steps/s", compiled, least=TARGET, peer=words, beside=peer),
+        rate_figure("compiled closed loop with noise", "steps/s", noisy),
+        difference("difference from that peer, ideal test", x, np.array(plain_python(plan, ground))),
+        *opensees(
+            opensees_peer.ask(case_of(plan, ground)),
+            x,
+            statistics.median(compiled),
+            statistics.median(objects),
         ),
     ]

@@ -1,47 +1,268 @@
-"""Messages per second of the recording, beside the bare MCAP writer."""
+"""Messages per second into a recording: the writer alone, and the recorder's process behind a burst over zenoh."""
 
 from __future__ import annotations
 
 import statistics
+import subprocess
+import sys
 import tempfile
+import time
+from itertools import count
 from pathlib import Path
+from typing import Any, NamedTuple
 
+import numpy as np
 from mcap.writer import CompressionType, Writer
 
 from benchmarks.result import Figure, rate_figure, rates
+from common.clock import MonotonicClock
+from common.endpoint import FrameEndpoint
+from common.laboratory import Laboratory, Setting
+from common.messages import Register, Resend
+from common.plan import PROTOCOL_VERSION, Plan
+from common.recording.reader import Run, read
 from common.recording.writer import CHUNK_SIZE, Recording
-from common.signals import TOPICS, Kind
+from common.signals import TICK_TOPICS, TOPICS, Kind
+from common.zenoh_link import ZenohLink, listenable
 
+ROOT = Path(__file__).resolve().parent.parent
 COUNT = 20_000
 NEEDED = 1_500  # per second of a default test
+BURSTS = (1, 20, 40, 60, 80, 120)  # times what a default test needs
+BURST_S = 3.0
+SLOT_S = 0.002  # samples leave a laboratory between ticks
+SESSION = 1
+REPEAT_S = 0.1
+PATIENCE_S = 30.0  # for the recorder to join
+END_S = 20.0  # for the recorder to end; what it has not written by then counts as missing
+POOL = 1_000  # different samples of a topic: noise, which no compression shrinks
+
+Values = list[list[Any]]
+
+
+# -- the writer alone ---------------------------------------------------------------------------------
+
+
+def values_of(topic: str) -> list[Any]:
+    """A sample of a topic."""
+    return [0.1 if row.kind in (Kind.NUMBER, Kind.STOREYS) else 1 for row in TOPICS[topic]]
+
+
+def recorded(path: Path) -> int:
+    """Write samples of the master, flushed as often as in a test; how many."""
+    values = values_of("master")
+    recording = Recording(path, "trial", 1, TOPICS)
+    for seq in range(COUNT):
+        recording.add("master", seq, seq, [seq, *values[1:]])
+        if seq % 150 == 0:
+            recording.flush()
+    recording.close({})
+    return COUNT
+
+
+def bare(path: Path) -> int:
+    """Write as many ready-made bytes with the MCAP writer alone; how many."""
+    with path.open("wb") as stream:
+        writer = Writer(stream, chunk_size=CHUNK_SIZE, compression=CompressionType.ZSTD)
+        writer.start()
+        channel = writer.register_channel("a", "", 0)
+        for seq in range(COUNT):
+            writer.add_message(channel, log_time=seq, data=b"x" * 130, publish_time=seq, sequence=seq)
+        writer.finish()  # type: ignore[no-untyped-call]
+    return COUNT
+
+
+# -- the process behind a burst -----------------------------------------------------------------------
+
+
+class Burst(NamedTuple):
+    """What a burst did: messages per second offered and written to the end, and what became of them."""
+
+    asked: float  # messages/s
+    offered: float  # messages/s that the sending laboratories managed
+    written: float  # messages/s from the first sample to the finished file
+    messages: int
+    missing: int  # not in the file
+    doubled: int  # in the file more than once, or out of order
+    reported: int  # missing by the recording's own summary, -1 without one
+    sent_again: int  # pieces that the recorder asked for again
+    behind: float  # s from the last sample sent to the end of the recorder's process
+
+    @property
+    def whole(self) -> bool:
+        """Whether the file holds every message exactly once, in order."""
+        return self.missing == 0 and self.doubled == 0
+
+
+class Laboratories:
+    """Both laboratories' streams to the recorder, over links of their own as in a test."""
+
+    def __init__(self, plan: Plan, endpoint: str) -> None:
+        self._digest = plan.digest()
+        self._links = [
+            ZenohLink("master", plan.test.name, listen=endpoint),
+            ZenohLink("slave", plan.test.name, connect=endpoint, patience=PATIENCE_S),
+        ]
+        self.labs = [
+            Laboratory(name, Setting(plan, FrameEndpoint(link, self._digest), MonotonicClock()))
+            for name, link in zip(("master", "slave"), self._links, strict=True)
+        ]
+        for lab in self.labs:
+            lab.enter(SESSION)
+        self._pools = {topic: pool(topic) for topic in TICK_TOPICS}
+        self.sent_again = 0
+
+    def close(self) -> None:
+        """Leave the links."""
+        for link in reversed(self._links):
+            link.close()
+
+    def join(self, recorder: subprocess.Popen[bytes]) -> None:
+        """Wait until the recorder takes part in the session; raises TimeoutError where it does not."""
+        master, slave = self.labs
+        deadline = time.monotonic() + PATIENCE_S
+        while any(lab.recorder is None or lab.recorder.session != SESSION for lab in (master, slave)):
+            if recorder.poll() is not None or time.monotonic() > deadline:
+                raise TimeoutError("the recorder did not join the burst")
+            master.endpoint.send(Register(SESSION, PROTOCOL_VERSION, self._digest))
+            self.listen()
+            time.sleep(REPEAT_S)
+
+    def listen(self) -> None:
+        """Do what the recorder asks for."""
+        for lab in self.labs:
+            while (received := lab.endpoint.receive()) is not None:
+                if isinstance(received.message, Resend) and received.message.lab == lab.name:
+                    self.sent_again += len(lab.outlet.again(received.message))
+                lab.listen_to_recorder(received.message)
+
+    def send(self, rate: float, ticks: int) -> float:
+        """Send the samples of so many ticks at `rate` messages/s; the seconds it took."""
+        began, sent = time.monotonic(), 0
+        while sent < ticks:
+            due = min(ticks, 1 + int((time.monotonic() - began) * rate / len(TICK_TOPICS)))
+            for tick in range(sent, due):
+                self._sample(tick)
+            sent = due
+            for lab in self.labs:
+                lab.send_samples(everything=sent == ticks)
+            self.listen()
+            time.sleep(SLOT_S)
+        return time.monotonic() - began
+
+    def _sample(self, tick: int) -> None:
+        master, slave = self.labs
+        for lab, topic in ((master, "master"), (master, "latency"), (slave, "slave")):
+            lab.outlet.add(topic, tick, tick, (tick, *self._pools[topic][tick % POOL]))
+
+    def finish(self, recorder: subprocess.Popen[bytes]) -> float:
+        """Say how long the streams are until the recorder has ended; the seconds it took, at most `END_S`."""
+        began = time.monotonic()
+        for turn in count():
+            if recorder.poll() is not None or time.monotonic() - began > END_S:
+                break
+            if turn % round(REPEAT_S / SLOT_S) == 0:
+                for lab in self.labs:
+                    lab.endpoint.send(lab.outlet.finished())
+            self.listen()
+            time.sleep(SLOT_S)
+        return time.monotonic() - began
+
+
+def pool(topic: str) -> Values:
+    """Samples of a topic without their tick."""
+    draws = np.random.default_rng(1).normal(size=(POOL, len(TOPICS[topic]))).tolist()
+    kept = (Kind.NUMBER, Kind.STOREYS)
+    return [
+        [draw if row.kind in kept else 1 for row, draw in zip(TOPICS[topic][1:], line[1:], strict=True)]
+        for line in draws
+    ]
+
+
+def burst(rate: float, seconds: float, folder: Path) -> Burst:
+    """A burst into the recorder's own process, which is read back and counted."""
+    plan, endpoint, path = Plan().with_test(duration=seconds), listenable(), folder / "burst.mcap"
+    (folder / "plan.toml").write_text(plan.toml(), encoding="utf-8")
+    ticks = max(1, round(rate * seconds / len(TICK_TOPICS)))
+    labs = Laboratories(plan, endpoint)
+    words = [str(folder / "plan.toml"), "--connect", endpoint, "-o", str(path)]
+    recorder = subprocess.Popen(
+        [sys.executable, "-m", "recorder", *words], cwd=ROOT, stderr=subprocess.DEVNULL
+    )
+    try:
+        labs.join(recorder)
+        spent = labs.send(rate, ticks)
+        behind = labs.finish(recorder)
+    finally:
+        recorder.kill()
+        recorder.wait()
+        labs.close()
+    messages, run = ticks * len(TICK_TOPICS), read(path)
+    return Burst(
+        rate,
+        messages / spent,
+        messages / (spent + behind),
+        messages,
+        *account(run, ticks),
+        reported(run),
+        labs.sent_again,
+        behind,
+    )
+
+
+def account(run: Run, ticks: int) -> tuple[int, int]:
+    """How many messages of a recording are missing, and how many are there twice or out of order."""
+    missing = doubled = 0
+    for topic in TICK_TOPICS:
+        found = run.sequences.get(topic, np.zeros(0, dtype=np.int64))
+        missing += ticks - np.intersect1d(found, np.arange(ticks)).size
+        doubled += int(np.count_nonzero(np.diff(found) <= 0))
+    return missing, doubled
+
+
+def reported(run: Run) -> int:
+    """How many items the recording itself says are missing, -1 where it was cut off."""
+    summary = run.metadata.get("summary")
+    return int(summary["items_lost"]) + int(summary["items_dropped"]) if summary else -1
+
+
+def bursts() -> list[Burst]:
+    """Bursts of rising rate up to the first that loses something."""
+    found: list[Burst] = []
+    with tempfile.TemporaryDirectory() as folder:
+        for times in BURSTS:
+            found.append(burst(times * NEEDED, BURST_S, Path(folder)))
+            if not found[-1].whole:
+                break
+    return found
+
+
+# -- figures ------------------------------------------------------------------------------------------
+
+
+def figures(found: list[Burst]) -> list[Figure]:
+    """The fastest bursts without loss, with all bursts as points of a curve; and what the next one lost."""
+    whole = [each for each in found if each.whole]
+    most = max((each.offered for each in whole), default=0.0)
+    easy = max((each.offered for each in whole if each.sent_again == 0), default=0.0)
+    process = "recorder process over zenoh"
+    complete = rate_figure(f"{process}, every message once", "messages/s", [most], least=20 * NEEDED)
+    results = [
+        complete._replace(points=[each._asdict() for each in found]),
+        rate_figure(f"{process}, nothing sent again", "messages/s", [easy]),
+    ]
+    if lossy := [each for each in found if not each.whole]:
+        share = lossy[0].missing / lossy[0].messages
+        results.append(Figure(f"lost at {lossy[0].offered:,.0f} messages/s", "of them", share, share))
+    return results
 
 
 def run() -> list[Figure]:
-    """Messages of the master's topic, flushed as often as in a test."""
-    values = [0.1 if row.kind in (Kind.NUMBER, Kind.STOREYS) else 1 for row in TOPICS["master"]]
+    """The writer beside the bare MCAP writer, and the recorder's process behind bursts."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "a.mcap"
-
-        def recorded() -> int:
-            recording = Recording(path, "trial", 1, TOPICS)
-            for seq in range(COUNT):
-                recording.add("master", seq, seq, [seq, *values[1:]])
-                if seq % 150 == 0:
-                    recording.flush()
-            recording.close({})
-            return COUNT
-
-        def bare() -> int:
-            with path.open("wb") as stream:
-                writer = Writer(stream, chunk_size=CHUNK_SIZE, compression=CompressionType.ZSTD)
-                writer.start()
-                channel = writer.register_channel("a", "", 0)
-                for seq in range(COUNT):
-                    writer.add_message(channel, log_time=seq, data=b"x" * 130, publish_time=seq, sequence=seq)
-                writer.finish()  # type: ignore[no-untyped-call]
-            return COUNT
-
-        beside = statistics.median(rates(bare, repeats=5))
-        found = rates(recorded, repeats=5)
+        beside = statistics.median(rates(lambda: bare(path), repeats=5))
+        found = rates(lambda: recorded(path), repeats=5)
     words = "bare MCAP writer with ready-made bytes"
-    return [rate_figure("recording", "messages/s", found, least=20 * NEEDED, peer=words, beside=beside)]
+    alone = rate_figure("recording", "messages/s", found, least=20 * NEEDED, peer=words, beside=beside)
+    return [alone, *figures(bursts())]

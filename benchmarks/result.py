@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import statistics
 import time
-from collections.abc import Callable
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 
 class Figure(NamedTuple):
@@ -13,12 +13,13 @@ class Figure(NamedTuple):
 
     name: str
     unit: str
-    best: float
-    median: float
+    best: float | None  # None where it could not be had here; the name says why
+    median: float | None
     target: str = ""
     met: bool | None = None
     peer: str = ""
     ratio: float | None = None  # this figure over the peer's, medians
+    points: Sequence[Mapping[str, Any]] = ()  # of a curve, in the order of its values
 
 
 def rates(work: Callable[[], int], repeats: int = 7) -> list[float]:

@@ -13,12 +13,13 @@ from typing import Any
 
 from common import plan as plans
 from common import reality as realities
+from common import realtime
 from common.errors import RthsError
 from common.laboratory import Report
 from common.plan import Plan
 from common.reality import Reality
 
-SHIPPED = ("default", "paper", "rc_column")
+SHIPPED = ("default", "paper", "rc_column", "two_dampers")
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 
 
@@ -51,6 +52,23 @@ def connect_argument(parser: argparse.ArgumentParser) -> None:
         default=DEFAULT_ENDPOINT,
         metavar="ENDPOINT",
         help=f"where the master listens (default: {DEFAULT_ENDPOINT})",
+    )
+
+
+def rt_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of a laboratory's process: how real time it shall be."""
+    parser.add_argument(
+        "--rt",
+        choices=realtime.MODES,
+        default="auto",
+        help="real-time priority, locked memory, own processor: what can be had (auto), all or refuse (on), none (off)",
+    )
+
+
+def processor_argument(parser: argparse.ArgumentParser) -> None:
+    """The option that binds a laboratory's process."""
+    parser.add_argument(
+        "--processor", type=int, metavar="N", help="the one processor to run on (default: any)"
     )
 
 

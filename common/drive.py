@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import ctypes
-import gc
 import signal
-import sys
 from collections.abc import Callable, Mapping
 from types import FrameType
 from typing import Protocol
 
 from common.laboratory import Laboratory
 from common.messages import Message
+from common.realtime import freeze
+from common.surroundings import Surroundings
 
-PR_SET_TIMERSLACK = 29
 IDLE_NS = 5_000_000  # how often the handshake looks after itself
 LEAVE_NS = 5_000_000_000  # how long the last words may take
 PROGRESS_NS = 200_000_000
@@ -25,8 +23,8 @@ class Loop(Protocol):
     lab: Laboratory
     ticks: int
 
-    def take(self, message: Message, received_ns: int) -> None:
-        """Act on a message."""
+    def take(self, message: Message, received_ns: int, role: str) -> None:
+        """Act on a message of a role."""
 
     def poll(self) -> None:
         """Move the handshake on."""
@@ -64,13 +62,16 @@ class Loop(Protocol):
         """What a user watches."""
 
 
-def drive(loop: Loop, stopping: Callable[[], str]) -> None:
+def drive(loop: Loop, stopping: Callable[[], str], surroundings: Surroundings) -> None:
     """Run a test to its end; `stopping` gives the reason to end it early, empty while there is none."""
     handshake(loop, stopping)
-    calm()
+    if loop.lab.running:
+        surroundings.begin()
+    freeze()
     if run(loop, stopping):
         loop.finish()
     loop.disarm()
+    surroundings.end(loop.ticks)
     depart(loop)
 
 
@@ -102,8 +103,10 @@ def run(loop: Loop, stopping: Callable[[], str]) -> bool:
 
 
 def wait(loop: Loop, tick: int) -> None:
-    """Until the time of a tick, and then for its message as long as it may be waited for."""
-    fetch_until(loop, loop.earliest(tick))
+    """Sleep until the time of a tick, take what has come, and wait for its message as long as it may be waited for."""
+    loop.lab.clock.sleep_until(loop.earliest(tick))
+    while fetch(loop, 0):
+        pass
     while not loop.heard(tick) and loop.lab.running and loop.lab.clock.now() < loop.latest(tick):
         fetch(loop, loop.latest(tick))
 
@@ -113,16 +116,8 @@ def fetch(loop: Loop, deadline: int) -> bool:
     received = loop.lab.endpoint.receive(max(deadline - loop.lab.clock.now(), 0) * 1e-9)
     if received is None:
         return False
-    loop.take(received.message, received.received_ns)
+    loop.take(received.message, received.received_ns, received.role)
     return True
-
-
-def fetch_until(loop: Loop, deadline: int) -> None:
-    """Take messages until the deadline, and those that are there already."""
-    while loop.lab.clock.now() < deadline:
-        fetch(loop, deadline)
-    while fetch(loop, 0):
-        pass
 
 
 def depart(loop: Loop) -> None:
@@ -132,20 +127,6 @@ def depart(loop: Loop) -> None:
         loop.leave()
         fetch(loop, loop.lab.clock.now() + IDLE_NS)
     loop.leave()
-
-
-def calm() -> None:
-    """Keep interpreter and kernel from delaying the loop.
-
-    No garbage collection, a quick hand-over between threads, and on Linux wake-ups that are not put off
-    to be bundled (timer slack 50 µs by default).
-    """
-    sys.setswitchinterval(1e-4)
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(PR_SET_TIMERSLACK, 1, 0, 0, 0)
-    gc.collect()
-    gc.freeze()
-    gc.disable()
 
 
 class Stopper:

@@ -7,18 +7,20 @@ from typing import NamedTuple, Protocol
 
 from common import codec
 from common.clock import MonotonicClock
+from common.inbox import Inbox
 from common.messages import Command, Feedback, Finished, Message, Samples
-from common.transport import CONTROL, SAMPLES, TICK, Transport
+from common.transport import CONTROL, SAMPLES, TICK, Packet, Transport
 
 CHANNELS: dict[type, str] = {Command: TICK, Feedback: TICK, Samples: SAMPLES, Finished: SAMPLES}
 
 
 class Received(NamedTuple):
-    """A valid message, from whom, and when it arrived (own clock, ns)."""
+    """A valid message, from whom, when its frame arrived and when it was decoded (own clock, ns)."""
 
     message: Message
     role: str
     received_ns: int
+    decoded_ns: int
 
 
 class Endpoint(Protocol):
@@ -27,8 +29,11 @@ class Endpoint(Protocol):
     def enter(self, session: int) -> None:
         """Take part in a session: what is sent from now on belongs to it."""
 
-    def send(self, message: Message) -> int:
-        """Hand a message to the link; never blocks. When it was encoded and handed over, own clock, ns."""
+    def send(self, message: Message, to: str = "") -> int:
+        """Hand a message to the link, `to` one role alone where it is named; never blocks.
+
+        When it was encoded and handed over, own clock, ns.
+        """
 
     def receive(self, timeout: float = 0.0) -> Received | None:
         """The next message, waiting at most `timeout` s for it; None where there is none."""
@@ -46,32 +51,36 @@ class FrameEndpoint:
         self._digest = plan_digest
         self._open_key = codec.session_key(0, plan_digest)
         self._key = self._open_key
+        self._inbox: Inbox[Received] = Inbox()
         self.rejected: Counter[str] = Counter()
+        transport.listen(self._heard)
 
     def enter(self, session: int) -> None:
         """Use the key of a session for what is sent from now on; frames before it are still understood."""
         self._key = codec.session_key(session, self._digest)
 
-    def send(self, message: Message) -> int:
+    def send(self, message: Message, to: str = "") -> int:
         """Hand a message to the link; when it was encoded, ns."""
         channel = CHANNELS.get(type(message), CONTROL)
         key = self._key if channel != CONTROL else self._open_key
         frame = codec.encode(message, key)
         encoded_ns = self._clock.now()
-        self._transport.send(channel, frame)
+        self._transport.send(channel, frame, to)
         return encoded_ns
 
     def receive(self, timeout: float = 0.0) -> Received | None:
-        """The next valid message, waiting at most `timeout` s for a frame; None where there is none."""
-        while True:
-            packet = self._transport.receive(timeout)
-            if packet is None:
-                return None
-            key = self._key if packet.channel != CONTROL else self._open_key
-            try:
-                return Received(codec.decode(packet.frame, key), packet.role, packet.received_ns)
-            except codec.RejectedFrame as rejection:
-                self.rejected[rejection.reason.value] += 1
+        """The next valid message, waiting at most `timeout` s for it; None where there is none."""
+        return self._inbox.get(timeout)
+
+    def _heard(self, packet: Packet) -> None:
+        """Decode a frame on the link's own thread, which is awake: whoever waits is woken by a message."""
+        key = self._key if packet.channel != CONTROL else self._open_key
+        try:
+            message = codec.decode(packet.frame, key)
+        except codec.RejectedFrame as rejection:
+            self.rejected[rejection.reason.value] += 1
+            return
+        self._inbox.put(Received(message, packet.role, packet.received_ns, self._clock.now()))
 
     def close(self) -> None:
         """Leave the link."""

@@ -49,7 +49,12 @@ TRANSITIONS: dict[State, dict[Event, State]] = {
         Event.STOP: State.STOPPING,
         **_ABNORMAL,
     },
-    State.REGISTERED: {Event.ARM: State.ARMED, Event.STOP: State.STOPPING, **_ABNORMAL},
+    State.REGISTERED: {
+        Event.REFUSE: State.REFUSED,
+        Event.ARM: State.ARMED,
+        Event.STOP: State.STOPPING,
+        **_ABNORMAL,
+    },
     State.ARMED: {Event.SCHEDULE: State.SCHEDULED, Event.STOP: State.STOPPING, **_ABNORMAL},
     State.SCHEDULED: {Event.RUN: State.RUNNING, Event.STOP: State.STOPPING, **_ABNORMAL},
     State.RUNNING: {Event.STOP: State.STOPPING, **_ABNORMAL},

@@ -1,15 +1,15 @@
-"""Frames on their way from the link's threads to the loop."""
+"""Messages on their way from the link's threads to the loop."""
 
 from __future__ import annotations
 
-import contextlib
 import threading
 from collections import deque
+from typing import Generic, TypeVar
 
-from common.transport import Packet
+Item = TypeVar("Item")
 
 
-class Inbox:
+class Inbox(Generic[Item]):
     """A queue for several producers and one consumer, who may wait with a timeout.
 
     Not `queue.SimpleQueue`: in CPython 3.11 its `get` waits for ever where a signal interrupts it and the
@@ -17,21 +17,23 @@ class Inbox:
     """
 
     def __init__(self) -> None:
-        self._packets: deque[Packet] = deque()
+        self._items: deque[Item] = deque()
         self._there = threading.Lock()
         self._there.acquire()
 
-    def put(self, packet: Packet) -> None:
-        """Add a frame and wake the consumer."""
-        self._packets.append(packet)
-        with contextlib.suppress(RuntimeError):  # woken already
+    def put(self, item: Item) -> None:
+        """Add an item and wake the consumer."""
+        self._items.append(item)
+        try:  # noqa: SIM105 - a context manager would cost more than the rest
             self._there.release()
+        except RuntimeError:  # woken already
+            pass
 
-    def get(self, timeout: float) -> Packet | None:
-        """The next frame, waiting at most `timeout` s; None where none came, or earlier on a false alarm."""
-        if not self._packets and timeout > 0.0:
+    def get(self, timeout: float) -> Item | None:
+        """The next item, waiting at most `timeout` s; None where none came, or earlier on a false alarm."""
+        if not self._items and timeout > 0.0:
             self._there.acquire(timeout=timeout)
         try:
-            return self._packets.popleft()
+            return self._items.popleft()
         except IndexError:
             return None

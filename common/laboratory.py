@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from common.clock import Clock
@@ -10,10 +11,13 @@ from common.endpoint import Endpoint
 from common.errors import InterlockError, LostError, RthsError
 from common.exchange import Event, Exchange, State
 from common.messages import Message, Recorder, Resend, Trip
-from common.outlet import Outlet
+from common.outlet import Outlet, next_of
 from common.plan import Plan
+from common.roles import title
 
 REPEAT_NS = 100_000_000  # an unanswered request is sent again after this long
+
+NO_VALUES: Mapping[str, float] = MappingProxyType({})
 
 Report = Callable[[str, Mapping[str, Any]], None]
 
@@ -60,12 +64,22 @@ class Laboratory:
         """Nominal time of a tick on this laboratory's clock."""
         return self.start_ns + tick * self.interval_ns
 
-    def note(self, code: str, text: str, *, level: str = "info", tick: int = 0, **values: float) -> None:
+    def note(
+        self,
+        code: str,
+        text: str,
+        *,
+        level: str = "info",
+        tick: int = 0,
+        values: Mapping[str, float] = NO_VALUES,
+    ) -> None:
         """Record and report an event."""
         t = tick * self.plan.test.interval
         at = self.epoch_ns + tick * self.interval_ns
-        self.outlet.add("event", at, at, (t, self.name, level, code, text, values))
-        self.report("event", {"t": t, "lab": self.name, "level": level, "code": code, "text": text} | values)
+        self.outlet.add("event", at, at, (t, self.name, level, code, text, dict(values)))
+        self.report(
+            "event", {"t": t, "lab": self.name, "level": level, "code": code, "text": text} | dict(values)
+        )
 
     def fail(self, event: Event, error: RthsError, *, code: str, tick: int = 0, remote: bool = False) -> None:
         """End the test for this laboratory; the first cause stays."""
@@ -92,7 +106,7 @@ class Laboratory:
         """End the test because the other laboratory has stopped its rig."""
         self.fail(
             Event.TRIP,
-            InterlockError(f"The {lab} stopped the test: {text}"),
+            InterlockError(f"The {title(lab)} stopped the test: {text}"),
             code="remote_trip",
             tick=tick,
             remote=True,
@@ -121,7 +135,7 @@ class Laboratory:
         recorder = self.recorder
         if recorder is None or not self.exchange.belongs(recorder.session):
             return False
-        return (recorder.master_next if self.name == "master" else recorder.slave_next) >= self.outlet.total
+        return next_of(recorder.nexts, self.name) >= self.outlet.total
 
     @property
     def running(self) -> bool:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+
 from common.errors import InputError
 from common.mailbox import LinkModel, PerfectLink
 from common.plugins import construct, find
@@ -17,7 +19,11 @@ OPTIONS = {  # option of the emulated network behind each parameter of an effect
 
 
 def link_model(reality: Reality) -> LinkModel:
-    """The impairment of one direction; raises InputError where the plug-in cannot be constructed."""
+    """The impairment of one direction, to or from the slave whose reality it is.
+
+    Raises:
+        InputError: the plug-in cannot be constructed.
+    """
     rig, options = reality.link, impairment(reality)
     if rig.class_ and options:
         raise InputError(
@@ -26,8 +32,16 @@ def link_model(reality: Reality) -> LinkModel:
     if not rig.class_ and not options:
         return PerfectLink()
     kind = find(rig.class_ or IMPAIRED, reality.base, "[link]")
-    model: LinkModel = construct(kind, {"seed": reality.seed} | (options or rig.options), "[link]")
+    model: LinkModel = construct(kind, {"seed": seed_of(reality)} | (options or rig.options), "[link]")
     return model
+
+
+def seed_of(reality: Reality) -> int:
+    """Seed of a slave's link: the reality's for the first slave, drawn from it for the others."""
+    if reality.place == 0:
+        return reality.seed
+    text = f"{reality.seed}:{reality.place}"
+    return int.from_bytes(hashlib.blake2b(text.encode(), digest_size=4).digest(), "big")
 
 
 def impairment(reality: Reality) -> dict[str, float]:

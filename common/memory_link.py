@@ -3,28 +3,34 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 
 from common.clock import Clock
 from common.endpoint import CHANNELS, Received
 from common.messages import Message
-from common.transport import CONTROL, HEARD
+from common.roles import SLAVE
+from common.transport import CONTROL, Route, heard
 
 
 class MemoryHub:
-    """What one role sends is at once in the queues of those who hear it; all must join before the first message."""
+    """What one role sends is at once in the queues of those who hear it; all must join before the first message.
 
-    def __init__(self, clock: Clock) -> None:
+    `slaves` are the roles of all slaves of the test.
+    """
+
+    def __init__(self, clock: Clock, slaves: Sequence[str] = (SLAVE,)) -> None:
         self.clock = clock
+        self._slaves = slaves
         self._members: dict[str, MemoryEndpoint] = {}
 
     def join(self, role: str) -> MemoryEndpoint:
         """The access of one role."""
         return self._members.setdefault(role, MemoryEndpoint(self, role))
 
-    def hearers(self, role: str, kind: type) -> list[MemoryEndpoint]:
-        """Those who hear a role's messages of a kind."""
-        route = (role, CHANNELS.get(kind, CONTROL))
-        return [member for hearer, member in self._members.items() if route in HEARD[hearer]]
+    def hearers(self, role: str, kind: type, to: str) -> list[MemoryEndpoint]:
+        """Those who hear a role's messages of a kind, `to` one role alone where it is named."""
+        route = Route(role, CHANNELS.get(kind, CONTROL), to)
+        return [member for hearer, member in self._members.items() if route in heard(hearer, self._slaves)]
 
 
 class MemoryEndpoint:
@@ -35,23 +41,24 @@ class MemoryEndpoint:
         self._hub = hub
         self._role = role
         self._queue: deque[Received] = deque()
-        self._hearers: dict[type, list[MemoryEndpoint]] = {}
+        self._hearers: dict[tuple[type, str], list[MemoryEndpoint]] = {}
 
     def enter(self, session: int) -> None:
         """Memory needs no key."""
 
-    def send(self, message: Message) -> int:
+    def send(self, message: Message, to: str = "") -> int:
         """Put a message into the queue of every role that hears it; the present time, ns."""
-        kind = type(message)
-        if kind not in self._hearers:
-            self._hearers[kind] = self._hub.hearers(self._role, kind)
-        for hearer in self._hearers[kind]:
+        route = (type(message), to)
+        if route not in self._hearers:
+            self._hearers[route] = self._hub.hearers(self._role, *route)
+        for hearer in self._hearers[route]:
             hearer.arrive(message, self._role)
         return self.clock.now()
 
     def arrive(self, message: Message, role: str) -> None:
         """Take in what a role has sent."""
-        self._queue.append(Received(message, role, self.clock.now()))
+        now = self.clock.now()
+        self._queue.append(Received(message, role, now, now))
 
     def receive(self, timeout: float = 0.0) -> Received | None:
         """The next message that is there already; time stands still in memory."""

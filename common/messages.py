@@ -17,10 +17,18 @@ class Register(NamedTuple):
     plan: str  # digest
 
 
+class Waiting(NamedTuple):
+    """Slave to master, while it belongs to no test: a process is here; `instance` tells it from others of its name."""
+
+    session: int
+    instance: int
+
+
 class Registered(NamedTuple):
     """Slave to master: ready to be armed."""
 
     session: int
+    instance: int
 
 
 class Refused(NamedTuple):
@@ -31,9 +39,10 @@ class Refused(NamedTuple):
 
 
 class Arm(NamedTuple):
-    """Master to slave: make the rig ready to move."""
+    """Master to slave: the process of this `instance` shall make its rig ready; one of another is one too many."""
 
     session: int
+    instance: int
 
 
 class Armed(NamedTuple):
@@ -152,8 +161,7 @@ class Recorder(NamedTuple):
     state: str  # ready, recording, failed, done
     plan: str
     reason: str
-    master_next: int
-    slave_next: int
+    nexts: bytes  # by role, the item that comes next
 
 
 class Resend(NamedTuple):
@@ -167,6 +175,7 @@ class Resend(NamedTuple):
 
 Message = (
     Register
+    | Waiting
     | Registered
     | Refused
     | Arm

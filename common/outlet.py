@@ -7,6 +7,7 @@ written in the loop and a slow recorder costs it nothing.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Mapping
 from typing import Any
 
 import msgpack
@@ -54,6 +55,22 @@ class Outlet:
     def finished(self) -> Finished:
         """The message that says how long the stream is."""
         return Finished(self._session, self._lab, self.total)
+
+
+def pack_nexts(nexts: Mapping[str, int]) -> bytes:
+    """How far the recorder is with each stream, as its message carries it."""
+    packed: bytes = msgpack.packb(dict(nexts))
+    return packed
+
+
+def next_of(packed: bytes, lab: str) -> int:
+    """The item of a stream that the recorder waits for, 0 where its message does not say."""
+    try:
+        found = msgpack.unpackb(packed)
+    except (ValueError, msgpack.UnpackException):
+        return 0
+    there = found.get(lab) if isinstance(found, dict) else None
+    return there if isinstance(there, int) else 0
 
 
 class Inlet:

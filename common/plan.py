@@ -12,10 +12,13 @@ from typing import Any
 
 import tomli_w
 
-from common.errors import PlanError
+from common.errors import InputError, PlanError
+from common.roles import name_of, slave_role
 from common.schema import Storeys, fill, key, nearest, plain
 
-PROTOCOL_VERSION = 2
+PROTOCOL_VERSION = 3
+MOST_SLAVES = 16
+SLAVE_NAME = re.compile(r"[a-z][a-z0-9_]*")
 
 
 @dataclass(frozen=True)
@@ -226,6 +229,20 @@ class Laboratory:
 
 
 @dataclass(frozen=True)
+class SlaveLaboratory:
+    """One of several slaves: what stands in its laboratory, and its interface to the structure.
+
+    A key that the plan gives in `[slave.NAME.table]`, `.damper` or `.control` holds for this slave; the others are
+    those of the plan's own tables. A table's compensator is taken whole.
+    """
+
+    table: Table = Table()
+    damper: Damper = Damper()
+    control: Control = Control()
+    rig: Rig = field(default_factory=Rig)
+
+
+@dataclass(frozen=True)
 class Recording:
     """Where recordings go, and whether a test may run without one."""
 
@@ -238,7 +255,10 @@ class Recording:
 
 @dataclass(frozen=True)
 class Plan:
-    """A test, fully described; `base` is the folder that its relative paths start from."""
+    """A test, fully described; `base` is the folder that its relative paths start from.
+
+    `slaves` holds the slaves by name in the order of the file; it is empty where there is one without a name.
+    """
 
     test: Test = Test()
     ground_motion: GroundMotion = GroundMotion()
@@ -256,6 +276,7 @@ class Plan:
     master: Laboratory = Laboratory()
     slave: Laboratory = Laboratory()
     recording: Recording = Recording()
+    slaves: dict[str, SlaveLaboratory] = field(default_factory=dict)
     base: Path = Path()
 
     @property
@@ -268,6 +289,44 @@ class Plan:
         """Number of control intervals of the whole test."""
         return round(self.test.duration / self.test.interval)
 
+    @property
+    def roles(self) -> tuple[str, ...]:
+        """The role of every slave, in the order of the file."""
+        return tuple(map(slave_role, self.slaves or [""]))
+
+    def of(self, role: str) -> Plan:
+        """The plan as one slave sees it: its own table, damper, control and rig in the usual places.
+
+        Raises:
+            InputError: the plan has no such slave.
+        """
+        self.slave_role(name_of(role))
+        if not self.slaves:
+            return self
+        lab = self.slaves[name_of(role)]
+        parts = {name: getattr(lab, name) for name in INTERFACE}
+        return replace(self, slave=Laboratory(lab.rig), slaves={}, **parts)
+
+    def slave_role(self, name: str) -> str:
+        """The role of the slave of that name, empty for the one without.
+
+        Raises:
+            InputError: the plan has no such slave.
+        """
+        known = ", ".join(self.slaves)
+        if self.slaves and not name:
+            raise InputError(f"The plan names its slaves: say which one this is with --name ({known}).")
+        if not self.slaves and name:
+            raise InputError(f"The plan has one slave without a name: leave out --name {name}.")
+        if name and name not in self.slaves:
+            raise InputError(f"The plan names no slave '{name}': {nearest(name, self.slaves)}")
+        return slave_role(name)
+
+    def everywhere(self, **parts: Any) -> Plan:
+        """The plan with a table, damper or control in place of its own and of every slave's."""
+        slaves = {name: replace(lab, **parts) for name, lab in self.slaves.items()}
+        return replace(self, slaves=slaves, **parts)
+
     def with_ticks(self, ticks: int) -> Plan:
         """The plan over another number of control intervals."""
         test = replace(self.test, duration=ticks * self.test.interval)
@@ -275,7 +334,10 @@ class Plan:
 
     def tables(self) -> dict[str, Any]:
         """The plan as nested plain values, all defaults written out."""
-        return {name: plain(getattr(self, name)) for name in TABLES}
+        tables = {name: plain(getattr(self, name)) for name in TABLES}
+        if self.slaves:
+            tables["slave"] = {name: plain(lab) for name, lab in self.slaves.items()}
+        return tables
 
     def toml(self) -> str:
         """The plan as TOML text, all defaults written out."""
@@ -284,6 +346,8 @@ class Plan:
     def digest(self) -> str:
         """Sixteen hex digits that agree where two plans describe the same test; the recording's folder is free."""
         tables = {name: table for name, table in self.tables().items() if name != "recording"}
+        if self.slaves:
+            tables["order"] = list(self.slaves)  # their place decides on the order of recorded values
         text = json.dumps(tables, sort_keys=True)
         return hashlib.blake2b(text.encode(), digest_size=8).hexdigest()
 
@@ -302,7 +366,8 @@ class Plan:
         return from_tables(tables, self.base)
 
 
-TABLES = tuple(name for name in Plan.__dataclass_fields__ if name != "base")
+TABLES = tuple(name for name in Plan.__dataclass_fields__ if name not in ("slaves", "base"))
+INTERFACE = ("table", "damper", "control")  # what a named slave may have of its own
 
 
 def load(path: Path) -> Plan:
@@ -337,15 +402,61 @@ def from_tables(tables: dict[str, Any], base: Path) -> Plan:
         if name not in TABLES:
             raise PlanError(f"Unknown table [{name}]: {nearest(name, TABLES)}")
     types = {name: type(getattr(Plan, name)) for name in TABLES}
-    plan = Plan(base=base, **{name: fill(types[name], tables.get(name, {}), name) for name in tables})
+    slaves = named_slaves(tables.get("slave", {}))
+    given = {name: fill(types[name], tables[name], name) for name in tables if name != "slave" or not slaves}
+    plan = Plan(base=base, **given)
+    plan = replace(plan, slaves={name: slave_laboratory(plan, name, slaves[name]) for name in slaves})
     check_storeys(plan)
     check_columns(plan)
     check_tolerances(plan)
     return plan
 
 
+def named_slaves(given: object) -> dict[str, dict[str, Any]]:
+    """The slaves that [slave] names, none where it holds the rig of the only one.
+
+    Raises:
+        PlanError: names and a rig are mixed, a name is none, or there are too many.
+    """
+    if not isinstance(given, dict) or given.keys() <= {"rig"}:
+        return {}
+    for name, table in given.items():
+        if not isinstance(table, dict):
+            raise PlanError(
+                f"{name} in [slave] is {table!r}: give [slave.rig], or tables [slave.NAME.rig] for several slaves."
+            )
+        if not SLAVE_NAME.fullmatch(name):
+            raise PlanError(
+                f"The slave's name '{name}' in [slave.{name}] must begin with a letter and have "
+                "small letters, digits and _ only."
+            )
+    if "rig" in given:
+        names = ", ".join(name for name in given if name != "rig")
+        raise PlanError(
+            f"[slave] holds a rig beside the slaves {names}: name that one too, as [slave.NAME.rig]."
+        )
+    if len(given) > MOST_SLAVES:
+        raise PlanError(f"[slave] names {len(given)} slaves, but there may be at most {MOST_SLAVES}.")
+    return given
+
+
+def slave_laboratory(plan: Plan, name: str, given: dict[str, Any]) -> SlaveLaboratory:
+    """The laboratory of a named slave, on top of the plan's own tables."""
+    where = f"slave.{name}"
+    known = (*INTERFACE, "rig")
+    for entry in given:
+        if entry not in known:
+            raise PlanError(f"Unknown key '{entry}' in [{where}]: {nearest(entry, known)}")
+    parts: dict[str, Any] = {}
+    for part in INTERFACE:
+        own, common = given.get(part, {}), getattr(plan, part)
+        merged = plain(common) | own if isinstance(own, dict) else own
+        parts[part] = fill(type(common), merged, f"{where}.{part}")
+    return SlaveLaboratory(rig=fill(Rig, given.get("rig", {}), f"{where}.rig"), **parts)
+
+
 def check_storeys(plan: Plan) -> None:
-    """Masses, stiffnesses, dashpots, the specimen's storey and the damper's floor must fit together."""
+    """Masses, stiffnesses, dashpots, the specimen's storey and the dampers' floors must fit together."""
     structure, storeys = plan.structure, plan.storeys
     for name, values in (("stiffness", structure.stiffness), ("damping", structure.damping)):
         if len(values) != storeys:
@@ -354,8 +465,10 @@ def check_storeys(plan: Plan) -> None:
             )
     if plan.column.storey > storeys:
         raise PlanError(f"storey in [column] is {plan.column.storey}, but the structure has {storeys}.")
-    if plan.damper.floor > storeys:
-        raise PlanError(f"floor in [damper] is {plan.damper.floor}, but the structure has {storeys}.")
+    dampers = {f"slave.{name}.damper": lab.damper for name, lab in plan.slaves.items()}
+    for where, damper in (dampers or {"damper": plan.damper}).items():
+        if damper.floor > storeys:
+            raise PlanError(f"floor in [{where}] is {damper.floor}, but the structure has {storeys}.")
 
 
 def check_columns(plan: Plan) -> None:
@@ -397,8 +510,7 @@ def safe_name(text: str) -> str:
 def ideal(plan: Plan) -> Plan:
     """The plan with transfer systems that follow at once, and no compensation."""
     return replace(
-        plan,
+        plan.everywhere(table=Table(frequency=float("inf"), damping_ratio=1.0, delay=0.0)),
         actuator=Actuator(gain=1.0, delay=0.0, time_constant=0.0),
         compensator=Compensator(kind="none", parameters={}),
-        table=Table(frequency=float("inf"), damping_ratio=1.0, delay=0.0),
     )

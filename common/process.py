@@ -4,22 +4,33 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from typing import Protocol
 
-from common import cli
+from common import cli, realtime
 from common.clock import MonotonicClock
 from common.drive import Loop, Stopper, drive
 from common.endpoint import FrameEndpoint
 from common.errors import InterlockError
 from common.laboratory import Setting
-from common.links import link_model
-from common.mailbox import LinkModel
 from common.reality import Reality
+from common.roles import SLAVE
+from common.surroundings import Surroundings
+
+
+class Assembly(Protocol):
+    """How a laboratory is put together: the module `assembly` of the master or the slave."""
+
+    def warm_up(self, reality: Reality) -> None:
+        """Compile the kernels."""
+
+    def build_loop(self, setting: Setting, reality: Reality) -> Loop:
+        """The laboratory's loop."""
 
 
 def conduct(
     role: str,
     args: argparse.Namespace,
-    build: Callable[[Setting, Reality, LinkModel], Loop],
+    assembly: Assembly,
     *,
     listen: str = "",
     connect: str = "",
@@ -34,15 +45,26 @@ def conduct(
     stopping = Stopper()
     plan = cli.load_plan(args)
     reality = cli.load_reality(args.reality, plan)
+    if role == SLAVE:
+        role = plan.slave_role(args.name or "")
+        reality = reality.of(role)
+    assembly.warm_up(reality)  # at ordinary priority: it computes for a second
+    granted = realtime.prepare(args.rt, args.processor)
     patience = plan.link.connect_timeout
     link = ZenohLink(
-        role, plan.test.name, listen=listen, connect=connect, patience=patience, stopping=stopping
+        role,
+        plan.test.name,
+        slaves=plan.roles,
+        listen=listen,
+        connect=connect,
+        patience=patience,
+        stopping=stopping,
     )
     try:
         setting = Setting(plan, FrameEndpoint(link, plan.digest()), MonotonicClock(), cli.reporter(args.json))
-        loop = build(setting, reality, link_model(reality))
+        loop = assembly.build_loop(setting, reality)
         loop.lab.heard_ns = setting.clock.now()
-        drive(loop, stopping)
+        drive(loop, stopping, Surroundings(loop.lab, granted, timed=role == "master"))
     finally:
         link.close()
     if loop.lab.error is not None:

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from common.errors import PlanError
 from common.plan import Plan, Rig, from_tables
+from common.roles import MASTER, SLAVE, slave_role
 from common.schema import fill, nearest
 
 Entry = tuple[str, Mapping[str, float]]  # name of an effect of the catalogue, and its parameters
@@ -24,7 +25,10 @@ KNOWN = ("seed", "master", "slave", "link", "effect", *TRUE_TABLES)
 
 @dataclass(frozen=True)
 class Reality:
-    """What differs from the plan; the plan itself where nothing does."""
+    """What differs from the plan; the plan itself where nothing does.
+
+    `role` and `place` (of all slaves, from 0) say whose reality it is where it is that of one slave alone.
+    """
 
     plan: Plan  # with the true parameters in place of the nominal ones
     seed: int
@@ -32,13 +36,38 @@ class Reality:
     slave: Rig
     link: Rig = field(default_factory=Rig)
     base: Path = Path()
-    hidden: frozenset[str] = frozenset()  # laboratories whose rig no recording may name
+    hidden: frozenset[str] = frozenset()  # roles whose rig no recording may name
     effects: tuple[Entry, ...] = ()  # laid over the emulated laboratories, in this order
+    only: tuple[str, ...] = ()  # the role of the slave that each effect is laid over alone, empty for all
+    slaves: dict[str, Rig] = field(default_factory=dict)  # by role, where the plan names them
+    role: str = SLAVE
+    place: int = 0
+
+    def of(self, role: str) -> Reality:
+        """The reality of one slave, as of a plan with no other; raises InputError where there is none such."""
+        plan = self.plan.of(role)
+        if not self.slaves:
+            return self
+        only = self.only or ("",) * len(self.effects)
+        kept = [
+            (entry, alone) for entry, alone in zip(self.effects, only, strict=True) if alone in ("", role)
+        ]
+        return replace(
+            self,
+            plan=plan,
+            slave=self.slaves[role],
+            slaves={},
+            effects=tuple(entry for entry, _ in kept),
+            only=tuple(alone for _, alone in kept),
+            role=role,
+            place=list(self.slaves).index(role),
+        )
 
 
 def as_planned(plan: Plan) -> Reality:
     """The laboratories are what the plan says."""
-    return Reality(plan, plan.test.seed, plan.master.rig, plan.slave.rig, base=plan.base)
+    slaves = {slave_role(name): lab.rig for name, lab in plan.slaves.items()}
+    return Reality(plan, plan.test.seed, plan.master.rig, plan.slave.rig, base=plan.base, slaves=slaves)
 
 
 def load(path: Path, plan: Plan) -> Reality:
@@ -67,16 +96,60 @@ def from_reality(tables: dict[str, Any], plan: Plan, base: Path) -> Reality:
     seed = tables.get("seed", plan.test.seed)
     if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
         raise PlanError(f"seed is {seed!r}, but must be a whole number of at least 0.")
+    labs = laboratories(tables, plan)
+    planned = {MASTER: plan.master.rig} | {role: plan.of(role).slave.rig for role in plan.roles}
+    rigs = {role: rig(labs[role], role, planned[role], plan.base, base) for role in planned}
+    effects = tables.get("effect", [])
     return Reality(
         plan=true_plan(tables, plan),
         seed=seed,
-        master=rig(tables, "master", plan.master.rig, plan.base, base),
-        slave=rig(tables, "slave", plan.slave.rig, plan.base, base),
-        link=rig({"link": {"rig": tables.get("link", {})}}, "link", Rig(), plan.base, base),
+        master=rigs.pop(MASTER),
+        slave=rigs.get(SLAVE, Rig()),
+        link=rig({"rig": tables.get("link", {})}, "link", Rig(), plan.base, base),
         base=base,
-        hidden=frozenset(lab for lab in ("master", "slave") if "rig" in tables.get(lab, {})),
-        effects=entries(tables.get("effect", [])),
+        hidden=frozenset(role for role, lab in labs.items() if "rig" in lab),
+        effects=entries(effects),
+        only=tuple(alone(entry, plan) for entry in effects),
+        slaves=rigs if plan.slaves else {},
     )
+
+
+def laboratories(tables: dict[str, Any], plan: Plan) -> dict[str, dict[str, Any]]:
+    """What the reality says of master and slaves, by role.
+
+    Raises:
+        PlanError: it is no table, or names a slave that the plan does not.
+    """
+    slaves = tables.get("slave", {})
+    if plan.slaves and isinstance(slaves, dict):
+        for name in slaves:
+            if name not in plan.slaves:
+                raise PlanError(f"The plan names no slave '{name}': {nearest(name, plan.slaves)}")
+        slaves = {slave_role(name): slaves.get(name, {}) for name in plan.slaves}
+    else:
+        slaves = {SLAVE: slaves}
+    labs = {MASTER: tables.get("master", {})} | slaves
+    for role, lab in labs.items():
+        known = ("rig", "table", "damper") if role in slaves and plan.slaves else ("rig",)
+        if not isinstance(lab, dict):
+            raise PlanError(f"[{role}] must be a table, not {lab!r}.")
+        for name in lab:
+            if name not in known:
+                raise PlanError(f"Unknown key '{name}' in [{role}]: {nearest(name, known)}")
+    return labs
+
+
+def alone(entry: Mapping[str, Any], plan: Plan) -> str:
+    """The role of the slave that an effect names, empty where it holds for all; raises PlanError for another."""
+    name = entry.get("slave", "")
+    if name == "":
+        return ""
+    if not isinstance(name, str) or name not in plan.slaves:
+        hint = nearest(str(name), plan.slaves) if plan.slaves else "leave slave out."
+        raise PlanError(
+            f"slave of [[effect]] '{entry['name']}' is {name!r}, which the plan does not name: {hint}"
+        )
+    return slave_role(name)
 
 
 def entries(given: object) -> tuple[Entry, ...]:
@@ -88,7 +161,7 @@ def entries(given: object) -> tuple[Entry, ...]:
         name = entry.get("name")
         if not isinstance(name, str):
             raise PlanError(f"an [[effect]] has the name {name!r}: give a name of the catalogue.")
-        values = {key: value for key, value in entry.items() if key != "name"}
+        values = {key: value for key, value in entry.items() if key not in ("name", "slave")}
         for key, value in values.items():
             if not isinstance(value, int | float) or isinstance(value, bool):
                 raise PlanError(f"{key} of [[effect]] '{name}' is {value!r}, but must be a number.")
@@ -97,16 +170,19 @@ def entries(given: object) -> tuple[Entry, ...]:
 
 
 def true_plan(tables: dict[str, Any], plan: Plan) -> Plan:
-    """The plan with the reality's parameters in place of its own."""
+    """The plan with the reality's parameters in place of its own; what holds for all slaves before a slave's own."""
     merged = plan.tables()
     for name in TRUE_TABLES:
         merged[name] |= tables.get(name, {})
+    for slave in plan.slaves:
+        for name in ("table", "damper"):
+            merged["slave"][slave][name] |= tables.get(name, {})
+            merged["slave"][slave][name] |= tables.get("slave", {}).get(slave, {}).get(name, {})
     return from_tables(merged, plan.base)
 
 
-def rig(tables: dict[str, Any], lab: str, planned: Rig, plan_base: Path, base: Path) -> Rig:
+def rig(entry: dict[str, Any], lab: str, planned: Rig, plan_base: Path, base: Path) -> Rig:
     """The rig of a laboratory, with the path of its class made absolute."""
-    entry = tables.get(lab, {})
     chosen, start = (planned, plan_base)
     if "rig" in entry:
         chosen, start = fill(Rig, entry["rig"], f"{lab}.rig"), base

@@ -5,8 +5,11 @@ The MCAP schemas, the listings, the plots, the exports and the limits all derive
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import Enum
 from typing import NamedTuple
+
+from common.roles import kind_of, latency_topic
 
 
 class Kind(Enum):
@@ -29,6 +32,7 @@ class Signal(NamedTuple):
     unit: str
     text: str
     kind: Kind = Kind.NUMBER
+    per_slave: bool = False  # one value per slave, in the plan's order, where a test has several
 
 
 SEQ = Signal("seq", "", "tick number", Kind.COUNT)
@@ -47,14 +51,25 @@ MASTER = (
     Signal("column_displacement", "m", "specimen deformation measured"),
     Signal("column_force", "N", "restoring force of the specimen measured"),
     Signal("numerical_force", "N", "restoring force of the numerical columns of the storey", Kind.STOREYS),
-    Signal("damper_force_used", "N", "damper force used, at the damper's own scale"),
-    Signal("damper_force_seq", "", "tick at which that force was measured, -1 for none yet", Kind.INDEX),
-    Signal("damper_force_age", "s", "its age at use"),
-    Signal("table_target", "m", "absolute floor displacement wanted at the end of the interval, as sent"),
-    Signal("damper_command", "N", "motor force of the damper, as sent"),
-    Signal("table_target_velocity", "m/s", "velocity of the table's target, as sent"),
-    Signal("table_target_acceleration", "m/s²", "its acceleration, as sent"),
-    Signal("table_target_jerk", "m/s³", "the rate of that acceleration, as sent"),
+    Signal("damper_force_used", "N", "damper force used, at the damper's own scale", per_slave=True),
+    Signal(
+        "damper_force_seq",
+        "",
+        "tick at which that force was measured, -1 for none yet",
+        Kind.INDEX,
+        per_slave=True,
+    ),
+    Signal("damper_force_age", "s", "its age at use", per_slave=True),
+    Signal(
+        "table_target",
+        "m",
+        "absolute floor displacement wanted at the end of the interval, as sent",
+        per_slave=True,
+    ),
+    Signal("damper_command", "N", "motor force of the damper, as sent", per_slave=True),
+    Signal("table_target_velocity", "m/s", "velocity of the table's target, as sent", per_slave=True),
+    Signal("table_target_acceleration", "m/s²", "its acceleration, as sent", per_slave=True),
+    Signal("table_target_jerk", "m/s³", "the rate of that acceleration, as sent", per_slave=True),
 )
 
 SLAVE = (
@@ -118,6 +133,13 @@ TOPICS: dict[str, tuple[Signal, ...]] = {
 
 TICK_TOPICS = ("master", "slave", "latency")
 
+
+def topics(slaves: Sequence[str]) -> dict[str, tuple[Signal, ...]]:
+    """What a recording of a test holds; `slaves` are the roles of its slaves."""
+    labs = {"master": MASTER} | dict.fromkeys(slaves, SLAVE)
+    return labs | dict.fromkeys(map(latency_topic, slaves), LATENCY) | {"event": EVENT}
+
+
 MEASURED = {
     "master": ("column_displacement", "column_force"),
     "slave": ("table_displacement", "table_acceleration", "damper_stroke", "damper_force"),
@@ -127,8 +149,8 @@ RESPONSES = ("column_displacement", "column_force", "table_acceleration", "dampe
 
 
 def signal(topic: str, name: str) -> Signal:
-    """The row of `name` in `topic`; raises KeyError where there is none."""
-    for row in TOPICS[topic]:
+    """The row of `name` in `topic`, that of a named slave included; raises KeyError where there is none."""
+    for row in TOPICS[kind_of(topic)]:
         if row.name == name:
             return row
     raise KeyError(f"{topic}/{name}")

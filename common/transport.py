@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import NamedTuple, Protocol
+
+from common.roles import MASTER, RECORDER, SLAVE
 
 
 class Packet(NamedTuple):
@@ -14,29 +17,53 @@ class Packet(NamedTuple):
     received_ns: int
 
 
-ROLES = ("master", "slave", "recorder")
-TICK, CONTROL, SAMPLES = "tick", "control", "samples"
+class Route(NamedTuple):
+    """What one role says on a channel: to all who hear it, or `to` one role alone."""
 
-HEARD: dict[str, tuple[tuple[str, str], ...]] = {
-    "master": (("slave", TICK), ("slave", CONTROL), ("recorder", CONTROL)),
-    "slave": (("master", TICK), ("master", CONTROL), ("recorder", CONTROL)),
-    "recorder": (
-        ("master", SAMPLES),
-        ("slave", SAMPLES),
-        ("master", CONTROL),
-        ("slave", CONTROL),
-    ),
-}
+    role: str
+    channel: str
+    to: str = ""
+
+
+TICK, CONTROL, SAMPLES = "tick", "control", "samples"
+CHANNELS = (TICK, CONTROL, SAMPLES)
+
+
+def addressed(slave: str) -> str:
+    """How the master's frames for one slave are addressed: by its role where it has a name, not at all otherwise."""
+    return slave if slave != SLAVE else ""
+
+
+def said(role: str, slaves: Sequence[str]) -> tuple[Route, ...]:
+    """The routes on which a role sends; `slaves` are the roles of all slaves of the test."""
+    routes = [Route(role, channel) for channel in CHANNELS]
+    if role == MASTER:
+        routes += [
+            Route(role, channel, slave) for slave in slaves if addressed(slave) for channel in CHANNELS[:2]
+        ]
+    return tuple(routes)
+
+
+def heard(role: str, slaves: Sequence[str]) -> tuple[Route, ...]:
+    """The routes that a role listens to: a slave hears what the master says to it or to all, no other slave."""
+    if role == MASTER:
+        here = [Route(slave, channel) for slave in slaves for channel in (TICK, CONTROL)]
+        return (*here, Route(RECORDER, CONTROL))
+    if role == RECORDER:
+        return tuple(Route(lab, channel) for channel in (SAMPLES, CONTROL) for lab in (MASTER, *slaves))
+    to = addressed(role)
+    own = (Route(MASTER, TICK, to), Route(MASTER, CONTROL), Route(RECORDER, CONTROL))
+    return (*own, Route(MASTER, CONTROL, to)) if to else own
 
 
 class Transport(Protocol):
     """One process's access to the link."""
 
-    def send(self, channel: str, frame: bytes) -> None:
-        """Hand a frame to the link; never blocks."""
+    def send(self, channel: str, frame: bytes, to: str = "") -> None:
+        """Hand a frame to the link, `to` one role alone where it is named; never blocks."""
 
-    def receive(self, timeout: float) -> Packet | None:
-        """The next frame, waiting at most `timeout` s; None where none came."""
+    def listen(self, heard: Callable[[Packet], None]) -> None:
+        """From now on call `heard` with every frame, from a thread of the link's own; once."""
 
     def close(self) -> None:
         """Leave the link."""

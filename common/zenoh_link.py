@@ -10,17 +10,18 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import json
+import os
 import re
 import socket
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from threading import get_ident
 
 import zenoh
 
 from common.errors import InputError, InterlockError, LostError
-from common.inbox import Inbox
-from common.transport import CONTROL, HEARD, SAMPLES, TICK, Packet
+from common.roles import SLAVE
+from common.transport import SAMPLES, Packet, Route, heard, said
 
 LEASE_MS = 1000
 ATTEMPT_MS = 500  # opening a session cannot be interrupted, so it is tried again and again for this long
@@ -76,43 +77,46 @@ def reach(config: zenoh.Config, connect: str, seconds: float, stopping: Callable
                 ) from None
 
 
+def key(test: str, route: Route) -> str:
+    """The key expression of a route."""
+    return "/".join((PREFIX, test, *filter(None, route)))
+
+
 class ZenohLink:
-    """One role's access to the link of a test; `listen` and `connect` are zenoh endpoints (tcp/host:port)."""
+    """One role's access to the link of a test; `listen` and `connect` are zenoh endpoints (tcp/host:port).
+
+    `slaves` are the roles of all slaves of the test.
+    """
 
     def __init__(
         self,
         role: str,
         test: str,
         *,
+        slaves: Sequence[str] = (SLAVE,),
         listen: str = "",
         connect: str = "",
         patience: float = 0.0,
         stopping: Callable[[], str] = str,
     ) -> None:
         zenoh.init_log_from_env_or("off")
-        self._packets = Inbox()
         config = configuration(role, checked(listen), checked(connect))
         if listen:
             self._session = self._listening(config, listen)
         else:
             self._session = reach(config, connect, patience, stopping)
         self._publishers = {
-            channel: self._session.declare_publisher(
-                f"{PREFIX}/{test}/{role}/{channel}",
-                express=channel != SAMPLES,
-                priority=zenoh.Priority.DATA if channel == SAMPLES else zenoh.Priority.REAL_TIME,
+            (route.channel, route.to): self._session.declare_publisher(
+                key(test, route),
+                express=route.channel != SAMPLES,
+                priority=zenoh.Priority.DATA if route.channel == SAMPLES else zenoh.Priority.REAL_TIME,
                 congestion_control=zenoh.CongestionControl.DROP,
                 reliability=zenoh.Reliability.RELIABLE,
             )
-            for channel in (TICK, CONTROL, SAMPLES)
+            for route in said(role, slaves)
         }
-        self._subscribers = [
-            self._session.declare_subscriber(
-                f"{PREFIX}/{test}/{other}/{channel}",
-                zenoh.handlers.Callback(self._hear(other, channel), indirect=False),
-            )
-            for other, channel in HEARD[role]
-        ]
+        self._heard = [(route, key(test, route)) for route in heard(role, slaves)]
+        self._subscribers: list[zenoh.Subscriber[None]] = []
 
     @staticmethod
     def _listening(config: zenoh.Config, listen: str) -> zenoh.Session:
@@ -124,32 +128,39 @@ class ZenohLink:
                 "choose another with --listen."
             ) from None
 
-    def _hear(self, role: str, channel: str) -> Callable[[zenoh.Sample], None]:
-        put = self._packets.put
-        now = time.monotonic_ns
-        attached: set[int] = set()
+    def listen(self, heard: Callable[[Packet], None]) -> None:
+        """From now on call `heard` with every frame, from the thread of zenoh's that receives it."""
+        self._subscribers += [
+            self._session.declare_subscriber(
+                name, zenoh.handlers.Callback(calling(heard, route), indirect=False)
+            )
+            for route, name in self._heard
+        ]
 
-        def heard(sample: zenoh.Sample) -> None:
-            received_ns = now()
-            put(Packet(role, channel, sample.payload.to_bytes(), received_ns))
-            if get_ident() not in attached:
-                attached.add(get_ident())
-                stay_attached()
-
-        return heard
-
-    def send(self, channel: str, frame: bytes) -> None:
+    def send(self, channel: str, frame: bytes, to: str = "") -> None:
         """Hand a frame to the link; dropped where the network is congested."""
-        self._publishers[channel].put(frame)
-
-    def receive(self, timeout: float) -> Packet | None:
-        """The next frame, waiting at most `timeout` s; None where none came."""
-        return self._packets.get(timeout)
+        self._publishers[channel, to].put(frame)
+        os.sched_yield()
 
     def close(self) -> None:
         """Leave the link; without it, zenoh's threads would keep the process alive."""
         with contextlib.suppress(zenoh.ZError):  # a peer that is gone cannot be said goodbye to
             self._session.close()  # type: ignore[no-untyped-call]
+
+
+def calling(heard: Callable[[Packet], None], route: Route) -> Callable[[zenoh.Sample], None]:
+    """A callback of zenoh's that hands a route's frames on, stamped as they arrive."""
+    now = time.monotonic_ns
+    attached: set[int] = set()
+
+    def call(sample: zenoh.Sample) -> None:
+        received_ns = now()
+        heard(Packet(route.role, route.channel, sample.payload.to_bytes(), received_ns))
+        if get_ident() not in attached:
+            attached.add(get_ident())
+            stay_attached()
+
+    return call
 
 
 def stay_attached() -> None:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from common.errors import InputError
 from common.plan import Plan, ideal, parse
 from common.recording.reader import GROUND, Run
+from common.roles import SLAVE
 from models import substructure
 from models.registry import Array
 
@@ -56,6 +57,7 @@ def build(run: Run, plan: Plan | None = None, *, against_ideal: bool = False) ->
     chosen = plan or own
     if chosen is None:
         raise InputError(f"{run.path} carries no plan: give the one that it was recorded under with --plan.")
+    check_slaves(run, chosen)
     topics = [topic for topic in MASTER_FIRST if run.has(topic)]
     if not topics:
         raise InputError(f"{run.path} holds no signals of a master or a slave to diagnose.")
@@ -79,6 +81,15 @@ def build(run: Run, plan: Plan | None = None, *, against_ideal: bool = False) ->
                 signals[command], present[command] = wanted(signals, present, target)
     known = plan is None or (own is not None and own.ground_motion == plan.ground_motion)
     return Record(chosen, run, ticks, signals, present, believed_ground(run, chosen, ticks, known), other)
+
+
+def check_slaves(run: Run, plan: Plan) -> None:
+    """Raise InputError where there is more than the one slave that a diagnosis knows."""
+    for what, several in ((str(run.path), run.roles != (SLAVE,)), ("The plan", bool(plan.slaves))):
+        if several:
+            raise InputError(
+                f"{what} names its slaves, but only a test with one slave without a name can be diagnosed."
+            )
 
 
 def wanted(signals: dict[str, Array], present: dict[str, Mask], target: str) -> tuple[Array, Mask]:

@@ -12,6 +12,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the master."""
     cli.plan_arguments(parser)
     cli.reality_argument(parser)
+    cli.rt_arguments(parser)
+    cli.processor_argument(parser)
     parser.add_argument(
         "--listen",
         default=cli.DEFAULT_ENDPOINT,
@@ -23,9 +25,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the master; its exit code."""
-    from master.assembly import build_loop
+    from master import assembly
 
-    return process.conduct("master", args, build_loop, listen=args.listen)
+    return process.conduct("master", args, assembly, listen=args.listen)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from typing import Any
 from common import schema
 from common.clock import unix_ns
 from common.laboratory import Setting
-from common.mailbox import LinkModel
+from common.links import link_model
 from common.plugins import construct, find
 from common.reality import Reality
 from common.rig import ColumnMeasurement, GuardedRig
@@ -63,7 +63,6 @@ def true_ground(system: System) -> Array:
 def build_loop(
     setting: Setting,
     reality: Reality,
-    link: LinkModel,
     *,
     session: int | None = None,
     epoch_ns: int | None = None,
@@ -74,7 +73,7 @@ def build_loop(
         setting,
         build_rig(reality),
         master_step(reality),
-        link,
+        {role: link_model(reality.of(role)) for role in setting.plan.roles},
         session=session if session is not None else secrets.randbelow(2**62) + 1,
         epoch_ns=epoch_ns if epoch_ns is not None else unix_ns(),
     )
@@ -82,6 +81,6 @@ def build_loop(
 
 def warm_up(reality: Reality) -> None:
     """Compile the kernels on arrays that are thrown away."""
-    master_step(reality)(0, 0.0, 0.0, 0.0)
+    master_step(reality)(0, 0.0, 0.0, [0.0] * len(reality.plan.roles))
     column_lab.advance(*build_a(true_system(reality)), 0.0)
     readings.step(*readings.build(reality.plan.test.interval, ("any",), {}), 0, 0.0, 0.0, 0.0)

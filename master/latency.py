@@ -40,18 +40,17 @@ class Row:
 
 
 class Account:
-    """Latency of the ticks, one row each, in order."""
+    """Latency of the ticks in the exchange with one slave, one row each, in order, into a topic of its own."""
 
-    def __init__(self, lab: Laboratory, offset: ClockOffset) -> None:
+    def __init__(self, lab: Laboratory, offset: ClockOffset, topic: str) -> None:
         self._lab = lab
+        self._topic = topic
         self._offset = offset
         self._rows: dict[int, Row] = {}
         self._on_the_way: deque[tuple[int, int]] = (
             deque()
         )  # commands that the slave has not heard: tick, sent_ns
         self._named = -1  # newest command that a feedback has named
-        self.sync_sent_ns = 0
-        self.first_offset = 0
         self.missed = 0
         self.round_trip = NAN
 
@@ -138,11 +137,7 @@ class Account:
             row.used_ns,
         )
         log_ns = lab.epoch_ns + row.tick * lab.interval_ns
-        lab.outlet.add("latency", log_ns, lab.epoch_ns + now - lab.start_ns, values)
-
-    def progress(self) -> dict[str, float]:
-        """Newest round trip (s) and the count of missed deadlines."""
-        return {"round_trip": self.round_trip, "missed": float(self.missed)}
+        lab.outlet.add(self._topic, log_ns, lab.epoch_ns + now - lab.start_ns, values)
 
 
 class Segments(NamedTuple):

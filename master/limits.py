@@ -9,11 +9,13 @@ from master.step import Outputs
 
 
 class MasterLimits:
-    """The plan's limits on laboratory A and on what is sent to laboratory B."""
+    """The plan's limits on laboratory A and on what is sent to the slaves."""
 
-    def __init__(self, limits: Limits, storeys: int) -> None:
+    def __init__(self, limits: Limits, storeys: int, slaves: int) -> None:
+        per_storey = ("displacement",) if storeys > 1 else ()
+        per_slave = ("table_target", "damper_command") if slaves > 1 else ()
         self._measurements = Guard(limits, ColumnMeasurement._fields)
-        self._outputs = Guard(limits, Outputs._fields, several=("displacement",) if storeys > 1 else ())
+        self._outputs = Guard(limits, Outputs._fields, (*per_storey, *per_slave))
 
     def violation(self, measured: ColumnMeasurement, outputs: Outputs) -> str:
         """A sentence on the first value beyond its limit, empty where there is none."""

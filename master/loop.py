@@ -6,144 +6,151 @@ in real time, and virtual time calls the same two.
 
 from __future__ import annotations
 
-from common.clock_offset import ClockOffset
+from collections.abc import Mapping
+from typing import Any
+
 from common.errors import InputError, InterlockError, LostError, RigError
 from common.exchange import Event, State
 from common.laboratory import REPEAT_NS, Laboratory, Setting
-from common.mailbox import LinkModel, Mailbox
+from common.mailbox import LinkModel
 from common.messages import (
-    Arm,
     Armed,
-    Command,
     Feedback,
     Message,
     Refused,
     Register,
     Registered,
     Scheduled,
-    Start,
     Stop,
     Stopped,
-    Sync,
     SyncReply,
     Trip,
+    Waiting,
 )
 from common.plan import PROTOCOL_VERSION
 from common.rig import ColumnCommand, GuardedRig
-from master.latency import Account
+from common.roles import MASTER, SLAVE
 from master.limits import MasterLimits
+from master.partner import Partner
 from master.step import MasterStep, Outputs
 
-SYNC_EXCHANGES = 200
-OFFSET_BLOCK, OFFSET_BLOCKS = 250, 40  # exchanges: the best of half a second each, twenty seconds of them
 LEAD_NS = 250_000_000  # from the agreement on the start to the start
 
 
-NO_FEEDBACK = Feedback(0, -1, -1, 0, -1, 0, 0, 0, 0.0, 0.0, 0.0, 0.0)
-
-NOTHING_SENT = (0.0, 0.0, 0.0, 0.0, 0.0)
-
-
 class MasterLoop:
-    """Laboratory A in a test."""
+    """Laboratory A in a test; `links` are the impairments of what comes from each slave, by role."""
 
     def __init__(
         self,
         setting: Setting,
         rig: GuardedRig,
         step: MasterStep,
-        link: LinkModel,
+        links: Mapping[str, LinkModel],
         *,
         session: int,
         epoch_ns: int,
     ) -> None:
-        self.lab = Laboratory("master", setting)
+        self.lab = Laboratory(MASTER, setting)
         plan = setting.plan
+        self.partners = {role: Partner(role, self.lab, links[role]) for role in plan.roles}
+        self._partners = tuple(self.partners.values())
+        self._alone = len(self._partners) == 1
         self._rig = rig
         self._step = step
-        self._limits = MasterLimits(plan.limits, plan.storeys)
-        self._feedback: Mailbox[Feedback] = Mailbox(link, "feedback", plan.test.interval, nominal=1)
-        self._offset = ClockOffset(length=OFFSET_BLOCK, blocks=OFFSET_BLOCKS)
-        self._account = Account(self.lab, self._offset)
-        self._used = NO_FEEDBACK
+        self._limits = MasterLimits(plan.limits, plan.storeys, len(self._partners))
         self._command = 0.0
         self._drift = 0.0
-        self._sent = NOTHING_SENT
         self._asked_ns = -REPEAT_NS
-        self._syncs = 0
+        self._sent_ns = 0  # when the newest command went out
         self._wall_ns = epoch_ns - setting.clock.now()
         self._digest = plan.digest()
-        self._slave_is_here = False
-        self._stopped = False
         self.ticks = 0
         self.lab.enter(session)
 
     # -- messages ---------------------------------------------------------------------------------
 
-    def take(self, message: Message, received_ns: int) -> None:
-        """Act on one message of the slave or the recorder."""
+    def take(self, message: Message, received_ns: int, role: str = SLAVE) -> None:
+        """Act on one message of a slave, whose role is given, or of the recorder."""
         lab = self.lab
         if isinstance(message, Feedback):
-            if lab.exchange.belongs(message.session):
-                self._take_feedback(message, received_ns)
+            if lab.exchange.belongs(message.session) and role in self.partners:
+                self.partners[role].take(message, received_ns)
             return
         lab.listen_to_recorder(message)
+        if role not in self.partners:
+            return
+        if isinstance(message, Waiting):
+            self._one_too_many(self.partners[role], message.instance)
+        elif lab.exchange.belongs(message.session):
+            self._take_answer(self.partners[role], message, received_ns)
+
+    def _take_answer(self, partner: Partner, message: Message, received_ns: int) -> None:
         match message:
-            case Trip() if lab.exchange.belongs(message.session) and not lab.exchange.ended:
-                lab.tripped(message.lab, message.text, self.ticks)
-            case Refused() if lab.exchange.belongs(message.session):
-                self._refused(message.reason)
-            case SyncReply() if lab.exchange.belongs(message.session):
-                self._take_sync(message, received_ns)
-            case Registered() | Armed() | Scheduled() | Stopped() if lab.exchange.belongs(message.session):
-                self._agree(message)
+            case Trip() if not self.lab.exchange.ended:
+                self.lab.tripped(partner.role, message.text, self.ticks)
+            case Refused():
+                self._refused(partner, message.reason)
+            case SyncReply() if self.lab.exchange.state is State.ARMED:
+                self._take_sync(partner, message, received_ns)
+            case Registered() | Armed() | Scheduled() | Stopped():
+                self._agree(partner, message, received_ns)
             case _:
                 pass
 
-    def _take_feedback(self, feedback: Feedback, received_ns: int) -> None:
-        if not self.lab.exchange.fresh(feedback.seq):
-            return
-        self.lab.heard_ns = received_ns
-        extra = self._feedback.put(feedback.seq, feedback)
-        self._account.answer(feedback, received_ns, self.lab.clock.now(), extra)
+    def _one_too_many(self, partner: Partner, instance: int) -> None:
+        """A process waits to take part: it is told where another one has its place."""
+        begun = self.lab.exchange.state is not State.IDLE and not self.lab.exchange.ended
+        if begun and instance != partner.instance:
+            partner.arm()
 
-    def _refused(self, reason: str) -> None:
-        error = InputError(f"The slave refuses the test: {reason}")
+    def _refused(self, partner: Partner, reason: str) -> None:
+        error = InputError(f"The {partner.title} refuses the test: {reason}")
         if self.lab.exchange.state is State.IDLE:
             self.lab.fail(Event.REFUSE, error, code="refused", remote=True)
         else:
             self.lab.fail(Event.TRIP, RigError(reason), code="not_armed", remote=True)
 
-    def _agree(self, message: Registered | Armed | Scheduled | Stopped) -> None:
-        """Move on where the answer is the one that the present state waits for; repeated answers change nothing."""
-        state = self.lab.exchange.state
+    def _agree(
+        self, partner: Partner, message: Registered | Armed | Scheduled | Stopped, received_ns: int
+    ) -> None:
+        """Move on where all have given the answer that the present state waits for; repeated ones change nothing."""
+        state, partners = self.lab.exchange.state, self._partners
         match message:
             case Registered() if state is State.IDLE:
-                self._slave_is_here = True
-                if self._recorder_is_here():
+                partner.register(message.instance, received_ns)
+                if all(one.registered for one in partners) and self._recorder_is_here():
                     self._move(Event.REGISTER)
                     self._arm()
             case Armed() if state is State.REGISTERED:
-                self._move(Event.ARM)
+                partner.armed = True
+                if all(one.armed for one in partners):
+                    self._move(Event.ARM)
             case Scheduled() if state is State.ARMED:
-                self._move(Event.SCHEDULE)
+                partner.scheduled = True
+                if all(one.scheduled for one in partners):
+                    self._move(Event.SCHEDULE)
             case Stopped():
-                self._stopped = True
+                partner.stopped = True
             case _:
                 pass
 
     def _move(self, event: Event) -> None:
         self.lab.exchange.happen(event)
         self.lab.heard_ns = self.lab.clock.now()
-        self._asked_ns = self.lab.heard_ns - REPEAT_NS
-        self.lab.report("state", {"lab": "master", "state": self.lab.exchange.state.value})
+        self._ask_anew(self.lab.heard_ns)
+        self.lab.report("state", {"lab": self.lab.name, "state": self.lab.exchange.state.value})
+
+    def _ask_anew(self, now: int) -> None:
+        self._asked_ns = now - REPEAT_NS
+        for partner in self._partners:
+            partner.ask_anew(now)
 
     def _recorder_is_here(self) -> bool:
         recorder = self.lab.recorder
         if recorder is not None and recorder.plan != self._digest:
             self.lab.fail(
                 Event.REFUSE,
-                InputError("The recorder was started with another plan: give all three the same."),
+                InputError("The recorder was started with another plan: give all the same."),
                 code="refused",
             )
             return False
@@ -156,13 +163,16 @@ class MasterLoop:
         except RigError as error:
             self._trip(error, "not_armed")
 
-    def _take_sync(self, reply: SyncReply, received_ns: int) -> None:
-        if reply.seq != self._syncs or self.lab.exchange.state is not State.ARMED:
+    def _take_sync(self, partner: Partner, reply: SyncReply, received_ns: int) -> None:
+        if not partner.take_sync(reply, received_ns):
             return
-        self._offset.add(self._account.sync_sent_ns, reply.received_ns, reply.sent_ns, received_ns)
-        self._syncs += 1
         self.lab.heard_ns = received_ns
-        self._asked_ns = received_ns - REPEAT_NS
+        if self._synchronised:
+            self._ask_anew(received_ns)
+
+    @property
+    def _synchronised(self) -> bool:
+        return all(partner.synchronised for partner in self._partners)
 
     # -- handshake --------------------------------------------------------------------------------
 
@@ -174,41 +184,44 @@ class MasterLoop:
         now = lab.clock.now()
         if now - lab.heard_ns > lab.plan.link.connect_timeout * 1e9:
             self._nobody()
-        elif now - self._asked_ns >= REPEAT_NS:
-            self._asked_ns = now
-            self._ask(now)
+        elif lab.exchange.state is State.IDLE:
+            if now - self._asked_ns >= REPEAT_NS:
+                self._asked_ns = now
+                lab.endpoint.send(Register(lab.exchange.session, PROTOCOL_VERSION, self._digest))
+        else:
+            for partner in self._partners:
+                if partner.due(now):
+                    self._ask(partner, now)
 
     def _nobody(self) -> None:
-        missing = "recorder" if self._slave_is_here else "slave"
+        missing = next((partner for partner in self._partners if not partner.registered), None)
+        who, option = (missing.title, missing.start_option) if missing else ("recorder", "")
         seconds = self.lab.plan.link.connect_timeout
         error = LostError(
-            f"No {missing} joined the test within {seconds:g} s: start it with the same plan and --connect."
+            f"No {who} joined the test within {seconds:g} s: start it with the same plan{option} and --connect."
         )
         self.lab.fail(Event.LOSE, error, code="nobody")
 
-    def _ask(self, now: int) -> None:
-        session = self.lab.exchange.session
+    def _ask(self, partner: Partner, now: int) -> None:
         match self.lab.exchange.state:
-            case State.IDLE:
-                self.lab.endpoint.send(Register(session, PROTOCOL_VERSION, self._digest))
-            case State.REGISTERED:
-                self.lab.endpoint.send(Arm(session))
-            case State.ARMED if self._syncs < SYNC_EXCHANGES:
-                self._account.sync_sent_ns = now
-                self.lab.endpoint.send(Sync(session, self._syncs, now))
-            case State.ARMED:
+            case State.REGISTERED if not partner.armed:
+                partner.arm()
+            case State.ARMED if not partner.synchronised:
+                partner.synchronise(now)
+            case State.ARMED if self._synchronised and not partner.scheduled:
                 self._schedule(now)
+                partner.schedule()
             case _:
                 pass
 
     def _schedule(self, now: int) -> None:
+        """Choose the start, once."""
         lab = self.lab
         if not lab.start_ns:
             lab.start_ns = now + LEAD_NS
             lab.epoch_ns = lab.start_ns + self._wall_ns
-            self._account.first_offset = self._offset.at(lab.start_ns)
-        there = lab.start_ns + self._account.first_offset
-        lab.endpoint.send(Start(lab.exchange.session, there, lab.epoch_ns))
+            for partner in self._partners:
+                partner.settle()
 
     # -- ticks ------------------------------------------------------------------------------------
 
@@ -217,50 +230,50 @@ class MasterLoop:
         lab = self.lab
         wake = lab.clock.now()
         if lab.exchange.state is State.SCHEDULED:
-            lab.exchange.happen(Event.RUN)
-            lab.heard_ns = wake
+            self._begin(wake)
         held = wake >= lab.tick_ns(tick + 1)
-        if (feedback := self._feedback.take(tick)) is not None:
-            self._used = feedback
-        self._account.close(tick - 1, wake)
+        forces = [partner.begin(tick, wake) for partner in self._partners]
         try:
             measured = self._rig.read()
-            outputs = self._step(
-                tick, measured.column_displacement, measured.column_force, self._used.damper_force
-            )
+            outputs = self._step(tick, measured.column_displacement, measured.column_force, forces)
             violation = self._limits.violation(measured, outputs)
             if not (held or violation):
                 self._command = outputs.actuator_command
-                self._sent = outputs.sent()
+                for partner, sent in zip(self._partners, outputs.sent(), strict=True):
+                    partner.sent = sent
             self._rig.write(ColumnCommand(self._command))
         except RigError as error:
             self._trip(error, "rig", tick)
             return
-        ready, sent = (0, 0) if held or violation else self._send(tick)
-        self._account.open(tick, wake, ready, sent, self._used)
+        self._send(tick, wake, nothing=bool(held or violation))
         if lab.recorder is not None:
-            self._sample(tick, measured, outputs, sent)
+            self._sample(tick, measured, outputs)
         self.ticks = tick + 1
         self._drift = outputs.column_target / lab.plan.column.deformation_ratio
         if violation:
             self._trip(InterlockError(violation), "limit", tick)
         self._watch(tick, wake)
 
-    def _send(self, tick: int) -> tuple[int, int]:
-        """Send the tick's command; when its values were ready, and when its frame was handed to the link, ns."""
-        lab = self.lab
-        now = lab.clock.now()
-        shift = self._offset.at(now) - self._account.first_offset
-        return now, lab.endpoint.send(Command(lab.exchange.session, tick, now, shift, *self._sent))
+    def _begin(self, now: int) -> None:
+        """The first tick."""
+        self.lab.exchange.happen(Event.RUN)
+        for partner in self._partners:
+            partner.heard_ns = now
 
-    def _sample(self, tick: int, measured: tuple[float, float], outputs: Outputs, sent_ns: int) -> None:
-        lab, used = self.lab, self._used
-        interval = lab.plan.test.interval
+    def _send(self, tick: int, wake_ns: int, *, nothing: bool) -> None:
+        """Send each slave the tick's command, unless `nothing` goes out, and open its account."""
+        ready = 0 if nothing else self.lab.clock.now()
+        for partner in self._partners:
+            self._sent_ns = 0 if nothing else partner.send(tick)
+            partner.account.open(tick, wake_ns, ready, self._sent_ns, partner.used)
+
+    def _sample(self, tick: int, measured: tuple[float, float], outputs: Outputs) -> None:
+        lab = self.lab
         log_ns = lab.epoch_ns + tick * lab.interval_ns
-        publish_ns = lab.epoch_ns + (sent_ns or lab.clock.now()) - lab.start_ns
+        publish_ns = lab.epoch_ns + (self._sent_ns or lab.clock.now()) - lab.start_ns
         values = (
             tick,
-            tick * interval,
+            tick * lab.plan.test.interval,
             outputs.ground_acceleration,
             outputs.displacement,
             outputs.velocity,
@@ -270,19 +283,25 @@ class MasterLoop:
             self._command,
             *measured,
             outputs.numerical_force,
-            used.damper_force,
-            used.seq,
-            (tick - used.seq) * interval if used.seq >= 0 else 0.0,
-            *self._sent,
+            *self._exchanged(tick),
         )
         lab.outlet.add("master", log_ns, publish_ns, values)
 
+    def _exchanged(self, tick: int) -> tuple[Any, ...]:
+        """What was used and what was sent: one value each, or one per slave where there are several."""
+        if self._alone:
+            partner = self._partners[0]
+            return *partner.use(tick), *partner.sent
+        return tuple(zip(*((*partner.use(tick), *partner.sent) for partner in self._partners), strict=True))
+
     def _watch(self, tick: int, now: int) -> None:
-        """End the test where the slave or the recorder is gone or cannot go on."""
-        lab, recording = self.lab, self.lab.plan.recording
-        if now - lab.heard_ns > lab.plan.link.loss_timeout * 1e9:
-            lab.lost("The slave", lab.plan.link.loss_timeout, tick)
-        elif recording.required and lab.recorder is not None and lab.recorder.state == "failed":
+        """End the test where a slave or the recorder is gone or cannot go on."""
+        lab, recording, seconds = self.lab, self.lab.plan.recording, self.lab.plan.link.loss_timeout
+        for partner in self._partners:
+            if now - partner.heard_ns > seconds * 1e9:
+                lab.lost(f"The {partner.title}", seconds, tick)
+                return
+        if recording.required and lab.recorder is not None and lab.recorder.state == "failed":
             error = InterlockError(f"The recording is lost: {lab.recorder.reason}")
             lab.fail(Event.TRIP, error, code="recording_lost", tick=tick)
         elif recording.required and now - lab.recorder_heard_ns > recording.patience * 1e9:
@@ -300,9 +319,9 @@ class MasterLoop:
             self.lab.note("stop", reason, tick=self.ticks)
 
     def leave(self) -> None:
-        """Disarm, tell the slave and give the recorder the rest; may be called again until `left`."""
+        """Tell the slaves and give the recorder the rest; may be called again until `left`."""
         lab = self.lab
-        if lab.exchange.state is State.STOPPING and self._stopped:
+        if lab.exchange.state is State.STOPPING and all(partner.stopped for partner in self._partners):
             lab.exchange.happen(Event.FINISH)
         now = lab.clock.now()
         if now - self._asked_ns < REPEAT_NS // 2:
@@ -317,22 +336,31 @@ class MasterLoop:
         lab.endpoint.send(lab.outlet.finished())
 
     def disarm(self) -> None:
-        """Bring the rig to a safe stop and close the account; once, before leaving."""
+        """Bring the rig to a safe stop and close the accounts; once, before leaving."""
         if complaint := self._rig.disarm():
             self.lab.note("disarm", complaint, level="warning", tick=self.ticks)
         if self.ticks:
-            self._account.finish(self.ticks - 1, self.lab.clock.now())
+            for partner in self._partners:
+                partner.account.finish(self.ticks - 1, self.lab.clock.now())
 
     @property
     def left(self) -> bool:
-        """Whether slave and recorder know and have all."""
+        """Whether slaves and recorder know and have all."""
         settled = self.lab.exchange.ended
         return settled and (self.lab.recorder_has_all() or self.lab.recorder is None)
 
     @property
     def progress(self) -> dict[str, float]:
-        """What a user watches while it runs: drift of the specimen's storey (m), round trip (s), missed deadlines."""
-        return {"drift": self._drift, **self._account.progress()}
+        """What a user watches while it runs: drift of the specimen's storey (m), round trip (s), missed deadlines.
+
+        Of several slaves the longest round trip and the most deadlines missed.
+        """
+        accounts = [partner.account for partner in self._partners]
+        return {
+            "drift": self._drift,
+            "round_trip": max(account.round_trip for account in accounts),
+            "missed": float(max(account.missed for account in accounts)),
+        }
 
     # -- pacing -----------------------------------------------------------------------------------
 
@@ -341,12 +369,12 @@ class MasterLoop:
         return self.lab.tick_ns(tick)
 
     def latest(self, tick: int) -> int:
-        """For the feedback of the tick before it is waited a little into the interval, until then, ns."""
+        """For the feedbacks of the tick before it is waited a little into the interval, until then, ns."""
         return self.lab.tick_ns(tick) + round((1.0 - self.lab.plan.link.wait_share) * self.lab.interval_ns)
 
     def heard(self, tick: int) -> bool:
-        """Whether what the tick waits for has come: the feedback of the tick before."""
-        return self._feedback.newest_seen >= tick - 1
+        """Whether what the tick waits for has come: every slave's feedback of the tick before."""
+        return all(partner.heard(tick - 1) for partner in self._partners)
 
     def finish(self) -> None:
         """All ticks are done."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from operator import add
 from typing import Any
 
 from common import schema
@@ -36,6 +37,7 @@ class ColumnLab:
         )
         self._readings = readings.build(interval, MEASURED_A, more.sensors)
         self._noise = noise.Noise(seed, readings.levels(MEASURED_A, levels, more.sensors))
+        self._plain = not more.sensors  # a reading is value plus noise
         self._interval, self._tick = interval, 0
         self._true = (0.0, 0.0)
         self._advance = column_lab.advance
@@ -46,6 +48,8 @@ class ColumnLab:
     def read(self) -> ColumnMeasurement:
         """Readings at the present tick, with the sensors' noise."""
         error, true, sensors = self._noise.row(), self._true, self._readings
+        if self._plain:
+            return ColumnMeasurement(*map(add, true, error))
         t = self._tick * self._interval
         self._tick += 1
         return ColumnMeasurement(

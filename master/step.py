@@ -2,57 +2,73 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 from common.plan import Plan
 from models import substructure
 from models.registry import Array
 
-Storeys = float | list[float]
+Values = float | list[float]
+Sent = tuple[float, float, float, float, float]
 
 
 class Outputs(NamedTuple):
-    """What a tick computes: the building at t_k, and the commands for the interval's end."""
+    """What a tick computes: the building at t_k, and the commands for the interval's end.
+
+    What goes to the slaves is one value each where there are several, what concerns storeys likewise.
+    """
 
     ground_acceleration: float
     column_target: float  # of t_k
     actuator_command: float
-    table_target: float
-    damper_command: float
-    table_target_velocity: float
-    table_target_acceleration: float
-    table_target_jerk: float
-    displacement: Storeys
-    velocity: Storeys
-    acceleration: Storeys
-    absolute_acceleration: Storeys
-    numerical_force: Storeys
+    table_target: Values
+    damper_command: Values
+    table_target_velocity: Values
+    table_target_acceleration: Values
+    table_target_jerk: Values
+    displacement: Values
+    velocity: Values
+    acceleration: Values
+    absolute_acceleration: Values
+    numerical_force: Values
 
-    def sent(self) -> tuple[float, float, float, float, float]:
-        """The command for laboratory B in its message's order: the target, the motor's force, the target's rates."""
-        return self[3:8]
+    def sent(self) -> list[Sent]:
+        """The command for each slave in its message's order: the target, the motor's force, the target's rates."""
+        values: Any = self[3:8]
+        return [values] if type(self.table_target) is float else list(zip(*values, strict=True))
 
 
 class MasterStep:
-    """The numerical substructure, the compensator and the damper's control, moving on tick by tick."""
+    """The numerical substructure, the compensator and the dampers' control, moving on tick by tick."""
 
     def __init__(self, plan: Plan, ground: Array, p_delta: float = 0.0) -> None:
         self._arrays = substructure.build(plan, ground, p_delta)
-        self._storeys = plan.storeys
+        self._forces = self._arrays.dampers[substructure.FORCE_USED]
+        self._plain = plan.storeys == len(plan.roles) == 1
+        self._slaves, self._storeys = len(plan.roles), plan.storeys
         self._advance = substructure.advance
 
     def __call__(
-        self, tick: int, column_displacement: float, column_force: float, damper_force: float
+        self, tick: int, column_displacement: float, column_force: float, damper_forces: Sequence[float]
     ) -> Outputs:
-        """One tick; displacement m, forces N, all as measured, the damper's at its own scale."""
+        """One tick; displacement m, forces N, all as measured, each slave's damper force at its own scale."""
         arrays = self._arrays
-        self._advance(*arrays, tick, column_displacement, column_force, damper_force)
+        for place, force in enumerate(damper_forces):
+            self._forces[place] = force
+        self._advance(*arrays, tick, column_displacement, column_force)
         row = arrays.output.tolist()
-        n = self._storeys
-        if n == 1:
-            return Outputs(*row)
-        first = substructure.STOREYS
-        groups = [
-            row[first + place * n : first + (place + 1) * n] for place in range(len(substructure.STOREY_ROWS))
-        ]
-        return Outputs(*row[:first], *groups)
+        return Outputs(*row) if self._plain else self._grouped(row)
+
+    def _grouped(self, row: list[float]) -> Outputs:
+        """The values of a row by name, those of several slaves or storeys together."""
+        slaves, n = self._slaves, self._storeys
+        first, sent = substructure.TABLE_TARGET, substructure.SENT
+        storeys = first + sent * slaves
+        each = [row[first + place : storeys : sent] for place in range(sent)]
+        own = [row[start : start + n] for start in range(storeys, len(row), n)]
+        return Outputs(
+            *row[:first],
+            *(values if slaves > 1 else values[0] for values in each),
+            *(values if n > 1 else values[0] for values in own),
+        )

@@ -67,7 +67,7 @@ def simulate(
     seed: int | None = None,
     exchange: Exchange | None = None,
 ) -> Rollout:
-    """Closed loop of the plan's models over the whole test, with effects laid over them where given.
+    """Closed loop of a plan with one slave: its models over the whole test, with effects laid over them where given.
 
     `ground` as `substructure.ground_rows` gives it. Without a `seed` the sensors are free of noise; with
     one they read what the emulated laboratories read under that seed of the plan. Of the link's effects
@@ -129,6 +129,7 @@ def noises(system: System, seed: int | None) -> tuple[Array, Array]:
 def roll(
     codes: Index,
     scalars: Array,
+    dampers: Array,
     mass: Array,
     coefficients: Array,
     column_params: Array,
@@ -188,9 +189,11 @@ def roll(
         measured_a[tick, 0] = readings.step(sensors_a, sensed_a, 0, displacement, noise_a[tick, 0], t)
         measured_a[tick, 1] = readings.step(sensors_a, sensed_a, 1, force, noise_a[tick, 1], t)
         used[tick] = measured_b[feedback[tick], 3] if feedback[tick] >= 0 else 0.0
+        dampers[substructure.FORCE_USED, 0] = used[tick]
         substructure.advance(
             codes,
             scalars,
+            dampers,
             mass,
             coefficients,
             column_params,
@@ -207,7 +210,6 @@ def roll(
             tick,
             measured_a[tick, 0],
             measured_a[tick, 1],
-            used[tick],
         )
         if not np.isfinite(output[ACTUATOR_COMMAND]):
             return tick

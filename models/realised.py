@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from common.errors import InputError
 from common.reality import Reality
+from common.roles import SLAVE
 from models.effects import CATALOGUE, lay
 from models.system import System
 
@@ -15,16 +16,22 @@ def true_system(reality: Reality) -> System:
     """The plan's parameters as they really are, with the effects laid over them.
 
     Raises:
-        InputError: an effect that the catalogue does not know, parameters it cannot have, or an effect
-            on a laboratory whose rig is a plug-in: it brings its own physics.
+        InputError: an effect that the catalogue does not know, parameters it cannot have, an effect on a
+            laboratory whose rig is a plug-in: it brings its own physics, or one that names a slave and is none of
+            a slave's.
     """
-    for name, _ in reality.effects:
-        lab = laboratory(CATALOGUE[name].site) if name in CATALOGUE else ""
+    only = reality.only or ("",) * len(reality.effects)
+    for (name, _), alone in zip(reality.effects, only, strict=True):
+        site = CATALOGUE[name].site if name in CATALOGUE else ""
+        lab = laboratory(site)
         if lab and getattr(reality, lab).class_:
             raise InputError(
-                f"The effect '{name}' cannot be laid over the plug-in in [{lab}.rig]: "
+                f"The effect '{name}' cannot be laid over the plug-in in "
+                f"[{reality.role if lab == SLAVE else lab}.rig]: "
                 "put it into that rig, or leave the rig out of the reality and the plan."
             )
+        if alone and site != "link" and lab != SLAVE:
+            raise InputError(f"The effect '{name}' is none of one slave's: leave out its slave.")
     return lay(System(reality.plan), reality.effects)
 
 

@@ -1,9 +1,10 @@
 """The master's computation of one control interval: building, compensator, damper control.
 
-    M·ẍ + C·ẋ + f_numerical(x) + specimen = −M·1·z̈ + λ·damper_force
+    M·ẍ + C·ẋ + f_numerical(x) + specimen = −M·1·z̈ + Σ λ·damper_force
 
-At tick k the forces measured at the displacement x_k complete the equation of motion; the integrator
-then gives x_{k+1}, from which the targets of the interval's end follow (contract, sections 2 and 3).
+with one damper for each slave's laboratory. At tick k the forces measured at the displacement x_k complete the
+equation of motion; the integrator then gives x_{k+1}, from which the targets of the interval's end follow (contract,
+sections 2 and 3).
 """
 
 from __future__ import annotations
@@ -23,15 +24,18 @@ from models.structures import shear_building
 
 Codes = NDArray[np.int64]
 
-# places in `codes` and `scalars`
-INTEGRATOR, SPECIMEN, COMPENSATOR, STOREY, FLOOR = range(5)
-INTERVAL, RATIO, REPRESENTS, FORCE_SCALE, MOTOR_GAIN, HIGH_PASS, HIGH_PASS_GAIN, P_DELTA = range(8)
+# places in `codes`, with one floor per damper from FLOORS on, in `scalars`, and of the rows of `dampers`
+INTEGRATOR, SPECIMEN, COMPENSATOR, STOREY, FLOORS = range(5)
+INTERVAL, RATIO, REPRESENTS, HIGH_PASS, HIGH_PASS_GAIN, P_DELTA = range(6)
+FORCE_SCALE, MOTOR_GAIN, FORCE_USED = range(3)
 
-# places in the output row; one value per storey each from STOREYS on
+# places in the output row: a slave's SENT values, those of further slaves after them, then one per storey each
 GROUND_ACCELERATION, COLUMN_TARGET, ACTUATOR_COMMAND = range(3)
 TABLE_TARGET, DAMPER_COMMAND, TABLE_VELOCITY, TABLE_ACCELERATION, TABLE_JERK = range(3, 8)
-STOREYS = 8
+SENT = 5
+STOREYS = TABLE_TARGET + SENT  # where there is one slave
 STOREY_ROWS = ("displacement", "velocity", "acceleration", "absolute_acceleration", "numerical_force")
+STOREY_VALUES = len(STOREY_ROWS)
 
 
 class Substructure(NamedTuple):
@@ -39,6 +43,7 @@ class Substructure(NamedTuple):
 
     codes: Codes
     scalars: Array
+    dampers: Array  # (3, slaves): λ, motor force over floor velocity N·s/m, and the force that a tick uses, N
     mass: Array  # (n,) kg
     coefficients: Array  # of the integrator
     column_params: Array  # (n, parameters) of the numerical columns
@@ -47,7 +52,7 @@ class Substructure(NamedTuple):
     state: Array  # (rows, n) of the integrator
     column_memory: Array  # (n, memory)
     compensator_memory: Array
-    recent: Array  # (2, RECENT): accelerations of specimen and floor at the last ticks, newest first, m/s²
+    recent: Array  # (1 + slaves, RECENT): accelerations of specimen and floors, newest first, m/s²
     filtered: Array  # (2,): the column force of the tick before, measured and corrected, N
     target: Array  # (1,): the specimen's target of the present tick, m
     balance: Array  # (n,): external minus restoring force, N
@@ -72,21 +77,20 @@ def build(plan: Plan, rows: Array, p_delta: float = 0.0) -> Substructure:
     method = integrators.build(structure.integrator, M, C, K, plan.test.interval, structure.rho_infinity)
     chosen = plan.compensator
     compensator = compensators.build(chosen.kind, chosen.parameters, plan.test.interval)
-    force_scale = plan.damper.force_scale if plan.control.amd else 0.0
-    motor_gain = plan.control.gain / plan.damper.force_scale if force_scale else 0.0
+    slaves = [plan.of(role) for role in plan.roles]
     scalars = [
         plan.test.interval,
         column.deformation_ratio,
         float(column.represents),
-        force_scale,
-        motor_gain,
         *force_correction.coefficients(plan.compensator.force, plan.test.interval),
         p_delta,
     ]
     n = plan.storeys
+    floors = [slave.damper.floor - 1 for slave in slaves]
     return Substructure(
-        np.array([method.code, packed[0][0], compensator.code, column.storey - 1, plan.damper.floor - 1]),
+        np.array([method.code, packed[0][0], compensator.code, column.storey - 1, *floors]),
         np.array(scalars),
+        np.array([damper(slave) for slave in slaves]).T.copy(),
         mass,
         method.coefficients,
         np.stack([params for _, params, _ in packed]),
@@ -95,12 +99,18 @@ def build(plan: Plan, rows: Array, p_delta: float = 0.0) -> Substructure:
         method.start(np.zeros(n), np.zeros(n), -mass * rows[0, 0]),
         np.stack([memory for _, _, memory in packed]),
         compensator.state,
-        np.zeros((2, trend.RECENT)),
+        np.zeros((1 + len(slaves), trend.RECENT)),
         np.zeros(2),
         np.zeros(1),
         np.zeros(n),
-        np.zeros(STOREYS + len(STOREY_ROWS) * n),
+        np.zeros(TABLE_TARGET + SENT * len(slaves) + STOREY_VALUES * n),
     )
+
+
+def damper(plan: Plan) -> tuple[float, float, float]:
+    """A slave's column of `dampers`; zero where the building does without the damper."""
+    force_scale = plan.damper.force_scale if plan.control.amd else 0.0
+    return force_scale, plan.control.gain / plan.damper.force_scale if force_scale else 0.0, 0.0
 
 
 def motion(plan: Plan) -> GroundMotion:
@@ -128,6 +138,7 @@ def shifted(rows: Array, ticks: float) -> Array:
 def advance(
     codes: Codes,
     scalars: Array,
+    dampers: Array,
     mass: Array,
     coefficients: Array,
     column_params: Array,
@@ -144,26 +155,27 @@ def advance(
     tick: int,
     column_displacement: float,
     column_force: float,
-    damper_force: float,
 ) -> None:
     """One tick: from the measurements at t_k to the commands for the interval's end, into `output`.
 
-    `column_displacement` m and `column_force` N as measured at t_k, `damper_force` N at the damper's own
-    scale as used. The arrays are those of `Substructure`; the states move on by one interval.
+    `column_displacement` m and `column_force` N as measured at t_k; the dampers' forces, each at its own scale, stand
+    in their row of `dampers`. The arrays are those of `Substructure`; the states move on by one interval.
     """
-    n = mass.size
+    n, slaves = mass.size, dampers.shape[1]
+    storeys = TABLE_TARGET + SENT * slaves
     corrected = force_correction.step(scalars[HIGH_PASS], scalars[HIGH_PASS_GAIN], filtered, column_force)
-    storey, floor = codes[STOREY], codes[FLOOR]
+    storey = codes[STOREY]
     interval, ratio = scalars[INTERVAL], scalars[RATIO]
     for i in range(n):
         balance[i] = -mass[i] * ground[0, tick]
-    balance[floor] += scalars[FORCE_SCALE] * damper_force
+    for slave in range(slaves):
+        balance[codes[FLOORS + slave]] += dampers[FORCE_SCALE, slave] * dampers[FORCE_USED, slave]
     for i in range(n):
         drift = shear_building.storey_drift(state[NEXT_DISPLACEMENT], i)
         force = specimens.step(codes[SPECIMEN], column_params[i], column_memory[i], drift)
         if scalars[P_DELTA] != 0.0:
             force += scalars[P_DELTA] * drift
-        output[STOREYS + 4 * n + i] = force
+        output[storeys + 4 * n + i] = force
         if i == storey:
             force += scalars[REPRESENTS] * corrected
         shear_building.add_nodal(-force, i, balance)
@@ -173,7 +185,6 @@ def advance(
     target[0] = ratio * shear_building.storey_drift(state[NEXT_DISPLACEMENT], storey)
     rate = ratio * shear_building.storey_drift(state[NEXT_VELOCITY], storey)
     trend.remember(recent[0], ratio * shear_building.storey_drift(state[ACCELERATION], storey))
-    trend.remember(recent[1], state[ACCELERATION, floor])
     output[GROUND_ACCELERATION] = ground[0, tick]
     output[COLUMN_TARGET] = previous_target
     output[ACTUATOR_COMMAND] = compensators.step(
@@ -189,15 +200,20 @@ def advance(
         interval,
     )
     here, ahead = ground[1, tick], ground[1, tick + 1]
-    output[TABLE_TARGET] = state[NEXT_DISPLACEMENT, floor] + ahead
-    output[TABLE_VELOCITY] = (
-        state[NEXT_VELOCITY, floor] + (ahead - here) / interval + 0.5 * interval * ground[0, tick + 1]
-    )
-    output[TABLE_ACCELERATION] = trend.ahead(recent[1]) + ground[0, tick + 1]
-    output[TABLE_JERK] = trend.slope(recent[1], interval) + (ground[0, tick + 1] - ground[0, tick]) / interval
-    output[DAMPER_COMMAND] = scalars[MOTOR_GAIN] * state[NEXT_VELOCITY, floor]
+    for slave in range(slaves):
+        floor, more, past = codes[FLOORS + slave], SENT * slave, recent[1 + slave]
+        trend.remember(past, state[ACCELERATION, floor])
+        output[TABLE_TARGET + more] = state[NEXT_DISPLACEMENT, floor] + ahead
+        output[TABLE_VELOCITY + more] = (
+            state[NEXT_VELOCITY, floor] + (ahead - here) / interval + 0.5 * interval * ground[0, tick + 1]
+        )
+        output[TABLE_ACCELERATION + more] = trend.ahead(past) + ground[0, tick + 1]
+        output[TABLE_JERK + more] = (
+            trend.slope(past, interval) + (ground[0, tick + 1] - ground[0, tick]) / interval
+        )
+        output[DAMPER_COMMAND + more] = dampers[MOTOR_GAIN, slave] * state[NEXT_VELOCITY, floor]
     for i in range(n):
-        output[STOREYS + i] = state[DISPLACEMENT, i]
-        output[STOREYS + n + i] = state[VELOCITY, i]
-        output[STOREYS + 2 * n + i] = state[ACCELERATION, i]
-        output[STOREYS + 3 * n + i] = state[ACCELERATION, i] + ground[0, tick]
+        output[storeys + i] = state[DISPLACEMENT, i]
+        output[storeys + n + i] = state[VELOCITY, i]
+        output[storeys + 2 * n + i] = state[ACCELERATION, i]
+        output[storeys + 3 * n + i] = state[ACCELERATION, i] + ground[0, tick]

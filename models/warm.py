@@ -23,7 +23,7 @@ def compile_all() -> None:
     replay.laboratory_b(System(plan), still, still)
     replay.column(System(plan), still)
     replay.building(System(plan), ground, still, still, still)
-    substructure.advance(*substructure.build(plan, ground), 0, 0.0, 0.0, 0.0)
+    substructure.advance(*substructure.build(plan, ground), 0, 0.0, 0.0)
     column_lab.advance(*column_lab.build(plan.test.interval, plan.actuator, plan.column), 0.0)
     table_lab.advance(*table_lab.build(plan.test.interval, plan.table, plan.damper), 0.0, 0.0)
     readings.step(*readings.build(plan.test.interval, ("any",), {}), 0, 0.0, 0.0, 0.0)

@@ -48,7 +48,14 @@ def run(args: argparse.Namespace) -> int:
     ground = substructure.ground_rows(plan, motion)
     path = files.choose_path(args.output, plan)
     patience = plan.link.connect_timeout
-    link = ZenohLink("recorder", plan.test.name, connect=args.connect, patience=patience, stopping=stopping)
+    link = ZenohLink(
+        "recorder",
+        plan.test.name,
+        slaves=plan.roles,
+        connect=args.connect,
+        patience=patience,
+        stopping=stopping,
+    )
     try:
         recording = files.begin(path, plan, motion, ground, unix_ns())
         setting = Setting(plan, FrameEndpoint(link, plan.digest()), MonotonicClock(), report)

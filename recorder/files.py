@@ -10,10 +10,11 @@ from pathlib import Path
 
 from common.clock import unix_ns
 from common.errors import InputError
+from common.machine import facts
 from common.plan import Plan
 from common.recording.reader import GROUND
 from common.recording.writer import Recording
-from common.signals import TOPICS
+from common.signals import topics
 from models.ground_motion import GroundMotion
 from models.registry import Array
 
@@ -56,10 +57,10 @@ def begin(path: Path, plan: Plan, record: GroundMotion, ground: Array, at_ns: in
 
     The schemas reach the file with the first message only, so that event must not wait.
     """
-    recording = Recording(path, plan.test.name, plan.storeys, TOPICS)
+    recording = Recording(path, plan.test.name, plan.storeys, topics(plan.roles), plan.roles)
     recording.metadata("plan", {"toml": plan.toml(), "digest": plan.digest()})
     recording.metadata("versions", {name: metadata.version(name) for name in PACKAGES})
-    recording.metadata("host", host())
+    recording.metadata("host", host() | facts())
     recording.metadata(GROUND, {"record": record.describe(), "scale": repr(plan.ground_motion.scale)})
     recording.attach(GROUND, ground.astype("<f8").tobytes(), "application/octet-stream")
     recording.add("event", at_ns, at_ns, (0.0, "recorder", "info", "begin", "recording begun", {}))

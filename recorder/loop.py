@@ -11,13 +11,14 @@ from common.endpoint import Endpoint
 from common.errors import InputError, LostError
 from common.laboratory import REPEAT_NS, Report, Setting
 from common.messages import Finished, Message, Recorder, Register, Resend, Samples
-from common.outlet import Inlet
+from common.outlet import Inlet, pack_nexts
 from common.plan import Plan
+from common.roles import LATENCY, MASTER, kind_of
+from common.surroundings import CODES, described
 from recorder.sink import Item, Sink
 
 PATIENCE_NS = 1_000_000_000  # a hole that is not filled by then is lost
 SILENCE_NS = 5_000_000_000  # a test from which nothing is heard for so long is over
-LABS = ("master", "slave")
 CONSEQUENCE = "remote_trip"  # the other laboratory's cause counts
 MISSED_AT = [row.name for row in signals.LATENCY].index("deadline_missed")
 
@@ -32,13 +33,16 @@ class RecorderLoop:
         self._report: Report = setting.report
         self._sink = sink
         self._digest = setting.plan.digest()
-        self._inlets = {lab: Inlet() for lab in LABS}
+        self._inlets = {lab: Inlet() for lab in (MASTER, *setting.plan.roles)}
         self._holes: dict[str, tuple[int, int]] = {}  # first missing item, and since when it is missed
         self._session = 0
         self._said_ns = -REPEAT_NS
         self._heard_ns = setting.clock.now()
-        self._seen: dict[str, set[int]] = {topic: set() for topic in signals.TICK_TOPICS}
+        self._seen: dict[str, set[int]] = {
+            topic: set() for topic in signals.topics(setting.plan.roles) if topic != "event"
+        }
         self._missed = 0
+        self._machines: dict[str, str] = {}  # metadata of the recording
         self._outcome = ("", "")
         self._said_failure = False
         self.error: InputError | LostError | None = None
@@ -54,9 +58,9 @@ class RecorderLoop:
             return
         self._heard_ns = received_ns
         match message:
-            case Samples() if message.lab in LABS:
+            case Samples() if message.lab in self._inlets:
                 self._write(self._inlets[message.lab].take(message))
-            case Finished() if message.lab in LABS:
+            case Finished() if message.lab in self._inlets:
                 self._inlets[message.lab].total = message.total
             case _:
                 pass
@@ -67,7 +71,7 @@ class RecorderLoop:
         if request.plan != self._digest:
             self.error = InputError(
                 f"The plans differ (master {request.plan}, recorder {self._digest}): "
-                "give all three the same file and options."
+                "give all the same file and options."
             )
             self._say()
             self.done = True
@@ -88,12 +92,14 @@ class RecorderLoop:
             self._take_event(values)
             return
         self._seen[topic].add(values[0])
-        if topic == "latency":
+        if kind_of(topic) == LATENCY:
             self._missed += bool(values[MISSED_AT])
 
     def _take_event(self, values: Item) -> None:
-        """Take note of why the test ended: the first cause, or what led to it where that arrives later."""
-        _, _, level, code, text, _ = values
+        """Take note of the machines, and of why the test ended: the first cause, or what led to it if that is late."""
+        _, lab, level, code, text, numbers = values
+        if code in CODES:
+            self._machines |= described(lab, code, numbers)
         settled = self._outcome[0] not in ("", CONSEQUENCE)
         if (
             (level == "error" or code == "stop")
@@ -121,8 +127,8 @@ class RecorderLoop:
             self._report(
                 "event", {"lab": "recorder", "level": "error", "code": "recording_lost", "text": failure}
             )
-        nexts = (self._inlets[lab].next for lab in LABS)
-        self._endpoint.send(Recorder(self._session, state, self._digest, failure, *nexts))
+        nexts = pack_nexts({lab: inlet.next for lab, inlet in self._inlets.items()})
+        self._endpoint.send(Recorder(self._session, state, self._digest, failure, nexts))
 
     def _fill_holes(self, now: int) -> None:
         for lab, inlet in self._inlets.items():
@@ -166,7 +172,7 @@ class RecorderLoop:
         """Say goodbye, write the summary, close the file; the summary as written."""
         self._say()
         summary = self.summary()
-        self._sink.close(summary)
+        self._sink.close(summary, self._machines)
         return summary
 
     def summary(self) -> dict[str, str]:

@@ -7,6 +7,7 @@ from queue import Empty, Full, Queue
 from typing import Any, Protocol
 
 from common.clock import Clock
+from common.recording.reader import MACHINES
 from common.recording.writer import Recording
 
 FLUSH_NS = 100_000_000
@@ -30,8 +31,8 @@ class Sink(Protocol):
     def put(self, items: list[Item]) -> None:
         """Take items; never waits for the disk in real time."""
 
-    def close(self, summary: dict[str, str]) -> None:
-        """Write what is left and the summary."""
+    def close(self, summary: dict[str, str], machines: dict[str, str]) -> None:
+        """Write what is left, the summary and what is known of the machines."""
 
 
 class FileSink:
@@ -66,10 +67,12 @@ class FileSink:
         except OSError as error:
             self.failure = f"the disk does not take it ({error.strerror})."
 
-    def close(self, summary: dict[str, str]) -> None:
+    def close(self, summary: dict[str, str], machines: dict[str, str]) -> None:
         """Finish the file; after a failure it stays readable up to there."""
         try:
             if not self.failure:
+                if machines:
+                    self._recording.metadata(MACHINES, machines)
                 self._recording.close(summary)
                 return
         except OSError as error:
@@ -114,8 +117,8 @@ class ThreadedSink:
             except Empty:
                 self._sink.keep_up()
 
-    def close(self, summary: dict[str, str]) -> None:
-        """Write what is queued, then the summary."""
+    def close(self, summary: dict[str, str], machines: dict[str, str]) -> None:
+        """Write what is queued, then the summary and what is known of the machines."""
         self._ending.set()
         self._thread.join()
-        self._sink.close(summary)
+        self._sink.close(summary, machines)

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from rths.benches import Result
 
 PARTS = ("column", "actuator", "table", "damper")
+OF_SLAVE = ("table", "damper")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -33,6 +34,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="PIECE",
         help="only the pieces that begin so (step, sine, random, sweep, static); may be repeated",
+    )
+    parser.add_argument(
+        "--name", metavar="NAME", help="whose table or damper it is, where the plan names several slaves"
     )
     clock = parser.add_mutually_exclusive_group()
     clock.add_argument("--virtual", action="store_true", help="virtual clock, as fast as it goes (default)")
@@ -55,7 +59,11 @@ def run(args: argparse.Namespace) -> int:
 
     plan = plans.load(cli.plan_path(args.plan)).with_test(seed=args.seed)
     order = benches.Order(args.part, args.compensated, tuple(args.only), args.real_time)
-    result = benches.play(plan, cli.load_reality(args.reality, plan), order, args.output, Stopper())
+    reality = cli.load_reality(args.reality, plan)
+    if args.part in OF_SLAVE:
+        role = plan.slave_role(args.name or "")
+        plan, reality = plan.of(role), reality.of(role)
+    result = benches.play(plan, reality, order, args.output, Stopper())
     if args.json:
         sys.stdout.write(json.dumps(summary(result)) + "\n")
     else:

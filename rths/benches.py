@@ -93,7 +93,7 @@ def play(
         error = failure
     finally:
         cause = str(error) if error else "completed"
-        sink.close({"outcome": "stopped" if error else "completed", "cause": cause, "ticks": str(done)})
+        sink.close({"outcome": "stopped" if error else "completed", "cause": cause, "ticks": str(done)}, {})
     if sink.failure and error is None:
         error = InterlockError(f"The recording is lost: {sink.failure}")
     return Result(path, order.part, plan.test.interval, done, late, programme.segments, error)

@@ -13,8 +13,6 @@ from common.errors import InputError
 if TYPE_CHECKING:
     from rths.source import Source
 
-LEFT_OUT = ("seq", "t")
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `compare`."""
@@ -54,10 +52,12 @@ def compare(a: Source, b: Source) -> dict[str, Any]:
     """
     import numpy as np
 
+    from rths.source import OF_THE_TICK
+
     ticks, in_a, in_b = np.intersect1d(a.ticks, b.ticks, return_indices=True)
     result = {}
     for name in a.signals:
-        if name in LEFT_OUT or name not in b.signals or not ticks.size:
+        if name in OF_THE_TICK or name not in b.signals or not ticks.size:
             continue
         x, y = a.signals[name][in_a].astype(float), b.signals[name][in_b].astype(float)
         if x.shape == y.shape:

@@ -46,9 +46,10 @@ def run(args: argparse.Namespace) -> int:
 
 
 def flat(recording: Run) -> dict[str, Any]:
-    """One column per signal, named `<topic>_<signal>`, with `_<storey>` where there are several; one row per tick.
+    """One column per signal, named `<topic>_<signal>`, with `_<number>` of storey or slave where there are several.
 
-    A tick that a topic does not have is NaN there, or 0 in a column of whole numbers.
+    One row per tick; the topic of a named slave is `slave_<name>`. A tick that a topic does not have is NaN there,
+    or 0 in a column of whole numbers.
     """
     import numpy as np
 
@@ -63,12 +64,12 @@ def flat(recording: Run) -> dict[str, Any]:
                 (ticks.size, *column.shape[1:]), np.nan if column.dtype.kind == "f" else 0, column.dtype
             )
             whole[places] = column
-            columns |= spread(f"{topic}_{name}", whole)
+            columns |= spread(f"{topic.replace('.', '_')}_{name}", whole)
     return columns
 
 
 def spread(name: str, column: Any) -> dict[str, Any]:
-    """A column by itself, or one per storey."""
+    """A column by itself, or one per storey or slave."""
     if column.ndim == 1:
         return {name: column}
-    return {f"{name}_{storey + 1}": column[:, storey].copy() for storey in range(column.shape[1])}
+    return {f"{name}_{place + 1}": column[:, place].copy() for place in range(column.shape[1])}

@@ -10,6 +10,8 @@ from typing import Any
 
 from common import cli
 from common.errors import InputError
+from common.roles import name_of
+from rths.bench import OF_SLAVE
 
 PARTS = ("column", "actuator", "table", "damper")
 
@@ -34,12 +36,16 @@ def run(args: argparse.Namespace) -> int:
     from rths.identification import identify, part_of, possible
 
     recording = read(args.file)
-    parts = [args.part or part_of(recording)]
-    if not parts[0]:
-        parts = possible(recording)
-    if not parts:
+    reports = []
+    for role in recording.roles:
+        view = recording.of(role)
+        parts = [args.part or part_of(view)]
+        if not parts[0]:
+            parts = possible(view)
+        own = [part for part in parts if role == recording.roles[0] or part in OF_SLAVE]
+        reports += [identify(view, part) | named(part, role) for part in own]
+    if not reports:
         raise InputError(f"{args.file} holds no part's in- and outputs: see rths inspect {args.file}.")
-    reports = [identify(recording, part) for part in parts]
     if args.fit:
         reports.append(fitted(recording, args.fit))
     if args.json:
@@ -48,6 +54,11 @@ def run(args: argparse.Namespace) -> int:
         for report in reports:
             show(report)
     return 0
+
+
+def named(part: str, role: str) -> dict[str, str]:
+    """The part under the name of its slave, where that has one."""
+    return {"part": f"{part}.{name_of(role)}"} if name_of(role) and part in OF_SLAVE else {}
 
 
 def fitted(recording: Any, model: str) -> dict[str, Any]:

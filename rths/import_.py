@@ -14,15 +14,29 @@ from common import cli, signals
 from common import plan as plans
 from common.errors import InputError, PlanError
 from common.plan import Plan
+from common.roles import MASTER, kind_of, name_of
 from common.schema import fill, key, nearest
 from common.signals import Kind, Signal
 
-LAB_SIGNALS = {
-    row.name: topic
-    for topic in ("master", "slave")
-    for row in signals.TOPICS[topic]
-    if row.kind in (Kind.NUMBER, Kind.STOREYS) and row is not signals.TIME
-}
+
+def lab_signals(plan: Plan) -> dict[str, str]:
+    """What can be given: our signals, those of a named slave as `NAME.signal`, and the topic of each."""
+    found: dict[str, str] = {}
+    for topic in (MASTER, *plan.roles):
+        for row in signals.TOPICS[kind_of(topic)]:
+            if row.kind in (Kind.NUMBER, Kind.STOREYS) and row is not signals.TIME:
+                found[prefix(topic) + row.name] = topic  # where both ends know a signal, the slave's is meant
+    return found
+
+
+def prefix(topic: str) -> str:
+    """What stands before a signal's name in the topic of a named slave."""
+    return f"{name_of(topic)}." if name_of(topic) else ""
+
+
+def bare(name: str) -> str:
+    """A signal's name without that of its slave."""
+    return name.rpartition(".")[2]
 
 
 @dataclass(frozen=True)
@@ -71,7 +85,7 @@ def run(args: argparse.Namespace) -> int:
 
 def show(args: argparse.Namespace, mapping: Mapping, ticks: int, present: list[str]) -> None:
     """Say what was written, and which signals are absent."""
-    absent = [name for name in LAB_SIGNALS if name not in present]
+    absent = [name for name in lab_signals(mapping.plan) if name not in present]
     if args.json:
         report = {"file": str(args.output), "ticks": ticks, "signals": present, "absent": absent}
         sys.stdout.write(json.dumps(report) + "\n")
@@ -100,19 +114,23 @@ def load_map(path: Path) -> Mapping:
     if not isinstance(tables.get("plan"), str) or not tables.get("signals"):
         raise InputError(f'{path}: give plan = "file.toml" and a table [signals].')
     plan = plans.load(path.parent / tables["plan"])
-    sources = {name: source(path, name, entry) for name, entry in tables["signals"].items()}
-    several = [name for name in sources if signals.signal(LAB_SIGNALS[name], name).kind is Kind.STOREYS]
-    if plan.storeys > 1 and several:
-        raise InputError(
-            f"{path}: '{several[0]}' has one value per storey here and cannot be given as one column."
-        )
+    known_signals = lab_signals(plan)
+    sources = {name: source(path, name, entry, known_signals) for name, entry in tables["signals"].items()}
+    for name in sources:
+        row = signals.signal(known_signals[name], bare(name))
+        per = "storey" if plan.storeys > 1 and row.kind is Kind.STOREYS else ""
+        per = "slave" if len(plan.roles) > 1 and row.per_slave else per
+        if per:
+            raise InputError(
+                f"{path}: '{name}' has one value per {per} here and cannot be given as one column."
+            )
     return Mapping(plan, sources, str(tables.get("time", "")), float(tables.get("rate", 0.0)))
 
 
-def source(path: Path, name: str, entry: dict[str, Any]) -> Source:
+def source(path: Path, name: str, entry: dict[str, Any], known_signals: dict[str, str]) -> Source:
     """One row of [signals]."""
-    if name not in LAB_SIGNALS:
-        raise InputError(f"Unknown signal '{name}' in {path}: {nearest(name, LAB_SIGNALS)}")
+    if name not in known_signals:
+        raise InputError(f"Unknown signal '{name}' in {path}: {nearest(name, known_signals)}")
     try:
         values = dict(entry)
         known = values.pop("value", None)
@@ -173,20 +191,23 @@ def write(path: Path, mapping: Mapping, t: Any, values: dict[str, Any], data: st
     """The recording: the topics and fields that there are signals for, with the plan."""
     from common.recording.writer import Recording
 
-    topics: dict[str, tuple[Signal, ...]] = {}
-    for topic in ("master", "slave"):
-        rows = tuple(
-            row for row in signals.TOPICS[topic] if row.name in values and LAB_SIGNALS[row.name] == topic
-        )
-        if rows:
-            topics[topic] = (signals.SEQ, signals.TIME, *rows)
+    known = lab_signals(mapping.plan)
+    given: dict[str, list[str]] = {}
+    for topic in (MASTER, *mapping.plan.roles):
+        ours = (prefix(topic) + row.name for row in signals.TOPICS[kind_of(topic)])
+        if names := [name for name in ours if name in values and known[name] == topic]:
+            given[topic] = names
+    topics: dict[str, tuple[Signal, ...]] = {
+        topic: (signals.SEQ, signals.TIME, *(signals.signal(topic, bare(name)) for name in names))
+        for topic, names in given.items()
+    }
     plan = mapping.plan.with_test(duration=t.size * mapping.plan.test.interval)
-    recording = Recording(path, plan.test.name, plan.storeys, topics)
+    recording = Recording(path, plan.test.name, plan.storeys, topics, plan.roles)
     recording.metadata("plan", {"toml": plan.toml(), "digest": plan.digest()})
     recording.metadata("import", {"data": data})
     interval_ns = round(plan.test.interval * 1e9)
-    for topic, rows in topics.items():
-        table = zip(*(values[row.name].tolist() for row in rows[2:]), strict=True)
+    for topic, names in given.items():
+        table = zip(*(values[name].tolist() for name in names), strict=True)
         for tick, row in enumerate(table):
             recording.add(topic, tick * interval_ns, tick * interval_ns, (tick, float(t[tick]), *row))
     recording.close({"ticks_expected": str(t.size), "outcome": "import", "cause": "imported"})

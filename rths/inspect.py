@@ -109,15 +109,16 @@ def write_tracking(tracking: dict[str, dict[str, Any]]) -> None:
 
 
 def write_latency(summary: dict[str, Any]) -> None:
-    """Percentiles of the segments, and late ticks."""
-    segments = summary["latency"]
-    if not segments:
-        return
-    names = list(next(iter(segments.values())))
-    rows = [["latency, µs", *names]]
-    rows += [
-        [segment, *(f"{facts[name] * 1e6:.0f}" for name in names)] for segment, facts in segments.items()
-    ]
-    sys.stdout.write("\n")
-    table(rows)
+    """Percentiles of the segments, of named slaves each under its name, and late ticks."""
+    tables = summary["latency"] if summary["slaves"] else {"": summary["latency"]}
+    for slave, segments in tables.items():
+        if not segments:
+            return
+        names = list(next(iter(segments.values())))
+        rows = [[f"latency {slave}, µs" if slave else "latency, µs", *names]]
+        rows += [
+            [segment, *(f"{facts[name] * 1e6:.0f}" for name in names)] for segment, facts in segments.items()
+        ]
+        sys.stdout.write("\n")
+        table(rows)
     sys.stdout.write(f"late ticks: {summary['late_ticks']}\n")

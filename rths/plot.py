@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from common import cli
 from common.errors import InputError
+from common.roles import name_of, title
 
 if TYPE_CHECKING:
     from common.recording.reader import Run
@@ -42,25 +43,32 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(
             f"Cannot make the folder {folder}: {error.strerror}; give another with -o."
         ) from None
-    drawn = [
-        name for name, draw in PICTURES.items() if picture(recording, draw, folder / f"{name}.{args.format}")
+    paths = [
+        str(path)
+        for role in recording.roles
+        for name, draw in PICTURES.items()
+        if picture(recording, role, draw, path := folder / f"{labelled(name, role)}.{args.format}")
     ]
-    if not drawn:
+    if not paths:
         raise InputError(f"{args.file} has no signals for any picture: see rths inspect {args.file}.")
-    paths = [f"{folder / name}.{args.format}" for name in drawn]
     sys.stdout.write(json.dumps({"pictures": paths}) if args.json else "\n".join(paths))
     sys.stdout.write("\n")
     return 0
 
 
-def picture(recording: Run, draw: Callable[[Run, Any], bool], path: Path) -> bool:
-    """Draw one picture into a file; False where the recording lacks its signals."""
+def labelled(name: str, role: str) -> str:
+    """The picture's file, with the slave's name where it has one."""
+    return f"{name}-{name_of(role)}" if name_of(role) else name
+
+
+def picture(recording: Run, role: str, draw: Callable[[Run, Any], bool], path: Path) -> bool:
+    """Draw one picture of what concerns a slave into a file; False where the recording lacks its signals."""
     from rths.figure import figure
 
     canvas = figure()
-    if not draw(recording, canvas):
+    if not draw(recording.of(role), canvas):
         return False
-    canvas.suptitle(caption(recording), fontsize=8, x=0.01, ha="left")
+    canvas.suptitle(caption(recording, role), fontsize=8, x=0.01, ha="left")
     try:
         canvas.savefig(path)
     except OSError as error:
@@ -68,10 +76,11 @@ def picture(recording: Run, draw: Callable[[Run, Any], bool], path: Path) -> boo
     return True
 
 
-def caption(recording: Run) -> str:
-    """What was tested, under which motion."""
+def caption(recording: Run, role: str) -> str:
+    """What was tested, which slave is shown where it has a name, under which motion."""
     motion = recording.metadata.get("ground_motion", {})
-    return f"{recording.test}: {motion['record']}, × {motion['scale']}" if motion else recording.test
+    test = f"{recording.test}, {title(role)}" if name_of(role) else recording.test
+    return f"{test}: {motion['record']}, × {motion['scale']}" if motion else test
 
 
 def histories(recording: Run, canvas: Any) -> bool:

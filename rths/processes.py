@@ -14,10 +14,12 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any, NamedTuple
 
+from common.roles import MASTER, kind_of, name_of
+
 ROOT = Path(__file__).resolve().parent.parent
 
 
-LEADER = "master"  # the process that ends the test for all
+LEADER = MASTER  # the process that ends the test for all
 PR_SET_PDEATHSIG = 1
 
 
@@ -34,7 +36,7 @@ class Said(NamedTuple):
 
 
 class Processes:
-    """Master, slave and recorder; their reports in one queue, their complaints kept."""
+    """Master, slaves and recorder by role; their reports in one queue, their complaints kept."""
 
     def __init__(self) -> None:
         self._running: dict[str, subprocess.Popen[str]] = {}
@@ -43,9 +45,10 @@ class Processes:
         self.complaints: dict[str, str] = {}
 
     def start(self, name: str, arguments: Sequence[str]) -> None:
-        """Start `python -m name arguments --json`, out of reach of the terminal's Ctrl-C."""
+        """Start `python -m name arguments --json`, out of reach of the terminal's Ctrl-C; a slave with its name."""
+        own = ["--name", name_of(name)] if name_of(name) else []
         process = subprocess.Popen(
-            [sys.executable, "-m", name, *arguments, "--json"],
+            [sys.executable, "-m", kind_of(name), *arguments, *own, "--json"],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -87,6 +90,11 @@ class Processes:
         for thread in self._threads:
             thread.join()
         return self._queue.empty()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The processes that were started."""
+        return tuple(self._running)
 
     def interrupt(self, name: str) -> None:
         """Ask one process to stop in order."""

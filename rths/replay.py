@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from common import cli
 from common.errors import InputError
+from common.roles import MASTER, SLAVE, latency_topic
 
 if TYPE_CHECKING:
     from common.recording.reader import Run
@@ -74,7 +75,7 @@ def replay_master(recording: Run) -> dict[str, Match]:
     from rths.summary import plan_of
 
     plan = plan_of(recording)
-    if plan is None or not recording.has("master"):
+    if plan is None or not recording.has(MASTER):
         raise InputError(f"{recording.path} holds no plan and master's signals to replay.")
     columns = {name: values.tolist() for name, values in recording.columns["master"].items()}
     step = MasterStep(plan, ground_of(recording))
@@ -88,7 +89,7 @@ def replay_master(recording: Run) -> dict[str, Match]:
             tick,
             columns["column_displacement"][tick],
             columns["column_force"][tick],
-            columns["damper_force_used"][tick],
+            per_slave(columns["damper_force_used"][tick]),
         )._asdict()
         if tick in held:
             outputs |= command
@@ -98,11 +99,17 @@ def replay_master(recording: Run) -> dict[str, Match]:
     return {f"master/{name}": match for name, match in matches.items()}
 
 
+def per_slave(values: float | list[float]) -> list[float]:
+    """What the master's topic has as one value where there is one slave, and as a list of several."""
+    return values if isinstance(values, list) else [values]
+
+
 def held_ticks(recording: Run) -> set[int]:
-    """Ticks in which the master moved nothing, because it came too late or stopped."""
-    if not recording.has("latency"):
+    """Ticks in which the master moved nothing, because it came too late or stopped; then no slave was sent anything."""
+    topic = latency_topic(recording.roles[0])
+    if not recording.has(topic):
         return set()
-    latency = recording.columns["latency"]
+    latency = recording.columns[topic]
     return {
         int(seq) for seq, sent in zip(latency["seq"], latency["command_sent_ns"], strict=True) if sent == 0
     }
@@ -120,9 +127,20 @@ def ground_of(recording: Run) -> Any:
 
 
 def replay_slave(recording: Run) -> dict[str, Match]:
-    """What the slave did with the commands it had, and the master with the feedback it had."""
-    if not recording.has("slave"):
-        return {}
+    """What each slave did with the commands it had, and the master with the feedbacks it had."""
+    matches: dict[str, Match] = {}
+    for role in recording.roles:
+        if recording.has(role):
+            suffix = role.removeprefix(SLAVE)
+            for name, match in replay_exchange(recording, role).items():
+                place = f"{MASTER}/{name}{suffix}" if name == "damper_force_used" else f"{role}/{name}"
+                matches[place] = match
+    return matches
+
+
+def replay_exchange(whole: Run, role: str) -> dict[str, Match]:
+    """Both directions of the exchange with one slave, and its table's command."""
+    recording = whole.of(role)
     slave = {name: values.tolist() for name, values in recording.columns["slave"].items()}
     master = {name: values.tolist() for name, values in recording.columns["master"].items()}
     sent = {seq: place for place, seq in enumerate(master["seq"])}
@@ -138,10 +156,7 @@ def replay_slave(recording: Run) -> dict[str, Match]:
             matches["damper_force_used"].take(
                 t, slave["damper_force"][source], master["damper_force_used"][place]
             )
-    return {
-        f"slave/{name}" if name != "damper_force_used" else f"master/{name}": match
-        for name, match in matches.items()
-    }
+    return matches
 
 
 def replay_table(recording: Run, slave: dict[str, Any], match: Match) -> None:

@@ -6,26 +6,31 @@ import argparse
 import json
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from common import cli
-from common.drive import Stopper, calm
+from common.drive import Stopper
 from common.errors import InputError, InterlockError, LostError, RthsError
 from common.plan import Plan
 from common.reality import Reality
+from common.realtime import assign, freeze
+from common.roles import title
 from rths.terminal import Progress
 
 ERRORS = {2: InputError, 3: InterlockError, 4: LostError}
 POLL_S = 0.1
+UNSAID = ("machine", "bare_loop")  # for the recording
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `run`."""
     cli.plan_arguments(parser, optional=True)
     cli.reality_argument(parser)
+    cli.rt_arguments(parser)
     clock = parser.add_mutually_exclusive_group()
-    clock.add_argument("--real-time", action="store_true", help="three processes, wall clock (default)")
+    clock.add_argument("--real-time", action="store_true", help="a process each, wall clock (default)")
     clock.add_argument(
         "--virtual", action="store_true", help="one process, virtual clock, as fast as it goes"
     )
@@ -61,7 +66,7 @@ def in_virtual_time(plan: Plan, reality: Reality, output: Path, stopping: Stoppe
 
     bench = virtual.assemble(plan, reality, output, virtual_report)
     sys.stderr.write(f"{before_the_start(plan)}\n")
-    calm()
+    freeze()
     started = time.monotonic()
     error = virtual.run(bench, stopping)
     seconds = time.monotonic() - started
@@ -85,7 +90,7 @@ def virtual_report(kind: str, data: Any) -> None:
 def in_real_time(
     args: argparse.Namespace, plan: Plan, reality: Reality, output: Path, stopping: Stopper
 ) -> RthsError | None:
-    """The test in three processes; the error that ended it."""
+    """The test in a process each; the error that ended it."""
     from common.zenoh_link import listenable
     from rths.processes import Processes
 
@@ -95,14 +100,19 @@ def in_real_time(
     endpoint = listenable()
     warm_up(progress)
     progress.say(before_the_start(plan))
-    progress.say(f"{plan.test.name}: {plan.test.duration:g} s, starting master, slave and recorder")
+    progress.say(f"{plan.test.name}: {plan.test.duration:g} s, starting master, {crew(plan)} and recorder")
     try:
-        start_all(processes, args, endpoint, output)
+        start_all(processes, args, plan.roles, endpoint, output)
         first = follow(processes, progress, stopping)
     finally:
         processes.kill()
         progress.end()
     return verdict(processes, first)
+
+
+def crew(plan: Plan) -> str:
+    """The slaves of a test in words."""
+    return "slave" if not plan.slaves else f"slaves {', '.join(plan.slaves)}"
 
 
 def check(reality: Reality) -> None:
@@ -112,8 +122,9 @@ def check(reality: Reality) -> None:
     from common.links import link_model
 
     master.assembly.check(reality)
-    slave.assembly.check(reality)
-    link_model(reality)
+    for role in reality.plan.roles:
+        slave.assembly.check(reality.of(role))
+        link_model(reality.of(role))
 
 
 def warm_up(progress: Progress) -> None:
@@ -127,17 +138,27 @@ def warm_up(progress: Progress) -> None:
         compile_all()
 
 
-def start_all(processes: Any, args: argparse.Namespace, endpoint: str, output: Path) -> None:
-    """Start the three processes with the plan's options."""
+def start_all(
+    processes: Any, args: argparse.Namespace, roles: Sequence[str], endpoint: str, output: Path
+) -> None:
+    """Start master, slaves and recorder with the plan's options; `roles` are those of the slaves."""
     words = [str(cli.plan_path(args.plan))]
     for option in ("duration", "scale", "seed"):
         value = getattr(args, option)
         if value is not None:
             words += [f"--{option}", repr(value)]
     secret = ["--reality", str(args.reality)] if args.reality else []
-    processes.start("master", [*words, *secret, "--listen", endpoint])
-    processes.start("slave", [*words, *secret, "--connect", endpoint])
+    places = [real_time_words(args.rt, processor) for processor in assign(1 + len(roles))]
+    processes.start("master", [*words, *secret, *places[0], "--listen", endpoint])
+    for role, place in zip(roles, places[1:], strict=True):
+        processes.start(role, [*words, *secret, *place, "--connect", endpoint])
     processes.start("recorder", [*words, "--connect", endpoint, "-o", str(output)])
+
+
+def real_time_words(mode: str, processor: int | None) -> list[str]:
+    """Options of a laboratory's process."""
+    place = [] if processor is None else ["--processor", str(processor)]
+    return ["--rt", mode, *place]
 
 
 def follow(processes: Any, progress: Progress, stopping: Stopper) -> dict[str, int]:
@@ -151,12 +172,12 @@ def follow(processes: Any, progress: Progress, stopping: Stopper) -> dict[str, i
         said = processes.said(POLL_S)
         if said is not None and said.data["kind"] == "progress" and said.process == "master":
             progress.show(said.data)
-        elif said is not None and said.data["kind"] == "event":
+        elif said is not None and said.data["kind"] == "event" and said.data["code"] not in UNSAID:
             progress.say(f"{said.data['lab']}: {said.data['text']}")
         first = first or {name: code for name, code in processes.ended().items() if code}
         if (stopping() or first) and not asked:
             asked = True
-            for name in ("master", "slave", "recorder"):
+            for name in processes.names:
                 if name == "master" or (first and name not in first):
                     processes.interrupt(name)
     return first
@@ -169,10 +190,12 @@ def verdict(processes: Any, first: dict[str, int]) -> RthsError | None:
             if ended == code:
                 text = processes.complaints.get(name, "").removeprefix("rths: ").splitlines()
                 return ERRORS.get(code, LostError)(
-                    text[-1] if text else f"The {name} stopped before its end."
+                    text[-1] if text else f"The {title(name)} stopped before its end."
                 )
     for name, code in first.items():
-        return LostError(f"The {name} was killed (signal {-code}); the recording holds what came until then.")
+        return LostError(
+            f"The {title(name)} was killed (signal {-code}); the recording holds what came until then."
+        )
     return None
 
 

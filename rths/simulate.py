@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from common import cli
+from common.errors import InterlockError
 from common.plan import Compensator, Control, Plan, ideal
 
 if TYPE_CHECKING:
@@ -34,21 +35,44 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Simulate; 1 where the loop left the plan's limits."""
     from models import substructure
-    from models.closed_loop import signals, simulate
 
     plan = adapted(cli.load_plan(args), args)
     motion = substructure.motion(plan)
-    ground = substructure.ground_rows(plan, motion)
-    rollout = simulate(plan, ground, seed=plan.test.seed if args.noise else None)
-    summary = summarize(plan, signals(plan, rollout), rollout) | {"ground_motion": motion.describe()}
+    computed = played if plan.slaves else rolled_out
+    columns, beyond_limit = computed(plan, motion, args)
+    summary = summarize(plan, columns, beyond_limit) | {"ground_motion": motion.describe()}
     if args.output:
-        write(args.output, plan, rollout, motion, ground)
         summary["file"] = str(args.output)
     if args.json:
         sys.stdout.write(json.dumps(summary) + "\n")
     else:
         show(plan, summary)
     return 1 if summary["beyond_limit"] else 0
+
+
+def rolled_out(plan: Plan, motion: Any, args: argparse.Namespace) -> tuple[dict[str, Any], str]:
+    """Signals of the compiled rollout, written where a file is wanted; what left the plan's limits."""
+    from models import substructure
+    from models.closed_loop import signals, simulate
+
+    ground = substructure.ground_rows(plan, motion)
+    rollout = simulate(plan, ground, seed=plan.test.seed if args.noise else None)
+    if args.output:
+        write(args.output, plan, rollout, motion, ground)
+    columns = signals(plan, rollout)
+    return columns, beyond(plan, columns, rollout.ticks)
+
+
+def played(plan: Plan, motion: Any, args: argparse.Namespace) -> tuple[dict[str, Any], str]:
+    """The same of several slaves: the loops themselves in virtual time, which a limit stops."""
+    from recorder.files import checked
+    from rths.source import recorded
+    from rths.virtual import simulated
+
+    found, error = simulated(plan, args.output and checked(args.output), noise=args.noise)
+    if error is not None and not isinstance(error, InterlockError):
+        raise error
+    return recorded(found).signals, str(error or "")
 
 
 def adapted(plan: Plan, args: argparse.Namespace) -> Plan:
@@ -58,28 +82,29 @@ def adapted(plan: Plan, args: argparse.Namespace) -> Plan:
     if args.uncompensated:
         plan = replace(plan, compensator=Compensator("none", {}))
     if args.no_amd:
-        plan = replace(plan, control=Control(amd=False, gain=plan.control.gain))
+        plan = plan.everywhere(control=Control(amd=False, gain=plan.control.gain))
     return plan
 
 
-def summarize(plan: Plan, columns: dict[str, Any], rollout: Rollout) -> dict[str, Any]:
-    """Peaks, drift of the specimen's storey, and the first value beyond a limit."""
+def summarize(plan: Plan, columns: dict[str, Any], beyond_limit: str) -> dict[str, Any]:
+    """Peaks, drift of the specimen's storey, and a sentence on the first value beyond a limit."""
     import numpy as np
 
     from common import signals
 
     peaks = {}
     for name, values in columns.items():
-        if name != "t" and values.size:
-            unit = signals.signal(signals.topic_of(name), name).unit
-            peaks[name] = {"peak": float(np.max(np.abs(values))), "unit": unit}
+        base = name.rpartition(".")[2]
+        row = signals.signal(signals.topic_of(base), base)
+        if row.unit not in ("", "s") and values.size:
+            peaks[name] = {"peak": float(np.max(np.abs(values))), "unit": row.unit}
     drift = columns["column_target"] / plan.column.deformation_ratio
     return {
         "test": plan.test.name,
-        "ticks": rollout.ticks,
+        "ticks": len(columns["t"]),
         "peak_drift": float(np.max(np.abs(drift), initial=0.0)),
         "peaks": peaks,
-        "beyond_limit": beyond(plan, columns, rollout.ticks),
+        "beyond_limit": beyond_limit,
     }
 
 

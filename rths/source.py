@@ -10,10 +10,16 @@ import numpy as np
 
 from common import cli, plan
 from common.recording.reader import Run, Values, read
+from common.roles import MASTER, name_of
+
+OF_THE_TICK = ("seq", "t")
 
 
 class Source(NamedTuple):
-    """What there is to compare: tick numbers, signals by name, and a line on the ground motion."""
+    """What there is to compare: tick numbers, signals by name, and a line on the ground motion.
+
+    The signals of a named slave are called `NAME.signal`.
+    """
 
     ticks: Values
     signals: dict[str, Values]
@@ -21,12 +27,12 @@ class Source(NamedTuple):
 
 
 def columns(name: str) -> Source:
-    """What there is in a recording, or of the simulation of a plan (.toml, default, paper).
+    """What there is in a recording, or of the simulation of a plan (.toml, or the name of one that ships).
 
     Raises:
         InputError: it can be neither read nor simulated.
     """
-    if name in ("default", "paper") or name.endswith(".toml"):
+    if name in cli.SHIPPED or name.endswith(".toml"):
         return simulated(cli.plan_path(name))
     return recorded(read(Path(name)))
 
@@ -37,6 +43,10 @@ def simulated(path: Path) -> Source:
     from models.closed_loop import signals, simulate
 
     test = plan.load(path)
+    if test.slaves:
+        from rths.virtual import simulated as played
+
+        return recorded(played(test)[0])
     record = substructure.motion(test)
     values = signals(test, simulate(test, substructure.ground_rows(test, record)))
     ticks = (values["t"] / test.test.interval).round().astype(int)
@@ -44,14 +54,17 @@ def simulated(path: Path) -> Source:
 
 
 def recorded(run: Run) -> Source:
-    """The signals of a recording on the ticks that master and slave have in common."""
-    topics = [topic for topic in ("master", "slave") if run.has(topic)]
+    """The signals of a recording on the ticks that master and slaves have in common."""
+    topics = [topic for topic in (MASTER, *run.roles) if run.has(topic)]
     ticks = reduce(np.intersect1d, (run.sequences[topic] for topic in topics))
     values: dict[str, Values] = {}
     for topic in topics:
         _, _, chosen = np.intersect1d(ticks, run.sequences[topic], return_indices=True)
         for name, column in run.columns[topic].items():
-            values.setdefault(name, column[chosen])
+            if not name_of(topic):
+                values.setdefault(name, column[chosen])
+            elif name not in OF_THE_TICK:
+                values[f"{name_of(topic)}.{name}"] = column[chosen]
     motion = run.metadata.get("ground_motion")
     line = f"{motion['record']}, scaled by {motion['scale']}" if motion else "ground motion not recorded"
     return Source(ticks, values, line)

@@ -10,6 +10,7 @@ from common import signals
 from common.errors import InputError
 from common.plan import Plan, parse
 from common.recording.reader import Run, Values
+from common.roles import LATENCY, MASTER, SLAVE, kind_of, latency_topic, name_of
 from common.signals import Kind
 from models import indicators
 
@@ -31,9 +32,10 @@ SEGMENTS = (
 
 
 def plan_of(run: Run) -> Plan | None:
-    """The plan inside a recording, None where there is none."""
+    """The plan inside a recording, as the slave sees it whose part of a recording it is; None where there is none."""
     text = run.metadata.get("plan", {}).get("toml")
-    return parse(text, run.path.parent, f"the plan in {run.path}") if text else None
+    plan = parse(text, run.path.parent, f"the plan in {run.path}") if text else None
+    return plan.of(run.part_of) if plan and run.part_of else plan
 
 
 def summarize(run: Run) -> dict[str, Any]:
@@ -43,6 +45,7 @@ def summarize(run: Run) -> dict[str, Any]:
         "file": str(run.path),
         "test": run.test,
         "finished": run.finished,
+        "slaves": [name_of(role) for role in run.roles if name_of(role)],
         "ground_motion": run.metadata.get("ground_motion", {}),
         "ticks_expected": plan.ticks if plan else None,
         "topics": {topic: completeness(run, topic, plan) for topic in run.columns},
@@ -50,8 +53,8 @@ def summarize(run: Run) -> dict[str, Any]:
         "peaks": peaks(run),
         "tracking": tracking(run),
         "error_energy": error_energy(run, plan) if plan else None,
-        "latency": latency(run),
-        "late_ticks": int(np.sum(run.columns["latency"]["deadline_missed"])) if run.has("latency") else None,
+        "latency": latencies(run),
+        "late_ticks": late_ticks(run),
         "events": run.events,
     }
 
@@ -74,10 +77,10 @@ def completeness(run: Run, topic: str, plan: Plan | None) -> dict[str, Any]:
 def peaks(run: Run) -> dict[str, dict[str, Any]]:
     """Largest magnitude of every recorded quantity with a unit, and when it occurs."""
     result = {}
-    for topic in ("master", "slave"):
-        t = run.columns.get(topic, {}).get("t")
-        for row in signals.TOPICS[topic]:
-            values = run.columns.get(topic, {}).get(row.name)
+    for topic, columns in run.columns.items():
+        t = columns.get("t")
+        for row in signals.TOPICS[kind_of(topic)] if kind_of(topic) in (MASTER, SLAVE) else ():
+            values = columns.get(row.name)
             if (
                 row.kind not in (Kind.NUMBER, Kind.STOREYS)
                 or values is None
@@ -93,10 +96,14 @@ def peaks(run: Run) -> dict[str, dict[str, Any]]:
 
 
 def tracking(run: Run) -> dict[str, dict[str, float | None]]:
-    """How the transfer systems followed their targets: delay (s) two ways, amplitude, NRMSE, peak error."""
+    """How the transfer systems followed their targets: delay (s) two ways, amplitude, NRMSE, peak error.
+
+    By part; the table of a named slave is `table.NAME`.
+    """
     result: dict[str, dict[str, float | None]] = {}
-    for topic, part, target, measured, late in PATHS:
-        columns = run.columns.get(topic, {})
+    paths = ((path, topic) for path in PATHS for topic in run.columns if kind_of(topic) == path[0])
+    for (_, part, target, measured, late), topic in paths:
+        columns = run.columns[topic]
         if not {target, measured, "t"} <= columns.keys() or columns["t"].size <= LEAST_TICKS:
             continue
         wanted, got = columns[target][: columns["t"].size - late], columns[measured][late:]
@@ -104,7 +111,7 @@ def tracking(run: Run) -> dict[str, dict[str, float | None]]:
             continue
         interval = float(np.median(np.diff(columns["t"])))
         path = indicators.frequency_evaluation_index(wanted, got, interval)
-        result[part] = {
+        result[part + topic.removeprefix(kind_of(topic))] = {
             "delay": path.delay,
             "amplitude": path.amplitude,
             "frequency": path.frequency,
@@ -144,9 +151,26 @@ def correlation_delay(wanted: Values, got: Values, interval: float) -> float | N
         return None
 
 
-def latency(run: Run) -> dict[str, dict[str, float]]:
+def late_ticks(run: Run) -> int | None:
+    """Ticks in which a deadline was missed in the exchange with any slave, None where latency is not recorded."""
+    tables = [columns for topic, columns in run.columns.items() if kind_of(topic) == LATENCY]
+    if not any(columns["seq"].size for columns in tables):
+        return None
+    late = [columns["seq"][columns["deadline_missed"].astype(bool)] for columns in tables]
+    return int(np.unique(np.concatenate(late)).size)
+
+
+def latencies(run: Run) -> dict[str, Any]:
+    """Percentiles of every segment, of named slaves a table each by name."""
+    if run.roles == (SLAVE,):
+        return latency(run, LATENCY)
+    tables = {name_of(role): latency(run, latency_topic(role)) for role in run.roles}
+    return {name: table for name, table in tables.items() if table}
+
+
+def latency(run: Run, topic: str) -> dict[str, dict[str, float]]:
     """Percentiles of every segment of the ticks' time, s, over the ticks in which it was measured."""
-    columns = run.columns.get("latency", {})
+    columns = run.columns.get(topic, {})
     result = {}
     for name in SEGMENTS:
         values = columns.get(name, np.array([]))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -10,10 +12,11 @@ from common.clock import VirtualClock
 from common.endpoint import Endpoint
 from common.errors import RthsError
 from common.laboratory import Report, Setting, silent
-from common.links import link_model
 from common.memory_link import MemoryHub
-from common.plan import Plan
-from common.reality import Reality
+from common.plan import Plan, Rig, Sensors
+from common.reality import Reality, as_planned
+from common.recording.reader import Run, read
+from common.roles import MASTER, RECORDER
 from master.assembly import build_loop as build_master
 from master.loop import MasterLoop
 from models import substructure
@@ -29,29 +32,41 @@ MOST_ROUNDS = 20_000
 
 
 class Bench(NamedTuple):
-    """A test in memory: clock, both laboratories, and the recorder where there is one."""
+    """A test in memory: clock, master, slaves by role, and the recorder where there is one."""
 
     clock: VirtualClock
     master: MasterLoop
-    slave: SlaveLoop
+    slaves: dict[str, SlaveLoop]
     recorder: RecorderLoop | None
     endpoints: dict[str, Endpoint]
 
+    @property
+    def slave(self) -> SlaveLoop:
+        """The slave, of several the first."""
+        return next(iter(self.slaves.values()))
+
+    @property
+    def loops(self) -> dict[str, MasterLoop | SlaveLoop]:
+        """Master and slaves by role."""
+        return {MASTER: self.master, **self.slaves}
+
 
 def assemble(plan: Plan, reality: Reality, output: Path | None, report: Report = silent) -> Bench:
-    """Both laboratories over a link in memory, recording into `output` where one is given."""
+    """All laboratories over a link in memory, recording into `output` where one is given."""
     clock = VirtualClock()
-    hub = MemoryHub(clock)
-    roles = ("master", "slave") if output is None else ("master", "slave", "recorder")
+    hub = MemoryHub(clock, plan.roles)
+    roles = (MASTER, *plan.roles) if output is None else (MASTER, *plan.roles, RECORDER)
     endpoints: dict[str, Endpoint] = {role: hub.join(role) for role in roles}
     master = build_master(
         Setting(plan, endpoints["master"], clock, report),
         reality,
-        link_model(reality),
         session=SESSION,
         epoch_ns=0,
     )
-    slave = build_slave(Setting(plan, endpoints["slave"], clock, report), reality, link_model(reality))
+    slaves = {
+        role: build_slave(Setting(plan, endpoints[role], clock, report), reality.of(role))
+        for role in plan.roles
+    }
     recorder = None
     if output is not None:
         motion = substructure.motion(plan)
@@ -59,7 +74,7 @@ def assemble(plan: Plan, reality: Reality, output: Path | None, report: Report =
         recorder = RecorderLoop(
             Setting(plan, endpoints["recorder"], clock, report), FileSink(recording, clock)
         )
-    return Bench(clock, master, slave, recorder, endpoints)
+    return Bench(clock, master, slaves, recorder, endpoints)
 
 
 def run(bench: Bench, stopping: Callable[[], str]) -> RthsError | None:
@@ -79,27 +94,44 @@ def run(bench: Bench, stopping: Callable[[], str]) -> RthsError | None:
     else:
         bench.master.finish()
     _leave(bench)
-    return bench.master.lab.error or bench.slave.lab.error
+    return next((loop.lab.error for loop in bench.loops.values() if loop.lab.error), None)
+
+
+def simulated(plan: Plan, output: Path | None = None, *, noise: bool = False) -> tuple[Run, RthsError | None]:
+    """The nominal models of a plan with several slaves, played as a test: its recording, and what ended it early.
+
+    The loop objects stand in for the compiled rollout, which knows one slave. Without `noise` sensors are free of
+    it; a rig that the plan names has no part in a simulation.
+    """
+    sensors = plan.sensors if noise else Sensors(**dict.fromkeys(vars(plan.sensors), 0.0))
+    nominal = replace(as_planned(plan), plan=replace(plan, sensors=sensors), master=Rig())
+    nominal = replace(nominal, slaves=dict.fromkeys(nominal.slaves, Rig()))
+    with tempfile.TemporaryDirectory() as folder:
+        path = output or Path(folder) / "simulation.mcap"
+        error = run(assemble(plan, nominal, path), str)
+        return read(path), error
 
 
 def _tick(bench: Bench, tick: int) -> None:
-    master, slave = bench.master, bench.slave
+    master, slaves = bench.master, bench.slaves.items()
     bench.clock.sleep_until(master.lab.tick_ns(tick))
     _drain(bench, "master", master)
     if not master.lab.running:
         return
     master.tick(tick)
-    _drain(bench, "slave", slave)
-    if slave.lab.running:
-        slave.tick(tick)
+    for role, slave in slaves:
+        _drain(bench, role, slave)
+        if slave.lab.running:
+            slave.tick(tick)
     if bench.recorder is not None:
         master.lab.send_samples()
-        slave.lab.send_samples()
+        for _, slave in slaves:
+            slave.lab.send_samples()
         _record(bench)
 
 
 def _exchange(bench: Bench, *, poll: bool) -> None:
-    for role, loop in (("master", bench.master), ("slave", bench.slave)):
+    for role, loop in bench.loops.items():
         if poll:
             loop.poll()
         _drain(bench, role, loop)
@@ -109,7 +141,7 @@ def _exchange(bench: Bench, *, poll: bool) -> None:
 def _drain(bench: Bench, role: str, loop: MasterLoop | SlaveLoop) -> None:
     endpoint = bench.endpoints[role]
     while (received := endpoint.receive()) is not None:
-        loop.take(received.message, received.received_ns)
+        loop.take(received.message, received.received_ns, received.role)
 
 
 def _record(bench: Bench) -> None:
@@ -124,18 +156,19 @@ def _record(bench: Bench) -> None:
 def _leave(bench: Bench) -> None:
     bench.clock.sleep_until(bench.master.lab.tick_ns(bench.master.ticks))
     _exchange(bench, poll=False)
-    bench.master.disarm()
-    bench.slave.disarm()
+    loops = bench.loops.values()
+    for loop in loops:
+        loop.disarm()
     for _ in range(MOST_ROUNDS):
-        if bench.master.left and bench.slave.left and (bench.recorder is None or bench.recorder.done):
+        if all(loop.left for loop in loops) and (bench.recorder is None or bench.recorder.done):
             break
         bench.clock.time += 50 * ROUND_NS
-        bench.master.leave()
-        bench.slave.leave()
+        for loop in loops:
+            loop.leave()
         _exchange(bench, poll=False)
     if bench.recorder is not None:
         bench.recorder.close()
 
 
 def _over(bench: Bench) -> bool:
-    return bench.master.lab.exchange.ended or bench.slave.lab.exchange.ended
+    return any(loop.lab.exchange.ended for loop in bench.loops.values())

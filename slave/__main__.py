@@ -12,15 +12,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the slave."""
     cli.plan_arguments(parser)
     cli.reality_argument(parser)
+    cli.rt_arguments(parser)
+    cli.processor_argument(parser)
     cli.connect_argument(parser)
+    parser.add_argument("--name", metavar="NAME", help="which slave this is, where the plan names several")
     cli.json_argument(parser, "report as JSON lines on standard output")
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the slave; its exit code."""
-    from slave.assembly import build_loop
+    from slave import assembly
 
-    return process.conduct("slave", args, build_loop, connect=args.connect)
+    return process.conduct("slave", args, assembly, connect=args.connect)
 
 
 if __name__ == "__main__":

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import secrets
 from typing import Any
 
 from common import schema
 from common.laboratory import Setting
-from common.mailbox import LinkModel
+from common.links import link_model
 from common.plugins import construct, find
 from common.reality import Reality
 from common.rig import GuardedRig, TableMeasurement
+from common.roles import name_of, title
 from models.closed_loop import build_b
 from models.labs import noise, readings, table_lab
 from models.realised import true_system
@@ -19,35 +21,49 @@ from slave.step import SlaveStep
 
 
 def build_rig(reality: Reality) -> GuardedRig:
-    """Laboratory B as the plan and the reality have it; raises InputError where it cannot be constructed."""
-    plan, rig = reality.plan, reality.slave
+    """A slave's laboratory as the plan and its reality have it; raises InputError where it cannot be constructed."""
+    plan, rig, where = reality.plan, reality.slave, f"[{reality.role}.rig]"
+    lab = f"laboratory B of the {title(reality.role)}" if name_of(reality.role) else "laboratory B"
     arguments: dict[str, Any] = {
         "interval": plan.test.interval,
-        "seed": noise.lab_seed(reality.seed, noise.LAB_B),
+        "seed": noise.lab_seed(reality.seed, noise.LAB_B + reality.place),
     }
     if not rig.class_:
         system = true_system(reality)
         plan = system.plan
         arguments |= {"effects": system.effects}
         arguments |= {name: schema.plain(getattr(plan, name)) for name in ("table", "damper", "sensors")}
-        return GuardedRig(TableLab(**arguments), "laboratory B", TableMeasurement)
-    kind = find(rig.class_, reality.base, "[slave.rig]")
-    name = "laboratory B" if "slave" in reality.hidden else f"laboratory B ({kind.__name__})"
-    return GuardedRig(construct(kind, arguments | rig.options, "[slave.rig]"), name, TableMeasurement)
+        return GuardedRig(TableLab(**arguments), lab, TableMeasurement)
+    kind = find(rig.class_, reality.base, where)
+    name = lab if reality.role in reality.hidden else f"{lab} ({kind.__name__})"
+    return GuardedRig(construct(kind, arguments | rig.options, where), name, TableMeasurement)
 
 
 def check(reality: Reality) -> None:
-    """Raise InputError where the laboratory could not be built; nothing of it is constructed or moved."""
+    """Raise InputError where a slave's laboratory could not be built; nothing of it is constructed or moved."""
     build_b(true_system(reality))
     SlaveStep(reality.plan)
     if reality.slave.class_:
-        find(reality.slave.class_, reality.base, "[slave.rig]")
+        find(reality.slave.class_, reality.base, f"[{reality.role}.rig]")
 
 
-def build_loop(setting: Setting, reality: Reality, link: LinkModel) -> SlaveLoop:
-    """The slave's loop, its kernels compiled."""
-    plan = reality.plan
+def build_loop(setting: Setting, reality: Reality, *, instance: int | None = None) -> SlaveLoop:
+    """The loop of the slave whose reality is given, its kernels compiled; the setting's plan is the whole test's.
+
+    The number that tells this process from others of its role is drawn where none is given.
+    """
+    warm_up(reality)
+    return SlaveLoop(
+        setting,
+        build_rig(reality),
+        link_model(reality),
+        role=reality.role,
+        instance=instance if instance is not None else secrets.randbelow(2**62) + 1,
+    )
+
+
+def warm_up(reality: Reality) -> None:
+    """Compile the kernels on arrays that are thrown away."""
     table_lab.advance(*build_b(true_system(reality)), 0.0, 0.0)
-    readings.step(*readings.build(plan.test.interval, ("any",), {}), 0, 0.0, 0.0, 0.0)
-    SlaveStep(plan)(NO_COMMAND, TableMeasurement(0.0, 0.0, 0.0, 0.0))
-    return SlaveLoop(setting, build_rig(reality), link)
+    readings.step(*readings.build(reality.plan.test.interval, ("any",), {}), 0, 0.0, 0.0, 0.0)
+    SlaveStep(reality.plan)(NO_COMMAND, TableMeasurement(0.0, 0.0, 0.0, 0.0))

@@ -28,9 +28,11 @@ from common.messages import (
     Sync,
     SyncReply,
     Trip,
+    Waiting,
 )
 from common.plan import PROTOCOL_VERSION
 from common.rig import GuardedRig, TableCommand, TableMeasurement
+from common.roles import MASTER, SLAVE, name_of, title
 from slave.limits import SlaveLimits
 from slave.step import SlaveStep
 
@@ -39,16 +41,19 @@ NOTHING_HEARD = (-1, 0)
 
 
 class SlaveLoop:
-    """Laboratory B in a test."""
+    """Laboratory B in a test, or one of several; `instance` tells this process from others of its role."""
 
-    def __init__(self, setting: Setting, rig: GuardedRig, link: LinkModel) -> None:
-        self.lab = Laboratory("slave", setting)
+    def __init__(
+        self, setting: Setting, rig: GuardedRig, link: LinkModel, *, role: str = SLAVE, instance: int = 1
+    ) -> None:
+        self.lab = Laboratory(role, setting)
+        self._instance = instance
         self._rig = rig
         self._limits = SlaveLimits(setting.plan.limits)
         self._commands: Mailbox[Command] = Mailbox(link, "command", setting.plan.test.interval, nominal=0)
         self._received_ns: dict[int, int] = {}
         self._heard = NOTHING_HEARD  # number and arrival of the newest command
-        self._step = SlaveStep(setting.plan)
+        self._step = SlaveStep(setting.plan.of(role))
         self._command = NO_COMMAND
         self._shift_ns = 0
         self._said_ns = -REPEAT_NS
@@ -57,22 +62,34 @@ class SlaveLoop:
 
     # -- messages ---------------------------------------------------------------------------------
 
-    def take(self, message: Message, received_ns: int) -> None:
-        """Act on one message of the master or the recorder."""
+    def take(self, message: Message, received_ns: int, role: str = MASTER) -> None:
+        """Act on one message of the master or the recorder; what it says tells which."""
         lab = self.lab
         if isinstance(message, Command):
             if lab.exchange.belongs(message.session):
                 self._take_command(message, received_ns)
             return
         lab.listen_to_recorder(message)
-        if isinstance(message, Register):
-            self._register(message)
-        if isinstance(message, Recorder | Resend) or not lab.exchange.belongs(message.session):
-            return
-        lab.heard_ns = received_ns
+        match message:
+            case Register():
+                self._register(message)
+            case Arm() if message.instance != self._instance:
+                self._make_way(message.session)
+                return
+            case Recorder() | Resend():
+                return
+        if lab.exchange.belongs(message.session):
+            lab.heard_ns = received_ns
+            self._follow(message, received_ns)
+
+    def _follow(self, message: Message, received_ns: int) -> None:
+        """Do what the master of this session wants."""
+        lab = self.lab
         match message:
             case Arm():
                 self._arm()
+            case Sync() | Start() if lab.exchange.state is State.REGISTERED:
+                pass  # for another process of this role: this one was never armed
             case Sync():
                 lab.endpoint.send(SyncReply(message.session, message.seq, received_ns, lab.clock.now()))
             case Start():
@@ -107,9 +124,21 @@ class SlaveLoop:
             lab.enter(request.session)
             self._move(Event.REGISTER)
         if lab.exchange.belongs(request.session):
-            lab.endpoint.send(Registered(request.session))
+            lab.endpoint.send(Registered(request.session, self._instance))
         else:
             lab.endpoint.send(Refused(request.session, "it takes part in another test already."))
+
+    def _make_way(self, session: int) -> None:
+        """Leave without a word that could disturb the test: another process takes part in it under this role."""
+        lab = self.lab
+        if lab.exchange.ended or lab.exchange.session not in (0, session):
+            return
+        lab.enter(0)
+        error = InputError(
+            f"Another {title(lab.name)} takes part in this test already: stop one of the two"
+            + (", or start this one under a name of its own." if name_of(lab.name) else ".")
+        )
+        lab.fail(Event.REFUSE, error, code="refused")
 
     def _complaint(self, request: Register) -> str:
         if request.protocol != PROTOCOL_VERSION:
@@ -146,7 +175,7 @@ class SlaveLoop:
 
     def _move(self, event: Event) -> None:
         self.lab.exchange.happen(event)
-        self.lab.report("state", {"lab": "slave", "state": self.lab.exchange.state.value})
+        self.lab.report("state", {"lab": self.lab.name, "state": self.lab.exchange.state.value})
 
     def poll(self) -> None:
         """Before the first tick: give up when nobody comes, or when the master has fallen silent."""
@@ -157,6 +186,9 @@ class SlaveLoop:
         if lab.clock.now() - lab.heard_ns > seconds * 1e9:
             error = LostError(f"No master was heard within {seconds:g} s: check the address after --connect.")
             lab.fail(Event.LOSE, error, code="nobody")
+        elif lab.exchange.state is State.IDLE and lab.clock.now() - self._said_ns >= REPEAT_NS:
+            self._said_ns = lab.clock.now()
+            lab.endpoint.send(Waiting(0, self._instance))
 
     # -- ticks ------------------------------------------------------------------------------------
 
@@ -237,7 +269,7 @@ class SlaveLoop:
             command.table_target_acceleration,
             command.table_target_jerk,
         )
-        lab.outlet.add("slave", log_ns, publish_ns, values)
+        lab.outlet.add(lab.name, log_ns, publish_ns, values)
 
     # -- end --------------------------------------------------------------------------------------
 
@@ -270,8 +302,9 @@ class SlaveLoop:
     @property
     def left(self) -> bool:
         """Whether the recorder has all."""
-        settled = self.lab.exchange.ended
-        return settled and (self.lab.recorder_has_all() or self.lab.recorder is None)
+        lab = self.lab
+        nothing = not lab.exchange.session or lab.recorder is None
+        return lab.exchange.ended and (nothing or lab.recorder_has_all())
 
     @property
     def progress(self) -> dict[str, float]:

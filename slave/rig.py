@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from operator import add
 from typing import Any
 
 from common import schema
@@ -36,6 +37,7 @@ class TableLab:
         )
         self._readings = readings.build(interval, MEASURED_B, more.sensors)
         self._noise = noise.Noise(seed, readings.levels(MEASURED_B, levels, more.sensors))
+        self._plain = not more.sensors  # a reading is value plus noise
         self._interval, self._tick = interval, 0
         self._true = (0.0, 0.0, 0.0, 0.0)
         self._advance = table_lab.advance
@@ -46,6 +48,8 @@ class TableLab:
     def read(self) -> TableMeasurement:
         """Readings at the present tick, with the sensors' noise."""
         error, true, sensors = self._noise.row(), self._true, self._readings
+        if self._plain:
+            return TableMeasurement(*map(add, true, error))
         t = self._tick * self._interval
         self._tick += 1
         return TableMeasurement(

@@ -6,7 +6,7 @@ import io
 import json
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,20 +21,29 @@ from numpy.typing import NDArray
 from common import signals
 from common.errors import InputError
 from common.recording.schema import message_class
+from common.roles import LATENCY, MASTER, SLAVE, latency_topic, title
 
 Values = NDArray[Any]
 
 RECORD_LIMIT = 64 << 20
 GROUND = "ground_motion"
+MACHINES = (
+    "real_time"  # metadata: real-time shape and time of the laboratories' machines, and the bare timing loop
+)
 DAMAGE = (McapError, ValueError, struct.error, zstandard.ZstdError)  # what the libraries raise on it
 
 
 @dataclass
 class Run:
-    """A recording read back: columns by topic and name, metadata, attachments."""
+    """A recording read back: columns by topic and name, metadata, attachments; `roles` are those of its slaves.
+
+    `part_of` is the role of the slave of several whose part of the recording it is, empty for a whole one.
+    """
 
     path: Path
     test: str = ""
+    roles: tuple[str, ...] = (SLAVE,)
+    part_of: str = ""
     columns: dict[str, dict[str, Values]] = field(default_factory=dict)
     sequences: dict[str, Values] = field(default_factory=dict)
     log_ns: dict[str, Values] = field(default_factory=dict)
@@ -52,6 +61,31 @@ class Run:
         """How many messages of a topic there are."""
         return int(self.sequences[topic].size) if topic in self.sequences else 0
 
+    def of(self, role: str) -> Run:
+        """The recording as one of one slave: its topics under the usual names, its share of the master's columns.
+
+        Raises:
+            InputError: the test has no such slave.
+        """
+        if role not in self.roles:
+            raise InputError(f"{self.path} has no {title(role)}; it has {', '.join(map(title, self.roles))}.")
+        if self.roles == (SLAVE,):
+            return self
+        own = {MASTER: MASTER, SLAVE: role, LATENCY: latency_topic(role)}
+        here = {kind: topic for kind, topic in own.items() if topic in self.columns}
+        columns = {kind: self.columns[topic] for kind, topic in here.items()}
+        if MASTER in columns and len(self.roles) > 1:
+            columns[MASTER] = share(columns[MASTER], self.roles.index(role))
+        return replace(
+            self,
+            roles=(SLAVE,),
+            part_of=role,
+            columns=columns,
+            sequences={kind: self.sequences[topic] for kind, topic in here.items()},
+            log_ns={kind: self.log_ns[topic] for kind, topic in here.items()},
+            units={kind: self.units[topic] for kind, topic in here.items()},
+        )
+
     def signal(self, name: str) -> Values | None:
         """A signal by name from the laboratory that knows it at first hand, None where it is not recorded."""
         order = ("slave", "master", "latency") if name in signals.MEASURED["slave"] else signals.TICK_TOPICS
@@ -59,6 +93,14 @@ class Run:
             if name in self.columns.get(topic, {}):
                 return self.columns[topic][name]
         return None
+
+
+def share(columns: dict[str, Values], place: int) -> dict[str, Values]:
+    """The master's columns with those that have one value per slave reduced to one of them."""
+    each = {row.name for row in signals.MASTER if row.per_slave}
+    return {
+        name: column[:, place] if name in each and column.size else column for name, column in columns.items()
+    }
 
 
 def read(path: Path) -> Run:
@@ -85,7 +127,7 @@ def read(path: Path) -> Run:
                 run.attachments[record.name] = record.data
             case _:
                 pass
-    for channel in channels.values():
+    for _, channel in sorted(channels.items()):  # in the order in which they were registered
         if channel.topic.startswith("rths/"):
             _decode(run, channel, schemas[channel.schema_id], table.get(channel.topic, []))
     if not run.columns and not run.events:
@@ -125,6 +167,7 @@ def _up_to_damage(stream: io.BufferedReader, run: Run) -> Iterator[Any]:
 
 def _decode(run: Run, channel: Channel, schema: Schema, messages: list[Message]) -> None:
     _, run.test, topic = channel.topic.split("/", 2)
+    run.roles = tuple(channel.metadata.get("slaves", SLAVE).split())
     files = descriptor_pb2.FileDescriptorSet.FromString(schema.data)
     kind = message_class(files.file[0], schema.name)
     decoded = [kind.FromString(message.data) for message in messages]

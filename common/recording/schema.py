@@ -6,6 +6,7 @@ from typing import Any, cast
 
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 
+from common.roles import kind_of
 from common.signals import Kind, Signal
 
 _FIELD = descriptor_pb2.FieldDescriptorProto
@@ -20,10 +21,19 @@ _TYPES = {
 }
 
 
-def schema_file(topic: str, rows: tuple[Signal, ...], storeys: int) -> descriptor_pb2.FileDescriptorProto:
+def message_name(topic: str) -> str:
+    """The message of a topic; those of several slaves have one in common."""
+    return kind_of(topic).capitalize()
+
+
+def schema_file(
+    topic: str, rows: tuple[Signal, ...], storeys: int, slaves: int = 1
+) -> descriptor_pb2.FileDescriptorProto:
     """Protobuf description of a topic's message, fields in the order of the signal table."""
-    name = topic.capitalize()
-    file = descriptor_pb2.FileDescriptorProto(name=f"rths/{topic}.proto", package="rths", syntax="proto3")
+    name = message_name(topic)
+    file = descriptor_pb2.FileDescriptorProto(
+        name=f"rths/{kind_of(topic)}.proto", package="rths", syntax="proto3"
+    )
     message = file.message_type.add(name=name)
     for number, row in enumerate(rows, start=1):
         if row.kind is Kind.VALUES:
@@ -39,7 +49,7 @@ def schema_file(topic: str, rows: tuple[Signal, ...], storeys: int) -> descripto
                 label=_FIELD.LABEL_REPEATED,
             )
             continue
-        several = row.kind is Kind.STOREYS and storeys > 1
+        several = (row.kind is Kind.STOREYS and storeys > 1) or (row.per_slave and slaves > 1)
         label = _FIELD.LABEL_REPEATED if several else _FIELD.LABEL_OPTIONAL
         message.field.add(name=row.name, number=number, type=_TYPES[row.kind], label=label)
     return file

@@ -6,7 +6,7 @@ import contextlib
 import io
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -14,7 +14,8 @@ from google.protobuf import descriptor_pb2
 from mcap.writer import CompressionType, Writer
 
 from common.errors import InputError
-from common.recording.schema import message_class, schema_file
+from common.recording.schema import message_class, message_name, schema_file
+from common.roles import SLAVE
 from common.signals import Signal
 
 CHUNK_SIZE = 64 * 1024
@@ -56,9 +57,19 @@ class Spool:
 
 
 class Recording:
-    """A recording being written. `topics` are the channels it holds, in the names of the signal table."""
+    """A recording being written.
 
-    def __init__(self, path: Path, test: str, storeys: int, topics: Mapping[str, tuple[Signal, ...]]) -> None:
+    `topics` are the channels it holds, in the names of the signal table; `slaves` the roles of the test's slaves.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        test: str,
+        storeys: int,
+        topics: Mapping[str, tuple[Signal, ...]],
+        slaves: Sequence[str] = (SLAVE,),
+    ) -> None:
         self._path = path
         try:
             self._stream = path.open("wb", buffering=0)
@@ -75,17 +86,17 @@ class Recording:
         self._classes: dict[str, type[Any]] = {}
         self._channels: dict[str, int] = {}
         self._numbers = dict.fromkeys(topics, 0)
+        schemas: dict[bytes, int] = {}
         for topic, rows in topics.items():
-            file = schema_file(topic, rows, storeys)
-            self._classes[topic] = message_class(file, f"rths.{topic.capitalize()}")
-            schema = self._writer.register_schema(
-                f"rths.{topic.capitalize()}",
-                "protobuf",
-                descriptor_pb2.FileDescriptorSet(file=[file]).SerializeToString(),
-            )
+            file, name = schema_file(topic, rows, storeys, len(slaves)), f"rths.{message_name(topic)}"
+            self._classes[topic] = message_class(file, name)
+            description = descriptor_pb2.FileDescriptorSet(file=[file]).SerializeToString()
+            if description not in schemas:
+                schemas[description] = self._writer.register_schema(name, "protobuf", description)
             units = json.dumps({row.name: row.unit for row in rows}, ensure_ascii=False)
+            named = {"slaves": " ".join(slaves)} if list(slaves) != [SLAVE] else {}
             self._channels[topic] = self._writer.register_channel(
-                f"rths/{test}/{topic}", "protobuf", schema, {"units": units}
+                f"rths/{test}/{topic}", "protobuf", schemas[description], {"units": units} | named
             )
 
     def add(self, topic: str, log_ns: int, publish_ns: int, values: tuple[Any, ...] | list[Any]) -> None:

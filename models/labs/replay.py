@@ -60,7 +60,7 @@ def column(system: System, deformation: Array) -> Array:
 
 
 def building(system: System, ground: Array, displacement: Array, force: Array, damper: Array) -> Array:
-    """Rows of `substructure` (ticks, 8 + 5·storeys) for the measurements (ticks,) that the master used."""
+    """Rows of `substructure` (ticks, 8 + 5·storeys) of a plan with one slave, for the measurements (ticks,) used."""
     arrays = substructure.build(system.plan, ground, system.effects.p_delta)
     result = np.zeros((force.size, arrays.output.size))
     play_building(*arrays, displacement, force, damper, result)
@@ -182,6 +182,7 @@ def play_column(
 def play_building(
     codes: substructure.Codes,
     scalars: Array,
+    dampers: Array,
     mass: Array,
     coefficients: Array,
     column_params: Array,
@@ -202,9 +203,11 @@ def play_building(
 ) -> None:
     """Fill `result` (ticks, 8 + 5·storeys) from the measurements."""
     for tick in range(force.size):
+        dampers[substructure.FORCE_USED, 0] = damper[tick]
         substructure.advance(
             codes,
             scalars,
+            dampers,
             mass,
             coefficients,
             column_params,
@@ -221,7 +224,6 @@ def play_building(
             tick,
             displacement[tick],
             force[tick],
-            damper[tick],
         )
         for place in range(output.size):
             result[tick, place] = output[place]

@@ -105,7 +105,7 @@ def play_building(case: Case, laid: tuple[Laid, ...], run: Run) -> dict[str, Val
     inputs = zip(
         columns["column_displacement"].tolist(),
         columns["column_force"].tolist(),
-        columns["damper_force_used"].tolist(),
+        ([force] for force in columns["damper_force_used"].tolist()),
         strict=True,
     )
     outputs = [step(tick, *values) for tick, values in enumerate(inputs)]

@@ -14,7 +14,7 @@ def packet(number: int) -> Packet:
 
 
 def test_frames_come_in_order_and_none_is_waited_for_too_long() -> None:
-    inbox = Inbox()
+    inbox: Inbox[Packet] = Inbox()
     for number in range(3):
         inbox.put(packet(number))
     assert [found.received_ns for _ in range(3) if (found := inbox.get(0.0))] == [0, 1, 2]
@@ -25,7 +25,7 @@ def test_frames_come_in_order_and_none_is_waited_for_too_long() -> None:
 
 
 def test_a_waiting_consumer_is_woken() -> None:
-    inbox = Inbox()
+    inbox: Inbox[Packet] = Inbox()
     threading.Timer(0.05, inbox.put, [packet(7)]).start()
     found, deadline = None, time.monotonic() + 5.0
     while found is None and time.monotonic() < deadline:
@@ -34,7 +34,8 @@ def test_a_waiting_consumer_is_woken() -> None:
 
 
 def test_nothing_is_lost_between_several_producers_and_a_consumer() -> None:
-    inbox, each = Inbox(), 2_000
+    inbox: Inbox[Packet] = Inbox()
+    each = 2_000
 
     def produce() -> None:
         for number in range(each):
@@ -52,7 +53,7 @@ def test_nothing_is_lost_between_several_producers_and_a_consumer() -> None:
 
 
 def test_a_signal_does_not_make_it_wait_for_ever() -> None:
-    inbox = Inbox()
+    inbox: Inbox[Packet] = Inbox()
     before = signal.signal(signal.SIGUSR1, lambda *_: time.sleep(0.2))
     try:
         threading.Timer(0.05, os.kill, [os.getpid(), signal.SIGUSR1]).start()

@@ -332,19 +332,19 @@ def test_a_tick_that_comes_a_whole_interval_late_moves_nothing_and_sends_nothing
 
 def test_repeated_and_outdated_feedback_is_not_used(bench: Bench) -> None:
     session = bench.master.lab.exchange.session
-    used = bench.master._used
+    used = bench.master.partners["slave"].used
     for seq in (used.seq, used.seq - 5):
         bench.master.take(Feedback(session, seq, seq, 0, -1, 0, 0, 0, 0.0, 0.0, 0.0, 999.0), 0)
     bench.clock.sleep_until(bench.master.lab.tick_ns(100))
     bench.master.tick(100)
-    assert bench.master._used.damper_force != 999.0
+    assert bench.master.partners["slave"].used.damper_force != 999.0
 
 
 def test_feedback_of_another_session_is_not_used(bench: Bench) -> None:
     bench.master.take(Feedback(12345, 99, 99, 0, -1, 0, 0, 0, 0.0, 0.0, 0.0, 999.0), 0)
     bench.clock.sleep_until(bench.master.lab.tick_ns(100))
     bench.master.tick(100)
-    assert bench.master._used.damper_force != 999.0
+    assert bench.master.partners["slave"].used.damper_force != 999.0
 
 
 class SlowLink:

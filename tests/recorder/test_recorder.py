@@ -63,7 +63,7 @@ def test_a_full_disk_leaves_what_was_written_readable_and_is_said(tmp_path: Path
         clock.time += 20_000_000
         sink.put([[*ITEM[:3], seq, *ITEM[4:]]])
     assert "No space left on device" in sink.failure
-    sink.close({})
+    sink.close({}, {})
     run = read(tmp_path / "a.mcap")
     count = run.ticks("slave")
     assert 0 < count < 500
@@ -116,7 +116,7 @@ def test_a_slow_disk_costs_drops_never_time(tmp_path: Path) -> None:
     assert threaded.dropped > 200
     assert "too slow" in threaded.failure
     gate.set()
-    threaded.close({})
+    threaded.close({}, {})
     assert read(tmp_path / "a.mcap").ticks("slave") == 300 - threaded.dropped
 
 
@@ -125,11 +125,11 @@ def test_samples_that_the_link_loses_are_asked_for_again(
 ) -> None:
     deliver, lost = MemoryEndpoint.send, []
 
-    def leaky(self: MemoryEndpoint, message: Any) -> None:
+    def leaky(self: MemoryEndpoint, message: Any, to: str = "") -> int:
         if isinstance(message, Samples) and message.first % 70 == 30 and message.first not in lost:
             lost.append(message.first)
-            return
-        deliver(self, message)
+            return 0
+        return deliver(self, message, to)
 
     monkeypatch.setattr(MemoryEndpoint, "send", leaky)
     bench = virtual.assemble(short_plan, reality.as_planned(short_plan), tmp_path / "a.mcap")
@@ -146,9 +146,10 @@ def test_what_can_not_be_had_again_is_counted_and_said(
 ) -> None:
     deliver = MemoryEndpoint.send
 
-    def leaky(self: MemoryEndpoint, message: Any) -> None:
-        if not (isinstance(message, Samples) and message.lab == "slave" and message.first == 500):
-            deliver(self, message)
+    def leaky(self: MemoryEndpoint, message: Any, to: str = "") -> int:
+        if isinstance(message, Samples) and message.lab == "slave" and message.first == 500:
+            return 0
+        return deliver(self, message, to)
 
     monkeypatch.setattr(MemoryEndpoint, "send", leaky)
     bench = virtual.assemble(short_plan, reality.as_planned(short_plan), tmp_path / "a.mcap")

@@ -80,6 +80,32 @@ def test_a_test_on_two_machines_is_recorded_whole(machines: tuple[str, str], tmp
         assert recording.sequences[topic].tolist() == list(range(2000))
 
 
+def test_two_slaves_one_beside_the_master_and_one_across_the_cable(
+    machines: tuple[str, str], tmp_path: Path
+) -> None:
+    first, second = machines
+    path = tmp_path / "slaves.mcap"
+    words = ("two_dampers", "--duration", "3")
+    here, there = "tcp/127.0.0.1:7447", f"tcp/{ADDRESS_A}:7447"
+    processes = {
+        "roof": start(first, "slave", *words, "--name", "roof", "--connect", here),
+        "middle": start(second, "slave", *words, "--name", "middle", "--connect", there),
+        "recorder": start(second, "record", *words, "--connect", there, "-o", path),
+        "master": start(first, "master", *words, "--listen", "tcp/0.0.0.0:7447"),
+    }
+    try:
+        for name, process in processes.items():
+            _, err = process.communicate(timeout=90)
+            assert process.returncode == 0, f"{name}: {err}"
+    finally:
+        for process in processes.values():
+            process.kill()
+            process.communicate()
+    recording = read(path)
+    for topic in ("master", "slave.roof", "slave.middle", "latency.roof", "latency.middle"):
+        assert recording.sequences[topic].tolist() == list(range(1500))
+
+
 def test_a_cable_that_is_pulled_ends_both_with_exit_code_4(machines: tuple[str, str], tmp_path: Path) -> None:
     first, second = machines
     plan = tmp_path / "plan.toml"

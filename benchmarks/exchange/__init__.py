@@ -1,0 +1,132 @@
+"""The exchange of a tick beside bare zenoh and bare sockets: free-running, paced, under load, over a cable."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import statistics
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from benchmarks.cable import ADDRESSES, NoCableError, cable
+from benchmarks.exchange.transports import NAMES
+from benchmarks.load import BUSY, busy
+from benchmarks.result import Figure
+from common.realtime import assign
+from common.zenoh_link import listenable
+
+ROOT = Path(__file__).resolve().parents[2]
+REPEATS = 3
+INTERVAL = 0.002
+LOCAL = ("127.0.0.1", "127.0.0.1")
+PEERS = {"zenoh": "bare zenoh", "tcp": "bare TCP", "udp": "bare UDP"}
+OURS = {"rths": "exchange", "rths_lab": "exchange with the emulated laboratory"}
+
+
+class Scenario(NamedTuple):
+    """One way to run the exchange; `most` are the ratios to bare zenoh that are aimed at, by percentile."""
+
+    name: str
+    interval: float
+    rounds: int
+    most: dict[int, float]
+    loaded: bool = False
+    wired: bool = False
+
+
+SCENARIOS = (
+    Scenario("free-running", 0.0, 60, {50: 1.25}),
+    Scenario("every 2 ms", INTERVAL, 30, {50: 1.25, 99: 1.5}),
+    Scenario(f"every 2 ms beside {BUSY} busy processes", INTERVAL, 30, {}, loaded=True),
+    Scenario("free-running over a cable", 0.0, 60, {}, wired=True),
+    Scenario("every 2 ms over a cable", INTERVAL, 30, {}, wired=True),
+)
+
+
+def run() -> list[Figure]:
+    """All scenarios, each several times."""
+    figures = []
+    for scenario in SCENARIOS:
+        try:
+            runs = [once(scenario) for _ in range(REPEATS)]
+        except NoCableError as reason:
+            figures.append(Figure(f"{scenario.name}: {reason}", "µs", None, None))
+            continue
+        figures += [figure for name, words in OURS.items() for figure in ours(scenario, name, words, runs)]
+        figures += [peer(scenario, name, words, runs) for name, words in PEERS.items()]
+    return figures
+
+
+def percentile(found: dict[str, Any], name: str, share: int) -> float:
+    """Percentile of a transport's round trips in one run, µs."""
+    return float(np.percentile(found["trips"][name], share)) * 1e-3
+
+
+def ours(scenario: Scenario, name: str, words: str, runs: list[dict[str, Any]]) -> Iterator[Figure]:
+    """Median and 99th percentile of the exchange, beside bare zenoh in the same run."""
+    for share in (50, 99):
+        values = [percentile(found, name, share) for found in runs]
+        ratios = [percentile(found, name, share) / percentile(found, "zenoh", share) for found in runs]
+        ratio, most = statistics.median(ratios), scenario.most.get(share)
+        judged = most is not None and (not scenario.interval or runs[0]["granted"]["priority"] > 0)
+        yield Figure(
+            f"{words}, {scenario.name}, p{share}",
+            "µs",
+            min(values),
+            statistics.median(values),
+            f"≤ {most} × zenoh" if most else "",
+            ratio <= most if judged and most else None,
+            "bare zenoh",
+            ratio,
+        )
+
+
+def peer(scenario: Scenario, name: str, words: str, runs: list[dict[str, Any]]) -> Figure:
+    """Median of a bare transport."""
+    values = [percentile(found, name, 50) for found in runs]
+    return Figure(f"{words}, {scenario.name}, p50", "µs", min(values), statistics.median(values))
+
+
+def once(scenario: Scenario) -> dict[str, Any]:
+    """Round trips of one run by transport, ns."""
+    with contextlib.ExitStack() as stack:
+        if scenario.loaded:
+            stack.enter_context(busy())
+        places: list[list[str]] = [[], []]
+        here, there = LOCAL
+        if scenario.wired:
+            names = stack.enter_context(cable())
+            places = [["ip", "netns", "exec", name] for name in names]
+            here, there = ADDRESSES
+        ports = [listenable().rpartition(":")[2] for _ in NAMES]
+        processors = [[] if place is None else ["--processor", str(place)] for place in assign(2)]
+        answering = ["answer", "--asking", here, "--here", there, "--ports", *ports, *processors[1]]
+        stack.enter_context(answerer([*places[1], *module(answering)]))
+        asking = ["ask", "--here", here, "--answering", there, "--ports", *ports, *processors[0]]
+        asking += ["--rounds", str(scenario.rounds), "--interval", str(scenario.interval)]
+        words = [*places[0], *module(asking)]
+        found = subprocess.run(words, cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True, timeout=300)
+    result: dict[str, Any] = json.loads(found.stdout)
+    return result
+
+
+def module(words: list[str]) -> list[str]:
+    """Command line of one of the two processes."""
+    return [sys.executable, "-m", f"benchmarks.exchange.{words[0]}", *words[1:]]
+
+
+@contextlib.contextmanager
+def answerer(words: list[str]) -> Iterator[None]:
+    """The answering process, until the end of the block."""
+    process = subprocess.Popen(words, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None  # noqa: S101 - it is a pipe
+    process.stdout.readline()
+    try:
+        yield
+    finally:
+        process.communicate(timeout=30)

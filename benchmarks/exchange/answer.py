@@ -1,0 +1,48 @@
+"""`python -m benchmarks.exchange.answer`: the process that answers on every transport, until its input closes."""
+
+from __future__ import annotations
+
+import argparse
+import select
+import sys
+import threading
+
+from benchmarks.exchange import transports
+from benchmarks.exchange.transports import NAMES
+from common import realtime
+
+
+def main() -> int:
+    """Answer; sockets and bare zenoh in threads of their own."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--asking", required=True, help="address of the asking end, where zenoh listens")
+    parser.add_argument("--here", required=True, help="address of this end, where the sockets listen")
+    parser.add_argument("--ports", type=int, nargs=len(NAMES), required=True, help=" ".join(NAMES))
+    parser.add_argument("--rt", choices=realtime.MODES, default="auto")
+    parser.add_argument("--processor", type=int)
+    args = parser.parse_args()
+    realtime.prepare(args.rt, args.processor)
+    ports = dict(zip(NAMES, args.ports, strict=True))
+    transports.answer_tcp(args.here, ports["tcp"])
+    transports.answer_udp(args.here, ports["udp"])
+    sys.stdout.write("listening\n")
+    sys.stdout.flush()
+    close = transports.answer_zenoh(args.asking, ports["zenoh"])
+    realtime.freeze()
+    other = threading.Thread(
+        target=transports.answer_rths, args=("rths_lab", args.asking, ports["rths_lab"], input_ended)
+    )
+    other.start()
+    transports.answer_rths("rths", args.asking, ports["rths"], input_ended)
+    other.join()
+    close()
+    return 0
+
+
+def input_ended() -> bool:
+    """Whether whoever started this process has closed its input."""
+    return bool(select.select([sys.stdin], [], [], 0.0)[0])
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,96 @@
+"""`python -m benchmarks.exchange.ask`: times exchanges over every transport, interleaved, and writes them as JSON.
+
+Blocks of exchanges of one transport follow each other in an order drawn anew each round, so that what the machine
+does meanwhile meets all alike. Paced, an exchange begins at each multiple of the interval, and the sleep's own
+lateness is taken down beside it: the bare timing loop of the same run.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import random
+import sys
+import time
+from collections.abc import Callable
+from functools import partial
+
+from benchmarks.exchange.transports import (
+    NAMES,
+    Asking,
+    RthsAsking,
+    TcpAsking,
+    UdpAsking,
+    ZenohAsking,
+)
+from common import realtime
+
+KINDS: dict[str, Callable[[str, int], Asking]] = {
+    "rths": partial(RthsAsking, "rths"),
+    "rths_lab": partial(RthsAsking, "rths_lab"),
+    "zenoh": ZenohAsking,
+    "tcp": TcpAsking,
+    "udp": UdpAsking,
+}
+SOCKETS = ("tcp", "udp")  # whose answering end listens
+WARM_UP = 300
+BLOCK = 50
+
+
+def block(asking: Asking, interval_ns: int) -> tuple[list[int], list[int]]:
+    """Round trips of a block, and how late each began, ns; without an interval one follows the other."""
+    trips, late = [], []
+    due = time.monotonic_ns() + interval_ns
+    for _ in range(BLOCK):
+        if interval_ns:
+            time.sleep(max(due - time.monotonic_ns(), 0) * 1e-9)
+        began = time.monotonic_ns()
+        trips.append(asking.exchange() - began)
+        late.append(began - due)
+        due = max(due, began - began % interval_ns if interval_ns else began) + interval_ns
+    return trips, late
+
+
+def main() -> int:
+    """Time what is asked for."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--here", required=True, help="address of this end, where zenoh listens")
+    parser.add_argument("--answering", required=True, help="address of the answering end")
+    parser.add_argument("--ports", type=int, nargs=len(NAMES), required=True, help=" ".join(NAMES))
+    parser.add_argument("--rounds", type=int, default=60, help=f"blocks of {BLOCK} exchanges per transport")
+    parser.add_argument("--interval", type=float, default=0.0, help="s between exchanges, 0 for free-running")
+    parser.add_argument("--rt", choices=realtime.MODES, default="auto")
+    parser.add_argument("--processor", type=int)
+    args = parser.parse_args()
+    granted = realtime.prepare(args.rt, args.processor)
+    ports = dict(zip(NAMES, args.ports, strict=True))
+    asking = {
+        name: kind(args.answering if name in SOCKETS else args.here, ports[name])
+        for name, kind in KINDS.items()
+    }
+    for one in asking.values():
+        for _ in range(WARM_UP):
+            one.exchange()
+    realtime.freeze()
+    found = rounds(asking, args.rounds, round(args.interval * 1e9))
+    for one in asking.values():
+        one.close()
+    json.dump({"granted": granted.values(), **found}, sys.stdout)
+    return 0
+
+
+def rounds(asking: dict[str, Asking], count: int, interval_ns: int) -> dict[str, dict[str, list[int]]]:
+    """Round trips and latenesses by transport, ns."""
+    draw = random.Random(1)  # noqa: S311 - an order, not a secret
+    trips: dict[str, list[int]] = {name: [] for name in asking}
+    late: dict[str, list[int]] = {name: [] for name in asking}
+    for _ in range(count):
+        for name in draw.sample(sorted(asking), len(asking)):
+            more = block(asking[name], interval_ns)
+            trips[name] += more[0]
+            late[name] += more[1]
+    return {"trips": trips, "late": late}
+
+
+if __name__ == "__main__":
+    sys.exit(main())

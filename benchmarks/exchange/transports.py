@@ -1,0 +1,242 @@
+"""Both ends of every transport that is compared: an exchange is a frame there and a frame back.
+
+`rths` is the exchange itself: frames of the codec over the link, answered by the slave's loop, its step and limits
+included, whose laboratory stands still; `rths_lab` has the emulated laboratory there. The others carry as many bytes
+and nothing else.
+"""
+
+from __future__ import annotations
+
+import json
+import socket
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Protocol
+
+import zenoh
+
+from common import reality
+from common.clock import MonotonicClock
+from common.endpoint import FrameEndpoint
+from common.laboratory import Setting
+from common.messages import Arm, Armed, Command, Feedback, Message, Register, Registered, Scheduled, Start
+from common.plan import PROTOCOL_VERSION, Laboratory, Plan, Recording, Rig
+from common.rig import TableCommand
+from common.zenoh_link import ZenohLink
+from slave.assembly import build_loop
+
+PAYLOAD = b"x" * 110  # a command's frame is about as long
+NAMES = ("rths", "rths_lab", "zenoh", "tcp", "udp")
+SESSION = INSTANCE = 1
+FAR_NS = 10**15  # a start so far ahead that no tick is ever late
+PATIENCE_S = 20.0
+
+
+class Asking(Protocol):
+    """The end that asks."""
+
+    def exchange(self) -> int:
+        """One frame there and one back; when the answer was in the asker's hands, ns."""
+
+    def close(self) -> None:
+        """Leave."""
+
+
+class StillTable:
+    """A laboratory that costs nothing: what the exchange does is all that is timed."""
+
+    def __init__(self, interval: float, seed: int) -> None:
+        pass
+
+    def arm(self) -> None:
+        """Ready."""
+
+    def read(self) -> tuple[float, float, float, float]:
+        """All at rest."""
+        return (0.0, 0.0, 0.0, 0.0)
+
+    def write(self, command: TableCommand) -> None:
+        """Nothing moves."""
+
+    def disarm(self) -> None:
+        """Nothing has moved."""
+
+
+LABORATORIES = {
+    "rths": Laboratory(Rig(class_=f"{__name__}:{StillTable.__name__}")),
+    "rths_lab": Laboratory(),
+}
+
+
+def bench_plan(kind: str) -> Plan:
+    """The default test with one of the laboratories; it needs no recorder here."""
+    named = replace(Plan().test, name=kind)
+    return replace(Plan(), test=named, slave=LABORATORIES[kind], recording=Recording(required=False))
+
+
+class RthsAsking:
+    """The master's end: encode, send, receive, check, decode."""
+
+    def __init__(self, kind: str, host: str, port: int) -> None:
+        plan = bench_plan(kind)
+        self._link = ZenohLink("master", plan.test.name, listen=f"tcp/{host}:{port}")
+        self._endpoint = FrameEndpoint(self._link, plan.digest())
+        self._endpoint.enter(SESSION)
+        self._agree(Register(SESSION, PROTOCOL_VERSION, plan.digest()), Registered)
+        self._agree(Arm(SESSION, INSTANCE), Armed)
+        self._agree(Start(SESSION, FAR_NS, FAR_NS), Scheduled)
+        self._seq = 0
+
+    def _agree(self, request: Message, answer: type) -> None:
+        for _ in range(int(PATIENCE_S / 0.1)):
+            self._endpoint.send(request)
+            while (received := self._endpoint.receive(0.1)) is not None:
+                if isinstance(received.message, answer):
+                    return
+        raise TimeoutError(f"no {answer.__name__} from the slave")
+
+    def exchange(self) -> int:
+        """A command and its feedback, until the feedback's values are there; the loop sleeps meanwhile."""
+        seq = self._seq
+        self._seq += 1
+        self._endpoint.send(Command(SESSION, seq, FAR_NS, 0, 1e-3, 1.0, 1e-2, 0.1, 1.0))
+        deadline = time.monotonic() + PATIENCE_S
+        while time.monotonic() < deadline:
+            received = self._endpoint.receive(1.0)
+            if received and isinstance(received.message, Feedback) and received.message.seq == seq:
+                return received.decoded_ns
+        raise TimeoutError("no feedback from the slave")
+
+    def close(self) -> None:
+        """Leave the link."""
+        self._link.close()
+
+
+def answer_rths(kind: str, host: str, port: int, ended: Callable[[], bool]) -> None:
+    """The slave's end: its loop and emulated laboratory, a tick for every command."""
+    plan = bench_plan(kind)
+    link = ZenohLink("slave", plan.test.name, connect=f"tcp/{host}:{port}", patience=PATIENCE_S)
+    endpoint = FrameEndpoint(link, plan.digest())
+    loop = build_loop(Setting(plan, endpoint, MonotonicClock()), reality.as_planned(plan), instance=INSTANCE)
+    while not ended():
+        received = endpoint.receive(0.2)
+        if received is not None:
+            loop.take(received.message, received.received_ns)
+            if isinstance(received.message, Command):
+                loop.tick(received.message.seq)
+    link.close()
+
+
+def bare_session(listen: str = "", connect: str = "") -> zenoh.Session:
+    """A session with nothing but a static link."""
+    config = zenoh.Config()
+    config.insert_json5("listen/endpoints", json.dumps([listen] if listen else []))
+    config.insert_json5("connect/endpoints", json.dumps([connect] if connect else []))
+    config.insert_json5("scouting/multicast/enabled", "false")
+    return zenoh.open(config)
+
+
+class ZenohAsking:
+    """Bare zenoh: put, then wait on a channel."""
+
+    def __init__(self, host: str, port: int) -> None:
+        self._session = bare_session(listen=f"tcp/{host}:{port}")
+        self._heard = self._session.declare_subscriber("bench/pong", zenoh.handlers.RingChannel(1))
+        self._publisher = self._session.declare_publisher("bench/ping", express=True)
+        deadline = MonotonicClock().now() + int(PATIENCE_S * 1e9)
+        while not self._publisher.matching_status.matching:  # type: ignore[attr-defined]
+            if MonotonicClock().now() > deadline:
+                raise TimeoutError("nobody answers over bare zenoh")
+            MonotonicClock().sleep_until(MonotonicClock().now() + 10_000_000)
+
+    def exchange(self) -> int:
+        """A payload and its echo."""
+        self._publisher.put(PAYLOAD)
+        self._heard.recv().payload.to_bytes()
+        return time.monotonic_ns()
+
+    def close(self) -> None:
+        """Leave the session."""
+        self._session.close()  # type: ignore[no-untyped-call]
+
+
+def answer_zenoh(host: str, port: int) -> Callable[[], None]:
+    """Echo in the callback; what closes it."""
+    deadline = MonotonicClock().now() + int(PATIENCE_S * 1e9)
+    while True:
+        try:
+            session = bare_session(connect=f"tcp/{host}:{port}")
+            break
+        except zenoh.ZError:
+            if MonotonicClock().now() > deadline:
+                raise
+    publisher = session.declare_publisher("bench/pong", express=True)
+    session.declare_subscriber("bench/ping", lambda sample: publisher.put(sample.payload))
+    return session.close
+
+
+class TcpAsking:
+    """A bare TCP socket without Nagle's algorithm."""
+
+    def __init__(self, host: str, port: int) -> None:
+        self._socket = socket.create_connection((host, port), timeout=PATIENCE_S)
+        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+    def exchange(self) -> int:
+        """A payload and its echo."""
+        self._socket.sendall(PAYLOAD)
+        left = len(PAYLOAD)
+        while left:
+            left -= len(self._socket.recv(left))
+        return time.monotonic_ns()
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._socket.close()
+
+
+def answer_tcp(host: str, port: int) -> None:
+    """Listen, and echo in a thread of its own."""
+    server = socket.create_server((host, port))
+
+    def serve() -> None:
+        peer, _ = server.accept()
+        peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        while data := peer.recv(4096):
+            peer.sendall(data)
+
+    threading.Thread(target=serve, daemon=True).start()
+
+
+class UdpAsking:
+    """A bare UDP socket."""
+
+    def __init__(self, host: str, port: int) -> None:
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.settimeout(PATIENCE_S)
+        self._socket.connect((host, port))
+
+    def exchange(self) -> int:
+        """A payload and its echo."""
+        self._socket.send(PAYLOAD)
+        self._socket.recv(4096)
+        return time.monotonic_ns()
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._socket.close()
+
+
+def answer_udp(host: str, port: int) -> None:
+    """Echo in a thread of its own."""
+    server = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    server.bind((host, port))
+
+    def serve() -> None:
+        while True:
+            data, sender = server.recvfrom(4096)
+            server.sendto(data, sender)
+
+    threading.Thread(target=serve, daemon=True).start()

@@ -1,0 +1,246 @@
+"""Cost of a tick over the building's storeys and over the tick rate, compiled and through the loop objects.
+
+Virtual time: nothing waits, so a cost is that of both laboratories, emulated rigs included, on one processor.
+A further curve is a row in `CURVES`: what is varied, over which values, and the plan of a value.
+"""
+
+from __future__ import annotations
+
+import gc
+import math
+import statistics
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from benchmarks.result import Figure
+from common import reality
+from common.plan import Plan, Recording, ideal
+from models import substructure
+from models.closed_loop import simulate
+from models.registry import Array
+from models.structures import partition, shear_building
+from rths import virtual
+
+REPEATS = 5
+TICKS = 4_000  # of a test through the loop objects
+COMPILED_TICKS = 10_000  # of a compiled one, so that building its arrays counts little
+STOREYS = (1, 2, 5, 10, 20, 50, 100)
+RATES_HZ = (500, 1_000, 2_000, 4_000, 8_000)
+PERIOD = 0.1  # s per storey: the usual rule for a frame's first period
+DAMPING_RATIO = 0.05  # of the first mode
+SCALE = 0.02  # of the ground motion: far from every limit
+FREE = 8_000  # ticks of free vibration in which the first frequency is looked for
+SAME = 1e-4  # what that frequency and the closed form's may differ by, relative
+
+
+class Point(NamedTuple):
+    """Cost of one tick, µs, best and median of the repeats; how many ticks fit into the interval."""
+
+    value: float  # of what is varied
+    interval: float  # s
+    compiled: float
+    compiled_median: float
+    objects: float
+    objects_median: float
+    finite: bool
+
+    @property
+    def real_time(self) -> float:
+        """How many times faster than real time the loop objects are, median."""
+        return self.interval * 1e6 / self.objects_median
+
+    def plain(self, name: str) -> dict[str, float]:
+        """The same for JSON and the table of points, the value under its `name`; times in µs."""
+        return {
+            name: self.value,
+            "interval": self.interval * 1e6,
+            "compiled": self.compiled,
+            "compiled_median": self.compiled_median,
+            "compiled_real_time_factor": self.interval * 1e6 / self.compiled_median,
+            "loops": self.objects,
+            "loops_median": self.objects_median,
+            "real_time_factor": self.real_time,
+            "share_of_interval": 1.0 / self.real_time,
+        }
+
+
+class Curve(NamedTuple):
+    """What is varied, over which values, and the plan of a value."""
+
+    name: str
+    unit: str
+    values: tuple[int, ...]
+    plan: Callable[[int], Plan]
+
+
+# -- plans ------------------------------------------------------------------------------------------
+
+
+def uniform(storeys: int) -> Plan:
+    """A uniform shear building whose first period is 0.1 s per storey, at least the default building's.
+
+    The specimen is one of the four columns of the lowest storey. CR is stable whatever the highest mode does.
+    """
+    plan = Plan()
+    (mass,), (stiffness,) = plan.structure.mass, plan.structure.stiffness
+    omega = min(2.0 * math.pi / (PERIOD * storeys), math.sqrt(stiffness / mass))
+    each = mass * (omega / first_frequency(storeys)) ** 2
+    structure = replace(
+        plan.structure,
+        mass=(mass,) * storeys,
+        stiffness=(each,) * storeys,
+        damping=(2.0 * DAMPING_RATIO / omega * each,) * storeys,
+        integrator="cr",
+    )
+    column = replace(plan.column, stiffness=plan.column.stiffness * each / stiffness)
+    motion = replace(plan.ground_motion, scale=SCALE)
+    return short(replace(plan, structure=structure, column=column, ground_motion=motion))
+
+
+def at_rate(hertz: int) -> Plan:
+    """The default test at another tick rate."""
+    plan = Plan()
+    motion = replace(plan.ground_motion, scale=SCALE)
+    return short(replace(plan, test=replace(plan.test, interval=1.0 / hertz), ground_motion=motion))
+
+
+def short(plan: Plan) -> Plan:
+    """The plan over so many ticks, without a recorder."""
+    return replace(plan.with_ticks(TICKS), recording=Recording(required=False))
+
+
+def first_frequency(storeys: int) -> float:
+    """First circular frequency of a uniform shear building over √(k/m) of a storey: 2·sin(π/(4n + 2))."""
+    return 2.0 * math.sin(math.pi / (4 * storeys + 2))
+
+
+CURVES = (
+    Curve("storeys", "storeys", STOREYS, uniform),
+    Curve("tick_rate", "Hz", RATES_HZ, at_rate),
+)
+
+
+# -- costs ------------------------------------------------------------------------------------------
+
+
+def costs(work: Callable[[], float], repeats: int = REPEATS) -> list[float]:
+    """What each repeat says it cost, the first not counted; the collector of garbage waits."""
+    work()
+    found = []
+    for _ in range(repeats):
+        gc.collect()
+        gc.disable()
+        found.append(work())
+        gc.enable()
+    return found
+
+
+def compiled(plan: Plan, ground: Array) -> float:
+    """Cost of a tick of the compiled rollout, µs; building its arrays is part of it."""
+    began = time.perf_counter()
+    ticks = simulate(plan, ground).ticks
+    return (time.perf_counter() - began) * 1e6 / max(ticks, 1)
+
+
+def objects(plan: Plan) -> float:
+    """Cost of a tick of the loop objects over the link in memory, µs; building and warming up are not part of it."""
+    bench = virtual.assemble(plan, reality.as_planned(plan), None)
+    began = time.perf_counter()
+    error = virtual.run(bench, str)
+    spent = time.perf_counter() - began
+    if error is not None:
+        raise error
+    return spent * 1e6 / bench.master.ticks
+
+
+def point(value: int, plan: Plan, repeats: int = REPEATS) -> Point:
+    """Cost of a tick of one plan."""
+    longer = plan.with_ticks(COMPILED_TICKS)
+    ground = substructure.ground_rows(longer, substructure.motion(plan))
+    fast = costs(lambda: compiled(longer, ground), repeats)
+    slow = costs(lambda: objects(plan), repeats)
+    return Point(
+        value,
+        plan.test.interval,
+        min(fast),
+        statistics.median(fast),
+        min(slow),
+        statistics.median(slow),
+        simulate(longer, ground).finite,
+    )
+
+
+# -- whether it computes the building it says --------------------------------------------------------
+
+
+def free_vibration(plan: Plan) -> float:
+    """First circular frequency (rad/s) of the ideal test, undamped, from its answer to a jolt of the ground.
+
+    The first mode's share of the answer obeys `q_{k+1} = 2·cos(ω·h)·q_k − q_{k−1}`.
+    """
+    n = plan.storeys
+    still = replace(plan.structure, damping=(0.0,) * n)
+    control = replace(plan.control, amd=False)
+    quiet = replace(ideal(plan), structure=still, control=control).with_ticks(FREE)
+    ground = np.zeros((2, FREE + 1))
+    ground[0, 1] = 1.0
+    start = substructure.STOREYS
+    x = simulate(quiet, ground).outputs[10:, start : start + n]
+    shape = np.sin((np.arange(n) + 1) * math.pi / (2 * n + 1))
+    q = x @ shape
+    cosine = q[1:-1] @ (q[2:] + q[:-2]) / (2.0 * q[1:-1] @ q[1:-1])
+    return float(math.acos(cosine) / quiet.test.interval)
+
+
+def frequency_error(storeys: int) -> float:
+    """Largest relative error of the first frequency, of the matrices and of the rollout, against the closed form."""
+    plan = uniform(storeys)
+    exact = first_frequency(storeys) * math.sqrt(plan.structure.stiffness[0] / plan.structure.mass[0])
+    modes = shear_building.modes(*partition.matrices(plan))
+    found = (2.0 * math.pi / modes.periods[0], free_vibration(plan))
+    return float(max(abs(omega / exact - 1.0) for omega in found))
+
+
+# -- figures ----------------------------------------------------------------------------------------
+
+
+def figures(curve: Curve, points: list[Point]) -> list[Figure]:
+    """The curve's last point as figures, the whole curve in the one of the loop objects."""
+    last = points[-1]
+    name = f"{last.value:,.0f} {curve.unit}"
+    limit = last.interval * 1e6
+    return [
+        Figure(
+            f"loop objects, {name}",
+            "µs/tick",
+            last.objects,
+            last.objects_median,
+            f"≤ {limit:,.0f}",
+            all(each.finite and each.real_time >= 1.0 for each in points),
+            "real time",
+            last.real_time,
+            [each.plain(curve.name) for each in points],
+        ),
+        Figure(
+            f"compiled loop, {name}",
+            "µs/tick",
+            last.compiled,
+            last.compiled_median,
+            peer="real time",
+            ratio=limit / last.compiled_median,
+        ),
+    ]
+
+
+def run() -> list[Figure]:
+    """All curves, and whether the tallest buildings vibrate as the closed form has it."""
+    found = []
+    for curve in CURVES:
+        found += figures(curve, [point(value, curve.plan(value)) for value in curve.values])
+    error = max(frequency_error(storeys) for storeys in STOREYS)
+    name = "first frequency of uniform buildings, off the closed form"
+    return [*found, Figure(name, "relative", error, error, f"≤ {SAME:g}", error <= SAME)]

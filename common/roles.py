@@ -1,0 +1,35 @@
+"""Who takes part in a test: a master, one slave or several with names, a recorder.
+
+A role is what a process is called in messages, keys and topics: `master`, `recorder`, `slave` where there is one,
+`slave.NAME` where the plan names its slaves.
+"""
+
+from __future__ import annotations
+
+MASTER, SLAVE, RECORDER, LATENCY = "master", "slave", "recorder", "latency"
+
+
+def slave_role(name: str) -> str:
+    """The role of a slave; `name` is empty for the one that has none."""
+    return f"{SLAVE}.{name}" if name else SLAVE
+
+
+def kind_of(text: str) -> str:
+    """A role or a topic without a slave's name: `slave` of `slave.roof`."""
+    return text.partition(".")[0]
+
+
+def name_of(text: str) -> str:
+    """The slave's name in a role or a topic, empty where there is none: `roof` of `slave.roof`."""
+    return text.partition(".")[2]
+
+
+def title(role: str) -> str:
+    """A role as a sentence names it: `slave 'roof'`."""
+    name = name_of(role)
+    return f"{kind_of(role)} '{name}'" if name else role
+
+
+def latency_topic(role: str) -> str:
+    """The topic of a slave's latency."""
+    return LATENCY + role.removeprefix(SLAVE)

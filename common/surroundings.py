@@ -1,0 +1,64 @@
+"""What a laboratory's process says of the machine it runs on: real-time shape, the host's share, a bare timing loop.
+
+Three events of the recording: `real_time` as the ticks begin, `machine` and, from the master, `bare_loop` as they end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from common.bare_loop import BareLoop
+from common.laboratory import Laboratory
+from common.machine import Watch, facts
+from common.realtime import Granted
+
+CODES = ("real_time", "machine", "bare_loop")
+
+
+class Surroundings:
+    """Watches from the first tick to the last; `timed` where a bare timing loop runs beside the test."""
+
+    def __init__(self, lab: Laboratory, granted: Granted, *, timed: bool) -> None:
+        self._lab = lab
+        self._granted = granted
+        self._timed = timed
+        self._bare = BareLoop()
+        self._watch: Watch | None = None
+
+    def begin(self) -> None:
+        """The ticks are about to begin."""
+        level = "warning" if self._granted.missing else "info"
+        self._lab.note("real_time", sentence(self._granted), level=level, values=self._granted.values())
+        if self._timed:
+            self._bare.start(self._lab.interval_ns, self._granted)
+        self._watch = Watch()
+
+    def end(self, tick: int) -> None:
+        """The ticks are over; nothing is said of a test that never began."""
+        if self._watch is None:
+            return
+        text = ", ".join(f"{name} {value}" for name, value in facts().items())
+        self._lab.note("machine", text, tick=tick, values=self._watch.values())
+        if self._timed and (found := self._bare.stop()):
+            text = (
+                f"bare timing loop beside the test: {found['late']:.0f} late, p99 {found['p99'] * 1e6:.0f} µs"
+            )
+            self._lab.note("bare_loop", text, tick=tick, values=found)
+
+
+def sentence(granted: Granted) -> str:
+    """What was granted, and what is missing and why."""
+    priority = f"FIFO priority {granted.priority}" if granted.priority else "ordinary priority"
+    place = f"processor {granted.processor}" if granted.processor >= 0 else "any processor"
+    memory = "memory locked" if granted.memory_locked else "memory not locked"
+    return " ".join((f"real time: {priority}, {place}, {memory}.", *granted.missing))
+
+
+def described(lab: str, code: str, values: Mapping[str, float]) -> dict[str, str]:
+    """An event's values as the recording's metadata has them: `<lab>.<name>`, the bare loop's as `bare_loop.<name>`."""
+    prefix = "bare_loop" if code == "bare_loop" else lab
+    result = {f"{prefix}.{name}": repr(value) for name, value in values.items()}
+    if code == "real_time":
+        priority = values["priority"]
+        result[f"{prefix}.scheduler"] = f"fifo {priority:.0f}" if priority else "other"
+    return result

@@ -1,0 +1,142 @@
+"""One slave as the master knows it: what it has answered, what came from it, what was sent to it."""
+
+from __future__ import annotations
+
+from common.clock_offset import ClockOffset
+from common.laboratory import REPEAT_NS, Laboratory
+from common.mailbox import LinkModel, Mailbox
+from common.messages import Arm, Command, Feedback, Start, Sync, SyncReply
+from common.roles import latency_topic, name_of, title
+from common.transport import addressed
+from master.latency import Account
+from master.step import Sent
+
+SYNC_EXCHANGES = 200
+OFFSET_BLOCK, OFFSET_BLOCKS = 250, 40  # exchanges: the best of half a second each, twenty seconds of them
+GIVEN_UP_NS = 5 * REPEAT_NS  # silence after which another process may register under the same name
+
+NO_FEEDBACK = Feedback(0, -1, -1, 0, -1, 0, 0, 0, 0.0, 0.0, 0.0, 0.0)
+
+NOTHING_SENT = (0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+class Partner:
+    """A slave in a test; `role` is what it is called, `link` the impairment of what comes from it."""
+
+    def __init__(self, role: str, lab: Laboratory, link: LinkModel) -> None:
+        interval = lab.plan.test.interval
+        self.role = role
+        self.title = title(role)
+        self._lab = lab
+        self._address = addressed(role)
+        self._feedback: Mailbox[Feedback] = Mailbox(link, "feedback", interval, nominal=1)
+        self._offset = ClockOffset(length=OFFSET_BLOCK, blocks=OFFSET_BLOCKS)
+        self._first_offset = 0
+        self._sync_sent_ns = 0
+        self._syncs = 0
+        self._asked_ns = -REPEAT_NS
+        self.account = Account(lab, self._offset, latency_topic(role))
+        self.instance = 0  # the process that takes part under this role, 0 for none yet
+        self.armed = False
+        self.scheduled = False
+        self.stopped = False
+        self.heard_ns = 0
+        self.used = NO_FEEDBACK
+        self.sent: Sent = NOTHING_SENT
+
+    # -- handshake --------------------------------------------------------------------------------
+
+    @property
+    def registered(self) -> bool:
+        """Whether it has registered."""
+        return self.instance != 0
+
+    def register(self, instance: int, now: int) -> None:
+        """A process registers: the first one counts, or a later one once that has fallen silent."""
+        if not self.registered or now - self.heard_ns > GIVEN_UP_NS:
+            self.instance = instance
+        if instance == self.instance:
+            self.heard_ns = now
+
+    @property
+    def synchronised(self) -> bool:
+        """Whether enough is known of its clock."""
+        return self._syncs >= SYNC_EXCHANGES
+
+    @property
+    def start_option(self) -> str:
+        """What its process is started with, beside plan and address."""
+        return f", --name {name_of(self.role)}" if self._address else ""
+
+    def ask_anew(self, now: int) -> None:
+        """What comes next is asked at once, not when the last question is due again."""
+        self._asked_ns = now - REPEAT_NS
+
+    def due(self, now: int) -> bool:
+        """Whether it is time to ask, and takes note of it."""
+        if now - self._asked_ns < REPEAT_NS:
+            return False
+        self._asked_ns = now
+        return True
+
+    def arm(self) -> None:
+        """Ask the process that has registered to arm; another of the same name learns by it that its place is taken."""
+        self._lab.endpoint.send(Arm(self._lab.exchange.session, self.instance), self._address)
+
+    def synchronise(self, now: int) -> None:
+        """Ask for one exchange of clock readings."""
+        self._sync_sent_ns = now
+        self._lab.endpoint.send(Sync(self._lab.exchange.session, self._syncs, now), self._address)
+
+    def take_sync(self, reply: SyncReply, received_ns: int) -> bool:
+        """Take in the answer to the last one asked for; whether it was that."""
+        if reply.seq != self._syncs:
+            return False
+        self._offset.add(self._sync_sent_ns, reply.received_ns, reply.sent_ns, received_ns)
+        self._syncs += 1
+        self.ask_anew(received_ns)
+        return True
+
+    def settle(self) -> None:
+        """The start is chosen: what is estimated of its clock by now counts."""
+        self._first_offset = self._offset.at(self._lab.start_ns)
+
+    def schedule(self) -> None:
+        """Tell it the agreed start on its own clock."""
+        lab = self._lab
+        there = lab.start_ns + self._first_offset
+        lab.endpoint.send(Start(lab.exchange.session, there, lab.epoch_ns), self._address)
+
+    # -- ticks ------------------------------------------------------------------------------------
+
+    def take(self, feedback: Feedback, received_ns: int) -> None:
+        """Take in a feedback, unless one as new was there before."""
+        if feedback.seq <= self._feedback.newest_seen:
+            return
+        self.heard_ns = received_ns
+        extra = self._feedback.put(feedback.seq, feedback)
+        self.account.answer(feedback, received_ns, self._lab.clock.now(), extra)
+
+    def heard(self, seq: int) -> bool:
+        """Whether the feedback of a tick has come, or a later one."""
+        return self._feedback.newest_seen >= seq
+
+    def begin(self, tick: int, now: int) -> float:
+        """The damper force (N) that a tick uses: of the newest feedback that is there by then."""
+        if (feedback := self._feedback.take(tick)) is not None:
+            self.used = feedback
+        self.account.close(tick - 1, now)
+        return self.used.damper_force
+
+    def send(self, tick: int) -> int:
+        """Send the command that is `sent`; when its frame was handed to the link, ns."""
+        lab = self._lab
+        now = lab.clock.now()
+        shift = self._offset.at(now) - self._first_offset
+        return lab.endpoint.send(Command(lab.exchange.session, tick, now, shift, *self.sent), self._address)
+
+    def use(self, tick: int) -> tuple[float, int, float]:
+        """Of the feedback in use at a tick: damper force (N), its tick, its age (s)."""
+        used = self.used
+        age = (tick - used.seq) * self._lab.plan.test.interval if used.seq >= 0 else 0.0
+        return used.damper_force, used.seq, age

@@ -1,0 +1,60 @@
+"""pytest plug-in of rths: the fixture `latency_budget`, for the tests of a laboratory's own code.
+
+    def test_latency(latency_budget):
+        latency_budget("runs/x.mcap")
+
+`--latency-budget FILE` gives the budget where the call gives none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from rths.latency_budget import Report
+
+    LatencyBudget = Callable[..., Report]
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """The option for the default budget."""
+    parser.getgroup("rths").addoption(
+        "--latency-budget",
+        metavar="FILE",
+        help="latency budget (TOML) of the fixture latency_budget where its call gives none",
+    )
+
+
+@pytest.fixture
+def latency_budget(pytestconfig: pytest.Config) -> LatencyBudget:
+    """Judge a recording: `latency_budget(recording, budget=None)` gives the report of one that is within.
+
+    The test fails with the table where the recording is over its budget, or with a sentence where it cannot be
+    read, and is skipped with the figures where the machine allows no verdict.
+    """
+
+    def call(recording: str | Path, budget: str | Path | None = None) -> Report:
+        return expect(recording, budget if budget is not None else pytestconfig.getoption("latency_budget"))
+
+    return call
+
+
+def expect(recording: str | Path, budget: str | Path | None) -> Report:
+    """The report of a recording that is within its budget; ends the test otherwise."""
+    __tracebackhide__ = True
+    from common.errors import RthsError
+    from rths.latency_budget import assess
+
+    try:
+        report = assess(recording, budget)
+    except RthsError as error:
+        pytest.fail(str(error), pytrace=False)
+    if report.status == "over":
+        pytest.fail(str(report), pytrace=False)
+    if report.status == "not_judged":
+        pytest.skip(str(report))
+    return report

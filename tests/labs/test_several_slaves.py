@@ -1,0 +1,356 @@
+"""Several slaves on one master, over a link in memory, in virtual time."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from common import cli, plan, reality
+from common.errors import InputError, InterlockError, LostError
+from common.exchange import State
+from common.laboratory import Setting
+from common.messages import Arm, Feedback, Register, Start, Sync, Waiting
+from common.plan import PROTOCOL_VERSION, Plan, Rig, from_tables
+from common.reality import Reality
+from common.recording.reader import Run, read
+from models import substructure
+from models.closed_loop import signals, simulate
+from rths import virtual
+from rths.replay import replay_master, replay_slave
+from rths.virtual import Bench
+from slave.assembly import build_loop as build_slave
+from tests.helpers import largest, without_recorder
+
+THREE = {"mass": [1.6e5] * 3, "stiffness": [9e7] * 3, "damping": [4e5] * 3}
+
+
+def tall(*names: str, duration: float = 2.0) -> Plan:
+    """A plan of three storeys with a slave of each name, dampers of different masses on different floors."""
+    slaves = {
+        name: {
+            "damper": {"floor": 1 + place % 3, "mass": 12.0 + place},
+            "control": {"gain": 1.2e5 / len(names)},
+        }
+        for place, name in enumerate(names)
+    }
+    tables = {
+        "test": {"name": "tall", "duration": duration},
+        "structure": THREE,
+        "column": {"stiffness": 45e6},
+    }
+    return from_tables(tables | {"slave": slaves}, Path())
+
+
+TWO = tall("roof", "middle")
+
+
+def run(chosen: Plan, path: Path, real: Reality | None = None) -> tuple[Run, Any, Bench]:
+    bench = virtual.assemble(chosen, real or reality.as_planned(chosen), path)
+    error = virtual.run(bench, lambda: "")
+    return read(path), error, bench
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    found, error, _ = run(TWO, tmp_path_factory.mktemp("two") / "two.mcap")
+    assert error is None
+    return found
+
+
+def replays(found: Run) -> bool:
+    matches = replay_master(found) | replay_slave(found)
+    assert {f"{role}/table_command" for role in found.roles} <= matches.keys()
+    return all(match.differing == 0 and match.compared > 0 for match in matches.values())
+
+
+@pytest.mark.parametrize("count", [1, 2, 4, 8, 16])
+def test_any_number_of_slaves_is_played_recorded_whole_and_replayed_to_the_last_bit(
+    count: int, tmp_path: Path
+) -> None:
+    chosen = tall(*(f"lab{place}" for place in range(count)), duration=1.0)
+    found, error, _ = run(chosen, tmp_path / "a.mcap")
+    assert error is None
+    assert found.roles == chosen.roles
+    for topic in ("master", *chosen.roles, *(f"latency.lab{place}" for place in range(count))):
+        assert found.sequences[topic].tolist() == list(range(chosen.ticks))
+        assert found.metadata["summary"][f"{topic}_recorded"] == str(chosen.ticks)
+    shape = (chosen.ticks, count) if count > 1 else (chosen.ticks,)
+    assert found.columns["master"]["damper_force_used"].shape == shape
+    assert replays(found)
+
+
+def test_both_ends_of_every_exchange_are_recorded_and_no_slave_has_anothers_commands(recording: Run) -> None:
+    for place, role in enumerate(recording.roles):
+        for name in ("table_target", "damper_command", "table_target_jerk"):
+            sent = recording.columns["master"][name][:, place]
+            assert np.array_equal(sent, recording.columns[role][name]), f"{role}/{name}"
+        used = recording.columns["master"]["damper_force_used"][1:, place]
+        assert np.array_equal(used, recording.columns[role]["damper_force"][:-1])
+    assert largest(np.diff(recording.columns["master"]["table_target"], axis=1)) > 1e-4
+
+
+def test_one_slave_with_a_name_is_the_slave_without(
+    short_plan: Plan, virtual_recording: Path, tmp_path: Path
+) -> None:
+    chosen = from_tables(short_plan.tables() | {"slave": {"roof": {}}}, short_plan.base)
+    found, error, _ = run(chosen, tmp_path / "named.mcap")
+    assert error is None
+    unnamed, named = read(virtual_recording), found.of("slave.roof")
+    for topic in ("master", "slave"):
+        for name, values in unnamed.columns[topic].items():
+            assert np.array_equal(values, named.columns[topic][name]), f"{topic}/{name}"
+
+
+def test_two_slaves_that_each_carry_half_a_damper_are_one(short_plan: Plan) -> None:
+    half = {
+        "damper": {"force_scale": short_plan.damper.force_scale / 2},
+        "control": {"gain": short_plan.control.gain / 2},
+    }
+    chosen = from_tables(short_plan.tables() | {"slave": {"left": half, "right": half}}, short_plan.base)
+    found, error = virtual.simulated(chosen)
+    assert error is None
+    ground = substructure.ground_rows(short_plan, substructure.motion(short_plan))
+    whole = signals(short_plan, simulate(short_plan, ground))
+    assert np.allclose(found.columns["master"]["displacement"], whole["displacement"], rtol=0.0, atol=1e-15)
+    for role in found.roles:
+        assert np.allclose(found.columns[role]["damper_stroke"], whole["damper_stroke"], rtol=0.0, atol=1e-13)
+
+
+def test_the_first_slaves_noise_is_that_of_the_only_one(tmp_path: Path) -> None:
+    one, _, _ = run(tall("roof"), tmp_path / "one.mcap")
+    two, _, _ = run(TWO, tmp_path / "two.mcap")
+    noise = [
+        found.columns[role]["damper_force"][0] for found, role in ((one, "slave.roof"), (two, "slave.roof"))
+    ]
+    assert noise[0] == noise[1] != two.columns["slave.middle"]["damper_force"][0]
+
+
+class LateRoof:
+    """Every third feedback three milliseconds late, where an option says so."""
+
+    def __init__(self, seed: int) -> None:
+        self.late = seed == TWO.test.seed  # the first slave's link has the plan's own seed
+
+    def fate(self, direction: str, seq: int, t: float) -> float | None:
+        return 0.003 if self.late and direction == "feedback" and seq % 3 == 0 else 0.0
+
+
+def test_late_messages_of_one_slave_affect_that_one_alone(tmp_path: Path, monkeypatch: Any) -> None:
+    monkeypatch.setattr("common.links.find", lambda *_: LateRoof)
+    real = dataclasses.replace(reality.as_planned(TWO), link=Rig("x:LateRoof"))
+    found, error, _ = run(TWO, tmp_path / "late.mcap", real)
+    assert error is None
+    used = found.columns["master"]["damper_force_seq"]
+    assert used[30:36, 0].tolist() == [29, 29, 31, 32, 32, 34]
+    assert used[:, 1].tolist() == list(range(-1, TWO.ticks - 1))
+    assert np.allclose(found.columns["master"]["damper_force_age"][31], [0.004, 0.002])
+    assert np.count_nonzero(found.columns["latency.roof"]["deadline_missed"]) > TWO.ticks / 4
+    assert not np.any(found.columns["latency.middle"]["deadline_missed"])
+    assert replays(found)
+
+
+def test_an_effect_of_one_slave_is_laid_over_that_one_alone(recording: Run, tmp_path: Path) -> None:
+    path = tmp_path / "reality.toml"
+    path.write_text("[[effect]]\nname = 'sensor.damper_stroke.bias'\noffset = 0.2\nslave = 'middle'\n")
+    found, error, _ = run(TWO, tmp_path / "biased.mcap", reality.load(path, TWO))
+    assert error is None or isinstance(error, InterlockError)
+    assert found.columns["slave.middle"]["damper_stroke"][0] == pytest.approx(0.2, abs=1e-3)
+    assert (
+        found.columns["slave.roof"]["damper_stroke"][0] == recording.columns["slave.roof"]["damper_stroke"][0]
+    )
+    assert "bias" not in repr(found.metadata) + repr(found.events)
+
+
+def test_an_effect_on_the_building_belongs_to_no_slave(tmp_path: Path) -> None:
+    path = tmp_path / "reality.toml"
+    path.write_text("[[effect]]\nname = 'structure.mass'\nfactor = 1.1\nslave = 'roof'\n")
+    with pytest.raises(InputError, match=r"'structure.mass' is none of one slave's: leave out its slave"):
+        virtual.assemble(TWO, reality.load(path, TWO), None)
+
+
+class BrokenTable:
+    """A laboratory B that fails at a tick."""
+
+    def __init__(self, interval: float, seed: int) -> None:
+        self.tick = 0
+
+    def arm(self) -> None:
+        pass
+
+    def read(self) -> Any:
+        self.tick += 1
+        if self.tick > 100:
+            raise OSError("the amplifier is off")
+        return 0.0, 0.0, 0.0, 0.0
+
+    def write(self, command: Any) -> None:
+        pass
+
+    def disarm(self) -> None:
+        pass
+
+
+@pytest.mark.parametrize("hidden", [True, False])
+def test_a_slave_that_trips_ends_the_test_for_all_and_the_sentence_names_it(
+    hidden: bool, tmp_path: Path, monkeypatch: Any
+) -> None:
+    monkeypatch.setattr("slave.assembly.find", lambda *_: BrokenTable)
+    real = reality.as_planned(TWO)
+    real = dataclasses.replace(
+        real,
+        slaves=real.slaves | {"slave.middle": Rig("x:BrokenTable")},
+        hidden=frozenset({"slave.middle"} if hidden else ()),
+    )
+    found, error, bench = run(TWO, tmp_path / "a.mcap", real)
+    assert isinstance(error, InterlockError)
+    assert str(error).startswith("The slave 'middle' stopped the test: laboratory B of the slave 'middle'")
+    assert all(loop.lab.exchange.state is State.TRIPPED for loop in bench.loops.values())
+    assert ("BrokenTable" in repr(found.events)) is not hidden
+    assert "the amplifier is off" in found.metadata["summary"]["cause"]
+    assert {event["lab"] for event in found.events} >= {"master", "slave.middle", "slave.roof"}
+
+
+def running(chosen: Plan, ticks: int) -> Bench:
+    """A test in memory after some ticks."""
+    bench = virtual.assemble(chosen, reality.as_planned(chosen), None)
+    while not bench.master.lab.running:
+        bench.clock.time += 1_000_000
+        virtual._exchange(bench, poll=True)
+    for tick in range(ticks):
+        virtual._tick(bench, tick)
+    return bench
+
+
+def test_a_slave_that_falls_silent_is_named_and_all_others_are_told() -> None:
+    bench = running(without_recorder(TWO), 100)
+    bench.slaves["slave.middle"].tick = lambda tick: None  # type: ignore[method-assign]
+    for tick in range(100, 700):
+        virtual._tick(bench, tick)
+        if bench.master.lab.exchange.ended:
+            break
+    assert bench.master.lab.exchange.state is State.LOST
+    assert isinstance(bench.master.lab.error, LostError)
+    assert str(bench.master.lab.error) == "The slave 'middle' has been silent for 1 s."
+    virtual._exchange(bench, poll=False)
+    assert all(slave.lab.exchange.state is State.TRIPPED for slave in bench.slaves.values())
+    roof = bench.slaves["slave.roof"].lab.error
+    assert str(roof) == "The master stopped the test: The slave 'middle' has been silent for 1 s."
+
+
+def test_a_slave_that_never_comes_is_named_with_how_to_start_it() -> None:
+    chosen = dataclasses.replace(
+        without_recorder(TWO), link=dataclasses.replace(TWO.link, connect_timeout=2.0)
+    )
+    bench = virtual.assemble(chosen, reality.as_planned(chosen), None)
+    middle = bench.slaves.pop("slave.middle")
+    while not bench.master.lab.exchange.ended:
+        bench.clock.time += 1_000_000
+        virtual._exchange(bench, poll=True)
+    assert str(bench.master.lab.error) == (
+        "No slave 'middle' joined the test within 2 s: start it with the same plan, --name middle and --connect."
+    )
+    assert middle.lab.exchange.state is State.IDLE
+    assert bench.slave.lab.exchange.state is State.TRIPPED
+
+
+def test_no_slave_is_armed_before_all_have_registered() -> None:
+    bench = virtual.assemble(without_recorder(TWO), reality.as_planned(TWO), None)
+    late = bench.slaves.pop("slave.middle")
+    for _ in range(500):
+        bench.clock.time += 1_000_000
+        virtual._exchange(bench, poll=True)
+    assert bench.master.lab.exchange.state is State.IDLE
+    assert bench.slave.lab.exchange.state is State.REGISTERED
+    bench.slaves["slave.middle"] = late
+    for _ in range(500):
+        bench.clock.time += 1_000_000
+        virtual._exchange(bench, poll=True)
+    assert bench.master.lab.running
+    assert {slave.lab.start_ns for slave in bench.slaves.values()} == {bench.master.lab.start_ns}
+
+
+def test_what_another_role_says_counts_for_that_role_alone() -> None:
+    bench = running(without_recorder(TWO), 100)
+    session = bench.master.lab.exchange.session
+    roof, middle = bench.master.partners.values()
+    forged = Feedback(session, 99, 99, 0, -1, 0, 0, 0, 0.0, 0.0, 0.0, 999.0)
+    bench.master.take(forged._replace(seq=100), 0, "slave.roof")
+    bench.master.take(forged._replace(seq=100), 0, "slave.nobody")
+    bench.clock.sleep_until(bench.master.lab.tick_ns(101))
+    bench.master.tick(101)
+    assert roof.used.damper_force == 999.0
+    assert middle.used.damper_force != 999.0
+
+
+# -- one name, two processes ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("named", [True, False])
+def test_the_second_process_of_a_name_is_refused_and_the_test_goes_on(named: bool, short_plan: Plan) -> None:
+    chosen = without_recorder(TWO if named else short_plan)
+    bench = running(chosen, 100)
+    role = chosen.roles[0]
+    real = reality.as_planned(chosen).of(role)
+    second = build_slave(Setting(chosen, bench.endpoints[role], bench.clock), real)
+    second.poll()
+    heard = bench.endpoints["master"].receive()
+    while heard is not None and not isinstance(heard.message, Waiting):
+        heard = bench.endpoints["master"].receive()
+    assert heard is not None
+    bench.master.take(heard.message, 0, heard.role)
+    told = bench.endpoints[role].receive()
+    while told is not None and not isinstance(told.message, Arm):
+        told = bench.endpoints[role].receive()
+    assert told is not None
+    second.take(told.message, 0)
+    bench.slave.take(told.message, 0)
+    assert second.lab.exchange.state is State.REFUSED
+    assert isinstance(second.lab.error, InputError)
+    assert "takes part in this test already: stop one of the two" in str(second.lab.error)
+    assert second.left
+    second.leave()
+    virtual._drain(bench, "master", bench.master)
+    virtual._tick(bench, 100)
+    assert bench.master.lab.running
+    assert bench.slave.lab.running
+
+
+def test_of_two_processes_that_register_the_first_is_armed() -> None:
+    chosen = without_recorder(TWO)
+    bench = virtual.assemble(chosen, reality.as_planned(chosen), None)
+    role, first = "slave.roof", bench.slaves["slave.roof"]
+    second = build_slave(
+        Setting(chosen, bench.endpoints[role], bench.clock), reality.as_planned(chosen).of(role)
+    )
+    request = Register(bench.master.lab.exchange.session, PROTOCOL_VERSION, chosen.digest())
+    for slave in (first, second):
+        slave.take(request, 0)
+    while bench.master.lab.exchange.state is not State.REGISTERED:
+        bench.clock.time += 1_000_000
+        bench.master.poll()
+        virtual._exchange(bench, poll=True)
+    partner = bench.master.partners[role]
+    while bench.endpoints["master"].receive() is not None:
+        pass
+    second.take(Sync(request.session, 0, 0), 0)
+    second.take(Start(request.session, 1, 1), 0)
+    assert bench.endpoints["master"].receive() is None  # a process that was not armed has nothing to say
+    second.take(Arm(request.session, partner.instance), 0)
+    assert partner.instance == first._instance
+    assert second.lab.exchange.state is State.REFUSED
+    assert second.lab.exchange.session == 0
+
+
+def test_the_shipped_plan_reduces_the_motion(tmp_path: Path) -> None:
+    chosen = plan.load(cli.plan_path("two_dampers")).with_test(duration=5.0)
+    peaks = []
+    for amd in (True, False):
+        control = dataclasses.replace(chosen.control, amd=amd)
+        found, error = virtual.simulated(chosen if amd else chosen.everywhere(control=control))
+        assert error is None
+        peaks.append(largest(found.columns["master"]["displacement"]))
+    assert peaks[0] < 0.85 * peaks[1]

@@ -1,0 +1,268 @@
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from common.errors import InputError
+from common.recording.reader import Run
+from rths.latency_budget.checks import Check
+from rths.latency_budget.figures import figures
+from rths.latency_budget.judge import Report, judge
+from rths.latency_budget.limits import from_tables, load
+from tests.rths.latency_budget import noisy
+
+QUIET = {
+    "p50": 5e-5,
+    "p90": 7e-5,
+    "p99": 1e-4,
+    "p99.9": 2e-4,
+    "max": 3e-4,
+    "interval": 2e-3,
+    "ticks": 5e3,
+    "late": 0.0,
+}
+
+
+def record(**changed: float) -> dict[str, str]:
+    """A bare loop's record; `p99_9` stands for "p99.9"."""
+    values = QUIET | {name.replace("_9", ".9"): value for name, value in changed.items()}
+    return {f"bare_loop.{name}": repr(value) for name, value in values.items()}
+
+
+def verdict(run: Run, tables: dict[str, Any] | None = None) -> Report:
+    return judge(figures(run), load(None) if tables is None else from_tables(tables))
+
+
+def check(report: Report, name: str) -> Check:
+    return next(item for item in report.checks if item.name == name)
+
+
+@pytest.mark.parametrize("ticks", [2500, 20_000])
+@pytest.mark.parametrize("scheduler", list(noisy.SPIKES))
+def test_clean_recordings_are_within_and_delayed_ones_over_ten_times_out_of_ten(
+    ticks: int, scheduler: str
+) -> None:
+    clean = [verdict(noisy.clean(seed, ticks, scheduler)).status for seed in range(10)]
+    delayed = [verdict(noisy.delayed(seed, ticks, scheduler)) for seed in range(10)]
+    assert clean == ["within"] * 10
+    assert [report.status for report in delayed] == ["over"] * 10
+    assert all(check(report, "feedback_one_way p99").verdict == "over" for report in delayed)
+
+
+@pytest.mark.parametrize("name", ["command_one_way", "slave_time"])
+def test_a_delay_of_the_command_or_in_the_slave_is_seen_too(name: str) -> None:
+    for seed in range(10):
+        run = noisy.clean(seed, 2500)
+        run.columns["latency"][name][::50] += 1e-3
+        assert check(verdict(run), f"{name} p99").verdict == "over"
+
+
+def test_without_a_bare_loop_limits_stand_alone() -> None:
+    run = noisy.delayed(1, 2500)
+    run.metadata = {}
+    report = verdict(run)
+    assert report.status == "over"
+    assert all(item.bare is None and item.allowed == item.limit for item in report.checks)
+    assert (
+        "No bare loop was recorded: a slow machine cannot be told from a slow test here." in report.warnings
+    )
+
+
+def test_the_bare_loop_raises_a_limit_once_per_wait_and_not_beyond_a_bound() -> None:
+    names = {"slave_time": 1e-3, "feedback_one_way": 1e-3, "round_trip": 1e-3}
+    tables = {name: {"p99": limit} for name, limit in names.items()}
+    run = noisy.run({name: [1e-4] * 600 for name in names}, record(p99=0.04e-3))
+    allowed = [item.allowed for item in verdict(run, tables).checks]
+    assert allowed == pytest.approx([1.04e-3, 1.08e-3, 1.2e-3])
+    run.metadata["real_time"] = record(p99=0.2e-3, p99_9=1e-3, max=2e-3)
+    allowed = [item.allowed for item in verdict(run, tables).checks]
+    assert allowed == pytest.approx([1.2e-3, 1.3e-3, 1.3e-3])
+    assert {item.bare for item in verdict(run, tables).checks} == {0.2e-3}
+
+
+def late_in(share: float, value: float, ticks: int = 10_000) -> dict[str, Any]:
+    values = np.full(ticks, 1e-4)
+    values[: round(share * ticks)] = value
+    return {"feedback_one_way": values}
+
+
+NOISE = record(
+    p99=1.5e-3, p99_9=3e-3, max=9e-3
+)  # about 1 % of the bare loop's ticks as late as what is judged here
+TAIL = {"feedback_one_way": {"p99": 0.6e-3}}
+
+
+def test_what_the_bare_loop_suffered_too_is_in_doubt() -> None:
+    report = verdict(noisy.run(late_in(0.015, 1.5e-3), NOISE), TAIL)
+    assert (report.status, report.exit_code) == ("not_judged", 0)
+    assert check(report, "feedback_one_way p99").verdict == "doubt"
+
+
+def test_what_the_bare_loop_did_not_suffer_is_over() -> None:
+    assert verdict(noisy.run(late_in(0.015, 1.5e-3), record()), TAIL).status == "over"
+    assert verdict(noisy.run(late_in(0.08, 1.5e-3), NOISE), TAIL).status == "over"
+
+
+@pytest.mark.parametrize(
+    ("changed", "reason"),
+    [
+        ({"slave.stolen_share": "0.08"}, "The host took 8.0% of the processors' time of the slave"),
+        (record(late=150.0), "The bare loop itself was late in 2.91% of its ticks: beyond 2.00% nothing"),
+    ],
+)
+def test_an_unfit_machine_allows_no_verdict_on_what_is_over(changed: dict[str, str], reason: str) -> None:
+    slow = verdict(noisy.run(late_in(0.08, 1.5e-3), record() | changed), TAIL)
+    assert slow.status == "not_judged"
+    assert slow.doubts[0].startswith(reason)
+    assert reason in str(slow)
+    assert verdict(noisy.run(late_in(0.0, 0.0), record() | changed), TAIL).status == "within"
+
+
+def test_an_unsteady_machine_allows_no_verdict_on_late_ticks_but_one_on_messages() -> None:
+    unsteady = record(late=50.0)
+    late = verdict(noisy.run(flags(100), unsteady), {"late": {"share": 0.01, "longest_gap": 2}})
+    assert late.status == "not_judged"
+    assert "beyond 0.50% late ticks and wake_lateness over their limits are not judged" in late.doubts[0]
+    assert verdict(noisy.run(late_in(0.08, 1.5e-3), unsteady), TAIL).status == "over"
+
+
+def test_a_message_that_waits_for_a_standstill_is_not_slow() -> None:
+    found = late_in(0.03, 20e-3) | {"wake_lateness": np.full(10_000, 5e-5)}
+    assert verdict(noisy.run(found, record()), TAIL).status == "over"
+    found["wake_lateness"][:301] = 20e-3
+    assert verdict(noisy.run(found, record()), TAIL).status == "not_judged"
+    found["wake_lateness"] *= 0.05  # woken within the interval: no standstill
+    assert verdict(noisy.run(found, record()), TAIL).status == "over"
+
+
+def flags(late: int, ticks: int = 1000) -> dict[str, Any]:
+    return {
+        "deadline_missed": np.arange(ticks) < late,
+        "command_sent_ns": np.where(np.arange(ticks) < late // 2, 0, 1),
+    }
+
+
+def test_late_and_missed_ticks_are_counted() -> None:
+    tables = {"late": {"share": 0.01, "missed_share": 0.01, "longest_gap": 30}}
+    report = verdict(noisy.run(flags(30)), tables)
+    assert {item.name: item.verdict for item in report.checks} == {
+        "late share": "over",
+        "missed share": "over",
+        "longest gap": "ok",
+    }
+    assert report.plain()["late"] == {
+        "ticks": 1000,
+        "late": 30,
+        "share": 0.03,
+        "longest_gap": 30,
+        "missed": 15,
+        "missed_share": 0.015,
+    }
+    assert verdict(noisy.run(flags(10)), tables).status == "within"
+    assert check(verdict(noisy.run(flags(31)), tables), "longest gap").verdict == "over"
+
+
+def test_a_stall_of_the_machine_is_no_gap_of_the_test() -> None:
+    run = noisy.run(flags(40), record(max=0.021))
+    stalled = check(verdict(run, {"late": {"longest_gap": 30}}), "longest gap")
+    assert (stalled.bare, stalled.allowed, stalled.verdict) == (11, 41.0, "ok")
+
+
+def test_no_late_tick_at_all_can_be_asked_for() -> None:
+    assert verdict(noisy.run(flags(1)), {"late": {"share": 0}}).status == "over"
+    assert verdict(noisy.run(flags(0)), {"late": {"share": 0}}).status == "within"
+
+
+def test_a_percentile_next_to_the_maximum_is_not_judged() -> None:
+    tables = {"feedback_one_way": {"p99": 1e-5, "p50": 1.0}}
+    report = verdict(noisy.run(late_in(0.0, 0.0, 499)), tables)
+    assert report.status == "within"
+    assert check(report, "feedback_one_way p99").verdict == "short"
+    assert report.warnings == ["Too few ticks for feedback_one_way p99: fewer than 5 values lie beyond."]
+    assert verdict(noisy.run(late_in(0.0, 0.0, 500)), tables).status == "over"
+    only = {"feedback_one_way": {"p99": 1e-5}}
+    assert verdict(noisy.run(late_in(0.0, 0.0, 499)), only).status == "not_judged"
+
+
+def test_a_maximum_decides_nothing() -> None:
+    run = noisy.clean(1, 2500, "fifo")
+    run.columns["latency"]["round_trip"][7] = 10.0
+    assert verdict(run).status == "within"
+
+
+def test_what_is_absent_is_said_and_what_is_left_is_judged() -> None:
+    run = noisy.run(late_in(0.08, 1.5e-3))
+    report = verdict(run)
+    assert report.status == "over"
+    assert "The recording has no value of wake_lateness, compute_time, command_one_way" in report.warnings[0]
+    assert "late ticks, missed ticks: not judged." in report.warnings[0]
+    with pytest.raises(
+        InputError, match=r"made_up.mcap has no value of what the budget .* limits: round_trip."
+    ):
+        verdict(run, {"round_trip": {"p99": 1e-3}})
+
+
+def test_each_of_several_slaves_is_judged() -> None:
+    run = noisy.clean(1, 2500)
+    run.columns["latency.west"] = run.columns.pop("latency")
+    run.sequences["latency.west"] = run.sequences.pop("latency")
+    assert verdict(run).status == "within"
+    noisy.add(run, "latency.east", noisy.delayed(2, 2500).columns["latency"])
+    report = verdict(run)
+    assert report.status == "over"
+    assert check(report, "east/feedback_one_way p99").verdict == "over"
+    assert check(report, "west/feedback_one_way p99").verdict == "ok"
+    assert {"west/round_trip", "east/round_trip"} <= report.plain()["segments"].keys()
+    assert {"west/late", "east/late"} <= report.plain()["late"].keys()
+
+
+@pytest.mark.parametrize(
+    "run", [noisy.clean(3, 2500), noisy.delayed(3, 2500), noisy.run(flags(1) | late_in(0.1, 1, 1000))]
+)
+def test_a_report_is_strict_json(run: Run) -> None:
+    plain = json.loads(json.dumps(verdict(run).plain(), allow_nan=False))
+    assert plain.keys() == {
+        *(
+            "status",
+            "recording",
+            "budget",
+            "ticks",
+            "segments",
+            "late",
+            "bare_loop",
+            "machine",
+            "checks",
+            "warnings",
+        ),
+    }
+    assert plain["segments"]["feedback_one_way"].keys() == {"p50", "p90", "p99", "p99.9", "max", "n"}
+    assert (plain["bare_loop"] or {}).keys() <= {*QUIET, "late_share"}
+    assert all(item["ok"] == (item["verdict"] == "ok") for item in plain["checks"])
+    assert plain["status"] == ("within" if all(item["ok"] for item in plain["checks"]) else "over")
+
+
+def test_the_table_names_what_is_over_and_the_bare_loop() -> None:
+    text = str(verdict(noisy.delayed(1, 2500)))
+    assert "over the budget: feedback_one_way p99" in text.splitlines()[-1]
+    assert any(line.startswith("bare loop ") for line in text.splitlines())
+    assert "; bare loop: " in text
+
+
+@given(st.floats(0.0, 5e-3), st.floats(0.0, 5e-3), st.sampled_from(["p50", "p90", "p99"]))
+def test_a_steady_delay_is_never_put_down_to_the_machine(value: float, limit: float, name: str) -> None:
+    run = noisy.run({"feedback_one_way": np.full(1000, value)}, record())
+    report = verdict(run, {"feedback_one_way": {name: limit}})
+    assert report.status == ("within" if value <= limit + min(2 * QUIET[name], 0.3e-3) + 1e-9 else "over")
+
+
+@given(st.integers(0, 40), st.floats(1e-4, 3e-3))
+def test_a_longer_tail_is_never_easier(late: int, value: float) -> None:
+    order = ["within", "not_judged", "over"]
+    shares = [late / 1000.0, (late + 1) / 1000.0]
+    ranks = [order.index(verdict(noisy.run(late_in(share, value), NOISE), TAIL).status) for share in shares]
+    assert ranks == sorted(ranks)

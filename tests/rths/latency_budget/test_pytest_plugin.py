@@ -1,0 +1,92 @@
+"""The plug-in in a child pytest, as a user's own test run has it."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from common import signals
+from common.recording.writer import Recording
+from tests.helpers import ROOT
+
+ROWS = (signals.SEQ, signals.Signal("feedback_one_way", "s", "feedback"))
+CASE = """
+def test_latency(latency_budget):
+    report = latency_budget("run.mcap")
+    assert report.status == "within"
+    assert report.exit_code == 0
+"""
+
+
+def recording(path: Path, latency: float, stolen: str) -> None:
+    written = Recording(path, "trial", 1, {"latency": ROWS})
+    for seq in range(600):
+        written.add("latency", seq, seq, (seq, latency))
+    written.metadata("real_time", {"master.stolen_share": stolen})
+    written.close({})
+
+
+def child(folder: Path, *words: str, case: str = CASE) -> tuple[int, str]:
+    (folder / "test_case.py").write_text(case)
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-p",
+        "rths.pytest_plugin",
+        "-rs",
+        "-W",
+        "error",
+        *words,
+        "test_case.py",
+    ]
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
+    return done.returncode, done.stdout + done.stderr
+
+
+def test_within_passes(tmp_path: Path) -> None:
+    recording(tmp_path / "run.mcap", 1e-4, "0.0")
+    code, out = child(tmp_path)
+    assert code == 0, out
+    assert "1 passed" in out
+
+
+def test_over_fails_with_the_table(tmp_path: Path) -> None:
+    recording(tmp_path / "run.mcap", 1.2e-3, "0.0")
+    code, out = child(tmp_path)
+    assert code == 1
+    assert "1 failed" in out
+    assert "feedback_one_way p99  1200 µs" in out
+    assert "over the budget: feedback_one_way p50, feedback_one_way p99" in out
+    assert "Traceback" not in out
+
+
+def test_not_judged_skips_with_the_figures(tmp_path: Path) -> None:
+    recording(tmp_path / "run.mcap", 1.2e-3, "0.2")
+    code, out = child(tmp_path)
+    assert code == 0, out
+    assert "1 skipped" in out
+    assert "The host took 20.0% of the processors' time of the master" in out
+    assert "feedback_one_way p99  1200 µs" in out
+
+
+@pytest.mark.parametrize("words", [["--latency-budget", "own.toml"], []])
+def test_a_budget_comes_from_the_option_or_from_the_call(tmp_path: Path, words: list[str]) -> None:
+    recording(tmp_path / "run.mcap", 1.2e-3, "0.0")
+    (tmp_path / "own.toml").write_text("[feedback_one_way]\np99 = 2e-3\n")
+    call = 'latency_budget("run.mcap")' if words else 'latency_budget("run.mcap", budget="own.toml")'
+    code, out = child(tmp_path, *words, case=f"def test_latency(latency_budget):\n    {call}\n")
+    assert code == 0, out
+
+
+def test_a_mistake_is_one_sentence(tmp_path: Path) -> None:
+    code, out = child(tmp_path)
+    assert code == 1
+    assert "Cannot read the recording run.mcap: No such file or directory." in out
+    assert "Error" not in out.replace("FAILED", "")
+    assert "pytest_plugin.py" not in out
