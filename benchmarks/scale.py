@@ -18,7 +18,7 @@ import numpy as np
 
 from benchmarks.result import Figure
 from common import reality
-from common.plan import Plan, Recording, ideal
+from common.plan import Plan, Recording, SlaveLaboratory, ideal
 from models import substructure
 from models.closed_loop import simulate
 from models.registry import Array
@@ -29,6 +29,7 @@ REPEATS = 5
 TICKS = 4_000  # of a test through the loop objects
 COMPILED_TICKS = 10_000  # of a compiled one, so that building its arrays counts little
 STOREYS = (1, 2, 5, 10, 20, 50, 100)
+LABORATORIES = (1, 2, 4, 8)
 RATES_HZ = (500, 1_000, 2_000, 4_000, 8_000)
 PERIOD = 0.1  # s per storey: the usual rule for a frame's first period
 DAMPING_RATIO = 0.05  # of the first mode
@@ -42,8 +43,8 @@ class Point(NamedTuple):
 
     value: float  # of what is varied
     interval: float  # s
-    compiled: float
-    compiled_median: float
+    compiled: float | None
+    compiled_median: float | None
     objects: float
     objects_median: float
     finite: bool
@@ -53,14 +54,16 @@ class Point(NamedTuple):
         """How many times faster than real time the loop objects are, median."""
         return self.interval * 1e6 / self.objects_median
 
-    def plain(self, name: str) -> dict[str, float]:
+    def plain(self, name: str) -> dict[str, float | None]:
         """The same for JSON and the table of points, the value under its `name`; times in µs."""
         return {
             name: self.value,
             "interval": self.interval * 1e6,
             "compiled": self.compiled,
             "compiled_median": self.compiled_median,
-            "compiled_real_time_factor": self.interval * 1e6 / self.compiled_median,
+            "compiled_real_time_factor": self.interval * 1e6 / self.compiled_median
+            if self.compiled_median
+            else None,
             "loops": self.objects,
             "loops_median": self.objects_median,
             "real_time_factor": self.real_time,
@@ -108,6 +111,17 @@ def at_rate(hertz: int) -> Plan:
     return short(replace(plan, test=replace(plan.test, interval=1.0 / hertz), ground_motion=motion))
 
 
+def laboratories(count: int) -> Plan:
+    """The default test with its damper split among so many laboratories, each of a part of its force."""
+    plan = Plan()
+    share = 1.0 / count
+    damper = replace(plan.damper, force_scale=share * plan.damper.force_scale)
+    control = replace(plan.control, gain=share * plan.control.gain)
+    slave = SlaveLaboratory(plan.table, damper, control, plan.slave.rig)
+    slaves = {f"part_{place}": slave for place in range(count)} if count > 1 else {}
+    return short(replace(plan, slaves=slaves))
+
+
 def short(plan: Plan) -> Plan:
     """The plan over so many ticks, without a recorder."""
     return replace(plan.with_ticks(TICKS), recording=Recording(required=False))
@@ -121,6 +135,7 @@ def first_frequency(storeys: int) -> float:
 CURVES = (
     Curve("storeys", "storeys", STOREYS, uniform),
     Curve("tick_rate", "Hz", RATES_HZ, at_rate),
+    Curve("laboratories", "slaves", LABORATORIES, laboratories),
 )
 
 
@@ -161,16 +176,17 @@ def point(value: int, plan: Plan, repeats: int = REPEATS) -> Point:
     """Cost of a tick of one plan."""
     longer = plan.with_ticks(COMPILED_TICKS)
     ground = substructure.ground_rows(longer, substructure.motion(plan))
-    fast = costs(lambda: compiled(longer, ground), repeats)
+    # the compiled rollout knows one slave
+    fast = [] if plan.slaves else costs(lambda: compiled(longer, ground), repeats)
     slow = costs(lambda: objects(plan), repeats)
     return Point(
         value,
         plan.test.interval,
-        min(fast),
-        statistics.median(fast),
+        min(fast, default=None),
+        statistics.median(fast) if fast else None,
         min(slow),
         statistics.median(slow),
-        simulate(longer, ground).finite,
+        not fast or simulate(longer, ground).finite,
     )
 
 
@@ -231,7 +247,7 @@ def figures(curve: Curve, points: list[Point]) -> list[Figure]:
             last.compiled,
             last.compiled_median,
             peer="real time",
-            ratio=limit / last.compiled_median,
+            ratio=limit / last.compiled_median if last.compiled_median else None,
         ),
     ]
 

@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping
 from types import FrameType
 from typing import Protocol
 
+from common.endpoint import Received
 from common.laboratory import Laboratory
-from common.messages import Message
 from common.realtime import freeze
 from common.surroundings import Surroundings
 
@@ -23,7 +23,7 @@ class Loop(Protocol):
     lab: Laboratory
     ticks: int
 
-    def take(self, message: Message, received_ns: int, role: str) -> None:
+    def take(self, received: Received) -> None:
         """Act on a message of a role."""
 
     def poll(self) -> None:
@@ -116,7 +116,7 @@ def fetch(loop: Loop, deadline: int) -> bool:
     received = loop.lab.endpoint.receive(max(deadline - loop.lab.clock.now(), 0) * 1e-9)
     if received is None:
         return False
-    loop.take(received.message, received.received_ns, received.role)
+    loop.take(received)
     return True
 
 

@@ -18,9 +18,9 @@ class Received(NamedTuple):
     """A valid message, from whom, when its frame arrived and when it was decoded (own clock, ns)."""
 
     message: Message
-    role: str
-    received_ns: int
-    decoded_ns: int
+    role: str = ""
+    received_ns: int = 0
+    decoded_ns: int = 0
 
 
 class Endpoint(Protocol):

@@ -101,7 +101,7 @@ LATENCY = (
     Signal("deadline_missed", "", "the tick's work or its answer came too late for the next tick", Kind.FLAG),
     Signal("encode_time", "s", "from the command's values to its frame handed to the link"),
     Signal("slave_compute_time", "s", "of the slave's time, from the start of its tick on"),
-    Signal("decode_time", "s", "from the feedback's arrival in the process to its values in the loop"),
+    Signal("decode_time", "s", "from the feedback's arrival to its values, decoded and checked"),
     Signal(
         "age_at_use", "s", "age of the feedback that the tick used, from its measurement to the tick's start"
     ),

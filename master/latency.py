@@ -35,7 +35,7 @@ class Row:
     missed: bool = False
     feedback: Feedback | None = None
     received_ns: int = 0
-    taken_ns: int = 0  # the feedback's values are in the loop
+    decoded_ns: int = 0  # the feedback's values are in the loop
     extra: float = 0.0  # s, of a link plug-in on the feedback
 
 
@@ -61,7 +61,7 @@ class Account:
         if sent_ns:
             self._on_the_way.append((tick, sent_ns))
 
-    def answer(self, feedback: Feedback, received_ns: int, taken_ns: int, extra: float | None) -> None:
+    def answer(self, feedback: Feedback, received_ns: int, decoded_ns: int, extra: float | None) -> None:
         """A feedback came, delayed by a link plug-in where `extra` (s) is positive, lost by it where None."""
         self._compare_clocks(feedback, received_ns)
         self._named = max(self._named, feedback.command_seq)
@@ -70,7 +70,7 @@ class Account:
             return
         row.feedback, row.extra = feedback, extra
         row.received_ns = received_ns + round(extra * 1e9)
-        row.taken_ns = taken_ns + round(extra * 1e9)
+        row.decoded_ns = decoded_ns + round(extra * 1e9)
         self.round_trip = (row.received_ns - row.sent_ns) * 1e-9
 
     def _compare_clocks(self, feedback: Feedback, received_ns: int) -> None:
@@ -172,6 +172,6 @@ def segments(row: Row, offset: int) -> Segments:
         slave_compute_time=(sent - started) * 1e-9,
         feedback_one_way=(back - sent + offset) * 1e-9,
         round_trip=(back - row.sent_ns) * 1e-9,
-        decode_time=(row.taken_ns - back) * 1e-9,
+        decode_time=(row.decoded_ns - back) * 1e-9,
         stamps=stamps,
     )

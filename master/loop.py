@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from common.endpoint import Received
 from common.errors import InputError, InterlockError, LostError, RigError
 from common.exchange import Event, State
 from common.laboratory import REPEAT_NS, Laboratory, Setting
@@ -29,7 +30,7 @@ from common.messages import (
 )
 from common.plan import PROTOCOL_VERSION
 from common.rig import ColumnCommand, GuardedRig
-from common.roles import MASTER, SLAVE
+from common.roles import MASTER
 from master.limits import MasterLimits
 from master.partner import Partner
 from master.step import MasterStep, Outputs
@@ -69,12 +70,12 @@ class MasterLoop:
 
     # -- messages ---------------------------------------------------------------------------------
 
-    def take(self, message: Message, received_ns: int, role: str = SLAVE) -> None:
-        """Act on one message of a slave, whose role is given, or of the recorder."""
-        lab = self.lab
+    def take(self, received: Received) -> None:
+        """Act on one message of a slave or of the recorder."""
+        lab, message, role = self.lab, received.message, received.role
         if isinstance(message, Feedback):
             if lab.exchange.belongs(message.session) and role in self.partners:
-                self.partners[role].take(message, received_ns)
+                self.partners[role].take(message, received.received_ns, received.decoded_ns)
             return
         lab.listen_to_recorder(message)
         if role not in self.partners:
@@ -82,7 +83,7 @@ class MasterLoop:
         if isinstance(message, Waiting):
             self._one_too_many(self.partners[role], message.instance)
         elif lab.exchange.belongs(message.session):
-            self._take_answer(self.partners[role], message, received_ns)
+            self._take_answer(self.partners[role], message, received.received_ns)
 
     def _take_answer(self, partner: Partner, message: Message, received_ns: int) -> None:
         match message:

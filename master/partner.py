@@ -109,13 +109,13 @@ class Partner:
 
     # -- ticks ------------------------------------------------------------------------------------
 
-    def take(self, feedback: Feedback, received_ns: int) -> None:
+    def take(self, feedback: Feedback, received_ns: int, decoded_ns: int) -> None:
         """Take in a feedback, unless one as new was there before."""
         if feedback.seq <= self._feedback.newest_seen:
             return
         self.heard_ns = received_ns
         extra = self._feedback.put(feedback.seq, feedback)
-        self.account.answer(feedback, received_ns, self._lab.clock.now(), extra)
+        self.account.answer(feedback, received_ns, decoded_ns, extra)
 
     def heard(self, seq: int) -> bool:
         """Whether the feedback of a tick has come, or a later one."""

@@ -121,4 +121,4 @@ def write_latency(summary: dict[str, Any]) -> None:
         ]
         sys.stdout.write("\n")
         table(rows)
-    sys.stdout.write(f"late ticks: {summary['late_ticks']}\n")
+    sys.stdout.write(f"late ticks: {summary['late_ticks']}, missed altogether: {summary['missed_ticks']}\n")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -24,10 +25,14 @@ PATHS = (
 SEGMENTS = (
     "wake_lateness",
     "compute_time",
+    "encode_time",
     "command_one_way",
     "slave_time",
+    "slave_compute_time",
     "feedback_one_way",
+    "decode_time",
     "round_trip",
+    "age_at_use",
 )
 
 
@@ -55,6 +60,7 @@ def summarize(run: Run) -> dict[str, Any]:
         "error_energy": error_energy(run, plan) if plan else None,
         "latency": latencies(run),
         "late_ticks": late_ticks(run),
+        "missed_ticks": missed_ticks(run),
         "events": run.events,
     }
 
@@ -153,11 +159,20 @@ def correlation_delay(wanted: Values, got: Values, interval: float) -> float | N
 
 def late_ticks(run: Run) -> int | None:
     """Ticks in which a deadline was missed in the exchange with any slave, None where latency is not recorded."""
+    return ticks_where(run, lambda columns: columns["deadline_missed"].astype(bool))
+
+
+def missed_ticks(run: Run) -> int | None:
+    """Of the late ticks, those in which no command went out: the master came a whole interval too late."""
+    return ticks_where(run, lambda columns: columns["command_sent_ns"] == 0)
+
+
+def ticks_where(run: Run, condition: Callable[[dict[str, Values]], Values]) -> int | None:
+    """Ticks in which a condition holds in the exchange with any slave, None where latency is not recorded."""
     tables = [columns for topic, columns in run.columns.items() if kind_of(topic) == LATENCY]
     if not any(columns["seq"].size for columns in tables):
         return None
-    late = [columns["seq"][columns["deadline_missed"].astype(bool)] for columns in tables]
-    return int(np.unique(np.concatenate(late)).size)
+    return int(np.unique(np.concatenate([columns["seq"][condition(columns)] for columns in tables])).size)
 
 
 def latencies(run: Run) -> dict[str, Any]:

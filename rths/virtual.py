@@ -141,7 +141,7 @@ def _exchange(bench: Bench, *, poll: bool) -> None:
 def _drain(bench: Bench, role: str, loop: MasterLoop | SlaveLoop) -> None:
     endpoint = bench.endpoints[role]
     while (received := endpoint.receive()) is not None:
-        loop.take(received.message, received.received_ns, received.role)
+        loop.take(received)
 
 
 def _record(bench: Bench) -> None:

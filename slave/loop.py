@@ -6,6 +6,7 @@ in real time, and virtual time calls the same two.
 
 from __future__ import annotations
 
+from common.endpoint import Received
 from common.errors import InputError, InterlockError, LostError, RigError
 from common.exchange import Event, State
 from common.laboratory import REPEAT_NS, Laboratory, Setting
@@ -32,7 +33,7 @@ from common.messages import (
 )
 from common.plan import PROTOCOL_VERSION
 from common.rig import GuardedRig, TableCommand, TableMeasurement
-from common.roles import MASTER, SLAVE, name_of, title
+from common.roles import SLAVE, name_of, title
 from slave.limits import SlaveLimits
 from slave.step import SlaveStep
 
@@ -62,9 +63,9 @@ class SlaveLoop:
 
     # -- messages ---------------------------------------------------------------------------------
 
-    def take(self, message: Message, received_ns: int, role: str = MASTER) -> None:
+    def take(self, received: Received) -> None:
         """Act on one message of the master or the recorder; what it says tells which."""
-        lab = self.lab
+        lab, message, received_ns = self.lab, received.message, received.received_ns
         if isinstance(message, Command):
             if lab.exchange.belongs(message.session):
                 self._take_command(message, received_ns)

@@ -123,7 +123,7 @@ def answer_rths(kind: str, host: str, port: int, ended: Callable[[], bool]) -> N
     while not ended():
         received = endpoint.receive(0.2)
         if received is not None:
-            loop.take(received.message, received.received_ns)
+            loop.take(received)
             if isinstance(received.message, Command):
                 loop.tick(received.message.seq)
     link.close()

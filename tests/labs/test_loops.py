@@ -11,6 +11,7 @@ import pytest
 
 from common import reality
 from common.clock import VirtualClock
+from common.endpoint import Received
 from common.errors import InputError, InterlockError, LostError, RigError, RthsError
 from common.exchange import State
 from common.memory_link import MemoryEndpoint
@@ -233,7 +234,7 @@ def test_another_plan_or_protocol_is_refused_before_anything_moves(short_plan: P
         Register(5, PROTOCOL_VERSION + 1, short_plan.digest()),
     ):
         bench = virtual.assemble(without_recorder(short_plan), reality.as_planned(short_plan), None)
-        bench.slave.take(request, 0)
+        bench.slave.take(Received(request))
         assert bench.slave.lab.exchange.state is State.REFUSED
         assert isinstance(bench.slave.lab.error, InputError)
         heard = bench.endpoints["master"].receive()
@@ -244,11 +245,11 @@ def test_another_plan_or_protocol_is_refused_before_anything_moves(short_plan: P
 def test_a_slave_has_one_master(short_plan: Plan) -> None:
     plan = without_recorder(short_plan)
     bench = virtual.assemble(plan, reality.as_planned(plan), None)
-    bench.slave.take(Register(5, PROTOCOL_VERSION, plan.digest()), 0)
-    bench.slave.take(Register(6, PROTOCOL_VERSION, plan.digest()), 0)
+    bench.slave.take(Received(Register(5, PROTOCOL_VERSION, plan.digest())))
+    bench.slave.take(Received(Register(6, PROTOCOL_VERSION, plan.digest())))
     assert bench.slave.lab.exchange.session == 5
-    bench.slave.take(Command(6, 0, 0, 0, 1.0, 1.0, 0.0, 0.0, 0.0), 0)
-    bench.slave.take(Trip(6, "master", "x", "y"), 0)
+    bench.slave.take(Received(Command(6, 0, 0, 0, 1.0, 1.0, 0.0, 0.0, 0.0)))
+    bench.slave.take(Received(Trip(6, "master", "x", "y")))
     assert not bench.slave.heard(0)
     assert bench.slave.lab.exchange.state is State.REGISTERED
 
@@ -334,14 +335,16 @@ def test_repeated_and_outdated_feedback_is_not_used(bench: Bench) -> None:
     session = bench.master.lab.exchange.session
     used = bench.master.partners["slave"].used
     for seq in (used.seq, used.seq - 5):
-        bench.master.take(Feedback(session, seq, seq, 0, -1, 0, 0, 0, 0.0, 0.0, 0.0, 999.0), 0)
+        bench.master.take(
+            Received(Feedback(session, seq, seq, 0, -1, 0, 0, 0, 0.0, 0.0, 0.0, 999.0), "slave")
+        )
     bench.clock.sleep_until(bench.master.lab.tick_ns(100))
     bench.master.tick(100)
     assert bench.master.partners["slave"].used.damper_force != 999.0
 
 
 def test_feedback_of_another_session_is_not_used(bench: Bench) -> None:
-    bench.master.take(Feedback(12345, 99, 99, 0, -1, 0, 0, 0, 0.0, 0.0, 0.0, 999.0), 0)
+    bench.master.take(Received(Feedback(12345, 99, 99, 0, -1, 0, 0, 0, 0.0, 0.0, 0.0, 999.0), "slave"))
     bench.clock.sleep_until(bench.master.lab.tick_ns(100))
     bench.master.tick(100)
     assert bench.master.partners["slave"].used.damper_force != 999.0

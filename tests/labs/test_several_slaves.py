@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from common import cli, plan, reality
+from common.endpoint import Received
 from common.errors import InputError, InterlockError, LostError
 from common.exchange import State
 from common.laboratory import Setting
@@ -278,8 +279,8 @@ def test_what_another_role_says_counts_for_that_role_alone() -> None:
     session = bench.master.lab.exchange.session
     roof, middle = bench.master.partners.values()
     forged = Feedback(session, 99, 99, 0, -1, 0, 0, 0, 0.0, 0.0, 0.0, 999.0)
-    bench.master.take(forged._replace(seq=100), 0, "slave.roof")
-    bench.master.take(forged._replace(seq=100), 0, "slave.nobody")
+    bench.master.take(Received(forged._replace(seq=100), "slave.roof"))
+    bench.master.take(Received(forged._replace(seq=100), "slave.nobody"))
     bench.clock.sleep_until(bench.master.lab.tick_ns(101))
     bench.master.tick(101)
     assert roof.used.damper_force == 999.0
@@ -301,13 +302,13 @@ def test_the_second_process_of_a_name_is_refused_and_the_test_goes_on(named: boo
     while heard is not None and not isinstance(heard.message, Waiting):
         heard = bench.endpoints["master"].receive()
     assert heard is not None
-    bench.master.take(heard.message, 0, heard.role)
+    bench.master.take(heard)
     told = bench.endpoints[role].receive()
     while told is not None and not isinstance(told.message, Arm):
         told = bench.endpoints[role].receive()
     assert told is not None
-    second.take(told.message, 0)
-    bench.slave.take(told.message, 0)
+    second.take(told)
+    bench.slave.take(told)
     assert second.lab.exchange.state is State.REFUSED
     assert isinstance(second.lab.error, InputError)
     assert "takes part in this test already: stop one of the two" in str(second.lab.error)
@@ -328,7 +329,7 @@ def test_of_two_processes_that_register_the_first_is_armed() -> None:
     )
     request = Register(bench.master.lab.exchange.session, PROTOCOL_VERSION, chosen.digest())
     for slave in (first, second):
-        slave.take(request, 0)
+        slave.take(Received(request))
     while bench.master.lab.exchange.state is not State.REGISTERED:
         bench.clock.time += 1_000_000
         bench.master.poll()
@@ -336,10 +337,10 @@ def test_of_two_processes_that_register_the_first_is_armed() -> None:
     partner = bench.master.partners[role]
     while bench.endpoints["master"].receive() is not None:
         pass
-    second.take(Sync(request.session, 0, 0), 0)
-    second.take(Start(request.session, 1, 1), 0)
+    second.take(Received(Sync(request.session, 0, 0)))
+    second.take(Received(Start(request.session, 1, 1)))
     assert bench.endpoints["master"].receive() is None  # a process that was not armed has nothing to say
-    second.take(Arm(request.session, partner.instance), 0)
+    second.take(Received(Arm(request.session, partner.instance)))
     assert partner.instance == first._instance
     assert second.lab.exchange.state is State.REFUSED
     assert second.lab.exchange.session == 0
