@@ -99,7 +99,7 @@ class ClockOffset:
         """Take in one exchange; stamps in ns."""
         self._newest = t4
         trip = (t4 - t1) - (t3 - t2)
-        if trip < self._shortest:
+        if trip <= self._shortest:  # of equal ones the newest
             self._shortest = trip
             self._keep(t1, t2, t3, t4)
         self._in_block += 1

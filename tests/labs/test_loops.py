@@ -402,10 +402,9 @@ def test_clocks_that_differ_and_drift_apart_do_not_shift_the_laboratories(
     latency = found.columns["latency"]
     assert np.all(latency["deadline_missed"] == 0)
     truth = 1.0 + gain * (latency["tick_ns"] * 1e-9)
-    assert np.allclose(
-        latency["clock_offset"], truth, atol=0.8e-3
-    )  # followed by its window late, about a second
-    assert bench.slave._shift_ns == pytest.approx(gain * 4e9, abs=0.8e6)
+    # so fast a drift leaves the line at the edge of what its bound allows
+    assert np.allclose(latency["clock_offset"], truth, atol=0.15e-3)
+    assert bench.slave._shift_ns == pytest.approx(gain * 4e9, abs=0.15e6)
 
 
 class OneWay:

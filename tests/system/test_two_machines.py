@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -11,39 +10,21 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.cable import ADDRESSES, NoCableError, cable, ip
 from common.recording.reader import read
 from tests.helpers import ROOT
 
-ADDRESS_A, ADDRESS_B = "10.83.0.1", "10.83.0.2"
-
-
-def ip(*words: str) -> None:
-    subprocess.run(["ip", *words], check=True, capture_output=True, text=True)
+ADDRESS_A, ADDRESS_B = ADDRESSES
 
 
 @pytest.fixture
 def machines() -> Iterator[tuple[str, str]]:
     """Two namespaces, `ADDRESS_A` in the first and `ADDRESS_B` in the second."""
-    if shutil.which("ip") is None:
-        pytest.skip("there is no ip command: install iproute2")
-    names = (f"rths-a-{os.getpid()}", f"rths-b-{os.getpid()}")
     try:
-        for name in names:
-            ip("netns", "add", name)
-    except subprocess.CalledProcessError as error:
-        pytest.skip(f"network namespaces are not allowed here: {error.stderr.strip()}")
-    try:
-        cables = (f"rva{os.getpid()}", f"rvb{os.getpid()}")
-        ip("link", "add", cables[0], "type", "veth", "peer", "name", cables[1])
-        for name, cable, address in zip(names, cables, (ADDRESS_A, ADDRESS_B), strict=True):
-            ip("link", "set", cable, "netns", name)
-            ip("-n", name, "addr", "add", f"{address}/24", "dev", cable)
-            ip("-n", name, "link", "set", cable, "up")
-            ip("-n", name, "link", "set", "lo", "up")
-        yield names
-    finally:
-        for name in names:
-            subprocess.run(["ip", "netns", "delete", name], check=False, capture_output=True)
+        with cable() as names:
+            yield names
+    except NoCableError as reason:
+        pytest.skip(str(reason))
 
 
 def start(machine: str, *words: str | Path) -> subprocess.Popen[str]:
