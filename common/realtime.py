@@ -81,9 +81,12 @@ def take(processor: int | None) -> Granted:
         return NOTHING._replace(
             missing=(f"No real-time shape: it is made for Linux, this is {sys.platform}; run on Linux.",)
         )
+    # at ordinary priority what takes tens of ms, for which others at the same priority would have to wait
+    gc.collect()
+    gc.freeze()
+    not_locked = lock_memory()
     priority, no_priority = raise_priority()
     bound, not_bound = (-1, "") if processor is None else bind(processor, priority)
-    not_locked = lock_memory()
     missing = tuple(sentence for sentence in (no_priority, not_bound, not_locked) if sentence)
     return Granted(priority, bound, not not_locked, missing)
 
