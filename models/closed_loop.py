@@ -91,6 +91,7 @@ def simulate(
         *readings.build(plan.test.interval, MEASURED_A, more.sensors),
         *readings.build(plan.test.interval, MEASURED_B, more.sensors),
         *noises(System(plan, more), seed),
+        np.zeros(master.output.size),
         outputs,
         measured_a,
         measured_b,
@@ -174,16 +175,20 @@ def roll(
     sensed_b: Array,
     noise_a: Array,
     noise_b: Array,
+    nothing: Array,
     outputs: Array,
     measured_a: Array,
     measured_b: Array,
     used: Array,
     written: Array,
 ) -> int:
-    """Fill the last five arrays tick by tick; return how many ticks stayed finite."""
+    """Fill the last five arrays tick by tick; return how many ticks stayed finite.
+
+    `nothing` is a row of zeros: what the slave follows before its first command.
+    """
     displacement, force = 0.0, 0.0
     y, y_acceleration, stroke, damper_force, present = 0.0, 0.0, 0.0, 0.0, 0.0
-    nothing, interval = np.zeros(outputs.shape[1]), scalars[substructure.INTERVAL]
+    interval = scalars[substructure.INTERVAL]
     for tick in range(outputs.shape[0]):
         t = tick * interval
         measured_a[tick, 0] = readings.step(sensors_a, sensed_a, 0, displacement, noise_a[tick, 0], t)
