@@ -28,7 +28,7 @@ SWITCH_INTERVAL = (
     1e-4  # s; at Python's 5 ms one busy thread costs the loop more than an interval per hand-over
 )
 PR_SET_TIMERSLACK = 29
-MCL_CURRENT, MCL_FUTURE = 1, 2
+MCL_CURRENT, MCL_FUTURE, MCL_ONFAULT = 1, 2, 4
 MOST_OF_MEMORY = 0.5  # of what is spare; locking more invites the kernel to end the process instead
 
 WHERE_LIMITS = "in /etc/security/limits.d/"
@@ -138,8 +138,10 @@ def bind(processor: int, priority: int) -> tuple[int, str]:
 
 
 def lock_memory() -> str:
-    """Keep all memory of the process, present and future, from being fetched late; a sentence why not, else empty.
+    """Keep what the process has in memory from being fetched late again; a sentence why not, else empty.
 
+    A page is locked as it is first used: to bring all that is mapped into memory, stacks and buffers that nobody
+    needs among it, would take 400 MB a process and half a second.
     Not under a limit: what is locked counts against it, and the first allocation beyond it would fail.
     """
     limit = raised("RLIMIT_MEMLOCK", -1)
@@ -150,13 +152,13 @@ def lock_memory() -> str:
             f"would fail; run as root, or give the user 'memlock unlimited' {WHERE_LIMITS}, or --cap-add "
             "IPC_LOCK in a container."
         )
-    needed, spare = mapped(), spare_memory()
+    needed, spare = resident(), spare_memory()
     if spare is not None and needed > MOST_OF_MEMORY * spare:
         return (
-            f"Memory is not locked: the process maps {needed >> 20} MiB and {spare >> 20} MiB are spare; "
+            f"Memory is not locked: the process holds {needed >> 20} MiB and {spare >> 20} MiB are spare; "
             "give the machine or its container more memory."
         )
-    if libc.mlockall(MCL_CURRENT | MCL_FUTURE) != 0:
+    if libc.mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) != 0:
         return f"Memory is not locked: {os.strerror(ctypes.get_errno())}; run as root, or free memory."
     return ""
 
@@ -203,10 +205,10 @@ def exempt(libc: ctypes.CDLL) -> bool:
     return may
 
 
-def mapped() -> int:
-    """Bytes that the process maps, all of which locking brings into memory; 0 where unknown."""
+def resident() -> int:
+    """Bytes of the process that are in memory and would be locked; 0 where unknown."""
     pages = first_line(Path("/proc/self/statm")).split()
-    return int(pages[0]) * os.sysconf("SC_PAGE_SIZE") if pages else 0
+    return int(pages[1]) * os.sysconf("SC_PAGE_SIZE") if pages else 0
 
 
 def tighten_timers() -> None:

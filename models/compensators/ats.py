@@ -28,7 +28,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy import signal
 
 from common.errors import InputError
 from common.schema import Rule
@@ -98,6 +97,8 @@ def pack(params: Array, interval: float) -> Array:
             f"lead of compensator 'ats' is {params[LEAD]:g}, but must be at most a1_most = {params[A1_MOST]:g}."
         )
     length = max(round(float(params[WINDOW]) / interval), 4)
+    from scipy import signal  # half a second and 50 MB that only this compensator needs
+
     sections = signal.butter(ORDER, float(params[CUTOFF]), fs=1.0 / interval, output="sos")
     rest = signal.sosfilt_zi(sections)
     return np.concatenate([params, [float(length)], sections[:, [0, 1, 2, 4, 5]].ravel(), rest.ravel()])

@@ -171,7 +171,7 @@ realtime.spare_memory = lambda: 10_000_000
 realtime.raised = lambda name, wanted: -1
 say(sentence=realtime.lock_memory())
 """)
-    assert found["sentence"].startswith("Memory is not locked: the process maps")
+    assert found["sentence"].startswith("Memory is not locked: the process holds")
     assert "9 MiB are spare" in found["sentence"]
 
 
