@@ -113,10 +113,14 @@ class Laboratory:
         )
 
     def listen_to_recorder(self, message: Message) -> None:
-        """Take note of the recorder's state, and send again what it has missed."""
+        """Take note of the recorder's state, and send again what it has missed.
+
+        Once the test has begun only the recorder of its session counts: another one is nobody's business.
+        """
         if isinstance(message, Recorder):
-            self.recorder = message
-            self.recorder_heard_ns = self.clock.now()
+            if self.exchange.belongs(message.session) or self.exchange.state is State.IDLE:
+                self.recorder = message
+                self.recorder_heard_ns = self.clock.now()
         elif (
             isinstance(message, Resend)
             and message.lab == self.name
@@ -130,10 +134,15 @@ class Laboratory:
         for piece in self.outlet.pieces(everything=everything):
             self.endpoint.send(piece)
 
+    @property
+    def recorded(self) -> bool:
+        """Whether a recorder takes part in the test."""
+        return self.recorder is not None and self.exchange.belongs(self.recorder.session)
+
     def recorder_has_all(self) -> bool:
         """Whether the recorder says that it has this laboratory's whole stream."""
         recorder = self.recorder
-        if recorder is None or not self.exchange.belongs(recorder.session):
+        if recorder is None or not self.recorded:
             return False
         return next_of(recorder.nexts, self.name) >= self.outlet.total
 

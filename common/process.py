@@ -61,10 +61,11 @@ def conduct(
         stopping=stopping,
     )
     try:
-        setting = Setting(plan, FrameEndpoint(link, plan.digest()), MonotonicClock(), cli.reporter(args.json))
+        endpoint = FrameEndpoint(link, plan.digest())
+        setting = Setting(plan, endpoint, MonotonicClock(), cli.reporter(args.json))
         loop = assembly.build_loop(setting, reality)
         loop.lab.heard_ns = setting.clock.now()
-        drive(loop, stopping, Surroundings(loop.lab, granted, timed=role == "master"))
+        drive(loop, stopping, Surroundings(loop.lab, granted, endpoint.rejected, timed=role == "master"))
     finally:
         link.close()
     if loop.lab.error is not None:

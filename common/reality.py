@@ -173,12 +173,21 @@ def true_plan(tables: dict[str, Any], plan: Plan) -> Plan:
     """The plan with the reality's parameters in place of its own; what holds for all slaves before a slave's own."""
     merged = plan.tables()
     for name in TRUE_TABLES:
-        merged[name] |= tables.get(name, {})
+        merged[name] |= table_of(tables, name, name)
     for slave in plan.slaves:
+        own = tables.get("slave", {}).get(slave, {})
         for name in ("table", "damper"):
-            merged["slave"][slave][name] |= tables.get(name, {})
-            merged["slave"][slave][name] |= tables.get("slave", {}).get(slave, {}).get(name, {})
+            merged["slave"][slave][name] |= table_of(tables, name, name)
+            merged["slave"][slave][name] |= table_of(own, name, f"slave.{slave}.{name}")
     return from_tables(merged, plan.base)
+
+
+def table_of(tables: Mapping[str, Any], name: str, where: str) -> dict[str, Any]:
+    """One table of several, empty where it is not given; raises PlanError where it is none."""
+    table = tables.get(name, {})
+    if not isinstance(table, dict):
+        raise PlanError(f"[{where}] must be a table, not {table!r}.")
+    return table
 
 
 def rig(entry: dict[str, Any], lab: str, planned: Rig, plan_base: Path, base: Path) -> Rig:

@@ -61,11 +61,12 @@ class Rig(Protocol):
 class GuardedRig:
     """A rig whose every failure becomes one sentence that names it.
 
-    `measurement` is the NamedTuple that `read` must fill.
+    `measurement` is the NamedTuple that `read` must fill. What a `hidden` rig says of its failure is kept back.
     """
 
-    def __init__(self, rig: Rig, name: str, measurement: Callable[..., Any]) -> None:
+    def __init__(self, rig: Rig, name: str, measurement: Callable[..., Any], *, hidden: bool = False) -> None:
         self._rig = rig
+        self._hidden = hidden
         self._name = name
         self._measurement = measurement
 
@@ -102,10 +103,12 @@ class GuardedRig:
         try:
             self._rig.disarm()
         except Exception as error:  # a plug-in may raise anything; the stop must go on
-            return f"{self._name}: disarm() failed: {error}"
+            return str(self._failure("disarm", error))
         return ""
 
     def _failure(self, what: str, error: Exception) -> RigError:
+        if self._hidden:
+            return RigError(f"{self._name}: {what}() failed: {type(error).__name__}.")
         if isinstance(error, RigError):
             return RigError(f"{self._name}: {error}")
         return RigError(f"{self._name}: {what}() failed: {type(error).__name__}: {error}")

@@ -16,11 +16,17 @@ CODES = ("real_time", "machine", "bare_loop")
 
 
 class Surroundings:
-    """Watches from the first tick to the last; `timed` where a bare timing loop runs beside the test."""
+    """Watches from the first tick to the last; `timed` where a bare timing loop runs beside the test.
 
-    def __init__(self, lab: Laboratory, granted: Granted, *, timed: bool) -> None:
+    `rejected` are the frames that were none, counted by reason as they come.
+    """
+
+    def __init__(
+        self, lab: Laboratory, granted: Granted, rejected: Mapping[str, int], *, timed: bool
+    ) -> None:
         self._lab = lab
         self._granted = granted
+        self._rejected = rejected
         self._timed = timed
         self._bare = BareLoop()
         self._watch: Watch | None = None
@@ -39,6 +45,9 @@ class Surroundings:
             return
         text = ", ".join(f"{name} {value}" for name, value in facts().items())
         self._lab.note("machine", text, tick=tick, values=self._watch.values())
+        if self._rejected:
+            counts = ", ".join(f"{count} by {reason}" for reason, count in sorted(self._rejected.items()))
+            self._lab.note("rejected", f"Frames were rejected: {counts}.", level="warning", tick=tick)
         if self._timed and (found := self._bare.stop()):
             text = (
                 f"bare timing loop beside the test: {found['late']:.0f} late, p99 {found['p99'] * 1e6:.0f} µs"

@@ -38,7 +38,8 @@ def build_rig(reality: Reality) -> GuardedRig:
         return GuardedRig(ColumnLab(**arguments), "laboratory A", ColumnMeasurement)
     kind = find(rig.class_, reality.base, "[master.rig]")
     name = "laboratory A" if "master" in reality.hidden else f"laboratory A ({kind.__name__})"
-    return GuardedRig(construct(kind, arguments | rig.options, "[master.rig]"), name, ColumnMeasurement)
+    built = construct(kind, arguments | rig.options, "[master.rig]")
+    return GuardedRig(built, name, ColumnMeasurement, hidden="master" in reality.hidden)
 
 
 def check(reality: Reality) -> None:

@@ -108,7 +108,7 @@ class Account:
             if not row.used_ns or not (known or everything):
                 return
             del self._rows[row.tick]
-            if self._lab.recorder is not None:
+            if self._lab.recorded:
                 self._record(row, now)
 
     def _record(self, row: Row, now: int) -> None:

@@ -18,6 +18,7 @@ from common.messages import (
     Armed,
     Feedback,
     Message,
+    Recorder,
     Refused,
     Register,
     Registered,
@@ -78,6 +79,8 @@ class MasterLoop:
                 self.partners[role].take(message, received.received_ns, received.decoded_ns)
             return
         lab.listen_to_recorder(message)
+        if isinstance(message, Recorder):
+            self._welcome(message)
         if role not in self.partners:
             return
         if isinstance(message, Waiting):
@@ -98,10 +101,16 @@ class MasterLoop:
             case _:
                 pass
 
+    def _welcome(self, recorder: Recorder) -> None:
+        """A recorder that comes while the test runs without one may record the rest."""
+        lab = self.lab
+        if lab.running and not lab.recorded and recorder.session == 0 and recorder.plan == self._digest:
+            lab.endpoint.send(Register(lab.exchange.session, PROTOCOL_VERSION, self._digest))
+
     def _one_too_many(self, partner: Partner, instance: int) -> None:
         """A process waits to take part: it is told where another one has its place."""
-        begun = self.lab.exchange.state is not State.IDLE and not self.lab.exchange.ended
-        if begun and instance != partner.instance:
+        over = self.lab.exchange.ended or self.lab.exchange.state is State.STOPPING
+        if partner.registered and not over and instance != partner.instance:
             partner.arm()
 
     def _refused(self, partner: Partner, reason: str) -> None:
@@ -195,6 +204,9 @@ class MasterLoop:
                     self._ask(partner, now)
 
     def _nobody(self) -> None:
+        if self.lab.exchange.state is not State.IDLE:
+            self._hesitant()
+            return
         missing = next((partner for partner in self._partners if not partner.registered), None)
         who, option = (missing.title, missing.start_option) if missing else ("recorder", "")
         seconds = self.lab.plan.link.connect_timeout
@@ -202,6 +214,22 @@ class MasterLoop:
             f"No {who} joined the test within {seconds:g} s: start it with the same plan{option} and --connect."
         )
         self.lab.fail(Event.LOSE, error, code="nobody")
+
+    def _hesitant(self) -> None:
+        """All are there, and one does not go on."""
+        arming = self.lab.exchange.state is State.REGISTERED
+        who = next((one for one in self._partners if not (one.armed if arming else one.scheduled)), None)
+        seconds = self.lab.plan.link.connect_timeout
+        what = "arm its rig" if arming else "agree on the start"
+        title = who.title if who else "slave"
+        self.lab.fail(
+            Event.LOSE,
+            LostError(
+                f"The {title} did not {what} within {seconds:g} s: look what its laboratory waits for, "
+                "or raise connect_timeout in [link]."
+            ),
+            code="hesitant",
+        )
 
     def _ask(self, partner: Partner, now: int) -> None:
         match self.lab.exchange.state:
@@ -247,7 +275,7 @@ class MasterLoop:
             self._trip(error, "rig", tick)
             return
         self._send(tick, wake, nothing=bool(held or violation))
-        if lab.recorder is not None:
+        if lab.recorded:
             self._sample(tick, measured, outputs)
         self.ticks = tick + 1
         self._drift = outputs.column_target / lab.plan.column.deformation_ratio
@@ -348,7 +376,7 @@ class MasterLoop:
     def left(self) -> bool:
         """Whether slaves and recorder know and have all."""
         settled = self.lab.exchange.ended
-        return settled and (self.lab.recorder_has_all() or self.lab.recorder is None)
+        return settled and (self.lab.recorder_has_all() or not self.lab.recorded)
 
     @property
     def progress(self) -> dict[str, float]:

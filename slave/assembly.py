@@ -36,7 +36,8 @@ def build_rig(reality: Reality) -> GuardedRig:
         return GuardedRig(TableLab(**arguments), lab, TableMeasurement)
     kind = find(rig.class_, reality.base, where)
     name = lab if reality.role in reality.hidden else f"{lab} ({kind.__name__})"
-    return GuardedRig(construct(kind, arguments | rig.options, where), name, TableMeasurement)
+    built = construct(kind, arguments | rig.options, where)
+    return GuardedRig(built, name, TableMeasurement, hidden=reality.role in reality.hidden)
 
 
 def check(reality: Reality) -> None:

@@ -239,7 +239,7 @@ class SlaveLoop:
                 *measured,
             )
         )
-        if lab.recorder is not None:
+        if lab.recorded:
             self._sample(tick, measured, wanted, sent_ns)
 
     def _told(self, seq: int, now: int) -> int:
@@ -304,7 +304,7 @@ class SlaveLoop:
     def left(self) -> bool:
         """Whether the recorder has all."""
         lab = self.lab
-        nothing = not lab.exchange.session or lab.recorder is None
+        nothing = not lab.exchange.session or not lab.recorded
         return lab.exchange.ended and (nothing or lab.recorder_has_all())
 
     @property

@@ -74,7 +74,7 @@ def test_whatever_a_rig_raises_is_a_sentence_that_names_it() -> None:
     ):
         with pytest.raises(RigError, match=rf"laboratory A \(Fake\): {word}\(\) failed: ZeroDivisionError"):
             call()
-    assert rig.disarm() == "laboratory A (Fake): disarm() failed: division by zero"
+    assert rig.disarm() == "laboratory A (Fake): disarm() failed: ZeroDivisionError: division by zero"
     with pytest.raises(RigError, match=r"laboratory A \(Fake\): the pump is off"):
         guarded(error=RigError("the pump is off")).arm()
 

@@ -43,6 +43,7 @@ class Trial:
         self.master, self.slave, self.delays, self.extra = master, slave, delays, extra
         clock = VirtualClock()
         self.lab = Laboratory("master", Setting(plan, MemoryHub(clock).join("master"), clock))
+        self.lab.enter(1)
         self.lab.recorder = Recorder(1, "recording", "", "", b"")
         self.offset = ClockOffset(length=OFFSET_BLOCK, blocks=OFFSET_BLOCKS)
         self.account = Account(self.lab, self.offset, "latency")
