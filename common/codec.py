@@ -11,15 +11,14 @@ from collections.abc import Callable
 from enum import Enum
 from math import isfinite
 from operator import itemgetter
-from typing import Any, get_args, get_type_hints
+from typing import Any, Protocol, get_args, get_type_hints
 
 import msgpack
 
 from common.messages import Message
 
 CHECK_SIZE = 8
-MOST_COUNT = 2**63
-MOST_TIME = 2**62  # ns, a century and a half
+MOST = 2**62  # of a whole number; in ns a century and a half, either way
 MOST_BYTES = 1_000_000
 
 MESSAGES: tuple[type[Any], ...] = get_args(Message)
@@ -55,19 +54,19 @@ class _Shape:
         hints = get_type_hints(message)
         self.message = message
         self.types = (int, *(hints[name] for name in message._fields))
-        self._times = self._items(message, int, times=True)
-        self._counts = self._items(message, int, times=False)
-        self._floats = self._items(message, float, times=False)
+        self._numbers = self._items(message, int)
+        self._counts = self._items(message, int, but="_ns")
+        self._floats = self._items(message, float)
         self._texts = [place for place, kind in enumerate(self.types) if kind in (str, bytes)]
 
     def _items(
-        self, message: type[Any], kind: type, *, times: bool
+        self, message: type[Any], kind: type, *, but: str = " "
     ) -> Callable[[list[Any]], tuple[Any, ...]]:
-        """What takes the items of a type out of a frame's, times (`…_ns`) or others."""
+        """What takes the items of a type out of a frame's, but for those whose names end so."""
         places = [
             place
             for place, name in enumerate(message._fields, start=1)
-            if self.types[place] is kind and name.endswith("_ns") is times
+            if self.types[place] is kind and not name.endswith(but)
         ]
         first, *_ = places or [0]
         # the getter of a single place gives no tuple; the kind, a small count, is a harmless second
@@ -75,13 +74,8 @@ class _Shape:
 
     def admits(self, items: list[Any]) -> bool:
         """Whether items of the right types have values that a message may have."""
-        counts, times = self._counts(items), self._times(items)
-        if (
-            min(counts) < -1
-            or max(counts) >= MOST_COUNT
-            or min(times) <= -MOST_TIME
-            or max(times) >= MOST_TIME
-        ):
+        numbers = self._numbers(items)
+        if min(self._counts(items)) < -1 or min(numbers) < -MOST or max(numbers) > MOST:
             return False
         if self._texts and any(len(items[place]) > MOST_BYTES for place in self._texts):
             return False
@@ -93,23 +87,39 @@ PACKER = msgpack.Packer()  # `msgpack.packb` allocates and frees a buffer of a m
 SHAPES = tuple(_Shape(message) for message in MESSAGES)
 
 
-def session_key(session: int, plan_digest: str) -> bytes:
+class Key(Protocol):
+    """A keyed hash that has taken nothing in yet."""
+
+    def copy(self) -> Key:
+        """Another one like it."""
+
+    def update(self, data: bytes, /) -> None:
+        """Take in some bytes."""
+
+    def digest(self) -> bytes:
+        """The check of what was taken in."""
+
+
+def session_key(session: int, plan_digest: str) -> Key:
     """Key of the check within a session; before one is agreed, session 0 gives a key that all share."""
     text = f"{session}:{plan_digest}" if session else "unregistered"
-    return hashlib.blake2b(text.encode(), digest_size=32).digest()
+    secret = hashlib.blake2b(text.encode(), digest_size=32).digest()
+    return hashlib.blake2b(digest_size=CHECK_SIZE, key=secret)
 
 
-def _check(key: bytes, payload: bytes) -> bytes:
-    return hashlib.blake2b(payload, digest_size=CHECK_SIZE, key=key).digest()
+def _check(key: Key, payload: bytes) -> bytes:
+    keyed = key.copy()
+    keyed.update(payload)
+    return keyed.digest()
 
 
-def encode(message: Message, key: bytes) -> bytes:
+def encode(message: Message, key: Key) -> bytes:
     """The frame of a message."""
     payload: bytes = PACKER.pack((KINDS[type(message)], *message))
     return payload + _check(key, payload)
 
 
-def decode(frame: bytes, key: bytes) -> Message:
+def decode(frame: bytes, key: Key) -> Message:
     """The message of a frame; raises RejectedFrame with the reason where it is none."""
     payload = frame[:-CHECK_SIZE]
     if _check(key, payload) != frame[-CHECK_SIZE:] or not payload:

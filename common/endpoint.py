@@ -47,7 +47,7 @@ class FrameEndpoint:
 
     def __init__(self, transport: Transport, plan_digest: str) -> None:
         self._transport = transport
-        self._clock = MonotonicClock()
+        self._now = MonotonicClock().now
         self._digest = plan_digest
         self._open_key = codec.session_key(0, plan_digest)
         self._key = self._open_key
@@ -64,7 +64,7 @@ class FrameEndpoint:
         channel = CHANNELS.get(type(message), CONTROL)
         key = self._key if channel != CONTROL else self._open_key
         frame = codec.encode(message, key)
-        encoded_ns = self._clock.now()
+        encoded_ns = self._now()
         self._transport.send(channel, frame, to)
         return encoded_ns
 
@@ -80,7 +80,7 @@ class FrameEndpoint:
         except codec.RejectedFrame as rejection:
             self.rejected[rejection.reason.value] += 1
             return
-        self._inbox.put(Received(message, packet.role, packet.received_ns, self._clock.now()))
+        self._inbox.put(Received(message, packet.role, packet.received_ns, self._now()))
 
     def close(self) -> None:
         """Leave the link."""

@@ -61,10 +61,20 @@ def prepare(mode: str, processor: int | None) -> Granted:
     'off' takes only what costs no privilege and changes no scheduling. `processor` None leaves the process free.
 
     Raises:
-        InputError: the mode is 'on' and something could not be had, or there is no such mode.
+        InputError: there is no such mode, the processor is none that this process may use or is given with 'off',
+            or the mode is 'on' and something could not be had.
     """
     if mode not in MODES:
         raise InputError(f"There is no real-time mode '{mode}': choose one of {', '.join(MODES)}.")
+    if processor is not None and mode == "off":
+        raise InputError("--processor needs --rt auto or on: with off the process is bound to none.")
+    if processor is not None and sys.platform == "linux":
+        allowed = os.sched_getaffinity(0)
+        if processor not in allowed:
+            raise InputError(
+                f"There is no processor {processor} for this process: it may use {listed(allowed)} only; "
+                "choose one of these, or widen its set (taskset, docker --cpuset-cpus)."
+            )
     tighten_timers()
     hand_over_quickly()
     if mode == "off":

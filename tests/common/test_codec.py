@@ -40,7 +40,7 @@ REST = (0.0, 0.0, 0.0)  # the rates of the target
 COMMAND = Command(7, 3, 10, 0, 0.001, 12.5, 0.02, 0.3, 4.0)
 
 
-def framed(content: object, key: bytes = KEY) -> bytes:
+def framed(content: object, key: codec.Key = KEY) -> bytes:
     payload: bytes = msgpack.packb(content)
     return payload + codec._check(key, payload)
 
