@@ -91,7 +91,11 @@ SLAVE = (
 LATENCY = (
     SEQ,
     Signal("wake_lateness", "s", "start of the tick after its nominal time"),
-    Signal("compute_time", "s", "from the start of the tick's work to the command's values"),
+    Signal(
+        "compute_time",
+        "s",
+        "from the start of the tick's work to the command's values, its turn among several slaves",
+    ),
     Signal("command_one_way", "s", "command from the master to the slave"),
     Signal("slave_time", "s", "from the command's arrival to the feedback sent"),
     Signal("feedback_one_way", "s", "feedback from the slave to the master, its encoding included"),

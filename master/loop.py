@@ -291,9 +291,8 @@ class MasterLoop:
 
     def _send(self, tick: int, wake_ns: int, *, nothing: bool) -> None:
         """Send each slave the tick's command, unless `nothing` goes out, and open its account."""
-        ready = 0 if nothing else self.lab.clock.now()
         for partner in self._partners:
-            self._sent_ns = 0 if nothing else partner.send(tick)
+            ready, self._sent_ns = (0, 0) if nothing else partner.send(tick)
             partner.account.open(tick, wake_ns, ready, self._sent_ns, partner.used)
 
     def _sample(self, tick: int, measured: tuple[float, float], outputs: Outputs) -> None:

@@ -128,12 +128,13 @@ class Partner:
         self.account.close(tick - 1, now)
         return self.used.damper_force
 
-    def send(self, tick: int) -> int:
-        """Send the command that is `sent`; when its frame was handed to the link, ns."""
+    def send(self, tick: int) -> tuple[int, int]:
+        """Send the command that is `sent`; when its turn came, and when its frame was handed to the link, ns."""
         lab = self._lab
         now = lab.clock.now()
         shift = self._offset.at(now) - self._first_offset
-        return lab.endpoint.send(Command(lab.exchange.session, tick, now, shift, *self.sent), self._address)
+        command = Command(lab.exchange.session, tick, now, shift, *self.sent)
+        return now, lab.endpoint.send(command, self._address)
 
     def use(self, tick: int) -> tuple[float, int, float]:
         """Of the feedback in use at a tick: damper force (N), its tick, its age (s)."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from common.recording.reader import Run
 
 FORMATS = ("png", "svg", "pdf")
+LEGEND_ROWS = 4  # as many stand beside one of six axes
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -68,7 +69,7 @@ def picture(recording: Run, role: str, draw: Callable[[Run, Any], bool], path: P
     canvas = figure()
     if not draw(recording.of(role), canvas):
         return False
-    canvas.suptitle(caption(recording, role), fontsize=8, x=0.01, ha="left")
+    canvas.suptitle(caption(recording, role), fontsize=8, x=0.01, ha="left", wrap=True)
     try:
         canvas.savefig(path)
     except OSError as error:
@@ -77,10 +78,11 @@ def picture(recording: Run, role: str, draw: Callable[[Run, Any], bool], path: P
 
 
 def caption(recording: Run, role: str) -> str:
-    """What was tested, which slave is shown where it has a name, under which motion."""
+    """What was tested, which slave is shown where it has a name; under it, under which motion."""
     motion = recording.metadata.get("ground_motion", {})
     test = f"{recording.test}, {title(role)}" if name_of(role) else recording.test
-    return f"{test}: {motion['record']}, × {motion['scale']}" if motion else test
+    lines = [test, f"{motion['record']}, × {motion['scale']}"] if motion else [test]
+    return "\n".join(lines)
 
 
 def histories(recording: Run, canvas: Any) -> bool:
@@ -98,10 +100,39 @@ def histories(recording: Run, canvas: Any) -> bool:
         return False
     axes = canvas.subplots(len(present), 1, sharex=True, squeeze=False)[:, 0]
     for axis, (name, factor, label) in zip(axes, present, strict=True):
-        axis.plot(time_of(recording, name), factor * values(recording, name), linewidth=0.7)
+        lines = axis.plot(time_of(recording, name), factor * values(recording, name), linewidth=0.7)
         axis.set_ylabel(label)
+        if len(lines) > 1:
+            number_floors(axis, lines)
     axes[-1].set_xlabel("time, s")
     return True
+
+
+def number_floors(axis: Any, lines: Sequence[Any]) -> None:
+    """A colour and a number for each floor's line, the lowest in front, and their legend beside the axis."""
+    import matplotlib as mpl
+
+    from rths.figure import COLOURS
+
+    count = len(lines)
+    many = mpl.colormaps["viridis"].resampled(count)
+    for place, line in enumerate(lines):
+        line.set(zorder=3.0 - place / count)  # the upper floors move more and would cover it
+        if count > len(COLOURS):
+            line.set(color=many(place))
+    axis.legend(
+        lines,
+        range(1, count + 1),
+        title="floor",
+        loc="center left",
+        bbox_to_anchor=(1.0, 0.5),
+        fontsize=7,
+        title_fontsize=7,
+        labelspacing=0.2,
+        handlelength=1.2,
+        columnspacing=0.8,
+        ncols=-(-count // LEGEND_ROWS),
+    )
 
 
 def values(recording: Run, name: str) -> Any:
@@ -159,7 +190,7 @@ def tracking(recording: Run, canvas: Any) -> bool:
         axes[0, place].plot(t[window], wanted[window], label="target")
         axes[0, place].plot(t[window], got[window], "--", label="measured")
         axes[0, place].set_ylabel(label)
-        axes[0, place].legend(loc="upper right")
+        axes[0, place].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
         axes[1, place].plot(t[window], (got - wanted)[window])
         axes[1, place].set_ylabel("measured − target, mm")
         axes[1, place].set_xlabel("time, s")
@@ -170,6 +201,7 @@ def latency(recording: Run, canvas: Any) -> bool:
     """Where the time of a tick goes: distribution of every segment, and the round trip over the test."""
     import numpy as np
 
+    from rths.figure import COLOURS
     from rths.summary import SEGMENTS
 
     columns = recording.columns.get("latency", {})
@@ -178,11 +210,13 @@ def latency(recording: Run, canvas: Any) -> bool:
     if "round_trip" not in measured:  # virtual time, or nothing came back
         return False
     upper, lower = canvas.subplots(2, 1)
-    for name, column in measured.items():
+    for place, (name, column) in enumerate(measured.items()):
         ordered = np.sort(np.maximum(column, 1.0))
-        upper.plot(ordered, 1.0 - np.arange(ordered.size) / ordered.size, label=name.replace("_", " "))
+        above = 1.0 - np.arange(ordered.size) / ordered.size
+        style = "-" if place < len(COLOURS) else "--"  # from there on colours come again
+        upper.plot(ordered, above, style, label=name.replace("_", " "))
     upper.set(xscale="log", yscale="log", xlabel="time, µs", ylabel="share of ticks above")
-    upper.legend(loc="lower left")
+    upper.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     seq = columns["seq"][np.isfinite(columns["round_trip"])]
     lower.plot(seq, measured["round_trip"], ".", markersize=1)
     lower.set(yscale="log", xlabel="tick", ylabel="round trip, µs")

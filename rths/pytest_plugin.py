@@ -49,10 +49,13 @@ def expect(recording: str | Path, budget: str | Path | None) -> Report:
     from common.errors import RthsError
     from rths.latency_budget import assess
 
+    report, mistake = None, ""
     try:
         report = assess(recording, budget)
     except RthsError as error:
-        pytest.fail(str(error), pytrace=False)
+        mistake = str(error)
+    if report is None:  # failed here, not in the handler: there pytest shows the error beside its own
+        pytest.fail(mistake, pytrace=False)
     if report.status == "over":
         pytest.fail(str(report), pytrace=False)
     if report.status == "not_judged":

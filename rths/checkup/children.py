@@ -50,7 +50,8 @@ def exchange(interval_ns: int, until_ns: int, mode: str) -> tuple[dict[str, Any]
 
     endpoint = listenable()
     words = [endpoint, "--rt", mode, "--interval-ns", str(interval_ns), "--until-ns", str(until_ns)]
-    places = [[] if place is None else ["--processor", str(place)] for place in realtime.assign(2)]
+    processors = [None, None] if mode == "off" else realtime.assign(2)
+    places = [[] if processor is None else ["--processor", str(processor)] for processor in processors]
     with (
         child("master", *words, *places[0]) as master,
         child("slave", *words, *places[1]),

@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import InputError
-from common.recording.reader import Run
+from common.recording.reader import Run, Values
+from common.roles import MASTER, latency_topic, name_of
 from rths.latency_budget.limits import PERCENTILES, WAITS
 
 Numbers = NDArray[np.float64]
-TOPIC = "latency"
 RECORD = "real_time"
 BARE = "bare_loop"
+FLUSH_NS = 1_000_000_000  # what a recording that is cut off may lack at its end
 LEAST = 1e-9  # s: percentiles of zero have no logarithm
 
 
@@ -72,15 +73,24 @@ class Bare:
 
 @dataclass(frozen=True)
 class Exchange:
-    """The ticks of the master with one slave; `name` is empty where there is only one."""
+    """The ticks of the master with one slave; `name` is empty where there is only one.
+
+    A tick without a row of latency counts as late, for nothing shows that it had an answer.
+    """
 
     name: str
     ticks: int
+    unrecorded: int  # of these, ticks without a row
     segments: dict[
         str, Numbers
     ]  # s, per tick in order, NaN where it was not measured; only those measured at all
     late: NDArray[np.bool_] | None  # per tick, in order
-    missed: NDArray[np.bool_] | None
+    missed: NDArray[np.bool_] | None  # per row, in order
+
+    @property
+    def silent(self) -> bool:
+        """Whether the recording has no row at all."""
+        return self.unrecorded == self.ticks
 
     def calm(self, interval: float) -> NDArray[np.bool_]:
         """Ticks at whose start and at the end of which the master woke within an interval (s); all where unknown."""
@@ -112,12 +122,13 @@ def figures(run: Run) -> Figures:
     Raises:
         InputError: it has no latency of any tick.
     """
-    topics = [name for name in run.columns if name == TOPIC or name.startswith(f"{TOPIC}.")]
-    exchanges = [exchange(run, topic) for topic in topics if run.has(topic)]
-    if not exchanges:
+    topics = [latency_topic(role) for role in run.roles]
+    if not any(run.has(topic) for topic in topics):
         raise InputError(
             f"{run.path} holds no latency of any tick: give one of a whole test, as rths run makes it."
         )
+    ticks = np.unique(np.concatenate([numbers(run, topic) for topic in (MASTER, *topics)]))
+    exchanges = [exchange(run, topic, expected(run, topic, ticks)) for topic in topics]
     record = run.metadata.get(RECORD) or from_events(run)
     stolen = {lab: number(record, f"{lab}.stolen_share") for lab in labs(record, "stolen_share")}
     return Figures(
@@ -126,7 +137,7 @@ def figures(run: Run) -> Figures:
         bare_loop(record),
         {lab: share for lab, share in stolen.items() if share is not None},
         {lab: record[f"{lab}.scheduler"] for lab in labs(record, "scheduler")},
-        warnings(run, exchanges),
+        warnings(run, ticks, exchanges),
     )
 
 
@@ -149,16 +160,46 @@ def labs(record: Mapping[str, str], key: str) -> list[str]:
     return sorted(name.removesuffix(f".{key}") for name in record if name.endswith(f".{key}"))
 
 
-def exchange(run: Run, topic: str) -> Exchange:
-    """The latency of one topic, its ticks in order."""
-    columns, order = run.columns[topic], np.argsort(run.sequences[topic], kind="stable")
-    segments = {name: columns[name][order].astype(np.float64) for name in WAITS if name in columns}
+def numbers(run: Run, topic: str) -> Values:
+    """The ticks of which a topic has a row, in the order of the file."""
+    return run.sequences[topic] if run.has(topic) else np.array([], dtype=np.int64)
+
+
+def expected(run: Run, topic: str, ticks: Values) -> Values:
+    """The ticks of which a topic of latency should have a row: all, less what a cut-off recording had not written yet.
+
+    That is the end of it without a row, as far as it lies within the last second of the master's ticks.
+    """
+    if run.finished or not (run.has(MASTER) and run.has(topic)):
+        return ticks
+    times = run.log_ns[MASTER]
+    written = run.sequences[MASTER][times <= times.max() - FLUSH_NS].max(initial=-1)
+    due: Values = ticks[ticks <= max(written, run.sequences[topic].max())]
+    return due
+
+
+def exchange(run: Run, topic: str, ticks: Values) -> Exchange:
+    """The latency of one topic, its rows in order, with those of `ticks` (rising) that it lacks."""
+    columns = run.columns[topic] if run.has(topic) else {}
+    found = numbers(run, topic)
+    absent = np.setdiff1d(ticks, found)
+    order = np.argsort(np.concatenate([found, absent]), kind="stable")
+
+    def per_tick(name: str, otherwise: float) -> Values:
+        values: Values = np.concatenate([columns[name], np.full(absent.size, otherwise)])[order]
+        return values
+
+    segments = {name: per_tick(name, np.nan) for name in WAITS if name in columns}
+    late = per_tick("deadline_missed", True).astype(bool) if "deadline_missed" in columns else None
     return Exchange(
-        name=topic.removeprefix(TOPIC).removeprefix("."),
+        name=name_of(topic),
         ticks=order.size,
+        unrecorded=absent.size,
         segments={name: values for name, values in segments.items() if np.isfinite(values).any()},
-        late=columns["deadline_missed"][order].astype(bool) if "deadline_missed" in columns else None,
-        missed=columns["command_sent_ns"][order] == 0 if "command_sent_ns" in columns else None,
+        late=order >= found.size if late is None and absent.size else late,
+        missed=columns["command_sent_ns"][np.argsort(found, kind="stable")] == 0
+        if "command_sent_ns" in columns
+        else None,
     )
 
 
@@ -187,13 +228,25 @@ def bare_loop(record: Mapping[str, str]) -> Bare | None:
     return Bare(int(known["ticks"]), int(known["late"]), known["interval"], percentiles, known["max"])
 
 
-def warnings(run: Run, exchanges: list[Exchange]) -> list[str]:
-    """What makes the figures less than those of the whole test, a sentence each."""
+def warnings(run: Run, ticks: Values, exchanges: list[Exchange]) -> list[str]:
+    """What makes the figures less than those of the whole test, a sentence each; `ticks` have a row of the master's."""
     found = [] if run.finished else ["The recording was cut off before its end: judged as far as it goes."]
+    planned = number(run.metadata.get("summary", {}), "ticks_expected")
+    end = int(ticks[-1]) + 1
+    if run.finished and planned is not None and end < planned:
+        found.append(
+            f"The recording ends after {end} of {planned:.0f} planned ticks: judged as far as it goes."
+        )
+    if holes := end - ticks.size:
+        found.append(f"{holes} ticks are missing from the recording and are not judged.")
     for item in exchanges:
-        sequence = run.sequences[f"{TOPIC}.{item.name}" if item.name else TOPIC]
-        missing = int(np.ptp(sequence)) + 1 - np.unique(sequence).size
-        if missing:
-            where = f" of {item.name}" if item.name else ""
-            found.append(f"{missing} ticks{where} are missing from the recording and are not judged.")
+        where = f" with {item.name}" if item.name else ""
+        if item.silent:
+            found.append(
+                f"The recording has no latency of any of the {item.ticks} ticks{where}: over any budget."
+            )
+        elif item.unrecorded:
+            found.append(
+                f"{item.unrecorded} of {item.ticks} ticks{where} have no row of latency: they count as late."
+            )
     return found

@@ -1,7 +1,8 @@
 """Figures judged against a budget: its checks, and one status.
 
 A check that is over makes the recording `over`; else one in doubt leaves it `not_judged`; else it is `within`. On an
-unfit machine what it may have caused is in doubt.
+unfit machine what it may have caused is in doubt. A slave without a row of latency is over any budget on any machine:
+its gap is the whole test, and no noise loses every row.
 """
 
 from __future__ import annotations
@@ -75,6 +76,7 @@ def judge(found: Figures, budget: Budget) -> Report:
         )
     if doubts:
         checks = [excused(check, unfit=bool(unfit)) for check in checks]
+    checks += [silence(item) for item in found.exchanges if item.silent]
     verdicts = {check.verdict for check in checks}
     unknown = DOUBT in verdicts or verdicts == {SHORT}
     status = OVER if OVER in verdicts else NOT_JUDGED if unknown else WITHIN
@@ -85,6 +87,12 @@ def excused(check: Check, *, unfit: bool) -> Check:
     """The check on an unsteady machine, where those of messages alone stand, or on an unfit one, where none does."""
     stands = check.verdict != OVER or (check.calm and not unfit)
     return check if stands else replace(check, verdict=DOUBT)
+
+
+def silence(item: Exchange) -> Check:
+    """The check that a slave without a row of latency fails: no tick may be without where all are."""
+    ticks = float(item.ticks)
+    return Check(item.label("ticks without latency"), "ticks", ticks, None, 0.0, 0.0, OVER)
 
 
 def limited(budget: Budget) -> list[str]:
@@ -149,7 +157,7 @@ def counts(item: Exchange) -> dict[str, float | int]:
 def remarks(found: Figures, budget: Budget, checks: list[Check]) -> list[str]:
     """What was not judged, or with less than the budget assumes, a sentence each."""
     said = []
-    if gone := [name for item in found.exchanges for name in absent(item, budget)]:
+    if gone := [name for item in found.exchanges if not item.silent for name in absent(item, budget)]:
         said.append(f"The recording has no value of {', '.join(gone)}: not judged.")
     if short := [check.name for check in checks if check.verdict == SHORT]:
         said.append(f"Too few ticks for {', '.join(short)}: fewer than {LEAST_BEYOND} values lie beyond.")

@@ -106,7 +106,7 @@ say(granted=granted._asdict(), values=granted.values(), locked=int(locked.split(
 def test_off_changes_no_scheduling_and_still_tightens_timers() -> None:
     found = said("""
 before = os.sched_getaffinity(0)
-granted = realtime.prepare("off", min(before))
+granted = realtime.prepare("off", None)
 slack = int(open("/proc/self/timerslack_ns").read())
 say(granted=granted._asdict(), free=os.sched_getaffinity(0) == before, scheduler=scheduler_name(),
     slack=slack, switch=sys.getswitchinterval())
@@ -201,17 +201,28 @@ def test_a_refusal_within_the_limit_points_at_the_control_group(monkeypatch: pyt
     assert "cpu.rt_runtime_us" in sentence
 
 
-@pytest.mark.usefixtures("permitted")
-def test_a_processor_that_is_not_there_is_named_with_those_that_are() -> None:
-    found = said("""
-granted = realtime.prepare("auto", 4095)
-say(granted=granted._asdict())
-""")
-    assert found["granted"]["processor"] == -1
-    assert any(
-        sentence.startswith("Not bound to processor 4095: this process may use processor")
-        for sentence in found["granted"]["missing"]
-    )
+@pytest.mark.parametrize("mode", ["auto", "on"])
+@pytest.mark.parametrize("processor", [4095, -1])
+def test_a_processor_that_is_not_there_is_refused_with_those_that_are(mode: str, processor: int) -> None:
+    done = child(f"sys.exit(cli.guarded(lambda: bool(realtime.prepare({mode!r}, {processor})) and 0))")
+    allowed = ", ".join(map(str, sorted(os.sched_getaffinity(0))))
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"rths: There is no processor {processor} for this process: it may use ")
+    assert f" {allowed} only; choose one of these" in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("processor", [0, 4095, -1])
+def test_a_processor_is_refused_where_it_would_not_be_used(processor: int) -> None:
+    with pytest.raises(InputError, match="--processor needs --rt auto or on"):
+        realtime.prepare("off", processor)
+
+
+def test_a_processor_outside_the_set_of_the_process_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _pid: {1, 3})
+    monkeypatch.setattr(realtime, "take", lambda _processor: pytest.fail("it took something before"))
+    with pytest.raises(InputError, match="There is no processor 2 .*: it may use processors 1, 3 only;"):
+        realtime.prepare("auto", 2)
 
 
 def test_an_unknown_mode_is_refused() -> None:

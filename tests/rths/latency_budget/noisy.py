@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from common.recording.reader import Run
+from common.roles import MASTER, name_of, slave_role
 from rths.latency_budget.limits import PERCENTILES
 
 INTERVAL = 2e-3
@@ -54,16 +55,33 @@ def bare_loop(machine: Machine) -> dict[str, str]:
 
 def run(found: dict[str, Any], record: dict[str, str] | None = None, topic: str = "latency") -> Run:
     """A recording of such latency."""
-    result = Run(Path("made_up.mcap"), finished=True)
+    result = Run(Path("made_up.mcap"), roles=(), finished=True)
     result.metadata = {"real_time": record} if record is not None else {}
     add(result, topic, found)
     return result
 
 
 def add(result: Run, topic: str, found: dict[str, Any]) -> None:
-    """Latency of one more topic."""
+    """Latency of one more topic, of the slave that belongs to it."""
+    result.roles += (slave_role(name_of(topic)),)
     result.columns[topic] = {name: np.asarray(values) for name, values in found.items()}
     result.sequences[topic] = np.arange(len(next(iter(found.values()))))
+
+
+def ticked(result: Run, ticks: int) -> Run:
+    """The recording with the ticks of its master, and a summary that says how many were planned."""
+    result.columns[MASTER] = {"seq": np.arange(ticks)}
+    result.sequences[MASTER] = np.arange(ticks)
+    result.log_ns[MASTER] = np.arange(ticks) * round(INTERVAL * 1e9)
+    result.metadata["summary"] = {"ticks_expected": str(ticks)}
+    return result
+
+
+def keep(result: Run, topic: str, rows: Any) -> Run:
+    """The recording with only some rows of a topic, by index or mask."""
+    result.columns[topic] = {name: values[rows] for name, values in result.columns[topic].items()}
+    result.sequences[topic] = result.sequences[topic][rows]
+    return result
 
 
 def clean(seed: int, ticks: int, scheduler: str = "ordinary") -> Run:

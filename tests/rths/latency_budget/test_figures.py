@@ -119,7 +119,8 @@ def test_events_say_the_same_where_there_is_no_metadata_record() -> None:
 def test_every_slave_is_an_exchange_of_its_own() -> None:
     run = noisy.run({"round_trip": [1e-3]}, topic="latency.west")
     noisy.add(run, "latency.east", {"round_trip": [2e-3, 3e-3]})
-    assert [(item.name, item.ticks) for item in figures(run).exchanges] == [("west", 1), ("east", 2)]
+    found = [(item.name, item.ticks, item.unrecorded) for item in figures(run).exchanges]
+    assert found == [("west", 2, 1), ("east", 2, 0)]
 
 
 def test_a_recording_without_latency_is_refused() -> None:
@@ -136,11 +137,39 @@ def test_a_recording_without_latency_is_refused() -> None:
 def test_holes_and_a_cut_are_said() -> None:
     run = noisy.run({"round_trip": [1e-3, 1e-3, 1e-3]})
     assert figures(run).warnings == []
-    run.sequences["latency"], run.finished = np.array([0, 1, 4]), False
+    run.sequences["latency"], run.finished = np.array([1, 2, 4]), False
     assert figures(run).warnings == [
         "The recording was cut off before its end: judged as far as it goes.",
         "2 ticks are missing from the recording and are not judged.",
     ]
+
+
+def test_an_end_before_the_planned_one_is_said() -> None:
+    run = noisy.ticked(noisy.run({"round_trip": [1e-3] * 300}), 300)
+    assert figures(run).warnings == []
+    run.metadata["summary"]["ticks_expected"] = "1166"
+    assert figures(run).warnings == [
+        "The recording ends after 300 of 1166 planned ticks: judged as far as it goes."
+    ]
+
+
+def test_rows_stand_at_their_ticks_whatever_their_order_in_the_file() -> None:
+    found = {"round_trip": [3e-3, 1e-3], "deadline_missed": [True, False], "command_sent_ns": [0, 1]}
+    run = noisy.ticked(noisy.run(found), 4)
+    run.sequences["latency"] = np.array([3, 1])
+    item = figures(run).exchanges[0]
+    assert (item.ticks, item.unrecorded, item.silent) == (4, 2, False)
+    assert np.array_equal(item.segments["round_trip"], [np.nan, 1e-3, np.nan, 3e-3], equal_nan=True)
+    assert item.late is not None
+    assert item.late.tolist() == [True, False, True, True]
+    assert item.missed is not None
+    assert item.missed.tolist() == [False, True]
+
+
+def test_without_flags_in_the_file_ticks_without_a_row_are_late_all_the_same() -> None:
+    item = figures(noisy.ticked(noisy.run({"round_trip": [1e-3] * 3}), 5)).exchanges[0]
+    assert item.late is not None
+    assert item.late.tolist() == [False] * 3 + [True] * 2
 
 
 ROWS = (

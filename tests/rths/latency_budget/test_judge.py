@@ -208,9 +208,8 @@ def test_what_is_absent_is_said_and_what_is_left_is_judged() -> None:
 
 
 def test_each_of_several_slaves_is_judged() -> None:
-    run = noisy.clean(1, 2500)
-    run.columns["latency.west"] = run.columns.pop("latency")
-    run.sequences["latency.west"] = run.sequences.pop("latency")
+    machine = noisy.Machine(1, 2500)
+    run = noisy.run(noisy.columns(machine), noisy.bare_loop(machine), "latency.west")
     assert verdict(run).status == "within"
     noisy.add(run, "latency.east", noisy.delayed(2, 2500).columns["latency"])
     report = verdict(run)
@@ -219,6 +218,74 @@ def test_each_of_several_slaves_is_judged() -> None:
     assert check(report, "west/feedback_one_way p99").verdict == "ok"
     assert {"west/round_trip", "east/round_trip"} <= report.plain()["segments"].keys()
     assert {"west/late", "east/late"} <= report.plain()["late"].keys()
+
+
+def two_slaves(ticks: int = 1166) -> Run:
+    """A clean recording with two slaves."""
+    machine = noisy.Machine(1, ticks, "fifo")
+    run = noisy.run(noisy.columns(machine), noisy.bare_loop(machine), "latency.roof")
+    noisy.add(run, "latency.middle", noisy.columns(machine))
+    return noisy.ticked(run, ticks)
+
+
+def test_a_slave_without_a_row_is_over_any_budget_on_any_machine() -> None:
+    run = two_slaves()
+    assert verdict(run).status == "within"
+    noisy.keep(run, "latency.middle", slice(0, 0))
+    report = verdict(run)
+    assert report.status == "over"
+    assert {item.name for item in report.checks if item.verdict == "over"} == {
+        "middle/late share",
+        "middle/longest gap",
+        "middle/ticks without latency",
+    }
+    assert report.plain()["late"]["middle/longest_gap"] == 1166
+    assert "over the budget: middle/late share" in str(report)
+    assert report.warnings == [
+        "The recording has no latency of any of the 1166 ticks with middle: over any budget."
+    ]
+    assert verdict(run, {"round_trip": {"p99": 1.0}}).status == "over"
+    run.metadata["real_time"]["master.stolen_share"] = "0.5"
+    assert verdict(run).status == "over"
+    del run.columns["latency.middle"], run.sequences["latency.middle"]
+    assert verdict(run).status == "over"
+    json.dumps(verdict(run).plain(), allow_nan=False)
+
+
+@pytest.mark.parametrize("rows", [slice(300), slice(866, None), slice(None, None, 2), slice(100, 1100)])
+def test_ticks_without_a_row_count_as_late(rows: slice) -> None:
+    report = verdict(noisy.keep(two_slaves(), "latency.middle", rows))
+    missing = 1166 - len(range(1166)[rows])
+    assert report.status == "over"
+    assert report.plain()["ticks"] == 1166
+    assert report.plain()["late"]["middle/late"] >= missing
+    assert check(report, "middle/late share").verdict == "over"
+    assert check(report, "roof/late share").verdict == "ok"
+    assert (
+        report.warnings[0]
+        == f"{missing} of 1166 ticks with middle have no row of latency: they count as late."
+    )
+
+
+def test_the_gap_of_a_lost_tail_joins_that_of_its_last_late_ticks() -> None:
+    run = noisy.ticked(noisy.run(flags(0, 100)), 100)
+    run.columns["latency"]["deadline_missed"][78:80] = True
+    report = verdict(noisy.keep(run, "latency", slice(80)), {"late": {"longest_gap": 21}})
+    assert (report.status, check(report, "longest gap").value) == ("over", 22.0)
+
+
+@pytest.mark.parametrize(("lost", "status"), [(0, "within"), (499, "within"), (500, "within"), (700, "over")])
+def test_of_a_recording_that_was_cut_off_the_last_second_may_lack_rows(lost: int, status: str) -> None:
+    run = noisy.keep(two_slaves(), "latency.middle", slice(1166 - lost))
+    run.finished = False
+    run.metadata.pop("summary")
+    report = verdict(run)
+    assert report.status == status
+    assert report.warnings[0] == "The recording was cut off before its end: judged as far as it goes."
+    assert any("count as late" in sentence for sentence in report.warnings) == (status == "over")
+    late = {"middle/ticks": 1166 - lost if lost <= 500 else 666, "roof/ticks": 1166}
+    assert late.items() <= report.plain()["late"].items()
+    assert verdict(noisy.keep(run, "latency.middle", slice(0, 0))).status == "over"
 
 
 @pytest.mark.parametrize(

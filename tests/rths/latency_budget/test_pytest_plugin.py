@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -31,22 +32,36 @@ def recording(path: Path, latency: float, stolen: str) -> None:
 
 
 def child(folder: Path, *words: str, case: str = CASE) -> tuple[int, str]:
+    """A run with the plug-in by hand and no installed one, which would be the same under another name."""
+    return pytest_in(
+        folder, "-p", "rths.pytest_plugin", *words, case=case, PYTEST_DISABLE_PLUGIN_AUTOLOAD="1"
+    )
+
+
+def pytest_in(folder: Path, *words: str, case: str = CASE, **variables: str) -> tuple[int, str]:
     (folder / "test_case.py").write_text(case)
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
-    command = [
-        sys.executable,
-        "-m",
-        "pytest",
-        "-p",
-        "rths.pytest_plugin",
-        "-rs",
-        "-W",
-        "error",
-        *words,
-        "test_case.py",
-    ]
-    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
+    given = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST_")}
+    command = [sys.executable, "-m", "pytest", "-rs", "-W", "error", *words, "test_case.py"]
+    done = subprocess.run(
+        command,
+        cwd=folder,
+        env=given | {"PYTHONPATH": str(ROOT)} | variables,
+        capture_output=True,
+        text=True,
+    )
     return done.returncode, done.stdout + done.stderr
+
+
+def installed(folder: Path) -> dict[str, str]:
+    """Variables under which Python finds an installation of rths with the entry points of pyproject.toml."""
+    tables = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    entries = "".join(f"{name} = {place}\n" for name, place in tables["entry-points"]["pytest11"].items())
+    folder = folder / "site"
+    place = folder / f"rths-{tables['version']}.dist-info"
+    place.mkdir(parents=True)
+    (place / "METADATA").write_text(f"Metadata-Version: 2.1\nName: rths\nVersion: {tables['version']}\n")
+    (place / "entry_points.txt").write_text(f"[pytest11]\n{entries}")
+    return {"PYTHONPATH": os.pathsep.join([str(folder), str(ROOT)])}
 
 
 def test_within_passes(tmp_path: Path) -> None:
@@ -87,6 +102,33 @@ def test_a_budget_comes_from_the_option_or_from_the_call(tmp_path: Path, words: 
 def test_a_mistake_is_one_sentence(tmp_path: Path) -> None:
     code, out = child(tmp_path)
     assert code == 1
-    assert "Cannot read the recording run.mcap: No such file or directory." in out
+    assert out.count("Cannot read the recording run.mcap: No such file or directory.") == 1
     assert "Error" not in out.replace("FAILED", "")
     assert "pytest_plugin.py" not in out
+    assert "During handling" not in out
+
+
+def test_where_rths_is_installed_the_fixture_is_there_by_itself(tmp_path: Path) -> None:
+    variables = installed(tmp_path)
+    recording(tmp_path / "run.mcap", 1e-4, "0.0")
+    code, out = pytest_in(tmp_path, **variables)
+    assert code == 0, out
+    assert "1 passed" in out
+
+
+@pytest.mark.parametrize(
+    ("words", "more"),
+    [
+        (["-p", "rths"], {}),
+        (["-p", "rths"], {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}),
+        (["-p", "rths.pytest_plugin"], {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}),
+        (["-p", "no:rths", "-p", "rths.pytest_plugin"], {}),
+    ],
+)
+def test_it_can_be_named_by_hand_where_it_is_installed(
+    tmp_path: Path, words: list[str], more: dict[str, str]
+) -> None:
+    variables = installed(tmp_path) | more
+    recording(tmp_path / "run.mcap", 1e-4, "0.0")
+    code, out = pytest_in(tmp_path, *words, **variables)
+    assert code == 0, out
