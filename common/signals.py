@@ -94,7 +94,7 @@ LATENCY = (
     Signal(
         "compute_time",
         "s",
-        "from the start of the tick's work to the command's values, its turn among several slaves",
+        "from the start of the tick's work to the command's values, with its turn among slaves",
     ),
     Signal("command_one_way", "s", "command from the master to the slave"),
     Signal("slave_time", "s", "from the command's arrival to the feedback sent"),

@@ -349,7 +349,8 @@ class MasterLoop:
     def leave(self) -> None:
         """Tell the slaves and give the recorder the rest; may be called again until `left`."""
         lab = self.lab
-        if lab.exchange.state is State.STOPPING and all(partner.stopped for partner in self._partners):
+        waited = [partner for partner in self._partners if partner.registered and not partner.stopped]
+        if lab.exchange.state is State.STOPPING and not waited:
             lab.exchange.happen(Event.FINISH)
         now = lab.clock.now()
         if now - self._asked_ns < REPEAT_NS // 2:

@@ -162,9 +162,10 @@ class RecorderLoop:
             self.done = True
 
     def stop(self, reason: str) -> None:
-        """End the recording because somebody wants it so."""
+        """End the recording because somebody wants it so; why the test ended before stays the outcome."""
         self.error = LostError(reason)
-        self._outcome = ("stop", reason)
+        if not self._outcome[0]:
+            self._outcome = ("stop", reason)
         self._say()
         self.done = True
 

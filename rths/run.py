@@ -6,21 +6,26 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from common import cli
 from common.drive import Stopper
-from common.errors import InputError, InterlockError, LostError, RthsError
+from common.errors import RthsError
+from common.exchange import State
 from common.plan import Plan
 from common.reality import Reality
 from common.realtime import assign, freeze
-from common.roles import title
+from common.roles import MASTER
 from rths.terminal import Progress
 
-ERRORS = {2: InputError, 3: InterlockError, 4: LostError}
+if TYPE_CHECKING:
+    from rths.ending import Ending
+    from rths.processes import Processes, Said
+
 POLL_S = 0.1
+AGREED = State.SCHEDULED.value  # with which the master reports that all know the start
 UNSAID = ("machine", "bare_loop")  # for the recording
 
 
@@ -92,6 +97,7 @@ def in_real_time(
 ) -> RthsError | None:
     """The test in a process each; the error that ended it."""
     from common.zenoh_link import listenable
+    from rths.ending import Ending, verdict
     from rths.processes import Processes
 
     check(reality)
@@ -103,11 +109,11 @@ def in_real_time(
     progress.say(f"{plan.test.name}: {plan.test.duration:g} s, starting master, {crew(plan)} and recorder")
     try:
         start_all(processes, args, plan.roles, endpoint, output)
-        first = follow(processes, progress, stopping)
+        follow(processes, Ending(plan), progress, stopping)
     finally:
-        processes.kill()
+        processes.close()
         progress.end()
-    return verdict(processes, first)
+    return verdict(processes, stopping())
 
 
 def crew(plan: Plan) -> str:
@@ -139,7 +145,7 @@ def warm_up(progress: Progress) -> None:
 
 
 def start_all(
-    processes: Any, args: argparse.Namespace, roles: Sequence[str], endpoint: str, output: Path
+    processes: Processes, args: argparse.Namespace, roles: Sequence[str], endpoint: str, output: Path
 ) -> None:
     """Start master, slaves and recorder with the plan's options; `roles` are those of the slaves."""
     words = [str(cli.plan_path(args.plan))]
@@ -157,46 +163,46 @@ def start_all(
 
 def real_time_words(mode: str, processor: int | None) -> list[str]:
     """Options of a laboratory's process."""
-    place = [] if processor is None else ["--processor", str(processor)]
+    place = [] if processor is None or mode == "off" else ["--processor", str(processor)]
     return ["--rt", mode, *place]
 
 
-def follow(processes: Any, progress: Progress, stopping: Stopper) -> dict[str, int]:
-    """Show what the processes say until all have ended; the exit codes of those that failed first.
-
-    A wish to stop goes to the master, once; so does the end of another process.
-    """
-    first: dict[str, int] = {}
-    asked = False
+def follow(processes: Processes, ending: Ending, progress: Progress, stopping: Callable[[], str]) -> None:
+    """Show what the processes say, and stop them where it is time, until all have ended."""
+    again: Stopper | None = None
     while not processes.all_ended():
         said = processes.said(POLL_S)
-        if said is not None and said.data["kind"] == "progress" and said.process == "master":
+        if said is not None:
+            tell(said, progress)
+            ending.agreed = ending.agreed or (said.process == MASTER and said.data.get("state") == AGREED)
+        if stopping() and again is None:
+            again = Stopper()  # from now on a second wish is told from the first
+        ending.insisted = again is not None and bool(again())
+        stop(processes, ending, stopping())
+
+
+def tell(said: Said, progress: Progress) -> None:
+    """Show one report, where it is for the user."""
+    match said.data:
+        case {"kind": "progress"} if said.process == MASTER:
             progress.show(said.data)
-        elif said is not None and said.data["kind"] == "event" and said.data["code"] not in UNSAID:
-            progress.say(f"{said.data['lab']}: {said.data['text']}")
-        first = first or {name: code for name, code in processes.ended().items() if code}
-        if (stopping() or first) and not asked:
-            asked = True
-            for name in processes.names:
-                if name == "master" or (first and name not in first):
-                    processes.interrupt(name)
-    return first
+        case {"kind": "event", "code": code, "lab": lab, "text": text} if code not in UNSAID:
+            progress.say(f"{lab}: {text}")
+        case {"kind": "text", "text": text}:
+            progress.say(f"{said.process}: {text}")
+        case _:
+            pass
 
 
-def verdict(processes: Any, first: dict[str, int]) -> RthsError | None:
-    """The error to show: of the processes that failed first, in the order of causes."""
-    for code in (2, 1, 3, 4):
-        for name, ended in first.items():
-            if ended == code:
-                text = processes.complaints.get(name, "").removeprefix("rths: ").splitlines()
-                return ERRORS.get(code, LostError)(
-                    text[-1] if text else f"The {title(name)} stopped before its end."
-                )
-    for name, code in first.items():
-        return LostError(
-            f"The {title(name)} was killed (signal {-code}); the recording holds what came until then."
-        )
-    return None
+def stop(processes: Processes, ending: Ending, wish: str) -> None:
+    """Ask and kill those whose time has come."""
+    now, ended = time.monotonic(), processes.ended()
+    ending.look(now, wish, processes.names, ended)
+    for name in processes.names:
+        if name not in ended and now >= ending.ask_at(name):
+            processes.ask(name)
+        if name not in ended and now >= ending.kill_at(name):
+            processes.kill(name)
 
 
 def show(path: Path, as_json: bool) -> None:

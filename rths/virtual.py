@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from common.clock import VirtualClock
 from common.endpoint import Endpoint
@@ -21,7 +21,7 @@ from master.assembly import build_loop as build_master
 from master.loop import MasterLoop
 from models import substructure
 from recorder import files
-from recorder.loop import RecorderLoop
+from recorder.loop import CONSEQUENCE, RecorderLoop
 from recorder.sink import FileSink
 from slave.assembly import build_loop as build_slave
 from slave.loop import SlaveLoop
@@ -78,7 +78,12 @@ def assemble(plan: Plan, reality: Reality, output: Path | None, report: Report =
 
 
 def run(bench: Bench, stopping: Callable[[], str]) -> RthsError | None:
-    """Play a test to its end; the error that ended it, None where it was completed."""
+    """Play a test to its end; the error that ended it, None where it was completed.
+
+    Where several laboratories end with one, that which follows another's is not the one: the cause counts, and of
+    several causes the master's.
+    """
+    codes = _listening(bench)
     rounds = 0
     while not bench.master.lab.running and not _over(bench) and rounds < MOST_ROUNDS:
         bench.clock.time += ROUND_NS
@@ -94,7 +99,26 @@ def run(bench: Bench, stopping: Callable[[], str]) -> RthsError | None:
     else:
         bench.master.finish()
     _leave(bench)
-    return next((loop.lab.error for loop in bench.loops.values() if loop.lab.error), None)
+    failed = {role: loop.lab.error for role, loop in bench.loops.items() if loop.lab.error}
+    causes = [error for role, error in failed.items() if codes.get(role) != CONSEQUENCE]
+    return next(iter([*causes, *failed.values()]), None)
+
+
+def _listening(bench: Bench) -> dict[str, str]:
+    """Codes of the errors that end the laboratories' tests from now on, by role, as they are reported."""
+    codes: dict[str, str] = {}
+
+    def listen(role: str, onward: Report) -> Report:
+        def report(kind: str, data: Mapping[str, Any]) -> None:
+            if kind == "event" and data["level"] == "error":
+                codes.setdefault(role, data["code"])
+            onward(kind, data)
+
+        return report
+
+    for role, loop in bench.loops.items():
+        loop.lab.report = listen(role, loop.lab.report)
+    return codes
 
 
 def simulated(plan: Plan, output: Path | None = None, *, noise: bool = False) -> tuple[Run, RthsError | None]:

@@ -212,9 +212,10 @@ def test_a_slaves_rig_that_fails_stops_the_master_too(
         reality.as_planned(short_plan), slave=Rig("x:BrokenLab", {"how": "raise", "at": 0})
     )
     found, error, bench = run(short_plan, tmp_path / "broken.mcap", real)
-    assert isinstance(error, InterlockError)
+    assert isinstance(error, RigError)  # the cause, not what the master made of it
     assert "laboratory B (BrokenLab)" in str(error)
     assert bench.slave.lab.exchange.state is State.TRIPPED
+    assert isinstance(bench.master.lab.error, InterlockError)
     assert "laboratory B (BrokenLab)" in found.metadata["summary"]["cause"]
 
 

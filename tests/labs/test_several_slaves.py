@@ -11,7 +11,7 @@ import pytest
 
 from common import cli, plan, reality
 from common.endpoint import Received
-from common.errors import InputError, InterlockError, LostError
+from common.errors import InputError, InterlockError, LostError, RigError
 from common.exchange import State
 from common.laboratory import Setting
 from common.messages import Arm, Feedback, Recorder, Register, Start, Sync, Waiting
@@ -207,8 +207,11 @@ def test_a_slave_that_trips_ends_the_test_for_all_and_the_sentence_names_it(
         hidden=frozenset({"slave.middle"} if hidden else ()),
     )
     found, error, bench = run(TWO, tmp_path / "a.mcap", real)
-    assert isinstance(error, InterlockError)
-    assert str(error).startswith("The slave 'middle' stopped the test: laboratory B of the slave 'middle'")
+    assert isinstance(error, RigError)
+    assert str(error).startswith("laboratory B of the slave 'middle'")
+    ended = bench.master.lab.error
+    assert isinstance(ended, InterlockError)
+    assert str(ended).startswith("The slave 'middle' stopped the test: laboratory B of the slave 'middle'")
     assert all(loop.lab.exchange.state is State.TRIPPED for loop in bench.loops.values())
     assert ("BrokenTable" in repr(found.events)) is not hidden
     assert (

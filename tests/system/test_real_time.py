@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import signal
@@ -155,6 +156,124 @@ def test_a_killed_front_door_ends_the_test_in_order(tmp_path: Path) -> None:
     recording = read(path)
     assert recording.finished
     assert "stopped by the user" in recording.metadata["summary"]["cause"]
+
+
+def crew(process: subprocess.Popen[str]) -> dict[str, int]:
+    """Process numbers of master, slave and recorder of a run, as soon as all are there."""
+    deadline = time.monotonic() + 20.0
+    found: dict[str, int] = {}
+    while set(found) != {"master", "slave", "recorder"}:
+        assert time.monotonic() < deadline, found
+        time.sleep(0.02)
+        found = {}
+        for children in Path(f"/proc/{process.pid}/task").glob("*/children"):
+            with contextlib.suppress(OSError):  # a thread that has ended meanwhile
+                found |= {module(child): int(child) for child in children.read_text().split()}
+    return found
+
+
+def module(number: str) -> str:
+    """What a process runs with `python -m`."""
+    words = Path(f"/proc/{number}/cmdline").read_text().split("\0")
+    return words[words.index("-m") + 1] if "-m" in words else ""
+
+
+def gone(number: int) -> bool:
+    """Whether a process has ended."""
+    try:
+        return Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
+    except OSError:
+        return True
+
+
+LINUX = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+
+
+@LINUX
+@pytest.mark.parametrize("seconds", [0.0, 0.7])
+def test_ctrl_c_in_the_first_moments_ends_soon(seconds: float, tmp_path: Path) -> None:
+    process = start("run", "--duration", "60", "-o", tmp_path / "a.mcap")
+    crew(process)
+    time.sleep(seconds)
+    process.send_signal(signal.SIGINT)
+    code, out, err = finish(process, 15.0)
+    assert code == 3, err
+    assert "stopped by the user" in err
+    assert "Traceback" not in out + err
+
+
+@LINUX
+@pytest.mark.parametrize("seconds", [0.0, 0.7])
+def test_a_front_door_killed_in_the_first_moments_leaves_nobody(seconds: float, tmp_path: Path) -> None:
+    process = start("run", "--duration", "60", "-o", tmp_path / "a.mcap")
+    numbers = crew(process).values()
+    time.sleep(seconds)
+    process.kill()
+    process.communicate()
+    deadline = time.monotonic() + 15.0
+    while not all(map(gone, numbers)) and time.monotonic() < deadline:
+        time.sleep(0.1)
+    assert all(map(gone, numbers))
+
+
+@LINUX
+def test_a_killed_slave_is_noticed_by_the_master_and_named(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    process = start("run", "--duration", "60", "-o", path)
+    numbers = crew(process)
+    wait_for_ticks(path)
+    os.kill(numbers["slave"], signal.SIGKILL)
+    code, _, err = finish(process, 20.0)
+    assert code == 4, err
+    assert "The slave was killed (signal 9)" in err.splitlines()[-1]
+    recording = read(path)
+    assert recording.finished
+    assert recording.metadata["summary"]["outcome"] == "lost"
+    assert recording.metadata["summary"]["cause"] == "The slave has been silent for 1 s."
+    assert recording.ticks("master") >= recording.ticks("slave") + 300  # those until it was noticed
+    assert recording.sequences["master"].tolist() == list(range(recording.ticks("master")))
+
+
+@LINUX
+def test_a_second_ctrl_c_ends_a_run_that_hangs(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    process = start("run", "--duration", "60", "-o", path)
+    numbers = crew(process)
+    wait_for_ticks(path)
+    os.kill(numbers["slave"], signal.SIGSTOP)
+    for _ in range(2):
+        process.send_signal(signal.SIGINT)
+        time.sleep(0.6)
+    code, _, err = finish(process, 6.0)
+    assert code == 3, err
+    assert all(map(gone, numbers.values()))
+
+
+LOUD = """
+class Loud:
+    def __init__(self, interval, seed): ...
+    def arm(self):
+        for number in range(10_000):
+            print("valve", number)
+    def read(self):
+        for number in range(5):
+            print("reading", number)
+        print("...", end="")
+        return 0.0, 0.0
+    def write(self, command): ...
+    def disarm(self): ...
+"""
+
+
+def test_a_rig_that_prints_holds_nobody_up(tmp_path: Path) -> None:
+    (tmp_path / "loud.py").write_text(LOUD)
+    plan = tmp_path / "loud.toml"
+    plan.write_text("[test]\nduration = 1.0\n[master.rig]\nclass = 'loud.py:Loud'\n")
+    code, _, err = finish(start("run", plan, "-o", tmp_path / "a.mcap"), 30.0)
+    assert code == 0, err[-1000:]
+    assert "master: valve 9999\n" in err
+    assert err.count("reading 4\n") == 500
+    assert "master: completed\n" in err
 
 
 def wait_for_ticks(path: Path, ticks: int = 200, seconds: float = 30.0) -> None:

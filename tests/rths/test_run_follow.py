@@ -1,0 +1,397 @@
+"""How `rths run` understands its processes, when it stops them, and what it calls the cause."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from common import reality
+from common.clock import VirtualClock
+from common.errors import InputError, InterlockError, LostError, RigError
+from common.laboratory import Setting
+from common.memory_link import MemoryHub
+from common.plan import Plan, Rig
+from recorder.loop import RecorderLoop
+from rths import virtual
+from rths.ending import KILL_S, LEAVE_S, MARGIN_S, SILENCE_S, WRITE_S, Ending, verdict
+from rths.processes import Leash, Processes, understood
+from rths.run import follow
+from rths.terminal import Progress
+
+NAMES = ("master", "slave", "recorder")
+EVENT = {"kind": "event", "lab": "slave", "level": "error", "code": "lost", "text": "gone"}
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "valve open",
+        "",
+        "3",
+        "[1, 2]",
+        "null",
+        '{"valve": "open"}',
+        '{"kind": "event"}',
+        '{"kind": 3}',
+        '{"kind": ["event"]}',
+        '{"kind": "valve", "text": "open"}',
+        "[" * 100_000,
+        '{"kind": ' * 50_000,
+        '{"kind": "event", "lab"',
+        "\N{REPLACEMENT CHARACTER}\x00",
+    ],
+)
+def test_what_is_no_report_is_a_line_of_text(line: str) -> None:
+    assert understood(line + "\n") == [{"kind": "text", "text": line}]
+
+
+def test_a_report_is_understood_behind_what_a_rig_has_printed_without_an_end_of_line() -> None:
+    assert understood(json.dumps(EVENT) + "\n") == [EVENT]
+    assert understood("...." + json.dumps(EVENT) + "\n") == [{"kind": "text", "text": "...."}, EVENT]
+
+
+class Times:
+    """When an ending asks and kills, looked at every tenth of a second for a minute."""
+
+    def __init__(self, ending: Ending, ends: dict[str, float], wish: float = 1e9) -> None:
+        self.asked: dict[str, float] = {}
+        self.killed: dict[str, float] = {}
+        for now in (tenth / 10 for tenth in range(600)):
+            ended = {name: 4 for name, end in ends.items() if now >= end}
+            ended |= dict.fromkeys(self.killed, -9)
+            ending.look(now, "stopped." if now >= wish else "", NAMES, ended)
+            for name in set(NAMES) - set(ended):
+                if now >= ending.ask_at(name):
+                    self.asked.setdefault(name, now)
+                if now >= ending.kill_at(name):
+                    self.killed.setdefault(name, now)
+
+
+def ending(plan: Plan, *, agreed: bool) -> Ending:
+    result = Ending(plan)
+    result.agreed = agreed
+    return result
+
+
+def near(value: float) -> Any:
+    return pytest.approx(value, abs=0.15)
+
+
+def test_a_wish_before_the_start_reaches_all_laboratories_at_once_and_then_the_recorder(
+    short_plan: Plan,
+) -> None:
+    times = Times(ending(short_plan, agreed=False), {"master": 2.0, "slave": 3.0}, wish=1.0)
+    assert times.asked == {
+        "master": near(1.0),
+        "slave": near(1.0),
+        "recorder": near(3.0 + MARGIN_S),
+    }
+    assert times.killed == {"recorder": near(3.0 + MARGIN_S + KILL_S)}
+
+
+def test_a_failure_before_the_start_reaches_the_others_after_a_moment(short_plan: Plan) -> None:
+    times = Times(ending(short_plan, agreed=False), {"recorder": 1.0, "slave": 3.0, "master": 3.0})
+    assert times.asked == {"master": near(1.0 + MARGIN_S), "slave": near(1.0 + MARGIN_S)}
+    assert not times.killed
+
+
+def test_a_wish_during_ticks_reaches_the_master_alone_and_who_hangs_is_killed(short_plan: Plan) -> None:
+    times = Times(ending(short_plan, agreed=True), {"master": 2.0, "recorder": 18.0}, wish=1.0)
+    notice = short_plan.link.loss_timeout + LEAVE_S
+    assert times.asked["master"] == near(1.0)
+    assert times.asked["slave"] == near(1.0 + notice)
+    assert times.killed == {"slave": near(1.0 + notice + KILL_S)}
+    assert notice + KILL_S == pytest.approx(10.0, abs=1.0)
+
+
+def test_a_lost_slave_is_the_masters_to_notice_and_the_recorder_ends_by_itself(short_plan: Plan) -> None:
+    times = Times(ending(short_plan, agreed=True), {"slave": 1.0, "master": 2.5, "recorder": 7.6})
+    assert not times.asked
+    assert not times.killed
+    hanging = Times(ending(short_plan, agreed=True), {"slave": 1.0, "master": 2.5})
+    assert hanging.asked == {"recorder": near(2.5 + SILENCE_S)}
+    assert hanging.killed == {"recorder": near(2.5 + WRITE_S)}
+
+
+def test_a_recorder_that_is_not_required_may_leave_a_running_test(short_plan: Plan) -> None:
+    for required, asked in ((True, {"master", "slave"}), (False, set())):
+        plan = dataclasses.replace(
+            short_plan, recording=dataclasses.replace(short_plan.recording, required=required)
+        )
+        assert Times(ending(plan, agreed=True), {"recorder": 1.0}).asked.keys() == asked
+
+
+def test_who_insists_has_all_killed(short_plan: Plan) -> None:
+    insisted = ending(short_plan, agreed=True)
+    insisted.insisted = True
+    assert set(Times(insisted, {}).killed) == set(NAMES)
+
+
+class Over:
+    """Processes that have ended: exit code and reported error of each."""
+
+    def __init__(self, *ends: tuple[str, int, str], asked: str = "", killed: str = "") -> None:
+        self._codes = {name: code for name, code, _ in ends}
+        self.errors = {name: error for name, _, error in ends if error}
+        self.asked, self.killed = set(asked.split()), set(killed.split())
+
+    def ended(self) -> dict[str, int]:
+        return self._codes
+
+    def complaint(self, name: str) -> str:
+        return f"a line before\nrths: of the {name}" if name == "nobody" else f"rths: of the {name}"
+
+
+WISH = "stopped by the user (SIGINT)."
+NONE: tuple[tuple[str, int, str], ...] = (("master", 0, ""), ("slave", 0, ""), ("recorder", 0, ""))
+
+
+@pytest.mark.parametrize(
+    ("over", "wish", "kind", "sentence"),
+    [
+        (
+            Over(("master", 3, "remote_trip"), ("slave", 4, "lost"), ("recorder", 0, "")),
+            "",
+            LostError,
+            "of the slave",
+        ),
+        (
+            Over(("master", 4, "lost"), ("slave", 3, "remote_trip"), ("recorder", 4, "")),
+            "",
+            LostError,
+            "of the master",
+        ),
+        (Over(("master", 4, "lost"), ("slave", 3, "limit")), "", InterlockError, "of the slave"),
+        (
+            Over(("master", -9, ""), ("slave", 4, "lost"), ("recorder", 4, "recording_lost")),
+            "",
+            LostError,
+            "The master was killed (signal 9)",
+        ),
+        (
+            Over(
+                ("master", 3, ""),
+                ("slave", 3, "stop"),
+                ("recorder", 4, "recording_lost"),
+                asked="recorder slave",
+            ),
+            WISH,
+            InterlockError,
+            WISH,
+        ),
+        (Over(("master", 4, "lost"), ("slave", -9, "")), "", LostError, "The slave was killed (signal 9)"),
+        (Over(("master", 4, "lost"), ("slave", 1, "")), "", LostError, "of the slave"),
+        (
+            Over(("master", 3, "remote_trip"), ("slave", 3, "stop")),
+            "",
+            InterlockError,
+            "of the slave",
+        ),
+        (
+            Over(("master", 3, ""), ("slave", 2, ""), ("recorder", 4, ""), asked="master recorder"),
+            "",
+            InputError,
+            "of the slave",
+        ),
+        (Over(("master", 4, "lost"), ("slave", -9, ""), killed="slave"), "", LostError, "of the master"),
+        (Over(("master", 0, ""), ("slave", -9, ""), killed="slave"), "", LostError, "did not stop"),
+        (Over(("master", 3, ""), ("slave", 3, ""), asked="master"), WISH, InterlockError, WISH),
+        (
+            Over(
+                ("master", -2, ""), ("slave", 3, "stop"), ("recorder", 4, ""), asked="master slave recorder"
+            ),
+            WISH,
+            InterlockError,
+            WISH,
+        ),
+        (
+            Over(("master", 3, "limit"), ("slave", 3, ""), asked="master"),
+            WISH,
+            InterlockError,
+            "of the master",
+        ),
+        (Over(("master", 3, ""), ("slave", 2, ""), asked="master"), WISH, InputError, "of the slave"),
+    ],
+)
+def test_the_cause_is_that_of_who_did_not_follow_another(
+    over: Over, wish: str, kind: type[Exception], sentence: str
+) -> None:
+    error = verdict(over, wish)
+    assert type(error) is kind
+    assert sentence in str(error)
+    over._codes = dict(reversed(over._codes.items()))
+    assert str(verdict(over, wish)) == str(error)
+
+
+def test_no_error_where_all_ended_with_0_even_if_somebody_wished() -> None:
+    assert verdict(Over(*NONE), "") is None
+    assert verdict(Over(*NONE), WISH) is None
+
+
+class BrokenTable:
+    """Laboratory B that fails on its way."""
+
+    def __init__(self, interval: float, seed: int) -> None:
+        self.reads = 0
+
+    def arm(self) -> None: ...
+
+    def read(self) -> Any:
+        self.reads += 1
+        if self.reads > 50:
+            raise RigError("the amplifier is off")
+        return 0.0, 0.0, 0.0, 0.0
+
+    def write(self, command: Any) -> None: ...
+
+    def disarm(self) -> None: ...
+
+
+def test_virtual_time_gives_the_cause_and_not_what_followed(
+    short_plan: Plan, tmp_path: Path, monkeypatch: Any
+) -> None:
+    monkeypatch.setattr("slave.assembly.find", lambda *_: BrokenTable)
+    real = reality.as_planned(short_plan)
+    real = dataclasses.replace(real, slaves={"slave": Rig("x:BrokenTable")})
+    bench = virtual.assemble(short_plan, real, tmp_path / "a.mcap")
+    error = virtual.run(bench, lambda: "")
+    assert isinstance(error, RigError)
+    assert error is bench.slave.lab.error
+    assert "stopped the test" in str(bench.master.lab.error)
+
+
+class NoSink:
+    """Takes nothing."""
+
+    failure = ""
+    dropped = 0
+
+    def put(self, items: Any) -> None: ...
+
+    def close(self, summary: Any, machines: Any) -> None: ...
+
+
+def test_a_recorder_that_is_asked_keeps_why_the_test_ended(short_plan: Plan) -> None:
+    clock = VirtualClock()
+    endpoint = MemoryHub(clock, short_plan.roles).join("recorder")
+    for known, outcome in ((("lost", "The slave is gone."), "lost"), (("", ""), "stop")):
+        loop = RecorderLoop(Setting(short_plan, endpoint, clock), NoSink())
+        loop._outcome = known
+        loop.stop("stopped by the user.")
+        assert loop.done
+        assert loop.summary()["outcome"] == outcome
+
+
+# -- real processes, though no laboratories ---------------------------------------------------------
+
+
+def program(folder: Path, name: str, text: str) -> None:
+    """A module that stands for a process of a test."""
+    (folder / f"{name}.py").write_text(text)
+
+
+DEAF = "import signal, time\nsignal.signal(signal.SIGINT, lambda *_: None)\ntime.sleep(60)\n"
+OBEDIENT = "import sys, time\ntry:\n    time.sleep(60)\nexcept KeyboardInterrupt:\n    sys.exit(3)\n"
+
+
+@pytest.fixture
+def processes(tmp_path: Path, monkeypatch: Any) -> Any:
+    monkeypatch.setattr("rths.processes.ROOT", tmp_path)
+    monkeypatch.chdir(tmp_path)
+    running = Processes()
+    yield running
+    running.close()
+
+
+def never() -> str:
+    return ""
+
+
+def test_a_flood_of_lines_that_are_no_reports_is_read_to_its_end(
+    processes: Processes, tmp_path: Path, short_plan: Plan, capsys: Any
+) -> None:
+    text = "import json, os\nos.write(1, b'\\xff\\xfe\\n' + b'valve open\\n' * 20_000)\n"
+    program(tmp_path, "slave", text + f"print('...' + json.dumps({EVENT!r}))\nraise SystemExit(4)\n")
+    processes.start("slave", [])
+    follow(processes, Ending(short_plan), Progress(1.0), never)
+    assert processes.ended() == {"slave": 4}
+    assert processes.errors == {"slave": "lost"}
+    err = capsys.readouterr().err
+    assert err.count("slave: valve open\n") == 20_000
+    assert "slave: gone\n" in err
+
+
+def test_a_pipe_that_a_grandchild_holds_keeps_nobody(
+    processes: Processes, tmp_path: Path, short_plan: Plan
+) -> None:
+    program(
+        tmp_path,
+        "slave",
+        "import subprocess, sys\n"
+        "child = subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(8)'])\n"
+        "print(child.pid, flush=True)\n",
+    )
+    processes.start("slave", [])
+    said = processes.said(5.0)
+    assert said is not None
+    follow(processes, Ending(short_plan), Progress(1.0), never)
+    os.kill(int(said.data["text"]), signal.SIGKILL)
+    assert processes.ended() == {"slave": 0}
+
+
+def test_a_second_wish_kills_who_does_not_hear_the_first(
+    processes: Processes, tmp_path: Path, short_plan: Plan, monkeypatch: Any
+) -> None:
+    monkeypatch.setattr("rths.run.Stopper", lambda: lambda: "again.")
+    for name in ("master", "slave"):
+        program(tmp_path, name, DEAF)
+        processes.start(name, [])
+    follow(processes, Ending(short_plan), Progress(1.0), lambda: WISH)
+    assert processes.killed == {"master", "slave"}
+
+
+def test_who_hangs_after_anothers_end_is_killed_without_a_wish(
+    processes: Processes, tmp_path: Path, short_plan: Plan, monkeypatch: Any
+) -> None:
+    for name in ("LEAVE_S", "MARGIN_S", "KILL_S"):
+        monkeypatch.setattr(f"rths.ending.{name}", 0.2)
+    program(tmp_path, "master", f"print({json.dumps(EVENT)!r}, flush=True)\nraise SystemExit(4)\n")
+    program(tmp_path, "slave", DEAF)
+    program(tmp_path, "recorder", DEAF)
+    for name in NAMES:
+        processes.start(name, [])
+    follow(processes, Ending(short_plan), Progress(1.0), never)
+    assert processes.killed == {"slave", "recorder"}
+    assert processes.ended()["master"] == 4
+    assert isinstance(verdict(processes, ""), LostError)
+
+
+def test_a_leash_interrupts_when_its_last_holder_is_gone(tmp_path: Path) -> None:
+    if sys.platform != "linux":
+        pytest.skip("Linux alone has it")
+    program(tmp_path, "child", "print('here', flush=True)\n" + OBEDIENT)
+    leash = Leash()
+    with leash.end() as ends:
+        child = subprocess.Popen(
+            [sys.executable, tmp_path / "child.py"], pass_fds=ends, stdout=subprocess.PIPE
+        )
+        leash.tie(ends, child.pid)
+    holder = subprocess.Popen(
+        [sys.executable, "-c", "input()"], pass_fds=[leash.writer], stdin=subprocess.PIPE
+    )
+    assert child.stdout is not None
+    assert child.stdout.readline() == b"here\n"
+    leash.close()
+    assert child.poll() is None
+    holder.kill()
+    holder.communicate()
+    assert child.wait(5.0) == 3
+    child.stdout.close()
