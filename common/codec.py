@@ -82,7 +82,8 @@ class _Shape:
         return isfinite(sum(self._floats(items)))
 
 
-PACKER = msgpack.Packer()  # `msgpack.packb` allocates and frees a buffer of a megabyte with every call
+# `msgpack.packb` allocates and frees a buffer of a megabyte with every call; this one is the loop's thread's alone
+PACKER = msgpack.Packer()
 
 SHAPES = tuple(_Shape(message) for message in MESSAGES)
 

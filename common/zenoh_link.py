@@ -27,6 +27,7 @@ LEASE_MS = 1000
 ATTEMPT_MS = 500  # opening a session cannot be interrupted, so it is tried again and again for this long
 ENDPOINT = re.compile(r"(tcp|tls|udp|quic)/.+:\d+")
 PREFIX = "rths"
+YIELD = getattr(os, "sched_yield", lambda: None)  # not every system has it
 
 
 def configuration(role: str, listen: str, connect: str) -> zenoh.Config:
@@ -140,7 +141,7 @@ class ZenohLink:
     def send(self, channel: str, frame: bytes, to: str = "") -> None:
         """Hand a frame to the link; dropped where the network is congested."""
         self._publishers[channel, to].put(frame)
-        os.sched_yield()
+        YIELD()  # to the link's own thread on this processor, which writes the frame
 
     def close(self) -> None:
         """Leave the link; without it, zenoh's threads would keep the process alive."""

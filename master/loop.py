@@ -218,14 +218,13 @@ class MasterLoop:
     def _hesitant(self) -> None:
         """All are there, and one does not go on."""
         arming = self.lab.exchange.state is State.REGISTERED
-        who = next((one for one in self._partners if not (one.armed if arming else one.scheduled)), None)
+        who = next(one for one in self._partners if not (one.armed if arming else one.scheduled))
         seconds = self.lab.plan.link.connect_timeout
         what = "arm its rig" if arming else "agree on the start"
-        title = who.title if who else "slave"
         self.lab.fail(
             Event.LOSE,
             LostError(
-                f"The {title} did not {what} within {seconds:g} s: look what its laboratory waits for, "
+                f"The {who.title} did not {what} within {seconds:g} s: look what its laboratory waits for, "
                 "or raise connect_timeout in [link]."
             ),
             code="hesitant",
