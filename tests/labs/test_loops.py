@@ -266,6 +266,20 @@ def test_nobody_there_is_said_in_the_time_the_plan_allows(short_plan: Plan) -> N
     assert str(bench.master.lab.error).startswith("No slave joined the test within 2 s")
 
 
+def test_a_slave_that_is_there_and_does_not_arm_is_named(short_plan: Plan) -> None:
+    plan = with_table(without_recorder(short_plan), "link", connect_timeout=2.0)
+    bench = virtual.assemble(plan, reality.as_planned(plan), None)
+    while bench.master.lab.exchange.state is State.IDLE:
+        bench.clock.time += 1_000_000
+        virtual._exchange(bench, poll=True)
+    assert bench.master.lab.exchange.state is State.REGISTERED
+    while not bench.master.lab.exchange.ended:
+        bench.clock.time += 1_000_000
+        bench.master.poll()
+    assert isinstance(bench.master.lab.error, LostError)
+    assert str(bench.master.lab.error).startswith("The slave did not arm its rig within 2 s")
+
+
 def test_a_missing_recorder_is_said(short_plan: Plan) -> None:
     plan = with_table(short_plan, "link", connect_timeout=2.0)
     bench = virtual.assemble(plan, reality.as_planned(plan), None)

@@ -37,6 +37,18 @@ def start(machine: str, *words: str | Path) -> subprocess.Popen[str]:
     )
 
 
+def await_all(processes: dict[str, subprocess.Popen[str]]) -> None:
+    """All end, and with 0."""
+    try:
+        for name, process in processes.items():
+            _, err = process.communicate(timeout=90)
+            assert process.returncode == 0, f"{name}: {err}"
+    finally:
+        for process in processes.values():
+            process.kill()
+            process.communicate()
+
+
 def test_a_test_on_two_machines_is_recorded_whole(machines: tuple[str, str], tmp_path: Path) -> None:
     first, second = machines
     path = tmp_path / "two.mcap"
@@ -47,14 +59,7 @@ def test_a_test_on_two_machines_is_recorded_whole(machines: tuple[str, str], tmp
         "recorder": start(second, "record", *words, "--connect", endpoint, "-o", path),
         "master": start(first, "master", *words, "--listen", "tcp/0.0.0.0:7447"),
     }
-    try:
-        for name, process in processes.items():
-            _, err = process.communicate(timeout=90)
-            assert process.returncode == 0, f"{name}: {err}"
-    finally:
-        for process in processes.values():
-            process.kill()
-            process.communicate()
+    await_all(processes)
     recording = read(path)
     assert recording.finished
     for topic in ("master", "slave", "latency"):
@@ -74,14 +79,7 @@ def test_two_slaves_one_beside_the_master_and_one_across_the_cable(
         "recorder": start(second, "record", *words, "--connect", there, "-o", path),
         "master": start(first, "master", *words, "--listen", "tcp/0.0.0.0:7447"),
     }
-    try:
-        for name, process in processes.items():
-            _, err = process.communicate(timeout=90)
-            assert process.returncode == 0, f"{name}: {err}"
-    finally:
-        for process in processes.values():
-            process.kill()
-            process.communicate()
+    await_all(processes)
     recording = read(path)
     for topic in ("master", "slave.roof", "slave.middle", "latency.roof", "latency.middle"):
         assert recording.sequences[topic].tolist() == list(range(1500))

@@ -76,7 +76,7 @@ def gap(size: float) -> Report:
     }
 
 
-def test_facts() -> Report:
+def facts_of_test() -> Report:
     return {
         "name": "el_centro_10",
         "duration": 40.0,
@@ -174,7 +174,7 @@ def details() -> Report:
     lag = {"damper.motor_lag": {"time_constant": value(0.0071, 0.0064, 0.0078, "s")}}
     falsified = {"sensor.damper_force.gain": {"factor": value(1.08, 1.071, 1.089, "–")}}
     return {
-        "test": test_facts(),
+        "test": facts_of_test(),
         "parts": parts(),
         "paths": {
             "command": {

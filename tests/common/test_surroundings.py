@@ -1,0 +1,62 @@
+from __future__ import annotations
+
+from collections import Counter
+
+import pytest
+
+from common.bare_loop import BareLoop
+from common.clock import VirtualClock
+from common.laboratory import Laboratory, Setting
+from common.memory_link import MemoryHub
+from common.plan import Plan
+from common.realtime import NOTHING, Granted
+from common.surroundings import Surroundings, described
+
+
+def laboratory() -> Laboratory:
+    clock = VirtualClock()
+    return Laboratory("slave", Setting(Plan(), MemoryHub(clock).join("slave"), clock))
+
+
+def events(lab: Laboratory) -> list[tuple[str, str, str]]:
+    """Level, code and text of what was noted."""
+    return [tuple(item[5:8]) for item in lab.outlet._pending if item[0] == "event"]
+
+
+def test_what_is_missing_is_a_warning_and_in_the_text() -> None:
+    lab = laboratory()
+    Surroundings(lab, Granted(0, -1, False, ("No priority: ask for it.",)), {}, timed=False).begin()
+    ((level, code, text),) = events(lab)
+    assert (level, code) == ("warning", "real_time")
+    assert text.endswith("No priority: ask for it.")
+
+
+def test_rejected_frames_are_told_at_the_end_by_reason() -> None:
+    lab, rejected = laboratory(), Counter[str]()
+    around = Surroundings(lab, NOTHING, rejected, timed=False)
+    around.begin()
+    rejected.update(check=3, value=1)
+    around.end(10)
+    assert ("warning", "rejected", "Frames were rejected: 3 by check, 1 by value.") in events(lab)
+
+
+def test_nothing_is_told_of_a_test_that_never_began() -> None:
+    lab = laboratory()
+    Surroundings(lab, NOTHING, Counter(check=1), timed=True).end(0)
+    assert events(lab) == []
+
+
+def test_a_bare_loop_that_gave_nothing_is_no_event(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(BareLoop, "start", lambda *_: None)
+    monkeypatch.setattr(BareLoop, "stop", lambda _: {})
+    lab = laboratory()
+    around = Surroundings(lab, NOTHING, {}, timed=True)
+    around.begin()
+    around.end(1)
+    assert [code for _, code, _ in events(lab)] == ["real_time", "machine"]
+
+
+def test_metadata_names_the_laboratory_and_its_scheduler() -> None:
+    assert described("slave.roof", "real_time", {"priority": 49.0})["slave.roof.scheduler"] == "fifo 49"
+    assert described("master", "real_time", {"priority": 0.0})["master.scheduler"] == "other"
+    assert described("master", "bare_loop", {"late": 2.0}) == {"bare_loop.late": "2.0"}
