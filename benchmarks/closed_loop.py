@@ -10,7 +10,8 @@ import numpy as np
 from benchmarks import loops, opensees_peer
 from benchmarks.opensees_peer import Answer, Case
 from benchmarks.result import Figure, rate_figure, rates
-from common.plan import Control, Plan, Recording, ideal
+from common.plan import Plan, ideal
+from common.tables import Control, Recording
 from models import substructure
 from models.closed_loop import signals, simulate
 from models.registry import Array

@@ -12,7 +12,8 @@ from pathlib import Path
 
 from benchmarks.result import Figure, rate_figure
 from common import reality
-from common.plan import Plan, Recording
+from common.plan import Plan
+from common.tables import Recording
 from rths import virtual
 
 TARGET = 50_000

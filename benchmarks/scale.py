@@ -18,7 +18,8 @@ import numpy as np
 
 from benchmarks.result import Figure
 from common import reality
-from common.plan import Plan, Recording, SlaveLaboratory, ideal
+from common.plan import Plan, ideal
+from common.tables import Recording, SlaveLaboratory
 from models import substructure
 from models.closed_loop import simulate
 from models.registry import Array

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from operator import itemgetter, le
 from typing import Any
 
-from common.plan import Limits
+from common.tables import Limits
 
 
 class Guard:

@@ -14,243 +14,32 @@ import tomli_w
 
 from common.errors import InputError, PlanError
 from common.roles import name_of, slave_role
-from common.schema import Storeys, fill, key, nearest, plain
+from common.schema import fill, nearest, plain
+from common.tables import (
+    Actuator,
+    Column,
+    Compensator,
+    Control,
+    Damper,
+    GroundMotion,
+    Laboratory,
+    Limits,
+    Link,
+    Preflight,
+    Recording,
+    Rig,
+    Safety,
+    Sensors,
+    SlaveLaboratory,
+    Structure,
+    Table,
+    Test,
+    Tolerances,
+)
 
 PROTOCOL_VERSION = 3
 MOST_SLAVES = 16
 SLAVE_NAME = re.compile(r"[a-z][a-z0-9_]*")
-
-
-@dataclass(frozen=True)
-class Test:
-    """What the test is called, how long it lasts and its control interval."""
-
-    __test__ = False  # not a test case of pytest
-
-    name: str = key(
-        "name of the test, part of topics and file names", default="default", pattern="[a-z0-9_-]+"
-    )
-    duration: float = key("length of the test", default=40.0, unit="s", above=0.0, most=7200.0)
-    interval: float = key("control interval", default=0.002, unit="s", least=1e-4, most=0.1)
-    seed: int = key("seed of every random draw", default=1, least=0)
-
-
-@dataclass(frozen=True)
-class GroundMotion:
-    """The earthquake."""
-
-    record: str = key(
-        "name of a shipped record, or path of an AT2, K-NET or CSV file", default="el_centro_1940_ns"
-    )
-    scale: float = key("factor on the record", default=0.1)
-
-
-@dataclass(frozen=True)
-class NumericalColumns:
-    """Force-deformation model of the numerical columns of every storey."""
-
-    model: str = key("name of a specimen model", default="linear")
-    parameters: dict[str, float] = key("parameters of that model beside the stiffness", default={}, more=True)
-
-
-@dataclass(frozen=True)
-class Structure:
-    """The building: one value per storey, or one for a single storey."""
-
-    mass: Storeys = key("floor masses, from the bottom", default=(160_000.0,), unit="kg", above=0.0)
-    stiffness: Storeys = key("storey stiffnesses, all columns", default=(25e6,), unit="N/m", least=0.0)
-    damping: Storeys = key("storey dashpots", default=(200_000.0,), unit="N·s/m", least=0.0)
-    integrator: str = key("integration method", default="newmark_explicit")
-    rho_infinity: float = key("KR-α: spectral radius at infinity", default=0.5, least=0.0, most=1.0)
-    columns: NumericalColumns = field(
-        default_factory=NumericalColumns, metadata={"table": NumericalColumns, "more": False}
-    )
-
-
-@dataclass(frozen=True)
-class Column:
-    """The experimental column of laboratory A."""
-
-    model: str = key("name of a specimen model", default="linear")
-    stiffness: float = key("elastic stiffness of the specimen", default=12.5e6, unit="N/m", least=0.0)
-    storey: int = key("storey in which the specimen stands", default=1, least=1)
-    columns_per_storey: int = key("columns of that storey", default=4, least=1)
-    represents: int = key("columns of the storey that the specimen stands for", default=1, least=1)
-    deformation_ratio: float = key("specimen deformation over storey drift", default=0.5, above=0.0)
-    parameters: dict[str, float] = key("parameters of the model beside the stiffness", default={}, more=True)
-
-
-@dataclass(frozen=True)
-class Actuator:
-    """Nominal first-order lag with dead time of the hydraulic actuator."""
-
-    gain: float = key("static gain", default=1.0, above=0.0)
-    delay: float = key("dead time L", default=0.014, unit="s", least=0.0, most=1.0)
-    time_constant: float = key("time constant T, 0 for none", default=0.030, unit="s", least=0.0)
-
-
-PAPER_COMPENSATOR = {"lead": 0.044, "proportional": 1.93, "integral": 0.047, "derivative": 0.0}
-
-
-@dataclass(frozen=True)
-class ForceCorrection:
-    """Phase lead of the measured column force before it enters the equation of motion."""
-
-    cutoff: float = key(
-        "corner frequency of the high-pass filter, 0 for none", default=0.0, unit="Hz", least=0.0
-    )
-    unity: float = key("frequency at which the filter's gain is one", default=2.0, unit="Hz", above=0.0)
-
-
-@dataclass(frozen=True)
-class Compensator:
-    """Compensation of the actuator's delay."""
-
-    kind: str = key("name of a compensator", default="pid_taylor")
-    parameters: dict[str, float] = key("its parameters", default=PAPER_COMPENSATOR, more=True)
-    force: ForceCorrection = field(
-        default_factory=ForceCorrection, metadata={"table": ForceCorrection, "more": False}
-    )
-
-
-@dataclass(frozen=True)
-class TableCompensator:
-    """Compensation of the shaking table, computed by the slave."""
-
-    kind: str = key("name of a compensator", default="none")
-    parameters: dict[str, float] = key("its parameters", default={}, more=True)
-
-
-@dataclass(frozen=True)
-class Table:
-    """Nominal second-order model with dead time of the shaking table."""
-
-    frequency: float = key(
-        "natural frequency, inf for an ideal table", default=15.0, unit="Hz", above=0.0, infinite=True
-    )
-    damping_ratio: float = key("damping ratio", default=0.7, unit="", above=0.0)
-    delay: float = key("dead time", default=0.004, unit="s", least=0.0, most=1.0)
-    compensator: TableCompensator = field(
-        default_factory=TableCompensator, metadata={"table": TableCompensator, "more": False}
-    )
-
-
-@dataclass(frozen=True)
-class Damper:
-    """Nominal model of the active mass damper and its scale to the building."""
-
-    mass: float = key("moving mass", default=16.0, unit="kg", above=0.0)
-    stiffness: float = key("spring", default=56.8, unit="N/m", least=0.0)
-    damping: float = key("dashpot", default=6.0, unit="N·s/m", least=0.0)
-    motor_time_constant: float = key("lag of the motor force", default=0.003, unit="s", least=0.0)
-    force_scale: float = key(
-        "λ: force on the building over force in the laboratory", default=100.0, least=0.0
-    )
-    floor: int = key("floor on which the damper stands", default=1, least=1)
-
-
-@dataclass(frozen=True)
-class Control:
-    """Velocity feedback of the damper."""
-
-    amd: bool = key("whether the building carries the damper", default=True)
-    gain: float = key(
-        "G: damping force on the building over floor velocity", default=120_000.0, unit="N·s/m", least=0.0
-    )
-
-
-@dataclass(frozen=True)
-class Sensors:
-    """White noise of each reading, rms."""
-
-    column_displacement: float = key("specimen deformation", default=5e-6, unit="m", least=0.0)
-    column_force: float = key("specimen force", default=100.0, unit="N", least=0.0)
-    table_displacement: float = key("table displacement", default=10e-6, unit="m", least=0.0)
-    table_acceleration: float = key("table acceleration", default=0.01, unit="m/s²", least=0.0)
-    damper_stroke: float = key("damper stroke", default=2e-6, unit="m", least=0.0)
-    damper_force: float = key("damper force", default=0.2, unit="N", least=0.0)
-
-
-@dataclass(frozen=True)
-class Link:
-    """The exchange between the laboratories."""
-
-    connect_timeout: float = key(
-        "wait for the other laboratory", default=30.0, unit="s", above=0.0, most=3600.0
-    )
-    loss_timeout: float = key(
-        "silence after which a laboratory is lost", default=1.0, unit="s", above=0.0, most=60.0
-    )
-    wait_share: float = key(
-        "share of the interval a message is waited for", default=0.75, above=0.0, most=0.95
-    )
-
-
-@dataclass(frozen=True)
-class Limits:
-    """Largest magnitudes; beyond one of them the test is stopped."""
-
-    displacement: float = key("storey displacement", default=0.15, unit="m", above=0.0)
-    actuator_command: float = key("actuator command", default=0.05, unit="m", above=0.0)
-    column_displacement: float = key("specimen deformation", default=0.03, unit="m", above=0.0)
-    column_force: float = key("specimen force", default=400e3, unit="N", above=0.0)
-    table_target: float = key("table target", default=0.40, unit="m", above=0.0)
-    table_command: float = key("table command", default=0.40, unit="m", above=0.0)
-    damper_command: float = key("motor force", default=1000.0, unit="N", above=0.0)
-    table_displacement: float = key("table displacement", default=0.40, unit="m", above=0.0)
-    table_acceleration: float = key("table acceleration", default=30.0, unit="m/s²", above=0.0)
-    damper_stroke: float = key("damper stroke", default=0.40, unit="m", above=0.0)
-    damper_force: float = key("damper force", default=1000.0, unit="N", above=0.0)
-
-
-@dataclass(frozen=True)
-class Tolerances:
-    """How well each nominal parameter is known, relative."""
-
-    default: float = key("for every parameter not named", default=0.02, least=0.0, most=1.0)
-    parameters: dict[str, float] = key('for single ones, as "part.parameter"', default={}, more=True)
-
-
-@dataclass(frozen=True)
-class Rig:
-    """The laboratory behind the rig interface."""
-
-    class_: str = key(
-        "'file.py:Class' or 'package.module:Class', empty for the emulated laboratory", default=""
-    )
-    options: dict[str, Any] = key("keyword arguments of the class", default={})
-
-
-@dataclass(frozen=True)
-class Laboratory:
-    """Master or slave: what stands in its laboratory."""
-
-    rig: Rig = field(default_factory=Rig, metadata={"table": Rig, "more": False})
-
-
-@dataclass(frozen=True)
-class SlaveLaboratory:
-    """One of several slaves: what stands in its laboratory, and its interface to the structure.
-
-    A key that the plan gives in `[slave.NAME.table]`, `.damper` or `.control` holds for this slave; the others are
-    those of the plan's own tables. A table's compensator is taken whole.
-    """
-
-    table: Table = Table()
-    damper: Damper = Damper()
-    control: Control = Control()
-    rig: Rig = field(default_factory=Rig)
-
-
-@dataclass(frozen=True)
-class Recording:
-    """Where recordings go, and whether a test may run without one."""
-
-    folder: str = key("folder of recordings, relative to where the command is started", default="runs")
-    required: bool = key("whether the test waits for a recorder and stops without it", default=True)
-    patience: float = key(
-        "silence of the recorder after which the test stops", default=10.0, unit="s", above=0.0
-    )
 
 
 @dataclass(frozen=True)
@@ -271,6 +60,8 @@ class Plan:
     control: Control = Control()
     sensors: Sensors = Sensors()
     link: Link = Link()
+    safety: Safety = Safety()
+    preflight: Preflight = Preflight()
     limits: Limits = Limits()
     tolerances: Tolerances = Tolerances()
     master: Laboratory = Laboratory()
@@ -409,6 +200,7 @@ def from_tables(tables: dict[str, Any], base: Path) -> Plan:
     check_storeys(plan)
     check_columns(plan)
     check_tolerances(plan)
+    check_safety(plan)
     return plan
 
 
@@ -492,6 +284,15 @@ def check_tolerances(plan: Plan) -> None:
             raise PlanError(f"Unknown parameter '{name}' in [tolerances]: {nearest(name, known)}")
         if not 0.0 <= value <= 1.0:
             raise PlanError(f"'{name}' in [tolerances] is {value}, but must be at least 0 and at most 1.")
+
+
+def check_safety(plan: Plan) -> None:
+    """A laboratory holds before it ramps."""
+    safety = plan.safety
+    if safety.hold_after >= safety.ramp_after:
+        raise PlanError(
+            f"hold_after in [safety] is {safety.hold_after}, but must be below ramp_after, {safety.ramp_after}."
+        )
 
 
 NOMINAL = ("structure", "column", "actuator", "table", "damper", "sensors")

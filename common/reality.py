@@ -13,9 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from common.errors import PlanError
-from common.plan import Plan, Rig, from_tables
+from common.plan import Plan, from_tables
 from common.roles import MASTER, SLAVE, slave_role
 from common.schema import fill, nearest
+from common.tables import Rig
 
 Entry = tuple[str, Mapping[str, float]]  # name of an effect of the catalogue, and its parameters
 

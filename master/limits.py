@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from common.limits import Guard
-from common.plan import Limits
 from common.rig import ColumnMeasurement
+from common.tables import Limits
 from master.step import Outputs
 
 
@@ -12,8 +12,8 @@ class MasterLimits:
     """The plan's limits on laboratory A and on what is sent to the slaves."""
 
     def __init__(self, limits: Limits, storeys: int, slaves: int) -> None:
-        per_storey = ("displacement",) if storeys > 1 else ()
-        per_slave = ("table_target", "damper_command") if slaves > 1 else ()
+        per_storey = ("displacement", "velocity", "acceleration") if storeys > 1 else ()
+        per_slave = Outputs._fields[3:8] if slaves > 1 else ()  # what is sent to each
         self._measurements = Guard(limits, ColumnMeasurement._fields)
         self._outputs = Guard(limits, Outputs._fields, (*per_storey, *per_slave))
 

@@ -7,8 +7,8 @@ from operator import add
 from typing import Any
 
 from common import schema
-from common.plan import Actuator, Column, Sensors
 from common.rig import ColumnCommand, ColumnMeasurement
+from common.tables import Actuator, Column, Sensors
 from models.closed_loop import MEASURED_A
 from models.labs import column_lab, noise, readings
 from models.system import Effects

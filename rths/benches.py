@@ -13,10 +13,11 @@ from common import signals
 from common.clock import Clock, MonotonicClock, VirtualClock, unix_ns
 from common.errors import InputError, InterlockError, RigError, RthsError
 from common.limits import Guard
-from common.plan import Plan, TableCompensator
+from common.plan import Plan
 from common.reality import Reality
 from common.recording.writer import Recording
 from common.rig import ColumnCommand, ColumnMeasurement, GuardedRig, TableCommand, TableMeasurement
+from common.tables import TableCompensator
 from master import assembly as master
 from models import excitation
 from models.excitation import POSITION, Programme, Segment

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from common.plan import Compensator, TableCompensator
+from common.tables import Compensator, TableCompensator
 from models import compensators
 from models.excitation import ACCELERATION, JERK, POSITION, RATE, Programme
 

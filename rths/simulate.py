@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from common import cli
 from common.errors import InterlockError
-from common.plan import Compensator, Control, Plan, ideal
+from common.plan import Plan, ideal
+from common.tables import Compensator, Control
 
 if TYPE_CHECKING:
     from models.closed_loop import Rollout

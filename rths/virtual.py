@@ -13,10 +13,11 @@ from common.endpoint import Endpoint
 from common.errors import RthsError
 from common.laboratory import Report, Setting, silent
 from common.memory_link import MemoryHub
-from common.plan import Plan, Rig, Sensors
+from common.plan import Plan
 from common.reality import Reality, as_planned
 from common.recording.reader import Run, read
 from common.roles import MASTER, RECORDER
+from common.tables import Rig, Sensors
 from master.assembly import build_loop as build_master
 from master.loop import MasterLoop
 from models import substructure

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from common.limits import Guard
 from common.messages import Command
-from common.plan import Limits
 from common.rig import TableCommand, TableMeasurement
+from common.tables import Limits
 
 
 class SlaveLimits:

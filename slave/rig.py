@@ -7,8 +7,8 @@ from operator import add
 from typing import Any
 
 from common import schema
-from common.plan import Damper, Sensors, Table
 from common.rig import TableCommand, TableMeasurement
+from common.tables import Damper, Sensors, Table
 from models.closed_loop import MEASURED_B
 from models.labs import noise, readings, table_lab
 from models.system import Effects

@@ -22,8 +22,9 @@ from common.clock import MonotonicClock
 from common.endpoint import FrameEndpoint
 from common.laboratory import Setting
 from common.messages import Arm, Armed, Command, Feedback, Message, Register, Registered, Scheduled, Start
-from common.plan import PROTOCOL_VERSION, Laboratory, Plan, Recording, Rig
+from common.plan import PROTOCOL_VERSION, Plan
 from common.rig import TableCommand
+from common.tables import Laboratory, Recording, Rig
 from common.zenoh_link import ZenohLink
 from slave.assembly import build_loop
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from common.plan import Actuator, Column
+from common.tables import Actuator, Column
 from models.compiled import jit
 from models.labs import specimen
 from models.labs.specimen import REACTION

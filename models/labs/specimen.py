@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from common.plan import Column
+from common.tables import Column
 from models import specimens
 from models.compiled import jit, jit_apart
 from models.registry import Array

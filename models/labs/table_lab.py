@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from common.errors import InputError
-from common.plan import Damper, Table
+from common.tables import Damper, Table
 from models.compiled import jit
 from models.labs.column_lab import substeps
 from models.registry import Array

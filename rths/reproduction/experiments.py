@@ -11,17 +11,10 @@ import numpy as np
 
 from common import cli
 from common import plan as plans
-from common.plan import (
-    Actuator,
-    Compensator,
-    Control,
-    GroundMotion,
-    Plan,
-    TableCompensator,
-    ideal,
-)
+from common.plan import Plan, ideal
 from common.reality import as_planned
 from common.recording.reader import Run, read
+from common.tables import Actuator, Compensator, Control, GroundMotion, TableCompensator
 from models import indicators, substructure
 from models.closed_loop import signals, simulate
 from models.registry import Array

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from common import plan
+from common import tables
 from common.errors import InputError, RigError
 from common.limits import Guard
 from common.plugins import construct, find
@@ -109,13 +109,13 @@ def test_options_that_do_not_fit_are_a_sentence() -> None:
 
 
 def test_limits_apply_by_name_and_take_no_nan() -> None:
-    guard = Guard(plan.Limits(column_force=10.0), ColumnMeasurement._fields)
+    guard = Guard(tables.Limits(column_force=10.0), ColumnMeasurement._fields)
     assert guard.violation((0.0, 10.0)) == ""
     assert guard.violation((0.0, -10.1)) == "column_force is -10.1, beyond its limit of 10."
     assert "column_displacement is nan" in guard.violation((math.nan, 0.0))
 
 
 def test_limits_apply_to_every_storey() -> None:
-    guard = Guard(plan.Limits(displacement=1.0), ("displacement", "other"), several=("displacement",))
+    guard = Guard(tables.Limits(displacement=1.0), ("displacement", "other"), several=("displacement",))
     assert guard.violation(([0.5, 1.0], 99.0)) == ""
     assert guard.violation(([0.5, -1.5], 0.0)) == "displacement is -1.5, beyond its limit of 1."

@@ -12,8 +12,9 @@ import pytest
 
 from common import reality
 from common.mailbox import LinkModel
-from common.plan import Plan, Rig
+from common.plan import Plan
 from common.recording.reader import Run, read
+from common.tables import Rig
 from diagnosis.link import Finding, account, exchange_of, findings
 from models.closed_loop import on_time
 from models.link.exchange import exchange

@@ -16,10 +16,11 @@ from common.errors import InputError, InterlockError, LostError, RigError, RthsE
 from common.exchange import State
 from common.memory_link import MemoryEndpoint
 from common.messages import Command, Feedback, Register, Trip
-from common.plan import PROTOCOL_VERSION, Plan, Rig, from_tables
+from common.plan import PROTOCOL_VERSION, Plan, from_tables
 from common.reality import Reality
 from common.recording.reader import Run, read
 from common.signals import TOPICS
+from common.tables import Rig
 from models import substructure
 from models.closed_loop import rows, signals, simulate
 from rths import virtual

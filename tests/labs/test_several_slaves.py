@@ -15,9 +15,10 @@ from common.errors import InputError, InterlockError, LostError, RigError
 from common.exchange import State
 from common.laboratory import Setting
 from common.messages import Arm, Feedback, Recorder, Register, Start, Sync, Waiting
-from common.plan import PROTOCOL_VERSION, Plan, Rig, from_tables
+from common.plan import PROTOCOL_VERSION, Plan, from_tables
 from common.reality import Reality
 from common.recording.reader import Run, read
+from common.tables import Rig
 from models import substructure
 from models.closed_loop import signals, simulate
 from rths import virtual

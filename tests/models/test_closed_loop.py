@@ -8,8 +8,9 @@ import math
 import numpy as np
 import pytest
 
-from common.plan import Actuator, Compensator, Control, Plan, from_tables, ideal
+from common.plan import Plan, from_tables, ideal
 from common.signals import TOPICS
+from common.tables import Actuator, Compensator, Control
 from models import substructure
 from models.closed_loop import Exchange, on_time, rows, signals, simulate
 from models.structures import shear_building

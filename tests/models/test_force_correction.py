@@ -10,7 +10,7 @@ import pytest
 
 from common import cli
 from common import plan as plans
-from common.plan import ForceCorrection
+from common.tables import ForceCorrection
 from models import force_correction
 from rths.reproduction.experiments import free_damping, without_amd
 

@@ -10,7 +10,8 @@ import pytest
 
 from common import cli
 from common import plan as plans
-from common.plan import Compensator, Plan
+from common.plan import Plan
+from common.tables import Compensator
 from models import substructure
 from models.closed_loop import signals, simulate
 from rths.partition import assess, critical_delay_of, sentence

@@ -18,7 +18,8 @@ from common.clock import VirtualClock
 from common.errors import InputError, InterlockError, LostError, RigError
 from common.laboratory import Setting
 from common.memory_link import MemoryHub
-from common.plan import Plan, Rig
+from common.plan import Plan
+from common.tables import Rig
 from recorder.loop import RecorderLoop
 from rths import virtual
 from rths.ending import KILL_S, LEAVE_S, MARGIN_S, SILENCE_S, WRITE_S, Ending, verdict
@@ -299,7 +300,10 @@ def program(folder: Path, name: str, text: str) -> None:
 
 
 DEAF = "import signal, time\nsignal.signal(signal.SIGINT, lambda *_: None)\ntime.sleep(60)\n"
-OBEDIENT = "import sys, time\ntry:\n    time.sleep(60)\nexcept KeyboardInterrupt:\n    sys.exit(3)\n"
+OBEDIENT = (
+    "import sys, time\ntry:\n    print('here', flush=True)\n    time.sleep(60)\nexcept KeyboardInterrupt:\n"
+    "    sys.exit(3)\n"
+)
 
 
 @pytest.fixture
@@ -377,7 +381,7 @@ def test_who_hangs_after_anothers_end_is_killed_without_a_wish(
 def test_a_leash_interrupts_when_its_last_holder_is_gone(tmp_path: Path) -> None:
     if sys.platform != "linux":
         pytest.skip("Linux alone has it")
-    program(tmp_path, "child", "print('here', flush=True)\n" + OBEDIENT)
+    program(tmp_path, "child", OBEDIENT)
     leash = Leash()
     with leash.end() as ends:
         child = subprocess.Popen(

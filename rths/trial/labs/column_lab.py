@@ -10,9 +10,9 @@ import numpy as np
 
 from common import schema
 from common.errors import InputError
-from common.plan import Actuator, Column
-from common.plan import Sensors as Levels
 from common.rig import ColumnCommand, ColumnMeasurement
+from common.tables import Actuator, Column
+from common.tables import Sensors as Levels
 from rths.trial.labs import column_kernel, delay, filters, laying, sensors, specimen
 from rths.trial.labs.column_effects import KNOWN
 from rths.trial.labs.column_kernel import Servo

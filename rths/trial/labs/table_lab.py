@@ -10,9 +10,9 @@ import numpy as np
 
 from common import schema
 from common.errors import InputError
-from common.plan import Damper, Table
-from common.plan import Sensors as Levels
 from common.rig import TableCommand, TableMeasurement
+from common.tables import Damper, Table
+from common.tables import Sensors as Levels
 from rths.trial.labs import delay, laying, table_kernel
 from rths.trial.labs.column_lab import STEP, readings
 from rths.trial.labs.table_effects import KNOWN

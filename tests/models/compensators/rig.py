@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from common.plan import Actuator, Column
+from common.tables import Actuator, Column
 from models import compensators
 from models.compensators import Built
 from models.labs import column_lab

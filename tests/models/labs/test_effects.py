@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from scipy.integrate import quad, solve_ivp, trapezoid
 
 from common.errors import InputError
-from common.plan import Actuator, Column, Damper, Plan, Table
+from common.plan import Plan
 from common.rig import ColumnCommand, TableCommand
 from common.schema import plain
+from common.tables import Actuator, Column, Damper, Table
 from master.rig import ColumnLab
 from models import substructure
 from models.closed_loop import MEASURED_A, MEASURED_B, Rollout, signals, simulate

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from common.plan import Actuator, Column, Damper, Sensors, Table
+from common.tables import Actuator, Column, Damper, Sensors, Table
 from models.labs import column_lab, noise, table_lab
 from models.transfer_systems import delay
 

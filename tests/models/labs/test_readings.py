@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from common.plan import Plan, Sensors
+from common.plan import Plan
 from common.rig import ColumnCommand, TableCommand
+from common.tables import Sensors
 from master.rig import ColumnLab
 from models import substructure
 from models.closed_loop import MEASURED_A, MEASURED_B, Rollout, simulate
