@@ -10,6 +10,7 @@ from typing import Protocol
 from common.endpoint import Received
 from common.laboratory import Laboratory
 from common.realtime import freeze
+from common.safety.modes import Mode
 from common.surroundings import Surroundings
 
 IDLE_NS = 5_000_000  # how often the handshake looks after itself
@@ -38,8 +39,17 @@ class Loop(Protocol):
     def heard(self, tick: int) -> bool:
         """Whether its message has come."""
 
+    def nominal(self, tick: int) -> int:
+        """When a tick begins if nothing is late, ns."""
+
     def tick(self, tick: int) -> None:
         """One control interval."""
+
+    def ease(self, tick: int) -> None:
+        """One interval on the way to rest."""
+
+    def tell(self) -> None:
+        """Tell the other laboratories of the end, again and again; may be called at any time."""
 
     def finish(self) -> None:
         """All ticks are done."""
@@ -70,6 +80,8 @@ def drive(loop: Loop, stopping: Callable[[], str], surroundings: Surroundings) -
     freeze()
     if run(loop, stopping):
         loop.finish()
+    come_to_rest(loop)
+    stay(loop, stopping)
     loop.disarm()
     surroundings.end(loop.ticks)
     depart(loop)
@@ -100,6 +112,30 @@ def run(loop: Loop, stopping: Callable[[], str]) -> bool:
             lab.report("progress", {"tick": tick, "t": tick * lab.plan.test.interval, **loop.progress})
     wait(loop, lab.plan.ticks)
     return lab.running
+
+
+def come_to_rest(loop: Loop) -> None:
+    """The ramp to rest, an interval at a time; intervals that were missed are left out, never caught up."""
+    lab, tick = loop.lab, loop.ticks
+    while lab.safety.mode is Mode.RAMPING:
+        tick += max((lab.clock.now() - loop.nominal(tick)) // lab.interval_ns, 0)
+        lab.clock.sleep_until(loop.nominal(tick))
+        while fetch(loop, 0):
+            pass
+        if lab.safety.mode is Mode.RAMPING:  # a message may have stopped the rig at once
+            loop.ease(tick)
+        loop.tell()
+        lab.send_samples()
+        tick += 1
+
+
+def stay(loop: Loop, stopping: Callable[[], str]) -> None:
+    """Where the plan wants it, a latched laboratory stays until an operator resets it."""
+    lab = loop.lab
+    while lab.plan.safety.wait_for_reset and lab.safety.latched and not stopping():
+        fetch(loop, lab.clock.now() + IDLE_NS)
+        loop.tell()
+        lab.send_samples()
 
 
 def wait(loop: Loop, tick: int) -> None:

@@ -23,6 +23,10 @@ class RigError(RthsError):
     exit_code = 3
 
 
+class EmergencyStopError(RigError):
+    """A laboratory's emergency stop was pressed: its rig is stopped at once, without a ramp (exit 3)."""
+
+
 class InterlockError(RthsError):
     """The test was stopped by a limit (exit 3)."""
 

@@ -8,16 +8,19 @@ from typing import Any, NamedTuple
 
 from common.clock import Clock
 from common.endpoint import Endpoint
-from common.errors import InterlockError, LostError, RthsError
+from common.errors import EmergencyStopError, InterlockError, LostError, RthsError
 from common.exchange import Event, Exchange, State
 from common.messages import Message, Recorder, Resend, Trip
 from common.outlet import Outlet, next_of
 from common.plan import Plan
 from common.roles import title
+from common.safety.modes import Cause, Mode, Safety, Turn
 
 REPEAT_NS = 100_000_000  # an unanswered request is sent again after this long
 
 NO_VALUES: Mapping[str, float] = MappingProxyType({})
+
+MODES = {mode: number for number, mode in enumerate(Mode)}  # as an event's values have them
 
 Report = Callable[[str, Mapping[str, Any]], None]
 
@@ -45,6 +48,9 @@ class Laboratory:
         self.clock = setting.clock
         self.report = setting.report
         self.exchange = Exchange()
+        self.safety = Safety(self._turned)
+        self.tick = 0  # the newest one that has begun
+        self.answer = (False, "")  # to the operator's newest press
         self.interval_ns = round(setting.plan.test.interval * 1e9)
         self.start_ns = 0  # own clock, tick 0
         self.epoch_ns = 0  # Unix time of tick 0 on the master's base
@@ -81,6 +87,33 @@ class Laboratory:
             "event", {"t": t, "lab": self.name, "level": level, "code": code, "text": text} | dict(values)
         )
 
+    def _turned(self, before: Mode, turn: Turn, after: Mode) -> None:
+        """Record and report a change of the safety mode; before the start is agreed there is no time of it."""
+        self.report("mode", {"lab": self.name, "mode": after.value})
+        if self.start_ns:
+            text = f"{before.value} → {after.value} ({turn.value})"
+            self.note(
+                "mode",
+                text,
+                tick=self.tick,
+                values={"mode": float(MODES[after]), "from": float(MODES[before])},
+            )
+
+    def sample_ramp(self, topic: str, tick: int, *values: float) -> None:
+        """Record one interval of the way to rest: commands written, then readings."""
+        if self.recorded:
+            at = self.epoch_ns + tick * self.interval_ns
+            t = tick * self.plan.test.interval
+            self.outlet.add(topic, at, at, (tick, t, self.safety.mode.value, *values))
+
+    def come_to_rest(self, tick: int, values: Mapping[str, float]) -> None:
+        """The rig is at rest; `values` say how it came there."""
+        self.tick = tick
+        self.safety.at_rest()
+        if self.safety.cause is not None:
+            figures = ", ".join(f"{name} {value:.4g}" for name, value in values.items())
+            self.note("safe", f"At rest after {self.safety.cause.code}: {figures}.", tick=tick, values=values)
+
     def fail(self, event: Event, error: RthsError, *, code: str, tick: int = 0, remote: bool = False) -> None:
         """End the test for this laboratory; the first cause stays."""
         if self.exchange.ended:
@@ -88,6 +121,10 @@ class Laboratory:
         self.exchange.happen(event, remote=remote, cause=str(error))
         self.error = error
         self.note(code, str(error), level="error", tick=tick)
+        if event is not Event.REFUSE:
+            turn = Turn.EMERGENCY if isinstance(error, EmergencyStopError) else Turn.TRIP
+            self.tick = tick
+            self.safety.trip(self.cause(code, error), turn)
         if event is not Event.REFUSE and not remote:
             self.say_why()
 
@@ -101,6 +138,29 @@ class Laboratory:
     def lost(self, who: str, seconds: float, tick: int = 0) -> None:
         """End the test because someone has been silent for too long."""
         self.fail(Event.LOSE, LostError(f"{who} has been silent for {seconds:g} s."), code="lost", tick=tick)
+
+    def cause(self, code: str, error: RthsError) -> Cause:
+        """An error as the cause of a latched state."""
+        return Cause(code, str(error), self.tick * self.plan.test.interval, self.name)
+
+    def overrun(self, late_ns: int, tick: int) -> bool:
+        """End the test where a tick comes too many intervals late: nobody knows what the rig did meanwhile."""
+        most = self.plan.safety.overrun
+        if late_ns <= most * self.interval_ns:
+            return False
+        error = InterlockError(
+            f"The {title(self.name)} was held up for {late_ns * 1e-6:.1f} ms, more than {most} intervals: free its "
+            "processor or give it real-time priority (`rths doctor`), or raise overrun in [safety]."
+        )
+        self.fail(Event.TRIP, error, code="overrun", tick=tick)
+        return True
+
+    def silent(self, who: str, tick: int) -> None:
+        """End the test because nothing fresh has come from someone for too many intervals."""
+        most = self.plan.safety.ramp_after
+        milliseconds = most * self.plan.test.interval * 1e3
+        error = LostError(f"Nothing fresh came from the {who} for {most} intervals ({milliseconds:g} ms).")
+        self.fail(Event.LOSE, error, code="watchdog", tick=tick)
 
     def tripped(self, lab: str, text: str, tick: int) -> None:
         """End the test because the other laboratory has stopped its rig."""

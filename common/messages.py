@@ -89,6 +89,7 @@ class Command(NamedTuple):
     seq: int
     sent_ns: int
     shift_ns: int  # how far the slave's clock has drifted from the master's since the start, estimated
+    heard_seq: int  # newest feedback that came over the wire, in use or not yet; -1 for none
     table_target: float
     damper_command: float
     table_target_velocity: float
@@ -134,6 +135,25 @@ class Trip(NamedTuple):
     session: int
     lab: str
     code: str
+    text: str
+
+
+class Operator(NamedTuple):
+    """Operator to the laboratories: stop, stop at once, or reset; `press` tells one press from its repetitions."""
+
+    session: int
+    plan: str  # digest
+    word: str  # stop, emergency, reset
+    press: int
+    reason: str
+
+
+class Answer(NamedTuple):
+    """Laboratory to operator: what a press has led to."""
+
+    session: int
+    press: int
+    accepted: int  # 1 or 0
     text: str
 
 
@@ -189,6 +209,8 @@ Message = (
     | Stop
     | Stopped
     | Trip
+    | Operator
+    | Answer
     | Samples
     | Finished
     | Recorder

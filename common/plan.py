@@ -37,7 +37,7 @@ from common.tables import (
     Tolerances,
 )
 
-PROTOCOL_VERSION = 3
+PROTOCOL_VERSION = 4
 MOST_SLAVES = 16
 SLAVE_NAME = re.compile(r"[a-z][a-z0-9_]*")
 
@@ -79,6 +79,11 @@ class Plan:
     def ticks(self) -> int:
         """Number of control intervals of the whole test."""
         return round(self.test.duration / self.test.interval)
+
+    @property
+    def window(self) -> int:
+        """Intervals by which a message may be late or ahead and still be fresh."""
+        return max(round(self.safety.message_age / self.test.interval), 1)
 
     @property
     def roles(self) -> tuple[str, ...]:

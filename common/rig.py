@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple, Protocol
 
-from common.errors import RigError
+from common.errors import EmergencyStopError, RigError
 
 
 class ColumnCommand(NamedTuple):
@@ -107,10 +107,11 @@ class GuardedRig:
         return ""
 
     def _failure(self, what: str, error: Exception) -> RigError:
+        kind = EmergencyStopError if isinstance(error, EmergencyStopError) else RigError
         if self._hidden:
-            return RigError(f"{self._name}: {what}() failed: {type(error).__name__}.")
+            return kind(f"{self._name}: {what}() failed: {type(error).__name__}.")
         if isinstance(error, RigError):
-            return RigError(f"{self._name}: {error}")
+            return kind(f"{self._name}: {error}")
         return RigError(f"{self._name}: {what}() failed: {type(error).__name__}: {error}")
 
     def _complaint(self, values: Any) -> str:

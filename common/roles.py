@@ -33,3 +33,9 @@ def title(role: str) -> str:
 def latency_topic(role: str) -> str:
     """The topic of a slave's latency."""
     return LATENCY + role.removeprefix(SLAVE)
+
+
+def ramp_topic(role: str) -> str:
+    """The topic of a laboratory's way to rest: `master_ramp`, `slave_ramp.roof`."""
+    kind, point, name = role.partition(".")
+    return f"{kind}_ramp{point}{name}"

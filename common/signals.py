@@ -9,7 +9,9 @@ from collections.abc import Sequence
 from enum import Enum
 from typing import NamedTuple
 
-from common.roles import kind_of, latency_topic
+from common.roles import MASTER as MASTER_ROLE
+from common.roles import SLAVE as SLAVE_ROLE
+from common.roles import kind_of, latency_topic, ramp_topic
 
 
 class Kind(Enum):
@@ -119,6 +121,29 @@ LATENCY = (
     Signal("feedback_used_ns", "ns", "start of the next tick, which can use it, master clock", Kind.STAMP),
 )
 
+MODE = Signal("mode", "", "safety mode after the tick", Kind.TEXT)
+
+MASTER_RAMP = (
+    SEQ,
+    TIME,
+    MODE,
+    Signal("actuator_command", "m", "command written on the way to rest"),
+    Signal("column_displacement", "m", "specimen deformation measured"),
+    Signal("column_force", "N", "restoring force of the specimen measured"),
+)
+
+SLAVE_RAMP = (
+    SEQ,
+    TIME,
+    MODE,
+    Signal("table_command", "m", "command written to the table on the way to rest"),
+    Signal("damper_command", "N", "motor force written on the way to zero"),
+    Signal("table_displacement", "m", "table displacement measured"),
+    Signal("table_acceleration", "m/s²", "table acceleration measured"),
+    Signal("damper_stroke", "m", "stroke of the damper measured"),
+    Signal("damper_force", "N", "force of the damper on the table measured"),
+)
+
 EVENT = (
     TIME,
     Signal("lab", "", "master, slave or recorder", Kind.TEXT),
@@ -128,10 +153,14 @@ EVENT = (
     Signal("values", "", "numbers that belong to it", Kind.VALUES),
 )
 
+MASTER_RAMP_TOPIC, SLAVE_RAMP_TOPIC = ramp_topic(MASTER_ROLE), ramp_topic(SLAVE_ROLE)
+
 TOPICS: dict[str, tuple[Signal, ...]] = {
     "master": MASTER,
     "slave": SLAVE,
     "latency": LATENCY,
+    MASTER_RAMP_TOPIC: MASTER_RAMP,
+    SLAVE_RAMP_TOPIC: SLAVE_RAMP,
     "event": EVENT,
 }
 
@@ -140,8 +169,10 @@ TICK_TOPICS = ("master", "slave", "latency")
 
 def topics(slaves: Sequence[str]) -> dict[str, tuple[Signal, ...]]:
     """What a recording of a test holds; `slaves` are the roles of its slaves."""
-    labs = {"master": MASTER} | dict.fromkeys(slaves, SLAVE)
-    return labs | dict.fromkeys(map(latency_topic, slaves), LATENCY) | {"event": EVENT}
+    found: dict[str, tuple[Signal, ...]] = {"master": MASTER} | dict.fromkeys(slaves, SLAVE)
+    found |= dict.fromkeys(map(latency_topic, slaves), LATENCY)
+    found |= {MASTER_RAMP_TOPIC: MASTER_RAMP} | dict.fromkeys(map(ramp_topic, slaves), SLAVE_RAMP)
+    return found | {"event": EVENT}
 
 
 MEASURED = {

@@ -20,3 +20,7 @@ class MasterLimits:
     def violation(self, measured: ColumnMeasurement, outputs: Outputs) -> str:
         """A sentence on the first value beyond its limit, empty where there is none."""
         return self._measurements.violation(measured) or self._outputs.violation(outputs)
+
+    def standing(self, measured: ColumnMeasurement) -> str:
+        """Why a rig at rest may not be reset, empty where all it reads is within its limits."""
+        return self._measurements.violation(measured)

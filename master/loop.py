@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from common.endpoint import Received
-from common.errors import InputError, InterlockError, LostError, RigError
+from common.errors import EmergencyStopError, InputError, InterlockError, LostError, RigError
 from common.exchange import Event, State
 from common.laboratory import REPEAT_NS, Laboratory, Setting
 from common.mailbox import LinkModel
@@ -18,6 +18,7 @@ from common.messages import (
     Armed,
     Feedback,
     Message,
+    Operator,
     Recorder,
     Refused,
     Register,
@@ -29,13 +30,18 @@ from common.messages import (
     Trip,
     Waiting,
 )
+from common.operation import obey
 from common.plan import PROTOCOL_VERSION
 from common.rig import ColumnCommand, GuardedRig
 from common.roles import MASTER
+from common.safety.modes import Turn
+from common.safety.watchdog import Finding
+from master.descent import ColumnDescent
 from master.limits import MasterLimits
 from master.partner import Partner
 from master.step import MasterStep, Outputs
 
+SAFETY = {Event.REGISTER: Turn.CONFIGURE, Event.ARM: Turn.ARM}
 LEAD_NS = 250_000_000  # from the agreement on the start to the start
 
 
@@ -60,6 +66,8 @@ class MasterLoop:
         self._rig = rig
         self._step = step
         self._limits = MasterLimits(plan.limits, plan.storeys, len(self._partners))
+        self._descent = ColumnDescent(self.lab, rig)
+        self._disarmed = False
         self._command = 0.0
         self._drift = 0.0
         self._asked_ns = -REPEAT_NS
@@ -77,6 +85,9 @@ class MasterLoop:
         if isinstance(message, Feedback):
             if lab.exchange.belongs(message.session) and role in self.partners:
                 self.partners[role].take(message, received.received_ns, received.decoded_ns)
+            return
+        if isinstance(message, Operator):
+            obey(self, message)
             return
         lab.listen_to_recorder(message)
         if isinstance(message, Recorder):
@@ -146,6 +157,8 @@ class MasterLoop:
 
     def _move(self, event: Event) -> None:
         self.lab.exchange.happen(event)
+        if event in SAFETY:
+            self.lab.safety.take(SAFETY[event])
         self.lab.heard_ns = self.lab.clock.now()
         self._ask_anew(self.lab.heard_ns)
         self.lab.report("state", {"lab": self.lab.name, "state": self.lab.exchange.state.value})
@@ -257,34 +270,70 @@ class MasterLoop:
         """One control interval (contract, section 3); a tick that comes a whole interval late moves nothing."""
         lab = self.lab
         wake = lab.clock.now()
+        lab.tick = tick
         if lab.exchange.state is State.SCHEDULED:
             self._begin(wake)
         held = wake >= lab.tick_ns(tick + 1)
         forces = [partner.begin(tick, wake) for partner in self._partners]
+        if self._alarmed(tick, wake, held=held):
+            self._descent.ease(tick)
+            return
         try:
             measured = self._rig.read()
             outputs = self._step(tick, measured.column_displacement, measured.column_force, forces)
             violation = self._limits.violation(measured, outputs)
-            if not (held or violation):
-                self._command = outputs.actuator_command
-                for partner, sent in zip(self._partners, outputs.sent(), strict=True):
-                    partner.sent = sent
-            self._rig.write(ColumnCommand(self._command))
+            if violation:
+                self._trip(InterlockError(violation), "limit", tick)
+                self._descent.step(tick, measured)
+            else:
+                self._write(outputs, held=held)
         except RigError as error:
-            self._trip(error, "rig", tick)
+            self._rig_failed(error, tick)
             return
         self._send(tick, wake, nothing=bool(held or violation))
         if lab.recorded:
             self._sample(tick, measured, outputs)
         self.ticks = tick + 1
         self._drift = outputs.column_target / lab.plan.column.deformation_ratio
-        if violation:
-            self._trip(InterlockError(violation), "limit", tick)
         self._watch(tick, wake)
+
+    def _alarmed(self, tick: int, wake_ns: int, *, held: bool) -> bool:
+        """Trip where this loop came far too late, or a slave has been silent for too long; hold before that."""
+        lab = self.lab
+        if lab.overrun(wake_ns - lab.tick_ns(tick), tick):
+            return True
+        if held:  # the silence may be this loop's own
+            return False
+        findings = [partner.look(tick) for partner in self._partners]
+        if Finding.RAMP in findings:
+            lab.silent(self._partners[findings.index(Finding.RAMP)].title, tick)
+            return True
+        lab.safety.follow(Turn.HOLD if Finding.HOLD in findings else Turn.RESUME)
+        return False
+
+    def _write(self, outputs: Outputs, *, held: bool) -> None:
+        """Move to the tick's command, or stay where it came too late."""
+        if not held:
+            self._command = outputs.actuator_command
+            for partner, sent in zip(self._partners, outputs.sent(), strict=True):
+                partner.sent = sent
+        self._descent.wrote(self._command)
+        self._rig.write(ColumnCommand(self._command))
+
+    def ease(self, tick: int) -> None:
+        """One interval on the way to rest."""
+        self._descent.ease(tick)
+
+    def _rig_failed(self, error: RigError, tick: int) -> None:
+        if isinstance(error, EmergencyStopError):
+            self.emergency(error)
+        else:
+            self._trip(error, "rig", tick)
 
     def _begin(self, now: int) -> None:
         """The first tick."""
         self.lab.exchange.happen(Event.RUN)
+        self.lab.safety.take(Turn.RUN)
         for partner in self._partners:
             partner.heard_ns = now
 
@@ -344,6 +393,28 @@ class MasterLoop:
         if self.lab.exchange.allows(Event.STOP):
             self.lab.exchange.happen(Event.STOP, cause=reason)
             self.lab.note("stop", reason, tick=self.ticks)
+            self.lab.safety.follow(Turn.END)
+            self.tell()
+
+    def wind_down(self, reason: str) -> None:
+        """End the test in order, as the operator wants."""
+        self.stop(reason)
+
+    def emergency(self, error: EmergencyStopError) -> None:
+        """Stop the rig at once."""
+        lab = self.lab
+        if lab.exchange.ended:
+            lab.safety.trip(lab.cause("emergency", error), Turn.EMERGENCY)
+        else:
+            lab.fail(Event.TRIP, error, code="emergency", tick=lab.tick)
+        self._stop_rig()
+
+    def standing(self) -> str:
+        """Why the cause of a latched state is not gone, empty where it is."""
+        try:
+            return self._limits.standing(self._rig.read())
+        except RigError as error:
+            return str(error)
 
     def leave(self) -> None:
         """Tell the slaves and give the recorder the rest; may be called again until `left`."""
@@ -355,21 +426,38 @@ class MasterLoop:
         if now - self._asked_ns < REPEAT_NS // 2:
             return
         self._asked_ns = now
-        session = lab.exchange.session
-        if lab.exchange.state is State.STOPPING:
-            lab.endpoint.send(Stop(session, self.ticks, lab.exchange.cause))
-        elif lab.error is not None:
-            lab.say_why()
+        self._say_end()
         lab.send_samples(everything=True)
         lab.endpoint.send(lab.outlet.finished())
 
+    def tell(self) -> None:
+        """Tell the slaves that the test ends, again after a while."""
+        now = self.lab.clock.now()
+        if now - self._asked_ns >= REPEAT_NS // 2:
+            self._asked_ns = now
+            self._say_end()
+
+    def _say_end(self) -> None:
+        lab = self.lab
+        if lab.exchange.state is State.STOPPING:
+            lab.endpoint.send(Stop(lab.exchange.session, self.ticks, lab.exchange.cause))
+        elif lab.error is not None:
+            lab.say_why()
+
     def disarm(self) -> None:
         """Bring the rig to a safe stop and close the accounts; once, before leaving."""
-        if complaint := self._rig.disarm():
-            self.lab.note("disarm", complaint, level="warning", tick=self.ticks)
+        self._stop_rig()
         if self.ticks:
             for partner in self._partners:
                 partner.account.finish(self.ticks - 1, self.lab.clock.now())
+                text, values = partner.exchanged()
+                self.lab.note("exchange", text, tick=self.ticks, values=values)
+
+    def _stop_rig(self) -> None:
+        if not self._disarmed:
+            self._disarmed = True
+            if complaint := self._rig.disarm():
+                self.lab.note("disarm", complaint, level="warning", tick=self.ticks)
 
     @property
     def left(self) -> bool:
@@ -391,6 +479,10 @@ class MasterLoop:
         }
 
     # -- pacing -----------------------------------------------------------------------------------
+
+    def nominal(self, tick: int) -> int:
+        """When a tick begins if nothing is late, ns."""
+        return self.lab.tick_ns(tick)
 
     def earliest(self, tick: int) -> int:
         """A tick begins at its nominal time, ns."""

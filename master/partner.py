@@ -7,6 +7,8 @@ from common.laboratory import REPEAT_NS, Laboratory
 from common.mailbox import LinkModel, Mailbox
 from common.messages import Arm, Command, Feedback, Start, Sync, SyncReply
 from common.roles import latency_topic, name_of, title
+from common.safety.watchdog import Finding, Watchdog
+from common.tally import Tally
 from common.transport import addressed
 from master.latency import Account
 from master.step import Sent
@@ -35,12 +37,15 @@ class Partner:
         self._sync_sent_ns = 0
         self._syncs = 0
         self._asked_ns = -REPEAT_NS
+        self._watchdog = Watchdog(lab.plan.safety, interval)
+        self.tally = Tally(lab.plan.ticks, lab.plan.window)
         self.account = Account(lab, self._offset, latency_topic(role))
         self.instance = 0  # the process that takes part under this role, 0 for none yet
         self.armed = False
         self.scheduled = False
         self.stopped = False
         self.heard_ns = 0
+        self.commands = 0  # sent
         self.used = NO_FEEDBACK
         self.sent: Sent = NOTHING_SENT
 
@@ -110,11 +115,14 @@ class Partner:
     # -- ticks ------------------------------------------------------------------------------------
 
     def take(self, feedback: Feedback, received_ns: int, decoded_ns: int) -> None:
-        """Take in a feedback, unless one as new was there before."""
-        if feedback.seq <= self._feedback.newest_seen:
+        """Take in a feedback, unless it is not fresh."""
+        expected = (received_ns - self._lab.start_ns) // self._lab.interval_ns
+        if not self.tally.admit(feedback.seq, expected):
             return
         self.heard_ns = received_ns
         extra = self._feedback.put(feedback.seq, feedback)
+        if extra is None:
+            self.tally.lose(feedback.seq)
         self.account.answer(feedback, received_ns, decoded_ns, extra)
 
     def heard(self, seq: int) -> bool:
@@ -125,16 +133,29 @@ class Partner:
         """The damper force (N) that a tick uses: of the newest feedback that is there by then."""
         if (feedback := self._feedback.take(tick)) is not None:
             self.used = feedback
+            self.tally.use(feedback.seq)
         self.account.close(tick - 1, now)
         return self.used.damper_force
+
+    def look(self, tick: int) -> Finding:
+        """What the watchdog says at a tick that came in time."""
+        return self._watchdog.look(tick - 1, self.used.seq, self.used.heard_seq)
 
     def send(self, tick: int) -> tuple[int, int]:
         """Send the command that is `sent`; when its turn came, and when its frame was handed to the link, ns."""
         lab = self._lab
         now = lab.clock.now()
         shift = self._offset.at(now) - self._first_offset
-        command = Command(lab.exchange.session, tick, now, shift, *self.sent)
+        command = Command(lab.exchange.session, tick, now, shift, self._feedback.newest_seen, *self.sent)
+        self.commands += 1
         return now, lab.endpoint.send(command, self._address)
+
+    def exchanged(self) -> tuple[str, dict[str, float]]:
+        """What became of the messages of both directions as far as this end knows: a sentence and its numbers."""
+        values = {f"{self.role}.commands_sent": float(self.commands)}
+        values |= self.tally.values(f"{self.role}.feedbacks")
+        text = f"{self.commands} commands sent to the {self.title}, {self.tally.used} of its feedbacks used."
+        return text, values
 
     def use(self, tick: int) -> tuple[float, int, float]:
         """Of the feedback in use at a tick: damper force (N), its tick, its age (s)."""

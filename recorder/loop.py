@@ -39,7 +39,9 @@ class RecorderLoop:
         self._said_ns = -REPEAT_NS
         self._heard_ns = setting.clock.now()
         self._seen: dict[str, set[int]] = {
-            topic: set() for topic in signals.topics(setting.plan.roles) if topic != "event"
+            topic: set()
+            for topic in signals.topics(setting.plan.roles)
+            if kind_of(topic) in signals.TICK_TOPICS
         }
         self._missed = 0
         self._machines: dict[str, str] = {}  # metadata of the recording
@@ -91,7 +93,8 @@ class RecorderLoop:
         if topic == "event":
             self._take_event(values)
             return
-        self._seen[topic].add(values[0])
+        if topic in self._seen:
+            self._seen[topic].add(values[0])
         if kind_of(topic) == LATENCY:
             self._missed += bool(values[MISSED_AT])
 

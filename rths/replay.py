@@ -173,7 +173,7 @@ def replay_table(recording: Run, slave: dict[str, Any], match: Match) -> None:
     for place, (t, seq) in enumerate(zip(slave["t"], slave["seq"], strict=True)):
         if seq != place:
             break
-        command = Command(0, seq, 0, 0, *(slave[name][place] for name in SENT))
+        command = Command(0, seq, 0, 0, -1, *(slave[name][place] for name in SENT))
         measured = TableMeasurement(*(slave[name][place] for name in TableMeasurement._fields))
         match.take(t, step(command, measured), slave["table_command"][place])
 

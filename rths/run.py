@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 POLL_S = 0.1
 AGREED = State.SCHEDULED.value  # with which the master reports that all know the start
-UNSAID = ("machine", "bare_loop")  # for the recording
+UNSAID = ("machine", "bare_loop", "mode", "exchange")  # for the recording
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -88,7 +88,7 @@ def before_the_start(plan: Plan) -> str:
 
 def virtual_report(kind: str, data: Any) -> None:
     """Events of a test in virtual time, on standard error."""
-    if kind == "event":
+    if kind == "event" and data["code"] not in UNSAID:
         cli.text_report(kind, data)
 
 

@@ -53,7 +53,11 @@ def summarize(run: Run) -> dict[str, Any]:
         "slaves": [name_of(role) for role in run.roles if name_of(role)],
         "ground_motion": run.metadata.get("ground_motion", {}),
         "ticks_expected": plan.ticks if plan else None,
-        "topics": {topic: completeness(run, topic, plan) for topic in run.columns},
+        "topics": {
+            topic: completeness(run, topic, plan)
+            for topic in run.columns
+            if kind_of(topic) in signals.TICK_TOPICS
+        },
         "recorder": dict(run.metadata.get("summary", {})),
         "peaks": peaks(run),
         "tracking": tracking(run),

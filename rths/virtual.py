@@ -17,6 +17,7 @@ from common.plan import Plan
 from common.reality import Reality, as_planned
 from common.recording.reader import Run, read
 from common.roles import MASTER, RECORDER
+from common.safety.modes import Mode
 from common.tables import Rig, Sensors
 from master.assembly import build_loop as build_master
 from master.loop import MasterLoop
@@ -99,6 +100,7 @@ def run(bench: Bench, stopping: Callable[[], str]) -> RthsError | None:
         _tick(bench, tick)
     else:
         bench.master.finish()
+    _come_to_rest(bench)
     _leave(bench)
     failed = {role: loop.lab.error for role, loop in bench.loops.items() if loop.lab.error}
     causes = [error for role, error in failed.items() if codes.get(role) != CONSEQUENCE]
@@ -153,6 +155,22 @@ def _tick(bench: Bench, tick: int) -> None:
         for _, slave in slaves:
             slave.lab.send_samples()
         _record(bench)
+
+
+def _come_to_rest(bench: Bench) -> None:
+    """The ramps of all laboratories, an interval at a time."""
+    tick = bench.master.ticks
+    while True:
+        bench.clock.sleep_until(bench.master.lab.tick_ns(tick))
+        _exchange(bench, poll=False)
+        loops = [loop for loop in bench.loops.values() if loop.lab.safety.mode is Mode.RAMPING]
+        if not loops:
+            return
+        for loop in loops:
+            loop.ease(tick)
+            loop.tell()
+            loop.lab.send_samples()
+        tick += 1
 
 
 def _exchange(bench: Bench, *, poll: bool) -> None:

@@ -23,3 +23,7 @@ class SlaveLimits:
             or self._command.violation(command)
             or self._written.violation(wanted)
         )
+
+    def standing(self, measured: TableMeasurement) -> str:
+        """Why a rig at rest may not be reset, empty where all it reads is within its limits."""
+        return self._measurements.violation(measured)

@@ -7,7 +7,7 @@ in real time, and virtual time calls the same two.
 from __future__ import annotations
 
 from common.endpoint import Received
-from common.errors import InputError, InterlockError, LostError, RigError
+from common.errors import EmergencyStopError, InputError, InterlockError, LostError, RigError
 from common.exchange import Event, State
 from common.laboratory import REPEAT_NS, Laboratory, Setting
 from common.mailbox import LinkModel, Mailbox
@@ -17,6 +17,7 @@ from common.messages import (
     Command,
     Feedback,
     Message,
+    Operator,
     Recorder,
     Refused,
     Register,
@@ -31,13 +32,19 @@ from common.messages import (
     Trip,
     Waiting,
 )
+from common.operation import obey
 from common.plan import PROTOCOL_VERSION
 from common.rig import GuardedRig, TableCommand, TableMeasurement
 from common.roles import SLAVE, name_of, title
+from common.safety.modes import Turn
+from common.safety.watchdog import Finding, Watchdog
+from common.tally import Tally
+from slave.descent import TableDescent
 from slave.limits import SlaveLimits
 from slave.step import SlaveStep
 
-NO_COMMAND = Command(0, -1, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
+SAFETY = {Event.REGISTER: Turn.CONFIGURE, Event.ARM: Turn.ARM}
+NO_COMMAND = Command(0, -1, 0, 0, -1, 0.0, 0.0, 0.0, 0.0, 0.0)
 NOTHING_HEARD = (-1, 0)
 
 
@@ -59,6 +66,11 @@ class SlaveLoop:
         self._shift_ns = 0
         self._said_ns = -REPEAT_NS
         self._digest = setting.plan.digest()
+        self._descent = TableDescent(self.lab, rig)
+        self._watchdog = Watchdog(setting.plan.safety, setting.plan.test.interval)
+        self._tally = Tally(setting.plan.ticks, setting.plan.window)
+        self._feedbacks = 0  # sent
+        self._disarmed = False
         self.ticks = 0
 
     # -- messages ---------------------------------------------------------------------------------
@@ -72,6 +84,9 @@ class SlaveLoop:
             return
         lab.listen_to_recorder(message)
         match message:
+            case Operator():
+                obey(self, message)
+                return
             case Register():
                 self._register(message)
             case Arm() if message.instance != self._instance:
@@ -103,13 +118,16 @@ class SlaveLoop:
                 pass
 
     def _take_command(self, command: Command, received_ns: int) -> None:
-        if not self.lab.exchange.fresh(command.seq):
+        expected = (received_ns - self.tick_ns(0)) // self.lab.interval_ns
+        if not self._tally.admit(command.seq, expected):
             return
         self.lab.heard_ns = received_ns
         self._heard = (command.seq, received_ns)
         self._shift_ns = command.shift_ns
         extra = self._commands.put(command.seq, command)
-        if extra is not None:
+        if extra is None:
+            self._tally.lose(command.seq)
+        else:
             self._received_ns[command.seq] = received_ns + round(extra * 1e9)
 
     def _register(self, request: Register) -> None:
@@ -173,9 +191,12 @@ class SlaveLoop:
     def _stop(self, request: Stop) -> None:
         if self.lab.exchange.allows(Event.STOP):
             self.lab.exchange.happen(Event.STOP, remote=True, cause=request.reason)
+            self.lab.safety.follow(Turn.END)
 
     def _move(self, event: Event) -> None:
         self.lab.exchange.happen(event)
+        if event in SAFETY:
+            self.lab.safety.take(SAFETY[event])
         self.lab.report("state", {"lab": self.lab.name, "state": self.lab.exchange.state.value})
 
     def poll(self) -> None:
@@ -200,33 +221,70 @@ class SlaveLoop:
     def tick(self, tick: int) -> None:
         """One control interval (contract, section 3); a tick that comes a whole interval late keeps its command."""
         lab, now = self.lab, self.lab.clock.now()
+        lab.tick = tick
         if lab.exchange.state is State.SCHEDULED:
-            lab.exchange.happen(Event.RUN)
-            lab.heard_ns = now
+            self._begin(now)
         held = now >= self.tick_ns(tick + 1)
         if not held and (command := self._commands.take(tick)) is not None:
             self._command = command
+            self._tally.use(command.seq)
+        if self._alarmed(tick, now, held=held):
+            self._descent.ease(tick)
+            return
         command = self._command
         try:
             measured = self._rig.read()
             wanted = TableCommand(self._step(command, measured), command.damper_command)
             violation = self._limits.violation(measured, command, wanted)
-            if not violation:
+            if violation:
+                lab.fail(Event.TRIP, InterlockError(violation), code="limit", tick=tick)
+                self._descent.step(tick, measured)
+            else:
+                self._descent.wrote(wanted)
                 self._rig.write(wanted)
         except RigError as error:
-            lab.fail(Event.TRIP, error, code="rig", tick=tick)
+            self._rig_failed(error, tick)
             return
         self._answer(tick, now, measured, wanted)
         self.ticks = tick + 1
-        if violation:
-            lab.fail(Event.TRIP, InterlockError(violation), code="limit", tick=tick)
-        elif now - lab.heard_ns > lab.plan.link.loss_timeout * 1e9:
+        if lab.running and now - lab.heard_ns > lab.plan.link.loss_timeout * 1e9:
             lab.lost("The master", lab.plan.link.loss_timeout, tick)
+
+    def _begin(self, now: int) -> None:
+        """The first tick."""
+        self.lab.exchange.happen(Event.RUN)
+        self.lab.safety.take(Turn.RUN)
+        self.lab.heard_ns = now
+
+    def _alarmed(self, tick: int, now: int, *, held: bool) -> bool:
+        """Trip where this loop came far too late, or the master has been silent for too long; hold before that."""
+        lab = self.lab
+        if lab.overrun(now - self.tick_ns(tick), tick):
+            return True
+        if held:  # the silence may be this loop's own
+            return False
+        finding = self._watchdog.look(tick, self._command.seq, self._command.heard_seq)
+        if finding is Finding.RAMP:
+            lab.silent("master", tick)
+            return True
+        lab.safety.follow(Turn.HOLD if finding is Finding.HOLD else Turn.RESUME)
+        return False
+
+    def ease(self, tick: int) -> None:
+        """One interval on the way to rest."""
+        self._descent.ease(tick)
+
+    def _rig_failed(self, error: RigError, tick: int) -> None:
+        if isinstance(error, EmergencyStopError):
+            self.emergency(error)
+        else:
+            self.lab.fail(Event.TRIP, error, code="rig", tick=tick)
 
     def _answer(self, tick: int, started_ns: int, measured: TableMeasurement, wanted: TableCommand) -> None:
         lab, command = self.lab, self._command
         received_ns = self._told(command.seq, started_ns)
         sent_ns = lab.clock.now()
+        self._feedbacks += 1
         lab.endpoint.send(
             Feedback(
                 lab.exchange.session,
@@ -278,10 +336,50 @@ class SlaveLoop:
         """Stop because somebody at this laboratory wants it so."""
         self.lab.fail(Event.TRIP, InterlockError(reason), code="stop", tick=self.ticks)
 
+    def wind_down(self, reason: str) -> None:
+        """End the test in order, as the operator wants; the master hears it too."""
+        lab = self.lab
+        if lab.exchange.allows(Event.STOP):
+            lab.exchange.happen(Event.STOP, cause=reason)
+            lab.note("stop", reason, tick=self.ticks)
+            lab.safety.follow(Turn.END)
+
+    def emergency(self, error: EmergencyStopError) -> None:
+        """Stop the rig at once."""
+        lab = self.lab
+        if lab.exchange.ended:
+            lab.safety.trip(lab.cause("emergency", error), Turn.EMERGENCY)
+        else:
+            lab.fail(Event.TRIP, error, code="emergency", tick=lab.tick)
+        self._stop_rig()
+
+    def standing(self) -> str:
+        """Why the cause of a latched state is not gone, empty where it is."""
+        try:
+            return self._limits.standing(self._rig.read())
+        except RigError as error:
+            return str(error)
+
     def disarm(self) -> None:
         """Bring the rig to a safe stop; once, before leaving."""
-        if complaint := self._rig.disarm():
-            self.lab.note("disarm", complaint, level="warning", tick=self.ticks)
+        self._stop_rig()
+        if self.ticks:
+            text = f"{self._feedbacks} feedbacks sent, {self._tally.used} commands used."
+            values = {"feedbacks_sent": float(self._feedbacks)} | self._tally.values("commands")
+            self.lab.note("exchange", text, tick=self.ticks, values=values)
+
+    def _stop_rig(self) -> None:
+        if not self._disarmed:
+            self._disarmed = True
+            if complaint := self._rig.disarm():
+                self.lab.note("disarm", complaint, level="warning", tick=self.ticks)
+
+    def tell(self) -> None:
+        """Tell the master why this laboratory has stopped, again after a while."""
+        now = self.lab.clock.now()
+        if self.lab.error is not None and now - self._said_ns >= REPEAT_NS // 2:
+            self._said_ns = now
+            self.lab.say_why()
 
     def leave(self) -> None:
         """Tell the master and give the recorder the rest; may be called again until `left`."""
@@ -313,6 +411,10 @@ class SlaveLoop:
         return {}
 
     # -- pacing -----------------------------------------------------------------------------------
+
+    def nominal(self, tick: int) -> int:
+        """When a tick begins if nothing is late, ns."""
+        return self.tick_ns(tick)
 
     def earliest(self, tick: int) -> int:
         """A tick begins as soon as its command comes, ns."""

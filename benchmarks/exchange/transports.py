@@ -102,7 +102,7 @@ class RthsAsking:
         """A command and its feedback, until the feedback's values are there; the loop sleeps meanwhile."""
         seq = self._seq
         self._seq += 1
-        self._endpoint.send(Command(SESSION, seq, FAR_NS, 0, 1e-3, 1.0, 1e-2, 0.1, 1.0))
+        self._endpoint.send(Command(SESSION, seq, FAR_NS, 0, seq - 1, 1e-3, 1.0, 1e-2, 0.1, 1.0))
         deadline = time.monotonic() + PATIENCE_S
         while time.monotonic() < deadline:
             received = self._endpoint.receive(1.0)

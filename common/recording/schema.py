@@ -23,7 +23,7 @@ _TYPES = {
 
 def message_name(topic: str) -> str:
     """The message of a topic; those of several slaves have one in common."""
-    return kind_of(topic).capitalize()
+    return "".join(map(str.capitalize, kind_of(topic).split("_")))
 
 
 def schema_file(

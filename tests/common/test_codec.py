@@ -37,7 +37,7 @@ def test_every_message_survives_the_wire(kind: type[Any], data: st.DataObject) -
 
 
 REST = (0.0, 0.0, 0.0)  # the rates of the target
-COMMAND = Command(7, 3, 10, 0, 0.001, 12.5, 0.02, 0.3, 4.0)
+COMMAND = Command(7, 3, 10, 0, 2, 0.001, 12.5, 0.02, 0.3, 4.0)
 
 
 def framed(content: object, key: codec.Key = KEY) -> bytes:

@@ -250,7 +250,7 @@ def test_a_slave_has_one_master(short_plan: Plan) -> None:
     bench.slave.take(Received(Register(5, PROTOCOL_VERSION, plan.digest())))
     bench.slave.take(Received(Register(6, PROTOCOL_VERSION, plan.digest())))
     assert bench.slave.lab.exchange.session == 5
-    bench.slave.take(Received(Command(6, 0, 0, 0, 1.0, 1.0, 0.0, 0.0, 0.0)))
+    bench.slave.take(Received(Command(6, 0, 0, 0, -1, 1.0, 1.0, 0.0, 0.0, 0.0)))
     bench.slave.take(Received(Trip(6, "master", "x", "y")))
     assert not bench.slave.heard(0)
     assert bench.slave.lab.exchange.state is State.REGISTERED

@@ -1,0 +1,66 @@
+"""What became of the messages of one direction, told at their receiving end by their numbers."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+NOT_SEEN, REJECTED, ADMITTED, USED = range(4)
+
+
+class Tally:
+    """Admits what is fresh and keeps the fate of every number; `ticks` are those of the test.
+
+    Fresh is what is newer than all before and was sent within `window` intervals of when it came, by the receiver's
+    own clock: what an interrupted transport delivers late is not, nor is a number far ahead.
+    """
+
+    def __init__(self, ticks: int, window: int) -> None:
+        self._fates = bytearray(ticks)
+        self._window = window
+        self._newest = -1
+        self.reasons: Counter[str] = Counter()
+
+    def admit(self, seq: int, expected: int) -> bool:
+        """Whether a message is fresh; `expected` is the tick in which it came."""
+        reason = self._reason(seq, expected)
+        if not reason:
+            self._newest = seq
+            self._fates[seq] = ADMITTED
+            return True
+        self.reasons[reason] += 1
+        if 0 <= seq < len(self._fates) and self._fates[seq] == NOT_SEEN:
+            self._fates[seq] = REJECTED
+        return False
+
+    def _reason(self, seq: int, expected: int) -> str:
+        if not 0 <= seq < len(self._fates) or seq > expected + self._window:
+            return "ahead"
+        if seq <= self._newest:
+            return "old" if self._fates[seq] == NOT_SEEN else "repeated"
+        return "stale" if seq < expected - self._window else ""
+
+    def lose(self, seq: int) -> None:
+        """An emulated link has lost a message that was admitted."""
+        self._fates[seq] = NOT_SEEN
+
+    def use(self, seq: int) -> None:
+        """A message has come into force."""
+        if 0 <= seq < len(self._fates):
+            self._fates[seq] = USED
+
+    @property
+    def used(self) -> int:
+        """Messages that came into force."""
+        return self._fates.count(USED)
+
+    @property
+    def rejected(self) -> int:
+        """Messages that came and never were in force: too late, or overtaken by a newer one."""
+        return self._fates.count(REJECTED) + self._fates.count(ADMITTED)
+
+    def values(self, prefix: str) -> dict[str, float]:
+        """Used and rejected messages and the frames turned away by reason, each name with a prefix."""
+        counts = {"used": self.used, "rejected": self.rejected} | {
+            f"turned_away.{reason}": count for reason, count in sorted(self.reasons.items())
+        }
+        return {f"{prefix}.{name}": float(count) for name, count in counts.items()}
