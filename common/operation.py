@@ -36,7 +36,7 @@ def obey(loop: Operated, wish: Operator) -> None:
         lab.answer = _done(loop, wish)
         lab.note("operator", f"{wish.word}: {lab.answer[1]}", tick=lab.tick)
     accepted, text = lab.answer
-    lab.endpoint.send(Answer(lab.exchange.session, wish.press, int(accepted), text))
+    lab.endpoint.send(Answer(0, wish.press, int(accepted), text))
 
 
 def _done(loop: Operated, wish: Operator) -> tuple[bool, str]:

@@ -25,6 +25,7 @@ BEGIN = '{"kind": '  # a rig may have printed without an end of line before it
 REPORTS = {  # what a process of ours says, and what belongs to it
     "event": {"lab", "level", "code", "text"},
     "state": {"lab", "state"},
+    "mode": {"lab", "mode"},
     "progress": {"tick", "t"},
     "recording": {"file", "summary"},
 }

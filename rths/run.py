@@ -18,6 +18,7 @@ from common.plan import Plan
 from common.reality import Reality
 from common.realtime import assign, freeze
 from common.roles import MASTER
+from rths.running import announced
 from rths.terminal import Progress
 
 if TYPE_CHECKING:
@@ -108,8 +109,9 @@ def in_real_time(
     progress.say(before_the_start(plan))
     progress.say(f"{plan.test.name}: {plan.test.duration:g} s, starting master, {crew(plan)} and recorder")
     try:
-        start_all(processes, args, plan.roles, endpoint, output)
-        follow(processes, Ending(plan), progress, stopping)
+        with announced(plan, endpoint):
+            start_all(processes, args, plan.roles, endpoint, output)
+            follow(processes, Ending(plan), progress, stopping)
     finally:
         processes.close()
         progress.end()
