@@ -1,13 +1,47 @@
-"""Limits of a plan on commands and measurements: beyond one of them a laboratory stops its rig."""
+"""Limits of a plan on commands and measurements: beyond one of them a laboratory stops its rig.
+
+A limit trips, it never clamps. NaN is beyond any limit, and nothing else is beyond an infinite one.
+"""
 
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable
 from operator import itemgetter, le
-from typing import Any
+from typing import Any, NamedTuple
 
 from common.tables import Limits
+
+UNITS: dict[str, str] = {field.name: field.metadata["rule"].unit for field in dataclasses.fields(Limits)}
+
+PATIENCE = 3  # intervals in a row by which an error must be beyond its limit
+
+
+class Violation(NamedTuple):
+    """A value beyond the limit of that name."""
+
+    name: str
+    value: float
+    limit: float
+
+    @property
+    def sentence(self) -> str:
+        """What was violated, by how much, in a sentence."""
+        limit = f"{self.limit:g} {UNITS.get(self.name, '')}".rstrip()
+        return f"{self.name} is {self.value:.6g}, beyond its limit of {limit}."
+
+    def __str__(self) -> str:
+        return self.sentence
+
+
+def violated(limits: Limits, **values: float) -> Violation | None:
+    """The first of some values, by the names of their limits, that is beyond its own."""
+    for name, value in values.items():
+        most = getattr(limits, name)
+        if not abs(value) <= most:
+            return Violation(name, value, most)
+    return None
 
 
 class Guard:
@@ -27,18 +61,70 @@ class Guard:
         self._most = [self._all[place] for place in twice]
         self._names = names
 
-    def violation(self, values: tuple[Any, ...]) -> str:
-        """A sentence on the first value beyond its limit, empty where there is none. NaN is beyond any limit."""
+    def violation(self, values: tuple[Any, ...]) -> Violation | None:
+        """The first value beyond its limit."""
         if all(map(le, map(abs, self._values(values)), self._most)) and not self._several:
-            return ""
+            return None
         for place in self._single:
             if not abs(values[place]) <= self._all[place]:
-                return self._sentence(place, values[place])
+                return Violation(self._names[place], values[place], self._all[place])
         for place in self._several:
             for value in values[place]:
                 if not abs(value) <= self._all[place]:
-                    return self._sentence(place, value)
-        return ""
+                    return Violation(self._names[place], value, self._all[place])
+        return None
 
-    def _sentence(self, place: int, value: float) -> str:
-        return f"{self._names[place]} is {value:.6g}, beyond its limit of {self._all[place]:g}."
+
+class Change:
+    """Checks how a command differs from the last ones that were written to the rig.
+
+    `step`, `velocity` and `acceleration` name the limits on the change within one `interval` (s), on that over
+    the interval, and on the second difference over its square; an empty name stands for none. A rig begins at
+    rest in its zero.
+    """
+
+    def __init__(
+        self, limits: Limits, interval: float, *, step: str, velocity: str = "", acceleration: str = ""
+    ) -> None:
+        self._limits, self._interval = limits, interval
+        self._names = {"step": step, "velocity": velocity, "acceleration": acceleration}
+        most = {kind: getattr(limits, name, math.inf) for kind, name in self._names.items()}
+        self._reach = min(most["step"], most["velocity"] * interval)
+        self._bend = most["acceleration"] * interval**2
+        self._last = 0.0
+        self._change = 0.0
+
+    def violation(self, command: float) -> Violation | None:
+        """The first rate beyond its limit, should this command be written."""
+        change = command - self._last
+        bend = change - self._change
+        if abs(change) <= self._reach and abs(bend) <= self._bend:
+            return None
+        rates = {
+            "step": change,
+            "velocity": change / self._interval,
+            "acceleration": bend / self._interval**2,
+        }
+        named = {name: rates[kind] for kind, name in self._names.items() if name}
+        return violated(self._limits, **named)
+
+    def written(self, command: float) -> None:
+        """The rig was given this command."""
+        self._change = command - self._last
+        self._last = command
+
+
+class Lasting:
+    """Checks an error that may be beyond the limit of its `name` for a moment, but not for `PATIENCE` intervals."""
+
+    def __init__(self, limits: Limits, name: str) -> None:
+        self._name, self._most = name, getattr(limits, name)
+        self._beyond = 0
+
+    def violation(self, error: float) -> Violation | None:
+        """The error of one more interval where it is beyond the limit for too long."""
+        if abs(error) <= self._most:
+            self._beyond = 0
+            return None
+        self._beyond += 1
+        return Violation(self._name, error, self._most) if self._beyond >= PATIENCE else None

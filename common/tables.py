@@ -236,8 +236,8 @@ class Limits:
     """Largest magnitudes; beyond one of them the test is stopped."""
 
     displacement: float = key("storey displacement", default=0.15, unit="m", above=0.0)
-    velocity: float = key("storey velocity", default=3.0, unit="m/s", above=0.0, infinite=True)
-    acceleration: float = key("storey acceleration", default=100.0, unit="m/s²", above=0.0, infinite=True)
+    velocity: float = key("storey velocity", default=1.0, unit="m/s", above=0.0, infinite=True)
+    acceleration: float = key("storey acceleration", default=30.0, unit="m/s²", above=0.0, infinite=True)
     actuator_command: float = key("actuator command", default=0.05, unit="m", above=0.0)
     actuator_velocity: float = key(
         "speed of the actuator command", default=0.5, unit="m/s", above=0.0, infinite=True
@@ -251,7 +251,7 @@ class Limits:
     )
     actuator_step: float = key(
         "change of the actuator command within one interval",
-        default=0.02,
+        default=0.005,
         unit="m",
         above=0.0,
         infinite=True,
@@ -277,17 +277,17 @@ class Limits:
         "speed of the table command", default=1.5, unit="m/s", above=0.0, infinite=True
     )
     table_step: float = key(
-        "change of the table command within one interval", default=0.05, unit="m", above=0.0, infinite=True
+        "change of the table command within one interval", default=0.01, unit="m", above=0.0, infinite=True
     )
     table_error: float = key(
         "table displacement beside its target, for three intervals",
-        default=0.05,
+        default=0.02,
         unit="m",
         above=0.0,
         infinite=True,
     )
     damper_step: float = key(
-        "change of the motor force within one interval", default=500.0, unit="N", above=0.0, infinite=True
+        "change of the motor force within one interval", default=200.0, unit="N", above=0.0, infinite=True
     )
     damper_command: float = key("motor force", default=1000.0, unit="N", above=0.0)
     table_displacement: float = key("table displacement", default=0.40, unit="m", above=0.0)

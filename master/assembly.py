@@ -12,6 +12,7 @@ from common.links import link_model
 from common.plugins import construct, find
 from common.reality import Reality
 from common.rig import ColumnMeasurement, GuardedRig
+from master.limits import MasterLimits
 from master.loop import MasterLoop
 from master.rig import ColumnLab
 from master.step import MasterStep
@@ -82,6 +83,7 @@ def build_loop(
 
 def warm_up(reality: Reality) -> None:
     """Compile the kernels on arrays that are thrown away."""
-    master_step(reality)(0, 0.0, 0.0, [0.0] * len(reality.plan.roles))
+    outputs = master_step(reality)(0, 0.0, 0.0, [0.0] * len(reality.plan.roles))
+    MasterLimits(reality.plan).violation(ColumnMeasurement(0.0, 0.0), outputs)
     column_lab.advance(*build_a(true_system(reality)), 0.0)
     readings.step(*readings.build(reality.plan.test.interval, ("any",), {}), 0, 0.0, 0.0, 0.0)

@@ -2,25 +2,52 @@
 
 from __future__ import annotations
 
-from common.limits import Guard
-from common.rig import ColumnMeasurement
-from common.tables import Limits
+from common.limits import Change, Guard, Lasting, Violation
+from common.plan import Plan
+from common.rig import ColumnCommand, ColumnMeasurement
+from master.energy import EnergyMonitor
 from master.step import Outputs
 
 
 class MasterLimits:
-    """The plan's limits on laboratory A and on what is sent to the slaves."""
+    """The plan's limits on laboratory A, on the building, and on what is sent to the slaves.
 
-    def __init__(self, limits: Limits, storeys: int, slaves: int) -> None:
-        per_storey = ("displacement", "velocity", "acceleration") if storeys > 1 else ()
-        per_slave = Outputs._fields[3:8] if slaves > 1 else ()  # what is sent to each
+    `violation` is asked once in every tick; `written` is told of every command that went to the rig.
+    """
+
+    def __init__(self, plan: Plan) -> None:
+        limits = plan.limits
+        per_storey = Outputs._fields[8:] if plan.storeys > 1 else ()
+        per_slave = Outputs._fields[3:8] if len(plan.roles) > 1 else ()  # what is sent to each
         self._measurements = Guard(limits, ColumnMeasurement._fields)
         self._outputs = Guard(limits, Outputs._fields, (*per_storey, *per_slave))
+        self._actuator = Change(
+            limits,
+            plan.test.interval,
+            step="actuator_step",
+            velocity="actuator_velocity",
+            acceleration="actuator_acceleration",
+        )
+        self._error = Lasting(limits, "column_error")
+        self._energy = EnergyMonitor(plan)
 
-    def violation(self, measured: ColumnMeasurement, outputs: Outputs) -> str:
-        """A sentence on the first value beyond its limit, empty where there is none."""
-        return self._measurements.violation(measured) or self._outputs.violation(outputs)
+    def violation(self, measured: ColumnMeasurement, outputs: Outputs) -> Violation | None:
+        """The first value beyond its limit, None where there is none."""
+        error = outputs.column_target - measured.column_displacement
+        lasting = self._error.violation(error)
+        energy = self._energy.violation(measured, outputs)
+        return (
+            self._measurements.violation(measured)
+            or self._outputs.violation(outputs)
+            or self._actuator.violation(outputs.actuator_command)
+            or lasting
+            or energy
+        )
+
+    def written(self, command: ColumnCommand) -> None:
+        """The rig was given this command."""
+        self._actuator.written(command.actuator_command)
 
     def standing(self, measured: ColumnMeasurement) -> str:
         """Why a rig at rest may not be reset, empty where all it reads is within its limits."""
-        return self._measurements.violation(measured)
+        return str(self._measurements.violation(measured) or "")

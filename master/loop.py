@@ -65,7 +65,7 @@ class MasterLoop:
         self._alone = len(self._partners) == 1
         self._rig = rig
         self._step = step
-        self._limits = MasterLimits(plan.limits, plan.storeys, len(self._partners))
+        self._limits = MasterLimits(plan)
         self._descent = ColumnDescent(self.lab, rig)
         self._disarmed = False
         self._command = 0.0
@@ -283,7 +283,7 @@ class MasterLoop:
             outputs = self._step(tick, measured.column_displacement, measured.column_force, forces)
             violation = self._limits.violation(measured, outputs)
             if violation:
-                self._trip(InterlockError(violation), "limit", tick)
+                self._trip(InterlockError(str(violation)), "limit", tick)
                 self._descent.step(tick, measured)
             else:
                 self._write(outputs, held=held)
@@ -317,8 +317,10 @@ class MasterLoop:
             self._command = outputs.actuator_command
             for partner, sent in zip(self._partners, outputs.sent(), strict=True):
                 partner.sent = sent
+        command = ColumnCommand(self._command)
         self._descent.wrote(self._command)
-        self._rig.write(ColumnCommand(self._command))
+        self._rig.write(command)
+        self._limits.written(command)
 
     def ease(self, tick: int) -> None:
         """One interval on the way to rest."""

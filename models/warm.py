@@ -7,7 +7,7 @@ import sys
 import numpy as np
 
 from common.plan import Plan
-from models import cache, compensators, substructure
+from models import cache, compensators, energy_balance, substructure
 from models.closed_loop import simulate
 from models.labs import column_lab, readings, replay, table_lab
 from models.system import System
@@ -24,6 +24,9 @@ def compile_all() -> None:
     replay.column(System(plan), still)
     replay.building(System(plan), ground, still, still, still)
     substructure.advance(*substructure.build(plan, ground), 0, 0.0, 0.0)
+    energy_balance.step(
+        *energy_balance.build(plan.test.interval, 0.5, 1.0, 1.0, np.ones(1)), 0.0, 0.0, 0.0, 0.0
+    )
     column_lab.advance(*column_lab.build(plan.test.interval, plan.actuator, plan.column), 0.0)
     table_lab.advance(*table_lab.build(plan.test.interval, plan.table, plan.damper), 0.0, 0.0)
     readings.step(*readings.build(plan.test.interval, ("any",), {}), 0, 0.0, 0.0, 0.0)

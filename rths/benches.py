@@ -12,7 +12,7 @@ from typing import NamedTuple
 from common import signals
 from common.clock import Clock, MonotonicClock, VirtualClock, unix_ns
 from common.errors import InputError, InterlockError, RigError, RthsError
-from common.limits import Guard
+from common.limits import Guard, Violation
 from common.plan import Plan
 from common.reality import Reality
 from common.recording.writer import Recording
@@ -140,7 +140,7 @@ class ColumnBench:
         chosen = plan.compensator if order.compensated else UNCOMPENSATED
         self._follow = Follower(chosen, programme, plan.test.interval)
 
-    def tick(self, tick: int) -> tuple[tuple[float, ...], str]:
+    def tick(self, tick: int) -> tuple[tuple[float, ...], Violation | None]:
         """Read, compute, write; the recorded values behind seq and t, and the violation of a limit."""
         measured = self.rig.read()
         target, command = self._follow(tick, measured.column_displacement)
@@ -164,7 +164,7 @@ class TableBench:
         chosen = plan.table.compensator if order.compensated else UNCOMPENSATED
         self._follow = Follower(chosen, programme, plan.test.interval)
 
-    def tick(self, tick: int) -> tuple[tuple[float, ...], str]:
+    def tick(self, tick: int) -> tuple[tuple[float, ...], Violation | None]:
         """Read, compute, write; the recorded values behind seq and t, and the violation of a limit."""
         measured = self.rig.read()
         if self._force is not None:
@@ -231,5 +231,5 @@ def loop(
         ]
         sink.put([row])
         if violation:
-            raise StoppedError(InterlockError(violation), tick + 1, late)
+            raise StoppedError(InterlockError(str(violation)), tick + 1, late)
     return plan.ticks, late

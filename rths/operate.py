@@ -88,9 +88,7 @@ def gathered(endpoint: Endpoint, plan: Plan, word: str, reason: str) -> dict[str
 def show(answers: dict[str, Answer], *, as_json: bool) -> None:
     """Write what each laboratory said."""
     if as_json:
-        plain = {
-            role: {"accepted": bool(one.accepted), "text": one.text} for role, one in answers.items()
-        }
+        plain = {role: {"accepted": bool(one.accepted), "text": one.text} for role, one in answers.items()}
         sys.stdout.write(json.dumps(plain) + "\n")
         return
     for role, one in answers.items():

@@ -71,5 +71,7 @@ def only(name: str | None = None) -> Running:
         )
     if len(entries) > 1:
         names = ", ".join(sorted({entry.test for entry in entries}))
-        raise InputError(f"{len(entries)} tests run on this machine ({names}): say which with PLAN --connect.")
+        raise InputError(
+            f"{len(entries)} tests run on this machine ({names}): say which with PLAN --connect."
+        )
     return entries[0]

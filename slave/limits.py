@@ -2,28 +2,50 @@
 
 from __future__ import annotations
 
-from common.limits import Guard
+from common.limits import Change, Guard, Lasting, Violation
 from common.messages import Command
+from common.plan import Plan
 from common.rig import TableCommand, TableMeasurement
-from common.tables import Limits
 
 
 class SlaveLimits:
-    """The plan's limits on laboratory B."""
+    """The plan's limits on laboratory B.
 
-    def __init__(self, limits: Limits) -> None:
+    `violation` is asked once in every tick; `written` is told of every command that went to the rig.
+    """
+
+    def __init__(self, plan: Plan) -> None:
+        limits, interval = plan.limits, plan.test.interval
         self._measurements = Guard(limits, TableMeasurement._fields)
         self._command = Guard(limits, Command._fields)
-        self._written = Guard(limits, TableCommand._fields)
+        self._wanted = Guard(limits, TableCommand._fields)
+        self._table = Change(limits, interval, step="table_step", velocity="table_velocity")
+        self._motor = Change(limits, interval, step="damper_step")
+        self._error = Lasting(limits, "table_error")
+        self._target = 0.0  # of the command asked about last
+        self._present = 0.0  # of the command that was in force over the interval just over
 
-    def violation(self, measured: TableMeasurement, command: Command, wanted: TableCommand) -> str:
-        """A sentence on the first value beyond its limit, empty where there is none."""
+    def violation(
+        self, measured: TableMeasurement, command: Command, wanted: TableCommand
+    ) -> Violation | None:
+        """The first value beyond its limit, None where there is none."""
+        self._target = command.table_target
+        lasting = self._error.violation(self._present - measured.table_displacement)
         return (
             self._measurements.violation(measured)
             or self._command.violation(command)
-            or self._written.violation(wanted)
+            or self._wanted.violation(wanted)
+            or self._table.violation(wanted.table_command)
+            or self._motor.violation(wanted.damper_command)
+            or lasting
         )
+
+    def written(self, command: TableCommand) -> None:
+        """The rig was given this command, for the target asked about last."""
+        self._present = self._target
+        self._table.written(command.table_command)
+        self._motor.written(command.damper_command)
 
     def standing(self, measured: TableMeasurement) -> str:
         """Why a rig at rest may not be reset, empty where all it reads is within its limits."""
-        return self._measurements.violation(measured)
+        return str(self._measurements.violation(measured) or "")

@@ -57,7 +57,7 @@ class SlaveLoop:
         self.lab = Laboratory(role, setting)
         self._instance = instance
         self._rig = rig
-        self._limits = SlaveLimits(setting.plan.limits)
+        self._limits = SlaveLimits(setting.plan)
         self._commands: Mailbox[Command] = Mailbox(link, "command", setting.plan.test.interval, nominal=0)
         self._received_ns: dict[int, int] = {}
         self._heard = NOTHING_HEARD  # number and arrival of the newest command
@@ -237,11 +237,12 @@ class SlaveLoop:
             wanted = TableCommand(self._step(command, measured), command.damper_command)
             violation = self._limits.violation(measured, command, wanted)
             if violation:
-                lab.fail(Event.TRIP, InterlockError(violation), code="limit", tick=tick)
+                lab.fail(Event.TRIP, InterlockError(str(violation)), code="limit", tick=tick)
                 self._descent.step(tick, measured)
             else:
                 self._descent.wrote(wanted)
                 self._rig.write(wanted)
+                self._limits.written(wanted)
         except RigError as error:
             self._rig_failed(error, tick)
             return

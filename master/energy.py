@@ -1,0 +1,68 @@
+"""Energies of the running test, watched at every tick: of the interface's error, and of the integration."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from common.limits import Violation, violated
+from common.plan import Plan
+from common.rig import ColumnMeasurement
+from master.step import Outputs
+from models import energy_balance
+from models.energy_balance import ACCELERATION, DISPLACEMENT, DRIFT_SHARE, ERROR_SHARE, VELOCITY
+from models.structures.partition import experimental_stiffness
+
+FLOOR_SHARE = 0.01  # of the largest displacement allowed
+
+
+class EnergyMonitor:
+    """The balance of one test, moving on tick by tick, and its limits `error_energy` and `numerical_drift`."""
+
+    def __init__(self, plan: Plan) -> None:
+        column = plan.column
+        self._limits, self._plain = plan.limits, plan.storeys == 1
+        self._balance = energy_balance.build(
+            plan.test.interval,
+            column.deformation_ratio,
+            float(column.represents),
+            floor(plan),
+            np.array(plan.structure.mass),
+        )
+        self._step = energy_balance.step
+
+    @property
+    def error_energy(self) -> float:
+        """Energy that the interface's error has put in, over that of the ground."""
+        return self._balance.sums.item(ERROR_SHARE)
+
+    @property
+    def numerical_drift(self) -> float:
+        """Energy that the integration has made, over that of the ground."""
+        return self._balance.sums.item(DRIFT_SHARE)
+
+    def violation(self, measured: ColumnMeasurement, outputs: Outputs) -> Violation | None:
+        """Take one tick into the sums; the first of them beyond its limit."""
+        balance = self._balance
+        motion = balance.motion
+        if self._plain:
+            motion[DISPLACEMENT, 0] = outputs.displacement
+            motion[VELOCITY, 0] = outputs.velocity
+            motion[ACCELERATION, 0] = outputs.acceleration
+        else:
+            motion[: ACCELERATION + 1] = outputs[8:11]
+        self._step(*balance, outputs.ground_acceleration, outputs.column_target, *measured)
+        error, drift = self.error_energy, self.numerical_drift
+        if abs(error) <= self._limits.error_energy and abs(drift) <= self._limits.numerical_drift:
+            return None
+        return violated(self._limits, error_energy=error, numerical_drift=drift)
+
+
+def floor(plan: Plan) -> float:
+    """Energy (J) below which nothing is judged: strain of the specimen's storey at `FLOOR_SHARE` of the limit.
+
+    Infinite for a storey without stiffness, of which no share can be taken.
+    """
+    stiffness = max(plan.structure.stiffness[plan.column.storey - 1], experimental_stiffness(plan))
+    return 0.5 * stiffness * (FLOOR_SHARE * plan.limits.displacement) ** 2 or math.inf

@@ -1,0 +1,100 @@
+"""Limits by themselves: rates against what was written, errors that last, sentences, NaN and inf."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from common.limits import PATIENCE, Change, Guard, Lasting, Violation, violated
+from common.tables import Limits
+
+INTERVAL = 0.002
+NAMES = {"step": "actuator_step", "velocity": "actuator_velocity", "acceleration": "actuator_acceleration"}
+
+
+def actuator(**most: float) -> Change:
+    limits = dict.fromkeys(NAMES.values(), math.inf) | most
+    return Change(Limits(**limits), INTERVAL, **NAMES)
+
+
+@pytest.mark.parametrize(
+    ("violation", "sentence"),
+    [
+        (
+            Violation("actuator_velocity", 0.612, 0.5),
+            "actuator_velocity is 0.612, beyond its limit of 0.5 m/s.",
+        ),
+        (Violation("error_energy", 1.25, 1.0), "error_energy is 1.25, beyond its limit of 1."),
+        (
+            Violation("column_force", math.nan, 4e5),
+            "column_force is nan, beyond its limit of 400000 N.",
+        ),
+    ],
+)
+def test_a_violation_is_a_sentence_with_the_unit_of_the_plan(violation: Violation, sentence: str) -> None:
+    assert str(violation) == violation.sentence == sentence
+
+
+def test_the_first_command_is_a_change_from_rest_in_zero() -> None:
+    assert actuator(actuator_step=1e-3).violation(1e-3) is None
+    assert actuator(actuator_step=1e-3).violation(-1.01e-3) == ("actuator_step", -1.01e-3, 1e-3)
+    for name, most, value in (
+        ("actuator_velocity", 0.5, 0.55),
+        ("actuator_acceleration", 250.0, 275.0),
+    ):
+        found = actuator(**{name: most}).violation(1.1e-3)
+        assert found is not None
+        assert (found.name, found.limit) == (name, most)
+        assert found.value == pytest.approx(value)
+
+
+def test_rates_are_those_of_what_was_written() -> None:
+    change = actuator(actuator_step=1e-3, actuator_acceleration=400.0)
+    change.written(1e-3)
+    assert change.violation(2.0e-3) is None
+    assert change.violation(2.1e-3) is not None
+    assert change.violation(2.1e-3) is not None  # nothing was written: it stays as far away
+    change.written(1e-3)  # held
+    found = change.violation(-0.7e-3)
+    assert found is not None
+    assert found.name == "actuator_step"
+    assert found.value == pytest.approx(-1.7e-3)
+
+
+def test_an_acceleration_is_the_second_difference() -> None:
+    change = actuator(actuator_acceleration=100.0)
+    for command in (1e-4, 3e-4, 6e-4):
+        assert change.violation(command) is None
+        change.written(command)
+    assert change.violation(9e-4) is None  # as fast as before
+    found = change.violation(4e-4)
+    assert found is not None
+    assert found.value == pytest.approx((4e-4 - 2 * 6e-4 + 3e-4) / INTERVAL**2)
+
+
+def test_a_quantity_without_a_limit_of_that_kind_has_none() -> None:
+    motor = Change(Limits(damper_step=10.0), INTERVAL, step="damper_step")
+    assert motor.violation(10.0) is None
+    assert motor.violation(10.1) == ("damper_step", 10.1, 10.0)
+
+
+def test_an_error_trips_when_it_lasts() -> None:
+    lasting = Lasting(Limits(column_error=0.01), "column_error")
+    errors = [0.011, -0.02, 0.01, 0.011, -0.011, 0.012, 0.013]
+    found = [lasting.violation(error) for error in errors]
+    assert [violation is not None for violation in found] == [False] * 5 + [True] * 2
+    assert found[5] == ("column_error", 0.012, 0.01)
+
+
+def test_nan_is_beyond_any_limit_and_nothing_else_beyond_an_infinite_one() -> None:
+    limits = Limits(velocity=math.inf, column_error=math.inf)
+    guard = Guard(limits, ("velocity",))
+    assert guard.violation((math.inf,)) is guard.violation((-1e300,)) is None
+    assert guard.violation((math.nan,)) is not None
+    assert violated(limits, velocity=1e9, column_error=math.nan) is not None
+    assert actuator().violation(1e300) is None
+    assert actuator().violation(math.nan) is not None
+    lasting = Lasting(limits, "column_error")
+    assert all(lasting.violation(1e9) is None for _ in range(2 * PATIENCE))
+    assert [lasting.violation(math.nan) is not None for _ in range(PATIENCE)] == [False, False, True]
