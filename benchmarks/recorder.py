@@ -37,6 +37,8 @@ PATIENCE_S = 30.0  # for the recorder to join
 END_S = 20.0  # for the recorder to end; what it has not written by then counts as missing
 POOL = 1_000  # different samples of a topic: noise, which no compression shrinks
 
+FILLING = {Kind.FLAG: True}
+
 Values = list[list[Any]]
 
 
@@ -174,16 +176,19 @@ def pool(topic: str) -> Values:
     draws = np.random.default_rng(1).normal(size=(POOL, len(TOPICS[topic]))).tolist()
     kept = (Kind.NUMBER, Kind.STOREYS)
     return [
-        [draw if row.kind in kept else 1 for row, draw in zip(TOPICS[topic][1:], line[1:], strict=True)]
+        [
+            draw if row.kind in kept else FILLING.get(row.kind, 1)
+            for row, draw in zip(TOPICS[topic][1:], line[1:], strict=True)
+        ]
         for line in draws
     ]
 
 
 def burst(rate: float, seconds: float, folder: Path) -> Burst:
     """A burst into the recorder's own process, which is read back and counted."""
-    plan, endpoint, path = Plan().with_test(duration=seconds), listenable(), folder / "burst.mcap"
-    (folder / "plan.toml").write_text(plan.toml(), encoding="utf-8")
     ticks = max(1, round(rate * seconds / len(TICK_TOPICS)))
+    plan, endpoint, path = Plan().with_ticks(ticks), listenable(), folder / "burst.mcap"
+    (folder / "plan.toml").write_text(plan.toml(), encoding="utf-8")
     labs = Laboratories(plan, endpoint)
     words = [str(folder / "plan.toml"), "--connect", endpoint, "-o", str(path)]
     recorder = subprocess.Popen(

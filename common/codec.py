@@ -1,13 +1,15 @@
 """Messages to bytes and back: msgpack arrays of fixed fields behind a keyed 64-bit check.
 
 A frame is `msgpack([kind, field, …]) + check`. What does not have exactly the fields, types and ranges
-of a known message, or whose check fails, is rejected with a reason and reaches nobody.
+of a known message, or whose check fails, is rejected with a reason and reaches nobody. A frame's size is
+bounded before anything else is done with it; what msgpack makes of hostile content within that size takes
+at most some sixty bytes of memory per byte of the frame, until it is thrown away.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from enum import Enum
 from math import isfinite
 from operator import itemgetter
@@ -18,22 +20,29 @@ import msgpack
 from common.messages import Message
 
 CHECK_SIZE = 8
-MOST = 2**62  # of a whole number; in ns a century and a half, either way
-MOST_BYTES = 1_000_000
+MOST = 2**62  # of a whole number; in ns a century and a half
+MOST_TEXT = 4_000  # characters of a text
+MOST_FRAME = 1 << 20  # bytes of a frame on any channel
+LEAST = {"shift_ns": -MOST, "command_seq": -1, "heard_seq": -1}  # of these whole numbers; 0 of all others
 
 MESSAGES: tuple[type[Any], ...] = get_args(Message)
 KINDS = {message: kind for kind, message in enumerate(MESSAGES)}
 
 
 class Reject(Enum):
-    """Why a frame was rejected."""
+    """Why a frame was rejected; `docs/rejections.md` says what each means and what to do."""
 
     LENGTH = "length"
     CHECK = "check"
+    UNREGISTERED = "unregistered"
+    OPEN_KEY = "open_key"
     FORMAT = "format"
     KIND = "kind"
+    KIND_NOT_ALLOWED = "kind_not_allowed"
     FIELDS = "fields"
+    TYPE = "type"
     VALUE = "value"
+    SENDER = "sender"
 
 
 class RejectedFrame(ValueError):  # noqa: N818 - it is a finding about a frame, counted rather than shown
@@ -45,7 +54,7 @@ class RejectedFrame(ValueError):  # noqa: N818 - it is a finding about a frame, 
 
 
 class _Shape:
-    """What the items of one frame must be: exact types, whole numbers and times in range, floats finite.
+    """What the items of one frame must be: exact types, whole numbers and texts in range, floats finite.
 
     The first item is the kind of the message. Checks are calls into C wherever they can be: they run twice a tick.
     """
@@ -55,18 +64,21 @@ class _Shape:
         self.message = message
         self.types = (int, *(hints[name] for name in message._fields))
         self._numbers = self._items(message, int)
-        self._counts = self._items(message, int, but="_ns")
+        self._counts = self._items(message, int, but=LEAST)
         self._floats = self._items(message, float)
-        self._texts = [place for place, kind in enumerate(self.types) if kind in (str, bytes)]
+        self._signed = [
+            (place, LEAST[name]) for place, name in enumerate(message._fields, start=1) if name in LEAST
+        ]
+        self.texts = [place for place, kind in enumerate(self.types) if kind is str]
 
     def _items(
-        self, message: type[Any], kind: type, *, but: str = " "
+        self, message: type[Any], kind: type, *, but: Container[str] = ()
     ) -> Callable[[list[Any]], tuple[Any, ...]]:
-        """What takes the items of a type out of a frame's, but for those whose names end so."""
+        """What takes the items of a type out of a frame's, but for those of these names."""
         places = [
             place
             for place, name in enumerate(message._fields, start=1)
-            if self.types[place] is kind and not name.endswith(but)
+            if self.types[place] is kind and name not in but
         ]
         first, *_ = places or [0]
         # the getter of a single place gives no tuple; the kind, a small count, is a harmless second
@@ -74,16 +86,30 @@ class _Shape:
 
     def admits(self, items: list[Any]) -> bool:
         """Whether items of the right types have values that a message may have."""
-        numbers = self._numbers(items)
-        if min(self._counts(items)) < -1 or min(numbers) < -MOST or max(numbers) > MOST:
+        if min(self._counts(items)) < 0 or max(self._numbers(items)) > MOST:
             return False
-        if self._texts and any(len(items[place]) > MOST_BYTES for place in self._texts):
-            return False
+        for place, least in self._signed:
+            if items[place] < least:
+                return False
+        for place in self.texts:
+            if not is_text(items[place]):
+                return False
         return isfinite(sum(self._floats(items)))
+
+
+def is_text(text: str) -> bool:
+    """Whether a message may hold a text: not too long, and nothing in it that moves a terminal's cursor."""
+    return len(text) <= MOST_TEXT and text.isprintable()
+
+
+def as_text(text: str) -> str:
+    """A text as a message may hold it: clipped, a space in place of what cannot be printed."""
+    return text if is_text(text) else "".join(c if c.isprintable() else " " for c in text[:MOST_TEXT])
 
 
 # `msgpack.packb` allocates and frees a buffer of a megabyte with every call; this one is the loop's thread's alone
 PACKER = msgpack.Packer()
+REPACKER = msgpack.Packer()  # the link's threads', which hold the interpreter's lock while they pack
 
 SHAPES = tuple(_Shape(message) for message in MESSAGES)
 
@@ -120,24 +146,59 @@ def encode(message: Message, key: Key) -> bytes:
     return payload + _check(key, payload)
 
 
-def decode(frame: bytes, key: Key) -> Message:
-    """The message of a frame; raises RejectedFrame with the reason where it is none."""
+def fit(message: Message) -> Message:
+    """A message with its texts as a frame may hold them: a rig's own words may be long, or of several lines."""
+    texts = SHAPES[KINDS[type(message)]].texts
+    fields: list[Any] = list(message)
+    if all(is_text(fields[place - 1]) for place in texts):
+        return message
+    for place in texts:
+        fields[place - 1] = as_text(fields[place - 1])
+    fitting: Message = type(message)(*fields)
+    return fitting
+
+
+def genuine(frame: bytes, key: Key) -> bool:
+    """Whether a frame's check is that of a key."""
+    return _check(key, frame[:-CHECK_SIZE]) == frame[-CHECK_SIZE:]
+
+
+def decode(frame: bytes, key: Key, *, allowed: Container[type] = KINDS, largest: int = MOST_FRAME) -> Message:
+    """The message of a frame; raises RejectedFrame with the reason where it is none.
+
+    `allowed` are the kinds that may come this way, `largest` bounds the frame's bytes. A message has one frame
+    only: what is packed in another way than `encode` does it is none.
+    """
+    if not CHECK_SIZE < len(frame) <= largest:
+        raise RejectedFrame(Reject.LENGTH)
     payload = frame[:-CHECK_SIZE]
-    if _check(key, payload) != frame[-CHECK_SIZE:] or not payload:
-        raise RejectedFrame(Reject.CHECK if payload else Reject.LENGTH)
+    if _check(key, payload) != frame[-CHECK_SIZE:]:
+        raise RejectedFrame(Reject.CHECK)
     try:
         items = msgpack.unpackb(payload)
     except (ValueError, msgpack.UnpackException):
         raise RejectedFrame(Reject.FORMAT) from None
     if type(items) is not list or not items:
         raise RejectedFrame(Reject.FORMAT)
+    shape = _shape(items, allowed)
+    if REPACKER.pack(items) != payload:
+        raise RejectedFrame(Reject.FORMAT)
+    message: Message = tuple.__new__(shape.message, items[1:])
+    return message
+
+
+def _shape(items: list[Any], allowed: Container[type]) -> _Shape:
+    """The shape that the items of a frame have; raises RejectedFrame where they have none."""
     kind = items[0]
     if type(kind) is not int or not 0 <= kind < len(MESSAGES):
         raise RejectedFrame(Reject.KIND)
     shape = SHAPES[kind]
+    if shape.message not in allowed:
+        raise RejectedFrame(Reject.KIND_NOT_ALLOWED)
     if len(items) != len(shape.types):
         raise RejectedFrame(Reject.FIELDS)
-    if tuple(map(type, items)) != shape.types or not shape.admits(items):
+    if tuple(map(type, items)) != shape.types:
+        raise RejectedFrame(Reject.TYPE)
+    if not shape.admits(items):
         raise RejectedFrame(Reject.VALUE)
-    message: Message = tuple.__new__(shape.message, items[1:])
-    return message
+    return shape

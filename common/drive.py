@@ -106,6 +106,7 @@ def run(loop: Loop, stopping: Callable[[], str]) -> bool:
         if not lab.running:
             return False
         loop.tick(tick)
+        lab.tell_news(tick)
         lab.send_samples()
         if lab.clock.now() - reported >= PROGRESS_NS:
             reported = lab.clock.now()

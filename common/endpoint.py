@@ -1,17 +1,92 @@
-"""A process's access to messages; over a transport by the codec, with rejected frames counted by reason."""
+"""A process's access to messages; over a transport by the codec, with rejected frames counted by reason.
+
+Which role may send which message is a table here, and so is which message may come before its receiver or its
+sender takes part in a session, under the key that all share.
+"""
 
 from __future__ import annotations
 
-from collections import Counter
-from typing import NamedTuple, Protocol
+from collections.abc import Mapping
+from typing import Any, NamedTuple, Protocol
 
 from common import codec
 from common.clock import MonotonicClock
+from common.codec import Reject, RejectedFrame
 from common.inbox import Inbox
-from common.messages import Command, Feedback, Finished, Message, Samples
+from common.messages import (
+    Answer,
+    Arm,
+    Armed,
+    Command,
+    Feedback,
+    Finished,
+    Message,
+    Operator,
+    Recorder,
+    Refused,
+    Register,
+    Registered,
+    Resend,
+    Samples,
+    Scheduled,
+    Start,
+    Stop,
+    Stopped,
+    Sync,
+    SyncReply,
+    Trip,
+    Waiting,
+)
+from common.rejections import Rejections
+from common.roles import MASTER, OPERATOR, RECORDER, SLAVE, kind_of
+from common.transport import CHANNELS as CHANNEL_NAMES
 from common.transport import CONTROL, SAMPLES, TICK, Packet, Transport
 
 CHANNELS: dict[type, str] = {Command: TICK, Feedback: TICK, Samples: SAMPLES, Finished: SAMPLES}
+
+# bytes of a frame: a tick's has numbers only; a control message some texts; a piece ten items of many storeys
+LARGEST = {TICK: 256, CONTROL: 1 << 16, SAMPLES: codec.MOST_FRAME}
+
+SPOKEN: Mapping[str, frozenset[type]] = {
+    MASTER: frozenset({Register, Arm, Sync, Start, Command, Stop, Trip, Answer, Samples, Finished}),
+    SLAVE: frozenset(
+        {
+            Waiting,
+            Registered,
+            Refused,
+            Armed,
+            SyncReply,
+            Scheduled,
+            Feedback,
+            Stopped,
+            Trip,
+            Answer,
+            Samples,
+            Finished,
+        }
+    ),
+    RECORDER: frozenset({Recorder, Resend}),
+    OPERATOR: frozenset({Operator}),
+}
+
+OPEN = frozenset(
+    {Register, Waiting, Refused, Arm, Recorder, Operator, Answer}
+)  # may come under the key that all share
+ALWAYS_OPEN = frozenset({Register, Arm, Operator, Answer})  # for those too who take part in no session
+SIGNED = frozenset({Trip, Samples, Finished})  # say as `lab` whom they are from
+
+
+def channel_of(kind: type) -> str:
+    """The channel on which messages of a kind travel."""
+    return CHANNELS.get(kind, CONTROL)
+
+
+# by kind of role and channel, what may come there
+ALLOWED: dict[tuple[str, str], frozenset[type]] = {
+    (role, channel): frozenset(kind for kind in kinds if channel_of(kind) == channel)
+    for role, kinds in SPOKEN.items()
+    for channel in CHANNEL_NAMES
+}
 
 
 class Received(NamedTuple):
@@ -38,31 +113,43 @@ class Endpoint(Protocol):
     def receive(self, timeout: float = 0.0) -> Received | None:
         """The next message, waiting at most `timeout` s for it; None where there is none."""
 
+    def news(self, now_ns: int) -> dict[str, Any] | None:
+        """An event on frames rejected since the last one, at most once a second; None where there is none."""
+
     def close(self) -> None:
         """Leave the link."""
 
 
 class FrameEndpoint:
-    """Sends and receives the messages of one session as frames over a transport."""
+    """Sends and receives the messages of one session as frames over a transport.
+
+    Frames of a session are under its key. A control message that is not of the sender's own session, or that must be
+    understood without one, is under the key that all share, and only those of `OPEN` are accepted under it.
+    """
 
     def __init__(self, transport: Transport, plan_digest: str) -> None:
         self._transport = transport
         self._now = MonotonicClock().now
         self._digest = plan_digest
         self._open_key = codec.session_key(0, plan_digest)
-        self._key = self._open_key
+        self._place = (0, self._open_key)  # session and its key; replaced as one, read by the link's threads
         self._inbox: Inbox[Received] = Inbox()
-        self.rejected: Counter[str] = Counter()
+        self.rejections = Rejections()
+        self.rejected = self.rejections.counts
         transport.listen(self._heard)
 
     def enter(self, session: int) -> None:
-        """Use the key of a session for what is sent from now on; frames before it are still understood."""
-        self._key = codec.session_key(session, self._digest)
+        """Use the key of a session from now on; what must be understood before it still is."""
+        self._place = (session, codec.session_key(session, self._digest))
 
     def send(self, message: Message, to: str = "") -> int:
         """Hand a message to the link; when it was encoded, ns."""
         channel = CHANNELS.get(type(message), CONTROL)
-        key = self._key if channel != CONTROL else self._open_key
+        session, key = self._place
+        if channel == CONTROL:
+            message = codec.fit(message)
+            if message.session != session or type(message) in ALWAYS_OPEN:
+                key = self._open_key
         frame = codec.encode(message, key)
         encoded_ns = self._now()
         self._transport.send(channel, frame, to)
@@ -72,16 +159,51 @@ class FrameEndpoint:
         """The next valid message, waiting at most `timeout` s for it; None where there is none."""
         return self._inbox.get(timeout)
 
+    def news(self, now_ns: int) -> dict[str, Any] | None:
+        """An event on frames rejected since the last one, at most once a second; None where there is none."""
+        return self.rejections.news(now_ns)
+
     def _heard(self, packet: Packet) -> None:
         """Decode a frame on the link's own thread, which is awake: whoever waits is woken by a message."""
-        key = self._key if packet.channel != CONTROL else self._open_key
         try:
-            message = codec.decode(packet.frame, key)
-        except codec.RejectedFrame as rejection:
-            self.rejected[rejection.reason.value] += 1
+            message = self._decoded(packet)
+        except RejectedFrame as rejection:
+            self.rejections.add(rejection.reason, packet.role, packet.received_ns)
             return
         self._inbox.put(Received(message, packet.role, packet.received_ns, self._now()))
+
+    def _decoded(self, packet: Packet) -> Message:
+        """The message of a frame; raises RejectedFrame where it is none that may come this way."""
+        role, channel, frame, _ = packet
+        allowed = ALLOWED.get((kind_of(role), channel), frozenset())
+        session, key = self._place
+        try:
+            message = codec.decode(frame, key, allowed=allowed, largest=LARGEST[channel])
+        except RejectedFrame as rejection:
+            if rejection.reason is not Reject.CHECK:
+                raise
+            if not session:
+                raise RejectedFrame(Reject.UNREGISTERED) from None
+            if channel != CONTROL:
+                raise
+            message = codec.decode(frame, self._open_key, allowed=allowed, largest=LARGEST[channel])
+            check_open(message)
+        else:
+            if not session:
+                check_open(message)
+        if channel != TICK and type(message) in SIGNED and message.lab != role:  # type: ignore[union-attr]
+            raise RejectedFrame(Reject.SENDER)
+        return message
 
     def close(self) -> None:
         """Leave the link."""
         self._transport.close()
+
+
+def check_open(message: Message) -> None:
+    """Raise RejectedFrame where a message must not come under the key that all share.
+
+    A recorder says under it only that it is ready: that it records a session, or cannot, is under the session's key.
+    """
+    if type(message) not in OPEN or (isinstance(message, Recorder) and message.session):
+        raise RejectedFrame(Reject.OPEN_KEY)

@@ -99,6 +99,11 @@ class Laboratory:
                 values={"mode": float(MODES[after]), "from": float(MODES[before])},
             )
 
+    def tell_news(self, tick: int) -> None:
+        """Record frames that were rejected lately, while the test runs."""
+        if (news := self.endpoint.news(self.clock.now())) is not None:
+            self.note(news["code"], news["text"], level=news["level"], tick=tick, values=news["values"])
+
     def sample_ramp(self, topic: str, tick: int, *values: float) -> None:
         """Record one interval of the way to rest: commands written, then readings."""
         if self.recorded:

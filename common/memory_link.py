@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
+from typing import Any
 
 from common.clock import Clock
 from common.endpoint import CHANNELS, Received
@@ -63,6 +64,10 @@ class MemoryEndpoint:
     def receive(self, timeout: float = 0.0) -> Received | None:
         """The next message that is there already; time stands still in memory."""
         return self._queue.popleft() if self._queue else None
+
+    def news(self, now_ns: int) -> dict[str, Any] | None:
+        """Memory has no frames that could be none."""
+        return None
 
     def close(self) -> None:
         """Nothing to leave."""

@@ -7,7 +7,7 @@ written in the loop and a slow recorder costs it nothing.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import msgpack
@@ -16,6 +16,7 @@ from common.messages import Finished, Message, Resend, Samples
 
 PIECE = 10  # items; at 500 ticks per second a piece leaves every 10 to 20 ms
 KEPT = 4_000  # pieces kept for sending again, a minute or more
+EARLY_BYTES = 32 << 20  # of pieces that wait for one before them; what comes beyond is asked for again
 
 
 class Outlet:
@@ -74,28 +75,61 @@ def next_of(packed: bytes, lab: str) -> int:
 
 
 class Inlet:
-    """Receiving end of one stream: hands items on in order, and says which are missing."""
+    """Receiving end of one stream: hands items on in order, and says which are missing.
 
-    def __init__(self) -> None:
+    `unpack` gives the items of a piece, None where it holds what cannot be recorded: such a piece is counted and
+    counts as missing. `most` bounds the stream's items, so that no number in a message makes it go on for ever.
+    """
+
+    def __init__(
+        self, unpack: Callable[[bytes], list[list[Any]] | None] = msgpack.unpackb, most: int = 2**62
+    ) -> None:
         self.next = 0
         self.total: int | None = None
         self.lost = 0
-        self._early: dict[int, Samples] = {}
+        self.rejected = 0
+        self._unpack = unpack
+        self._most = most
+        self._early: dict[int, tuple[list[list[Any]], int]] = {}  # items, and bytes they came in
+        self._held = 0
 
     def take(self, piece: Samples) -> list[list[Any]]:
         """The items that are now complete and in order; repeated pieces give none."""
-        if piece.first < self.next:
+        if piece.first < self.next or piece.first in self._early:
             return []
-        self._early[piece.first] = piece
-        return self._ready()
+        items = self._unpack(piece.items) if piece.first < self._most else None
+        if items is None:
+            self.rejected += 1
+            return []
+        if piece.first == self.next:
+            self.next += len(items)
+            return items + self._ready()
+        if len(self._early) < KEPT and self._held + len(piece.items) <= EARLY_BYTES:
+            self._early[piece.first] = (items, len(piece.items))
+            self._held += len(piece.items)
+        return []
+
+    def end(self, finished: Finished) -> None:
+        """The stream ends after so many items."""
+        if finished.total <= self._most:
+            self.total = finished.total
+        else:
+            self.rejected += 1
 
     def _ready(self) -> list[list[Any]]:
         items: list[list[Any]] = []
-        while (piece := self._early.pop(self.next, None)) is not None:
-            new = msgpack.unpackb(piece.items)
+        while (found := self._early.pop(self.next, None)) is not None:
+            new, size = found
+            self._held -= size
             self.next += len(new)
             items += new
+        self._forget()
         return items
+
+    def _forget(self) -> None:
+        """Pieces that begin within others that were handed on are none of this stream."""
+        for first in [first for first in self._early if first < self.next]:
+            self._held -= self._early.pop(first)[1]
 
     def missing(self) -> tuple[int, int] | None:
         """First and last item of the first hole, None where there is none."""

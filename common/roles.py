@@ -7,6 +7,7 @@ A role is what a process is called in messages, keys and topics: `master`, `reco
 from __future__ import annotations
 
 MASTER, SLAVE, RECORDER, LATENCY = "master", "slave", "recorder", "latency"
+OPERATOR, OBSERVER = "operator", "observer"
 
 
 def slave_role(name: str) -> str:

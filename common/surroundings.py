@@ -1,6 +1,7 @@
 """What a laboratory's process says of the machine it runs on: real-time shape, the host's share, a bare timing loop.
 
-Three events of the recording: `real_time` as the ticks begin, `machine` and, from the master, `bare_loop` as they end.
+Events of the recording: `real_time` as the ticks begin; `machine`, `rejected` where frames were, and, from the master,
+`bare_loop` as they end.
 """
 
 from __future__ import annotations
@@ -11,8 +12,9 @@ from common.bare_loop import BareLoop
 from common.laboratory import Laboratory
 from common.machine import Watch, facts
 from common.realtime import Granted
+from common.rejections import told
 
-CODES = ("real_time", "machine", "bare_loop")
+CODES = ("real_time", "machine", "bare_loop", "rejected")
 
 
 class Surroundings:
@@ -45,9 +47,12 @@ class Surroundings:
             return
         text = ", ".join(f"{name} {value}" for name, value in facts().items())
         self._lab.note("machine", text, tick=tick, values=self._watch.values())
-        if self._rejected:
-            counts = ", ".join(f"{count} by {reason}" for reason, count in sorted(self._rejected.items()))
-            self._lab.note("rejected", f"Frames were rejected: {counts}.", level="warning", tick=tick)
+        if counts := told(self._rejected):
+            text = ", ".join(f"{count} by {reason}" for reason, count in counts.items())
+            values = {reason: float(count) for reason, count in counts.items()}
+            self._lab.note(
+                "rejected", f"Frames were rejected: {text}.", level="warning", tick=tick, values=values
+            )
         if self._timed and (found := self._bare.stop()):
             text = (
                 f"bare timing loop beside the test: {found['late']:.0f} late, p99 {found['p99'] * 1e6:.0f} µs"
@@ -64,10 +69,13 @@ def sentence(granted: Granted) -> str:
 
 
 def described(lab: str, code: str, values: Mapping[str, float]) -> dict[str, str]:
-    """An event's values as the recording's metadata has them: `<lab>.<name>`, the bare loop's as `bare_loop.<name>`."""
-    prefix = "bare_loop" if code == "bare_loop" else lab
+    """An event's values as the recording's metadata has them: `<lab>.<name>`.
+
+    The bare loop's are `bare_loop.<name>`, the counts of rejected frames `<lab>.rejected.<reason>`.
+    """
+    prefix = {"bare_loop": code, "rejected": f"{lab}.{code}"}.get(code, lab)
     result = {f"{prefix}.{name}": repr(value) for name, value in values.items()}
-    if code == "real_time":
+    if code == "real_time" and "priority" in values:
         priority = values["priority"]
         result[f"{prefix}.scheduler"] = f"fifo {priority:.0f}" if priority else "other"
     return result

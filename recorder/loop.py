@@ -15,10 +15,12 @@ from common.outlet import Inlet, pack_nexts
 from common.plan import Plan
 from common.roles import LATENCY, MASTER, kind_of
 from common.surroundings import CODES, described
+from recorder.items import Items
 from recorder.sink import Item, Sink
 
 PATIENCE_NS = 1_000_000_000  # a hole that is not filled by then is lost
 SILENCE_NS = 5_000_000_000  # a test from which nothing is heard for so long is over
+ITEMS_PER_TICK, SPARE_TICKS = 4, 100_000  # bounds a stream's items: its topics of every tick, and events
 CONSEQUENCE = "remote_trip"  # the other laboratory's cause counts
 MISSED_AT = [row.name for row in signals.LATENCY].index("deadline_missed")
 
@@ -33,7 +35,9 @@ class RecorderLoop:
         self._report: Report = setting.report
         self._sink = sink
         self._digest = setting.plan.digest()
-        self._inlets = {lab: Inlet() for lab in (MASTER, *setting.plan.roles)}
+        labs = (MASTER, *setting.plan.roles)
+        most = ITEMS_PER_TICK * len(labs) * (setting.plan.ticks + SPARE_TICKS)
+        self._inlets = {lab: Inlet(Items(setting.plan, lab).unpack, most) for lab in labs}
         self._holes: dict[str, tuple[int, int]] = {}  # first missing item, and since when it is missed
         self._session = 0
         self._said_ns = -REPEAT_NS
@@ -63,7 +67,7 @@ class RecorderLoop:
             case Samples() if message.lab in self._inlets:
                 self._write(self._inlets[message.lab].take(message))
             case Finished() if message.lab in self._inlets:
-                self._inlets[message.lab].total = message.total
+                self._inlets[message.lab].end(message)
             case _:
                 pass
 
@@ -186,6 +190,7 @@ class RecorderLoop:
             result[f"{topic}_recorded"] = len(seen)
             result[f"{topic}_gaps"] = sum(1 for seq in range(max(seen, default=-1)) if seq not in seen)
         result["items_lost"] = sum(inlet.lost for inlet in self._inlets.values())
+        result["pieces_rejected"] = sum(inlet.rejected for inlet in self._inlets.values())
         result["items_dropped"] = self._sink.dropped
         result["deadline_misses"] = self._missed
         result["outcome"], result["cause"] = self._outcome[0] or "unknown", self._outcome[1]

@@ -51,8 +51,11 @@ def write_report(summary: dict[str, Any]) -> None:
         )
     write_latency(summary)
     for event in summary["events"]:
-        if event["level"] != "info":
+        if event["level"] != "info" and event["code"] != "rejected":
             say(f"{event['level']} at t {event['t']:.3f} s ({event['lab']}): {event['text']}\n")
+    for lab, counts in summary["rejected"].items():
+        reasons = ", ".join(f"{count} by {reason}" for reason, count in counts.items())
+        say(f"frames rejected by the {lab}: {reasons} (docs/rejections.md)\n")
     outcome = summary["recorder"]
     if outcome:
         say(f"outcome: {outcome.get('cause') or outcome.get('outcome', 'unknown')}\n")

@@ -65,6 +65,7 @@ def summarize(run: Run) -> dict[str, Any]:
         "latency": latencies(run),
         "late_ticks": late_ticks(run),
         "missed_ticks": missed_ticks(run),
+        "rejected": rejected(run),
         "events": run.events,
     }
 
@@ -169,6 +170,15 @@ def late_ticks(run: Run) -> int | None:
 def missed_ticks(run: Run) -> int | None:
     """Of the late ticks, those in which no command went out: the master came a whole interval too late."""
     return ticks_where(run, lambda columns: columns["command_sent_ns"] == 0)
+
+
+def rejected(run: Run) -> dict[str, dict[str, int]]:
+    """Frames that were rejected, by laboratory and reason: each event counts from the test's beginning."""
+    found = {}
+    for event in run.events:
+        if event["code"] == "rejected":
+            found[event["lab"]] = {reason: int(count) for reason, count in event["values"].items()}
+    return found
 
 
 def ticks_where(run: Run, condition: Callable[[dict[str, Values]], Values]) -> int | None:

@@ -150,7 +150,7 @@ class SlaveLoop:
     def _make_way(self, session: int) -> None:
         """Leave without a word that could disturb the test: another process takes part in it under this role."""
         lab = self.lab
-        if lab.exchange.ended or lab.exchange.session not in (0, session):
+        if not lab.exchange.allows(Event.REFUSE) or lab.exchange.session not in (0, session):
             return
         lab.enter(0)
         error = InputError(

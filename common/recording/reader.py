@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import zstandard
 from google.protobuf import descriptor_pb2
+from google.protobuf.message import DecodeError
 from mcap.exceptions import McapError
 from mcap.records import Attachment, Channel, Chunk, Footer, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader, breakup_chunk
@@ -30,7 +31,9 @@ GROUND = "ground_motion"
 MACHINES = (
     "real_time"  # metadata: real-time shape and time of the laboratories' machines, and the bare timing loop
 )
-DAMAGE = (McapError, ValueError, struct.error, zstandard.ZstdError)  # what the libraries raise on it
+# what the libraries raise on damage: in records, where sizes can be any number, and in what records describe
+DAMAGE = (McapError, ValueError, struct.error, zstandard.ZstdError, MemoryError, OverflowError)
+MISFIT = (DecodeError, TypeError, ValueError, KeyError, AttributeError)
 
 
 @dataclass
@@ -119,7 +122,7 @@ def read(path: Path) -> Run:
                 schemas[record.id] = record
             case Channel():
                 channels[record.id] = record
-            case Message():
+            case Message() if record.channel_id in channels:
                 table.setdefault(channels[record.channel_id].topic, []).append(record)
             case Metadata():
                 run.metadata[record.name] = record.metadata
@@ -129,7 +132,7 @@ def read(path: Path) -> Run:
                 pass
     for _, channel in sorted(channels.items()):  # in the order in which they were registered
         if channel.topic.startswith("rths/"):
-            _decode(run, channel, schemas[channel.schema_id], table.get(channel.topic, []))
+            _take(run, channel, schemas, table.get(channel.topic, []))
     if not run.columns and not run.events:
         raise InputError(f"{path} is an MCAP file, but holds no topic rths/<test>/<name>.")
     return run
@@ -153,7 +156,7 @@ def _up_to_damage(stream: io.BufferedReader, run: Run) -> Iterator[Any]:
     while True:
         try:
             record = next(records)
-            inner = breakup_chunk(record, validate_crc=True) if isinstance(record, Chunk) else [record]
+            inner = _inner(record) if isinstance(record, Chunk) else [record]
         except StopIteration:
             return
         except DAMAGE:
@@ -163,6 +166,24 @@ def _up_to_damage(stream: io.BufferedReader, run: Run) -> Iterator[Any]:
         first = False
         run.finished = isinstance(record, Footer)
         yield from inner
+
+
+def _inner(chunk: Chunk) -> list[Any]:
+    """The records in a chunk; raises ValueError where it would unpack to more than any recording has in one."""
+    unpacked = zstandard.frame_content_size(chunk.data) if chunk.compression == "zstd" else 0
+    if max(unpacked, chunk.uncompressed_size) > RECORD_LIMIT:
+        raise ValueError("a chunk is larger than any of a recording")
+    return list(breakup_chunk(chunk, validate_crc=True))
+
+
+def _take(run: Run, channel: Channel, schemas: dict[int, Schema], messages: list[Message]) -> None:
+    """Decode a topic; raises InputError where its messages and what describes them do not belong together."""
+    try:
+        _decode(run, channel, schemas[channel.schema_id], messages)
+    except MISFIT:
+        raise InputError(
+            f"{run.path} is damaged: its messages on {channel.topic} do not fit their description."
+        ) from None
 
 
 def _decode(run: Run, channel: Channel, schema: Schema, messages: list[Message]) -> None:

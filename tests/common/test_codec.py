@@ -15,16 +15,18 @@ from common.messages import Command, Feedback, Message, Register
 KEY = session_key(7, "plan")
 
 FIELDS = {
-    int: st.integers(-1, 2**62 - 1),
+    int: st.integers(0, codec.MOST),
     float: st.floats(-1e300, 1e300),
-    str: st.text(max_size=50),
+    str: st.text(st.characters(exclude_categories=("C", "Z")) | st.just(" "), max_size=50),
     bytes: st.binary(max_size=200),
 }
 
 
 def messages_of(kind: type[Any]) -> st.SearchStrategy[Message]:
     hints = get_type_hints(kind)
-    return st.builds(kind, **{name: FIELDS[hints[name]] for name in kind._fields})
+    fields = {name: FIELDS[hints[name]] for name in kind._fields}
+    signed = {name: st.integers(codec.LEAST[name], codec.MOST) for name in fields.keys() & codec.LEAST}
+    return st.builds(kind, **fields | signed)
 
 
 @pytest.mark.parametrize("kind", MESSAGES, ids=lambda kind: kind.__name__)
@@ -50,11 +52,12 @@ def framed(content: object, key: codec.Key = KEY) -> bytes:
     [
         ([codec.KINDS[Command], 7, 3, 10, 0, math.nan, 0.0, *REST], "value"),
         ([codec.KINDS[Command], 7, 3, 10, 0, math.inf, 0.0, *REST], "value"),
-        ([codec.KINDS[Command], 7, 3, 10, 0, 1, 0.0, *REST], "value"),
-        ([codec.KINDS[Command], 7, True, 10, 0, 1.0, 0.0, *REST], "value"),
+        ([codec.KINDS[Command], 7, 3, 10, 0, 1, 0.0, *REST], "type"),
+        ([codec.KINDS[Command], 7, True, 10, 0, 1.0, 0.0, *REST], "type"),
         ([codec.KINDS[Command], 7, -2, 10, 0, 1.0, 0.0, *REST], "value"),
         ([codec.KINDS[Command], 2**64 - 1, 3, 10, 0, 1.0, 0.0, *REST], "value"),
-        ([codec.KINDS[Command], "7", 3, 10, 0, 1.0, 0.0, *REST], "value"),
+        ([codec.KINDS[Command], 7, -1, 10, 0, 1.0, 0.0, *REST], "value"),
+        ([codec.KINDS[Command], "7", 3, 10, 0, 1.0, 0.0, *REST], "type"),
         ([codec.KINDS[Command], 7, 3, 10, 0, 1.0, *REST], "fields"),
         ([codec.KINDS[Command], 7, 3, 10, 0, 1.0, 0.0, *REST, 0.0], "fields"),
         ([len(MESSAGES), 7], "kind"),
@@ -98,7 +101,7 @@ def test_noise_with_a_valid_check_is_rejected_or_a_message(noise: bytes) -> None
     try:
         message = decode(noise + codec._check(KEY, noise), KEY)
     except RejectedFrame as rejection:
-        assert rejection.reason.value in ("length", "format", "kind", "fields", "value")
+        assert rejection.reason.value in ("length", "format", "kind", "fields", "type", "value")
     else:
         assert type(message) in MESSAGES
 

@@ -35,7 +35,7 @@ def test_rejected_frames_are_told_at_the_end_by_reason() -> None:
     lab, rejected = laboratory(), Counter[str]()
     around = Surroundings(lab, NOTHING, rejected, timed=False)
     around.begin()
-    rejected.update(check=3, value=1)
+    rejected.update(check=3, value=1, unregistered=9)
     around.end(10)
     assert ("warning", "rejected", "Frames were rejected: 3 by check, 1 by value.") in events(lab)
 
@@ -59,4 +59,5 @@ def test_a_bare_loop_that_gave_nothing_is_no_event(monkeypatch: pytest.MonkeyPat
 def test_metadata_names_the_laboratory_and_its_scheduler() -> None:
     assert described("slave.roof", "real_time", {"priority": 49.0})["slave.roof.scheduler"] == "fifo 49"
     assert described("master", "real_time", {"priority": 0.0})["master.scheduler"] == "other"
+    assert described("master", "rejected", {"check": 2.0}) == {"master.rejected.check": "2.0"}
     assert described("master", "bare_loop", {"late": 2.0}) == {"bare_loop.late": "2.0"}

@@ -1,0 +1,139 @@
+"""Which items of a laboratory's stream may be recorded: its own topics, and values as the signals have them."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import msgpack
+
+from common import signals
+from common.outlet import PIECE
+from common.plan import Plan
+from common.roles import MASTER, latency_topic
+from common.signals import Kind, Signal
+
+Item = list[Any]
+Check = Callable[[Any], bool]
+
+STAMPS = range(2**63)  # log and publish time, ns
+INTEGERS = {Kind.COUNT: range(2**32), Kind.INDEX: range(-(2**31), 2**31), Kind.STAMP: range(-(2**63), 2**63)}
+
+
+class Items:
+    """What one laboratory of a plan may send to the recorder."""
+
+    def __init__(self, plan: Plan, lab: str) -> None:
+        topics = signals.topics(plan.roles)
+        own = {"event", *((MASTER, *map(latency_topic, plan.roles)) if lab == MASTER else (lab,))}
+        self._ticks = range(plan.ticks)
+        self._rows = {topic: checks(topics[topic], plan) for topic in own}
+        self._plain = {topic: Plain(topics[topic]) for topic in own if is_plain(topics[topic], plan)}
+
+    def unpack(self, packed: bytes) -> list[Item] | None:
+        """The items of a piece; None where it holds anything that cannot be recorded."""
+        try:
+            items = msgpack.unpackb(packed)
+        except (ValueError, msgpack.UnpackException):
+            return None
+        if type(items) is not list or not 0 < len(items) <= PIECE or not all(map(self._admits, items)):
+            return None
+        return items
+
+    def _admits(self, item: Any) -> bool:
+        if type(item) is not list or len(item) < 4 or type(item[0]) is not str or item[0] not in self._rows:
+            return False
+        topic, log_ns, publish_ns, *values = item
+        rows = self._rows[topic]
+        if type(log_ns) is not int or type(publish_ns) is not int or len(values) != len(rows):
+            return False
+        if log_ns not in STAMPS or publish_ns not in STAMPS:
+            return False
+        if topic != "event" and values[0] not in self._ticks:
+            return False
+        if topic in self._plain and self._plain[topic].fits(values):
+            return True
+        return all(check(value) for check, value in zip(rows, values, strict=True))
+
+
+class Plain:
+    """The values of a topic that has one number per signal, checked by calls into C: most of a test's items."""
+
+    def __init__(self, rows: tuple[Signal, ...]) -> None:
+        self._types = tuple(PLAIN[row.kind][0] for row in rows)
+        self._layout = struct.Struct("<" + "".join(PLAIN[row.kind][1] for row in rows))
+
+    def fits(self, values: Item) -> bool:
+        """Whether the values are of exactly the types of their signals, and in their ranges."""
+        if tuple(map(type, values)) != self._types:
+            return False
+        try:
+            self._layout.pack(*values)
+        except struct.error:
+            return False
+        return True
+
+
+def is_plain(rows: tuple[Signal, ...], plan: Plan) -> bool:
+    """Whether a topic has one number per signal."""
+    several = plan.storeys > 1, len(plan.roles) > 1
+    return all(
+        row.kind in PLAIN
+        and not (row.kind is Kind.STOREYS and several[0])
+        and not (row.per_slave and several[1])
+        for row in rows
+    )
+
+
+def checks(rows: tuple[Signal, ...], plan: Plan) -> list[Check]:
+    """What each value of a topic must be, in the order of the signal table."""
+    return [value_check(row, plan.storeys, len(plan.roles)) for row in rows]
+
+
+def value_check(row: Signal, storeys: int, slaves: int) -> Check:
+    """What the value of a signal must be to be recorded."""
+    one = CHECKS[row.kind]
+    count = storeys if row.kind is Kind.STOREYS else slaves if row.per_slave else 1
+    if count == 1:
+        return one
+    return lambda value: type(value) is list and len(value) == count and all(map(one, value))
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value can be stored as a double; a sensor's may be no finite number."""
+    return type(value) is float or type(value) is int
+
+
+def is_values(value: Any) -> bool:
+    """Whether a value is a table of numbers by name."""
+    return type(value) is dict and all(
+        type(name) is str and is_number(number) for name, number in value.items()
+    )
+
+
+def integer(kind: Kind) -> Check:
+    """Whether a value is a whole number that its field can hold."""
+    limits: Mapping[Kind, range] = INTEGERS
+    return lambda value: type(value) is int and value in limits[kind]
+
+
+CHECKS: dict[Kind, Check] = {
+    Kind.NUMBER: is_number,
+    Kind.STOREYS: is_number,
+    Kind.COUNT: integer(Kind.COUNT),
+    Kind.INDEX: integer(Kind.INDEX),
+    Kind.STAMP: integer(Kind.STAMP),
+    Kind.FLAG: lambda value: type(value) is bool,
+    Kind.TEXT: lambda value: type(value) is str,
+    Kind.VALUES: is_values,
+}
+
+PLAIN: dict[Kind, tuple[type, str]] = {
+    Kind.NUMBER: (float, "d"),
+    Kind.STOREYS: (float, "d"),
+    Kind.COUNT: (int, "I"),
+    Kind.INDEX: (int, "i"),
+    Kind.STAMP: (int, "q"),
+    Kind.FLAG: (bool, "?"),
+}

@@ -1,0 +1,25 @@
+"""Valid messages at the wrong moment, which only a hostile sender has."""
+
+from __future__ import annotations
+
+import pytest
+
+from common import reality
+from common.endpoint import Received
+from common.exchange import State
+from common.messages import Arm, Register
+from common.plan import PROTOCOL_VERSION, Plan
+from rths import virtual
+
+
+@pytest.mark.parametrize("state", [State.ARMED, State.SCHEDULED, State.RUNNING, State.STOPPING])
+def test_a_slave_whose_place_is_said_to_be_taken_during_its_test_goes_on(
+    short_plan: Plan, state: State
+) -> None:
+    bench = virtual.assemble(short_plan, reality.as_planned(short_plan), None)
+    bench.slave.take(Received(Register(5, PROTOCOL_VERSION, short_plan.digest())))
+    bench.slave.lab.exchange.state = state
+    bench.slave.take(Received(Arm(5, 99)))
+    assert bench.slave.lab.exchange.state is state
+    assert bench.slave.lab.exchange.session == 5
+    assert bench.slave.lab.error is None
