@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from common import cli, realtime
+from common.address import loopback
 from common.clock import MonotonicClock
 from common.drive import Loop, Stopper, drive
 from common.endpoint import FrameEndpoint
 from common.errors import InterlockError
-from common.laboratory import Setting
+from common.laboratory import Report, Setting
+from common.plan import Plan
 from common.reality import Reality
 from common.roles import SLAVE
 from common.surroundings import Surroundings
+
+if TYPE_CHECKING:
+    from common.zenoh_link import ZenohLink
 
 
 class Assembly(Protocol):
@@ -40,9 +45,8 @@ def conduct(
     Raises:
         RthsError: what ended the test before its last tick.
     """
-    from common.zenoh_link import ZenohLink
-
     stopping = Stopper()
+    report = cli.reporter(args.json)
     plan = cli.load_plan(args)
     reality = cli.load_reality(args.reality, plan)
     if role == SLAVE:
@@ -50,19 +54,10 @@ def conduct(
         reality = reality.of(role)
     assembly.warm_up(reality)  # at ordinary priority: it computes for a second
     granted = realtime.prepare(args.rt, args.processor)
-    patience = plan.link.connect_timeout
-    link = ZenohLink(
-        role,
-        plan.test.name,
-        slaves=plan.roles,
-        listen=listen,
-        connect=connect,
-        patience=patience,
-        stopping=stopping,
-    )
+    link = join(plan, role, stopping, report, listen=listen, connect=connect)
     try:
         endpoint = FrameEndpoint(link, plan.digest())
-        setting = Setting(plan, endpoint, MonotonicClock(), cli.reporter(args.json))
+        setting = Setting(plan, endpoint, MonotonicClock(), report)
         loop = assembly.build_loop(setting, reality)
         loop.lab.heard_ns = setting.clock.now()
         drive(loop, stopping, Surroundings(loop.lab, granted, endpoint.rejected, timed=role == "master"))
@@ -73,6 +68,49 @@ def conduct(
     if loop.ticks < plan.ticks:
         raise InterlockError(loop.lab.exchange.cause or "The test was stopped before its end.")
     return 0
+
+
+def join(
+    plan: Plan,
+    role: str,
+    stopping: Callable[[], str],
+    report: Report,
+    *,
+    listen: str = "",
+    connect: str = "",
+) -> ZenohLink:
+    """A role's link in the test that a plan describes, with certificates where the plan names their folder.
+
+    Raises:
+        InputError: the endpoint or a certificate cannot be used.
+        LostError: no master was reached.
+    """
+    from common.zenoh_link import ZenohLink
+
+    def warn(code: str, text: str) -> None:
+        report("event", {"t": 0.0, "lab": role, "level": "warning", "code": code, "text": text})
+
+    identity = None
+    if plan.link.security.folder:
+        from common import security
+
+        identity = security.identity(plan, role)
+    elif not loopback(listen):
+        warn(
+            "open_link",
+            f"The link on {listen} is open: whoever reaches it can move the rigs; see docs/security.md.",
+        )
+    return ZenohLink(
+        role,
+        plan.test.name,
+        slaves=plan.roles,
+        listen=listen,
+        connect=connect,
+        patience=plan.link.connect_timeout,
+        stopping=stopping,
+        identity=identity,
+        noticed=lambda text: warn("stranger", text),
+    )
 
 
 def enter(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import NamedTuple, Protocol
 
-from common.roles import MASTER, RECORDER, SLAVE
+from common.roles import MASTER, OBSERVER, OPERATOR, RECORDER, SLAVE
 
 
 class Packet(NamedTuple):
@@ -36,6 +36,10 @@ def addressed(slave: str) -> str:
 
 def said(role: str, slaves: Sequence[str]) -> tuple[Route, ...]:
     """The routes on which a role sends; `slaves` are the roles of all slaves of the test."""
+    if role == OBSERVER:
+        return ()
+    if role == OPERATOR:
+        return (Route(role, CONTROL),)
     routes = [Route(role, channel) for channel in CHANNELS]
     if role == MASTER:
         routes += [
@@ -46,13 +50,23 @@ def said(role: str, slaves: Sequence[str]) -> tuple[Route, ...]:
 
 def heard(role: str, slaves: Sequence[str]) -> tuple[Route, ...]:
     """The routes that a role listens to: a slave hears what the master says to it or to all, no other slave."""
+    labs = (MASTER, *slaves)
     if role == MASTER:
         here = [Route(slave, channel) for slave in slaves for channel in (TICK, CONTROL)]
-        return (*here, Route(RECORDER, CONTROL))
+        return (*here, Route(RECORDER, CONTROL), Route(OPERATOR, CONTROL))
     if role == RECORDER:
-        return tuple(Route(lab, channel) for channel in (SAMPLES, CONTROL) for lab in (MASTER, *slaves))
+        return tuple(Route(lab, channel) for channel in (SAMPLES, CONTROL) for lab in labs)
+    if role == OPERATOR:
+        return tuple(Route(lab, CONTROL) for lab in (*labs, RECORDER))
+    if role == OBSERVER:
+        return tuple(route for speaker in (*labs, RECORDER, OPERATOR) for route in said(speaker, slaves))
     to = addressed(role)
-    own = (Route(MASTER, TICK, to), Route(MASTER, CONTROL), Route(RECORDER, CONTROL))
+    own = (
+        Route(MASTER, TICK, to),
+        Route(MASTER, CONTROL),
+        Route(RECORDER, CONTROL),
+        Route(OPERATOR, CONTROL),
+    )
     return (*own, Route(MASTER, CONTROL, to)) if to else own
 
 

@@ -3,6 +3,7 @@
 The master's session routes, so that a slave and a recorder that only dial the master also hear each
 other. One publisher per channel, express, at real-time priority, dropped rather than blocked when the
 network is congested: a late frame is worth nothing, and a blocked loop would be a fault (docs/decisions).
+With certificates the link is TLS, and the master's session holds every other to the routes of its role.
 """
 
 from __future__ import annotations
@@ -11,23 +12,29 @@ import contextlib
 import ctypes
 import json
 import os
-import re
 import socket
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from threading import get_ident
+from typing import TYPE_CHECKING
 
 import zenoh
 
+from common.access import access_control, guests
+from common.address import checked, dialled, secured
 from common.errors import InputError, InterlockError, LostError
-from common.roles import SLAVE
+from common.roles import MASTER, SLAVE
 from common.transport import SAMPLES, Packet, Route, heard, said
 
 LEASE_MS = 1000
 ATTEMPT_MS = 500  # opening a session cannot be interrupted, so it is tried again and again for this long
-ENDPOINT = re.compile(r"(tcp|tls|udp|quic)/.+:\d+")
 PREFIX = "rths"
+REFUSED = "zenoh_link_tls=warn"  # log of zenoh's that names every dial it refuses
 YIELD = getattr(os, "sched_yield", lambda: None)  # not every system has it
+
+if TYPE_CHECKING:
+    from common.security import Identity
 
 
 def configuration(role: str, listen: str, connect: str) -> zenoh.Config:
@@ -46,22 +53,34 @@ def configuration(role: str, listen: str, connect: str) -> zenoh.Config:
         "transport/link/tx/queue/congestion_control/drop/wait_before_drop": 0,
         "transport/shared_memory/enabled": False,
     }
-    for path, value in settings.items():
-        config.insert_json5(path, json.dumps(value))
+    insert(config, settings)
     return config
 
 
-def checked(endpoint: str) -> str:
-    """The endpoint itself; raises InputError where it is none."""
-    if endpoint and not ENDPOINT.fullmatch(endpoint):
-        raise InputError(f"'{endpoint}' is no endpoint: write it as tcp/HOST:PORT.")
-    return endpoint
+def insert(config: zenoh.Config, settings: Mapping[str, object]) -> None:
+    """Set what is at these paths of a configuration."""
+    for path, value in settings.items():
+        config.insert_json5(path, json.dumps(value))
 
 
-def reach(config: zenoh.Config, connect: str, seconds: float, stopping: Callable[[], str]) -> zenoh.Session:
-    """A session that has reached the master, tried for `seconds`.
+def secure(config: zenoh.Config, identity: Identity, test: str, slaves: Sequence[str]) -> None:
+    """Show a certificate and ask for one; the master's session holds every other to its role's routes."""
+    insert(config, identity.settings())
+    if identity.role == MASTER:
+        insert(config, {"access_control": access_control(slaves, partial(key, test))})
+
+
+def reach(
+    config: zenoh.Config,
+    connect: str,
+    seconds: float,
+    stopping: Callable[[], str],
+    refusal: Callable[[str], str],
+) -> zenoh.Session:
+    """A session that has reached the master, tried for `seconds`; `refusal` says why an endpoint takes nobody in.
 
     Raises:
+        InputError: the certificate is refused, which no patience mends.
         LostError: nobody listens there.
         InterlockError: somebody wants to stop.
     """
@@ -72,10 +91,25 @@ def reach(config: zenoh.Config, connect: str, seconds: float, stopping: Callable
         try:
             return zenoh.open(config)
         except zenoh.ZError:
+            if reason := refusal(connect):
+                raise InputError(reason) from None
             if time.monotonic() > deadline:
-                raise LostError(
-                    f"No master was reached at {connect} within {seconds:g} s: check the address and that it runs."
-                ) from None
+                raise LostError(unreached(connect, seconds)) from None
+
+
+def unrefused(_: str) -> str:
+    """Nobody is refused on an open link."""
+    return ""
+
+
+def unreached(connect: str, seconds: float) -> str:
+    """Why no master was reached, as far as that is known."""
+    from common import tls
+
+    return (
+        tls.mismatch(connect)
+        or f"No master was reached at {connect} within {seconds:g} s: check the address and that it runs."
+    )
 
 
 def key(test: str, route: Route) -> str:
@@ -86,7 +120,8 @@ def key(test: str, route: Route) -> str:
 class ZenohLink:
     """One role's access to the link of a test; `listen` and `connect` are zenoh endpoints (tcp/host:port).
 
-    `slaves` are the roles of all slaves of the test.
+    `slaves` are the roles of all slaves of the test. With an identity the link is TLS and the endpoints are those of
+    TLS too; `noticed` is told of those who join without a part in the test, from a thread of zenoh's.
     """
 
     def __init__(
@@ -99,13 +134,23 @@ class ZenohLink:
         connect: str = "",
         patience: float = 0.0,
         stopping: Callable[[], str] = str,
+        identity: Identity | None = None,
+        noticed: Callable[[str], None] = lambda _: None,
     ) -> None:
-        zenoh.init_log_from_env_or("off")
+        if identity is not None:
+            listen, connect = secured(listen), dialled(connect)
+            os.environ.setdefault("NO_COLOR", "1")  # zenoh would colour its log even in a file
+        zenoh.init_log_from_env_or(REFUSED if identity is not None and listen else "off")
         config = configuration(role, checked(listen), checked(connect))
+        if identity is not None:
+            secure(config, identity, test, slaves)
         if listen:
             self._session = self._listening(config, listen)
+            if identity is not None:
+                self._watch(guests(slaves), noticed)
         else:
-            self._session = reach(config, connect, patience, stopping)
+            refusal = identity.refusal if identity is not None else unrefused
+            self._session = reach(config, connect, patience, stopping, refusal)
         self._publishers = {
             (route.channel, route.to): self._session.declare_publisher(
                 key(test, route),
@@ -128,6 +173,18 @@ class ZenohLink:
                 f"Cannot listen on {listen}: the port is in use or the address is not this machine's; "
                 "choose another with --listen."
             ) from None
+
+    def _watch(self, expected: Sequence[str], noticed: Callable[[str], None]) -> None:
+        """Tell of everybody whose certificate is the authority's but of no role of the test."""
+
+        def joined(event: zenoh.LinkEvent) -> None:
+            name = event.link.auth_identifier
+            if event.kind == zenoh.SampleKind.PUT and name not in expected:
+                noticed(
+                    f"'{name}' has joined with a certificate of no role in this test: nothing of it passes."
+                )
+
+        self._session.info.declare_link_events_listener(joined, history=True)
 
     def listen(self, heard: Callable[[Packet], None]) -> None:
         """From now on call `heard` with every frame, from the thread of zenoh's that receives it."""

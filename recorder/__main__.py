@@ -35,7 +35,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the recorder; its exit code."""
-    from common.zenoh_link import ZenohLink
     from models import substructure
     from recorder import files
     from recorder.loop import RecorderLoop
@@ -47,15 +46,7 @@ def run(args: argparse.Namespace) -> int:
     motion = substructure.motion(plan)
     ground = substructure.ground_rows(plan, motion)
     path = files.choose_path(args.output, plan)
-    patience = plan.link.connect_timeout
-    link = ZenohLink(
-        "recorder",
-        plan.test.name,
-        slaves=plan.roles,
-        connect=args.connect,
-        patience=patience,
-        stopping=stopping,
-    )
+    link = process.join(plan, "recorder", stopping, report, connect=args.connect)
     try:
         recording = files.begin(path, plan, motion, ground, unix_ns())
         setting = Setting(plan, FrameEndpoint(link, plan.digest()), MonotonicClock(), report)

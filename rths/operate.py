@@ -61,9 +61,17 @@ def chosen(args: argparse.Namespace) -> tuple[Plan, str]:
 def asked(plan: Plan, connect: str, word: str, reason: str) -> dict[str, Answer]:
     """The answers by role; the wish is said again until all have answered or patience is over."""
     from common.endpoint import FrameEndpoint
+    from common.security import identity
     from common.zenoh_link import ZenohLink
 
-    link = ZenohLink(OPERATOR, plan.test.name, slaves=plan.roles, connect=connect, patience=PATIENCE_S)
+    link = ZenohLink(
+        OPERATOR,
+        plan.test.name,
+        slaves=plan.roles,
+        connect=connect,
+        patience=PATIENCE_S,
+        identity=identity(plan, OPERATOR) if plan.link.security.folder else None,
+    )
     try:
         return gathered(FrameEndpoint(link, plan.digest()), plan, word, reason)
     finally:

@@ -17,7 +17,7 @@ from common.exchange import State
 from common.plan import Plan
 from common.reality import Reality
 from common.realtime import assign, freeze
-from common.roles import MASTER
+from common.roles import MASTER, RECORDER
 from rths.running import announced
 from rths.terminal import Progress
 
@@ -124,11 +124,16 @@ def crew(plan: Plan) -> str:
 
 
 def check(reality: Reality) -> None:
-    """Raise InputError where a laboratory could not be built, before any process starts."""
+    """Raise InputError where a laboratory could not be built or not show who it is, before any process starts."""
     import master.assembly
     import slave.assembly
     from common.links import link_model
 
+    if reality.plan.link.security.folder:
+        from common import security
+
+        for role in (MASTER, *reality.plan.roles, RECORDER):
+            security.identity(reality.plan, role)
     master.assembly.check(reality)
     for role in reality.plan.roles:
         slave.assembly.check(reality.of(role))

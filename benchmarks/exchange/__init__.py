@@ -1,4 +1,4 @@
-"""The exchange of a tick beside bare zenoh and bare sockets: free-running, paced, under load, over a cable."""
+"""The exchange of a tick beside bare zenoh, bare sockets and TLS: free-running, paced, under load, over a cable."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ import json
 import statistics
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,6 +21,7 @@ from benchmarks.load import BUSY, busy
 from benchmarks.result import Figure
 from common.realtime import assign
 from common.zenoh_link import listenable
+from rths import keys
 
 ROOT = Path(__file__).resolve().parents[2]
 REPEATS = 3
@@ -26,6 +29,7 @@ INTERVAL = 0.002
 LOCAL = ("127.0.0.1", "127.0.0.1")
 PEERS = {"zenoh": "bare zenoh", "tcp": "bare TCP", "udp": "bare UDP"}
 OURS = {"rths": "exchange", "rths_lab": "exchange with the emulated laboratory"}
+HOUR = timedelta(hours=1)
 
 
 class Scenario(NamedTuple):
@@ -58,6 +62,7 @@ def run() -> list[Figure]:
             figures.append(Figure(f"{scenario.name}: {reason}", "µs", None, None))
             continue
         figures += [figure for name, words in OURS.items() for figure in ours(scenario, name, words, runs)]
+        figures += secured(scenario, runs)
         figures += [peer(scenario, name, words, runs) for name, words in PEERS.items()]
     return figures
 
@@ -86,6 +91,21 @@ def ours(scenario: Scenario, name: str, words: str, runs: list[dict[str, Any]]) 
         )
 
 
+def secured(scenario: Scenario, runs: list[dict[str, Any]]) -> Iterator[Figure]:
+    """Median and 99th percentile of the exchange over TLS, beside that over TCP in the same run."""
+    for share in (50, 99):
+        values = [percentile(found, "rths_tls", share) for found in runs]
+        ratios = [percentile(found, "rths_tls", share) / percentile(found, "rths", share) for found in runs]
+        yield Figure(
+            f"exchange over TLS, {scenario.name}, p{share}",
+            "µs",
+            min(values),
+            statistics.median(values),
+            peer="exchange",
+            ratio=statistics.median(ratios),
+        )
+
+
 def peer(scenario: Scenario, name: str, words: str, runs: list[dict[str, Any]]) -> Figure:
     """Median of a bare transport."""
     values = [percentile(found, name, 50) for found in runs]
@@ -103,12 +123,23 @@ def once(scenario: Scenario) -> dict[str, Any]:
             names = stack.enter_context(cable())
             places = [["ip", "netns", "exec", name] for name in names]
             here, there = ADDRESSES
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        now = datetime.now(UTC)
+        keys.write(folder, keys.certificates(("master", "slave"), (here,), now - HOUR, now + HOUR))
         ports = [listenable().rpartition(":")[2] for _ in NAMES]
         processors = [[] if place is None else ["--processor", str(place)] for place in assign(2)]
         answering = ["answer", "--asking", here, "--here", there, "--ports", *ports, *processors[1]]
+        answering += ["--keys", str(folder)]
         stack.enter_context(answerer([*places[1], *module(answering)]))
         asking = ["ask", "--here", here, "--answering", there, "--ports", *ports, *processors[0]]
-        asking += ["--rounds", str(scenario.rounds), "--interval", str(scenario.interval)]
+        asking += [
+            "--keys",
+            str(folder),
+            "--rounds",
+            str(scenario.rounds),
+            "--interval",
+            str(scenario.interval),
+        ]
         words = [*places[0], *module(asking)]
         found = subprocess.run(words, cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True, timeout=300)
     result: dict[str, Any] = json.loads(found.stdout)

@@ -6,6 +6,7 @@ import argparse
 import select
 import sys
 import threading
+from pathlib import Path
 
 from benchmarks.exchange import transports
 from benchmarks.exchange.transports import NAMES
@@ -18,6 +19,7 @@ def main() -> int:
     parser.add_argument("--asking", required=True, help="address of the asking end, where zenoh listens")
     parser.add_argument("--here", required=True, help="address of this end, where the sockets listen")
     parser.add_argument("--ports", type=int, nargs=len(NAMES), required=True, help=" ".join(NAMES))
+    parser.add_argument("--keys", type=Path, required=True, help="folder of certificates")
     parser.add_argument("--rt", choices=realtime.MODES, default="auto")
     parser.add_argument("--processor", type=int)
     args = parser.parse_args()
@@ -29,12 +31,17 @@ def main() -> int:
     sys.stdout.flush()
     close = transports.answer_zenoh(args.asking, ports["zenoh"])
     realtime.freeze()
-    other = threading.Thread(
-        target=transports.answer_rths, args=("rths_lab", args.asking, ports["rths_lab"], input_ended)
-    )
-    other.start()
-    transports.answer_rths("rths", args.asking, ports["rths"], input_ended)
-    other.join()
+    others = [
+        threading.Thread(
+            target=transports.answer_rths, args=(name, args.keys, args.asking, ports[name], input_ended)
+        )
+        for name in ("rths_tls", "rths_lab")
+    ]
+    for other in others:
+        other.start()
+    transports.answer_rths("rths", args.keys, args.asking, ports["rths"], input_ended)
+    for other in others:
+        other.join()
     close()
     return 0
 

@@ -14,6 +14,7 @@ import sys
 import time
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 
 from benchmarks.exchange.transports import (
     NAMES,
@@ -25,13 +26,8 @@ from benchmarks.exchange.transports import (
 )
 from common import realtime
 
-KINDS: dict[str, Callable[[str, int], Asking]] = {
-    "rths": partial(RthsAsking, "rths"),
-    "rths_lab": partial(RthsAsking, "rths_lab"),
-    "zenoh": ZenohAsking,
-    "tcp": TcpAsking,
-    "udp": UdpAsking,
-}
+OURS = ("rths", "rths_tls", "rths_lab")
+PEERS: dict[str, Callable[[str, int], Asking]] = {"zenoh": ZenohAsking, "tcp": TcpAsking, "udp": UdpAsking}
 SOCKETS = ("tcp", "udp")  # whose answering end listens
 WARM_UP = 300
 BLOCK = 50
@@ -57,6 +53,7 @@ def main() -> int:
     parser.add_argument("--here", required=True, help="address of this end, where zenoh listens")
     parser.add_argument("--answering", required=True, help="address of the answering end")
     parser.add_argument("--ports", type=int, nargs=len(NAMES), required=True, help=" ".join(NAMES))
+    parser.add_argument("--keys", type=Path, required=True, help="folder of certificates")
     parser.add_argument("--rounds", type=int, default=60, help=f"blocks of {BLOCK} exchanges per transport")
     parser.add_argument("--interval", type=float, default=0.0, help="s between exchanges, 0 for free-running")
     parser.add_argument("--rt", choices=realtime.MODES, default="auto")
@@ -64,9 +61,10 @@ def main() -> int:
     args = parser.parse_args()
     granted = realtime.prepare(args.rt, args.processor)
     ports = dict(zip(NAMES, args.ports, strict=True))
+    kinds = {name: partial(RthsAsking, name, args.keys) for name in OURS} | PEERS
     asking = {
         name: kind(args.answering if name in SOCKETS else args.here, ports[name])
-        for name, kind in KINDS.items()
+        for name, kind in kinds.items()
     }
     for one in asking.values():
         for _ in range(WARM_UP):

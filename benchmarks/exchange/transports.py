@@ -1,8 +1,8 @@
 """Both ends of every transport that is compared: an exchange is a frame there and a frame back.
 
 `rths` is the exchange itself: frames of the codec over the link, answered by the slave's loop, its step and limits
-included, whose laboratory stands still; `rths_lab` has the emulated laboratory there. The others carry as many bytes
-and nothing else.
+included, whose laboratory stands still; `rths_tls` is the same over a link with certificates and access control,
+`rths_lab` has the emulated laboratory there. The others carry as many bytes and nothing else.
 """
 
 from __future__ import annotations
@@ -13,23 +13,25 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Protocol
 
 import zenoh
 
-from common import reality
+from common import reality, security
 from common.clock import MonotonicClock
 from common.endpoint import FrameEndpoint
 from common.laboratory import Setting
 from common.messages import Arm, Armed, Command, Feedback, Message, Register, Registered, Scheduled, Start
 from common.plan import PROTOCOL_VERSION, Plan
 from common.rig import TableCommand
-from common.tables import Laboratory, Recording, Rig
+from common.security import Identity
+from common.tables import Laboratory, Link, Recording, Rig, Security
 from common.zenoh_link import ZenohLink
 from slave.assembly import build_loop
 
 PAYLOAD = b"x" * 110  # a command's frame is about as long
-NAMES = ("rths", "rths_lab", "zenoh", "tcp", "udp")
+NAMES = ("rths", "rths_tls", "rths_lab", "zenoh", "tcp", "udp")
 SESSION = INSTANCE = 1
 FAR_NS = 10**15  # a start so far ahead that no tick is ever late
 PATIENCE_S = 20.0
@@ -67,22 +69,35 @@ class StillTable:
 
 LABORATORIES = {
     "rths": Laboratory(Rig(class_=f"{__name__}:{StillTable.__name__}")),
+    "rths_tls": Laboratory(Rig(class_=f"{__name__}:{StillTable.__name__}")),
     "rths_lab": Laboratory(),
 }
+SECURE = ("rths_tls",)
 
 
-def bench_plan(kind: str) -> Plan:
-    """The default test with one of the laboratories; it needs no recorder here."""
-    named = replace(Plan().test, name=kind)
-    return replace(Plan(), test=named, slave=LABORATORIES[kind], recording=Recording(required=False))
+def bench_plan(kind: str, keys: Path) -> Plan:
+    """The default test with one of the laboratories; it needs no recorder here; `keys` is a folder of certificates."""
+    return replace(
+        Plan(),
+        test=replace(Plan().test, name=kind),
+        link=Link(security=Security(str(keys) if kind in SECURE else "")),
+        slave=LABORATORIES[kind],
+        recording=Recording(required=False),
+    )
+
+
+def identity(plan: Plan, role: str) -> Identity | None:
+    """A role's certificate, None where the link is open."""
+    return security.identity(plan, role) if plan.link.security.folder else None
 
 
 class RthsAsking:
     """The master's end: encode, send, receive, check, decode."""
 
-    def __init__(self, kind: str, host: str, port: int) -> None:
-        plan = bench_plan(kind)
-        self._link = ZenohLink("master", plan.test.name, listen=f"tcp/{host}:{port}")
+    def __init__(self, kind: str, keys: Path, host: str, port: int) -> None:
+        plan = bench_plan(kind, keys)
+        who = identity(plan, "master")
+        self._link = ZenohLink("master", plan.test.name, listen=f"tcp/{host}:{port}", identity=who)
         self._endpoint = FrameEndpoint(self._link, plan.digest())
         self._endpoint.enter(SESSION)
         self._agree(Register(SESSION, PROTOCOL_VERSION, plan.digest()), Registered)
@@ -115,10 +130,16 @@ class RthsAsking:
         self._link.close()
 
 
-def answer_rths(kind: str, host: str, port: int, ended: Callable[[], bool]) -> None:
+def answer_rths(kind: str, keys: Path, host: str, port: int, ended: Callable[[], bool]) -> None:
     """The slave's end: its loop and emulated laboratory, a tick for every command."""
-    plan = bench_plan(kind)
-    link = ZenohLink("slave", plan.test.name, connect=f"tcp/{host}:{port}", patience=PATIENCE_S)
+    plan = bench_plan(kind, keys)
+    link = ZenohLink(
+        "slave",
+        plan.test.name,
+        connect=f"tcp/{host}:{port}",
+        patience=PATIENCE_S,
+        identity=identity(plan, "slave"),
+    )
     endpoint = FrameEndpoint(link, plan.digest())
     loop = build_loop(Setting(plan, endpoint, MonotonicClock()), reality.as_planned(plan), instance=INSTANCE)
     while not ended():

@@ -225,13 +225,13 @@ def test_the_routes_of_one_slave_are_not_addressed() -> None:
 @given(count=st.integers(1, MOST_SLAVES))
 def test_what_is_heard_is_said_and_no_slave_hears_another_or_its_commands(count: int) -> None:
     slaves = tuple(f"slave.s{place}" for place in range(count))
-    all_roles = ("master", "recorder", *slaves)
+    all_roles = ("master", "recorder", "operator", "observer", *slaves)
     spoken = {route for role in all_roles for route in said(role, slaves)}
     for role in all_roles:
         assert set(heard(role, slaves)) <= spoken
     for slave in slaves:
         own = heard(slave, slaves)
-        assert {route.role for route in own} == {"master", "recorder"}
+        assert {route.role for route in own} == {"master", "recorder", "operator"}
         assert {route.to for route in own} == {"", slave}
         assert Route("master", transport.TICK) not in own
 

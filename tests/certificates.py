@@ -1,0 +1,34 @@
+"""Certificates for tests of the link."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+from common.security import Identity
+from rths import keys
+
+ROLES = ("master", "slave", "recorder", "operator", "observer")
+NOW = datetime.now(UTC)
+DAY = timedelta(days=1)
+
+
+def made(folder: Path, *, begin: datetime = NOW - DAY, end: datetime = NOW + DAY) -> dict[str, keys.Owner]:
+    """The files of an authority of its own, and one more of hers, for a visitor who has no part in a test."""
+    owners = keys.certificates((*ROLES, "visitor"), (), begin, end)
+    keys.write(folder, owners)
+    return owners
+
+
+def again(folder: Path, owners: dict[str, keys.Owner], role: str, begin: datetime, end: datetime) -> Path:
+    """Another certificate of a role by the same authority, in a folder of its own beside the authority's."""
+    owner = keys.issued(role, (), owners["authority"], begin, end)
+    keys.write(folder, {"authority": owners["authority"], role: owner})
+    return folder
+
+
+def identity(folder: Path, role: str, *, authority: Path | None = None) -> Identity:
+    """A role's files, unchecked."""
+    return Identity(
+        role, (authority or folder) / "authority.pem", folder / f"{role}.pem", folder / f"{role}.key"
+    )
