@@ -7,6 +7,7 @@ import json
 import secrets
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 from common import cli
@@ -61,17 +62,10 @@ def chosen(args: argparse.Namespace) -> tuple[Plan, str]:
 def asked(plan: Plan, connect: str, word: str, reason: str) -> dict[str, Answer]:
     """The answers by role; the wish is said again until all have answered or patience is over."""
     from common.endpoint import FrameEndpoint
-    from common.security import identity
-    from common.zenoh_link import ZenohLink
+    from common.process import join
 
-    link = ZenohLink(
-        OPERATOR,
-        plan.test.name,
-        slaves=plan.roles,
-        connect=connect,
-        patience=PATIENCE_S,
-        identity=identity(plan, OPERATOR) if plan.link.security.folder else None,
-    )
+    impatient = replace(plan, link=replace(plan.link, connect_timeout=PATIENCE_S))
+    link = join(impatient, OPERATOR, str, cli.text_report, connect=connect)
     try:
         return gathered(FrameEndpoint(link, plan.digest()), plan, word, reason)
     finally:

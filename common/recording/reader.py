@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from common import signals
 from common.errors import InputError
 from common.recording.schema import message_class
-from common.roles import LATENCY, MASTER, SLAVE, latency_topic, title
+from common.roles import LATENCY, MASTER, SLAVE, latency_topic, ramp_topic, title
 
 Values = NDArray[Any]
 
@@ -40,6 +40,8 @@ MISFIT = (DecodeError, TypeError, ValueError, KeyError, AttributeError)
 class Run:
     """A recording read back: columns by topic and name, metadata, attachments; `roles` are those of its slaves.
 
+    The ways to rest after the last tick are in `ramps`, by role.
+
     `part_of` is the role of the slave of several whose part of the recording it is, empty for a whole one.
     """
 
@@ -48,6 +50,7 @@ class Run:
     roles: tuple[str, ...] = (SLAVE,)
     part_of: str = ""
     columns: dict[str, dict[str, Values]] = field(default_factory=dict)
+    ramps: dict[str, dict[str, Values]] = field(default_factory=dict)
     sequences: dict[str, Values] = field(default_factory=dict)
     log_ns: dict[str, Values] = field(default_factory=dict)
     units: dict[str, dict[str, str]] = field(default_factory=dict)
@@ -196,8 +199,12 @@ def _decode(run: Run, channel: Channel, schema: Schema, messages: list[Message])
         run.events = [_event(item) for item in decoded]
         return
     names = [item.name for item in kind.DESCRIPTOR.fields]
+    columns = {name: np.array([getattr(item, name) for item in decoded]) for name in names}
+    if topic in map(ramp_topic, (MASTER, *run.roles)):
+        run.ramps[topic.replace(ramp_topic(""), "")] = columns
+        return
     run.units[topic] = json.loads(channel.metadata.get("units", "{}"))
-    run.columns[topic] = {name: np.array([getattr(item, name) for item in decoded]) for name in names}
+    run.columns[topic] = columns
     run.sequences[topic] = np.array([message.sequence for message in messages], dtype=np.int64)
     run.log_ns[topic] = np.array([message.log_time for message in messages], dtype=np.int64)
 
