@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from common import plan as plans
+from common import preflight, realtime
 from common import reality as realities
-from common import realtime
 from common.errors import RthsError
 from common.laboratory import Report
 from common.plan import Plan
@@ -75,6 +75,22 @@ def processor_argument(parser: argparse.ArgumentParser) -> None:
 def json_argument(parser: argparse.ArgumentParser, text: str) -> None:
     """The option for machine-readable output."""
     parser.add_argument("--json", action="store_true", help=text)
+
+
+def accept_argument(parser: argparse.ArgumentParser) -> None:
+    """The option that takes a risk by its name; `accepted_risks` reads it."""
+    parser.add_argument(
+        "--accept-risk",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help=f"run although pre-flight names this risk ({', '.join(preflight.NAMES)}); may be repeated, is recorded",
+    )
+
+
+def accepted_risks(args: argparse.Namespace) -> tuple[str, ...]:
+    """Names of the risks that the command line accepts; raises InputError for one that is none."""
+    return preflight.known(args.accept_risk)
 
 
 def load_plan(args: argparse.Namespace) -> Plan:

@@ -14,6 +14,7 @@ from common.endpoint import FrameEndpoint
 from common.errors import InterlockError
 from common.laboratory import Report, Setting
 from common.plan import Plan
+from common.preflight import Check, Gate
 from common.reality import Reality
 from common.roles import SLAVE
 from common.surroundings import Surroundings
@@ -28,8 +29,11 @@ class Assembly(Protocol):
     def warm_up(self, reality: Reality) -> None:
         """Compile the kernels."""
 
-    def build_loop(self, setting: Setting, reality: Reality) -> Loop:
-        """The laboratory's loop."""
+    def preflight(self, plan: Plan) -> list[Check]:
+        """What can be judged before the link opens."""
+
+    def build_loop(self, setting: Setting, reality: Reality, *, gate: Gate | None = None) -> Loop:
+        """The laboratory's loop, with the gate that its rig must pass."""
 
 
 def conduct(
@@ -47,20 +51,23 @@ def conduct(
     """
     stopping = Stopper()
     report = cli.reporter(args.json)
+    gate = Gate(cli.accepted_risks(args))
     plan = cli.load_plan(args)
     reality = cli.load_reality(args.reality, plan)
     if role == SLAVE:
         role = plan.slave_role(args.name or "")
         reality = reality.of(role)
     assembly.warm_up(reality)  # at ordinary priority: it computes for a second
+    gate.judge(assembly.preflight(plan))
     granted = realtime.prepare(args.rt, args.processor)
     link = join(plan, role, stopping, report, listen=listen, connect=connect)
     try:
         endpoint = FrameEndpoint(link, plan.digest())
         setting = Setting(plan, endpoint, MonotonicClock(), report)
-        loop = assembly.build_loop(setting, reality)
+        loop = assembly.build_loop(setting, reality, gate=gate)
         loop.lab.heard_ns = setting.clock.now()
-        drive(loop, stopping, Surroundings(loop.lab, granted, endpoint.rejected, timed=role == "master"))
+        timed = role == "master"
+        drive(loop, stopping, Surroundings(loop.lab, granted, endpoint.rejected, timed=timed, gate=gate))
     finally:
         link.close()
     if loop.lab.error is not None:

@@ -1,7 +1,8 @@
 """The interface behind which a laboratory stands: emulated, real, or a user's own model.
 
 A rig is constructed as `Class(interval=…, seed=…, **options)`. Every value is at the laboratory's own
-scale, in SI units.
+scale, in SI units. Between two commands it is read once, unless its class says `idle_readings = True`: then it may be
+read any number of times while nothing moves, and is, before the first command, to judge its sensors.
 """
 
 from __future__ import annotations
@@ -58,24 +59,61 @@ class Rig(Protocol):
         """Come to a safe stop; must not raise."""
 
 
+class AtRest(Protocol):
+    """Judges what a rig reads while nothing moves."""
+
+    def judge(
+        self, read: Callable[[], Any], names: tuple[str, ...], lab: str, *, hidden: bool, paced: bool
+    ) -> None:
+        """Read channels of these names several times, an interval apart where `paced`; raise RigError where unsound."""
+
+    def spare(self, lab: str, *, hidden: bool) -> None:
+        """Take note of a rig that cannot be read at rest."""
+
+
 class GuardedRig:
     """A rig whose every failure becomes one sentence that names it.
 
     `measurement` is the NamedTuple that `read` must fill. What a `hidden` rig says of its failure is kept back.
+    Once armed, its sensors are judged by `at_rest` where one is given: by a `twin` that is read in the rig's place
+    and thrown away, since reading an emulated rig moves its noise on, or by the rig itself if it allows that.
     """
 
-    def __init__(self, rig: Rig, name: str, measurement: Callable[..., Any], *, hidden: bool = False) -> None:
+    def __init__(
+        self,
+        rig: Rig,
+        name: str,
+        measurement: Callable[..., Any],
+        *,
+        hidden: bool = False,
+        at_rest: AtRest | None = None,
+        twin: Callable[[], Rig] | None = None,
+    ) -> None:
+        self._at_rest = at_rest
+        self._twin = twin
         self._rig = rig
         self._hidden = hidden
         self._name = name
         self._measurement = measurement
 
     def arm(self) -> None:
-        """Arm; raises RigError with the rig's own reason."""
+        """Arm; raises RigError with the rig's own reason, or with what its sensors read at rest."""
         try:
             self._rig.arm()
         except Exception as error:  # a plug-in may raise anything; the user gets a sentence
             raise self._failure("arm", error) from error
+        if self._at_rest is not None:
+            self._judge(self._at_rest)
+
+    def _judge(self, at_rest: AtRest) -> None:
+        fields: tuple[str, ...] = self._measurement._fields  # type: ignore[attr-defined]
+        if self._twin is not None:
+            twin = GuardedRig(self._twin(), self._name, self._measurement, hidden=self._hidden)
+            at_rest.judge(twin.read, fields, self._name, hidden=self._hidden, paced=False)
+        elif getattr(self._rig, "idle_readings", False):
+            at_rest.judge(self.read, fields, self._name, hidden=self._hidden, paced=True)
+        else:
+            at_rest.spare(self._name, hidden=self._hidden)
 
     def read(self) -> Any:
         """The measurements as the NamedTuple; raises RigError where they are no finite numbers of the right count."""

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from common.bare_loop import BareLoop
 from common.laboratory import Laboratory
 from common.machine import Watch, facts
+from common.preflight import Gate
 from common.realtime import Granted
 from common.rejections import told
 
@@ -20,12 +21,20 @@ CODES = ("real_time", "machine", "bare_loop", "rejected")
 class Surroundings:
     """Watches from the first tick to the last; `timed` where a bare timing loop runs beside the test.
 
-    `rejected` are the frames that were none, counted by reason as they come.
+    `rejected` are the frames that were none, counted by reason as they come; of the `gate` before the test it is told
+    what was passed and what was overruled.
     """
 
     def __init__(
-        self, lab: Laboratory, granted: Granted, rejected: Mapping[str, int], *, timed: bool
+        self,
+        lab: Laboratory,
+        granted: Granted,
+        rejected: Mapping[str, int],
+        *,
+        timed: bool,
+        gate: Gate | None = None,
     ) -> None:
+        self._gate = gate or Gate()
         self._lab = lab
         self._granted = granted
         self._rejected = rejected
@@ -37,6 +46,7 @@ class Surroundings:
         """The ticks are about to begin."""
         level = "warning" if self._granted.missing else "info"
         self._lab.note("real_time", sentence(self._granted), level=level, values=self._granted.values())
+        self._gate.note(self._lab)
         if self._timed:
             self._bare.start(self._lab.interval_ns, self._granted)
         self._watch = Watch()

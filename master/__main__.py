@@ -14,6 +14,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     cli.reality_argument(parser)
     cli.rt_arguments(parser)
     cli.processor_argument(parser)
+    cli.accept_argument(parser)
     parser.add_argument(
         "--listen",
         default=cli.DEFAULT_ENDPOINT,

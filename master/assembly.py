@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import secrets
+from functools import partial
 from typing import Any
 
 from common import schema
 from common.clock import unix_ns
 from common.laboratory import Setting
 from common.links import link_model
+from common.plan import Plan
 from common.plugins import construct, find
+from common.preflight import Check, Gate, SensorsAtRest
 from common.reality import Reality
-from common.rig import ColumnMeasurement, GuardedRig
+from common.rig import AtRest, ColumnMeasurement, GuardedRig
 from master.limits import MasterLimits
 from master.loop import MasterLoop
 from master.rig import ColumnLab
 from master.step import MasterStep
+from models import preflight as nominal
 from models import substructure
 from models.closed_loop import build_a
 from models.labs import column_lab, noise, readings
@@ -24,8 +28,17 @@ from models.registry import Array
 from models.system import System
 
 
-def build_rig(reality: Reality) -> GuardedRig:
-    """Laboratory A as the plan and the reality have it; raises InputError where it cannot be constructed."""
+def preflight(plan: Plan) -> list[Check]:
+    """What nominal models say of the test before anything is built; raises InputError where they cannot be."""
+    return nominal.checks(plan)
+
+
+def build_rig(reality: Reality, at_rest: AtRest | None = None) -> GuardedRig:
+    """Laboratory A as the plan and the reality have it, judged `at_rest` as it is armed.
+
+    Raises:
+        InputError: it cannot be constructed.
+    """
     plan, rig = reality.plan, reality.master
     arguments: dict[str, Any] = {
         "interval": plan.test.interval,
@@ -36,11 +49,12 @@ def build_rig(reality: Reality) -> GuardedRig:
         plan = system.plan
         arguments |= {"effects": system.effects}
         arguments |= {name: schema.plain(getattr(plan, name)) for name in ("actuator", "column", "sensors")}
-        return GuardedRig(ColumnLab(**arguments), "laboratory A", ColumnMeasurement)
+        twin = partial(ColumnLab, **arguments)
+        return GuardedRig(twin(), "laboratory A", ColumnMeasurement, at_rest=at_rest, twin=twin)
     kind = find(rig.class_, reality.base, "[master.rig]")
     name = "laboratory A" if "master" in reality.hidden else f"laboratory A ({kind.__name__})"
     built = construct(kind, arguments | rig.options, "[master.rig]")
-    return GuardedRig(built, name, ColumnMeasurement, hidden="master" in reality.hidden)
+    return GuardedRig(built, name, ColumnMeasurement, hidden="master" in reality.hidden, at_rest=at_rest)
 
 
 def check(reality: Reality) -> None:
@@ -68,12 +82,16 @@ def build_loop(
     *,
     session: int | None = None,
     epoch_ns: int | None = None,
+    gate: Gate | None = None,
 ) -> MasterLoop:
-    """The master's loop, its kernels compiled; session and epoch are drawn and read where none are given."""
+    """The master's loop, its kernels compiled; session and epoch are drawn and read where none are given.
+
+    With a `gate` its rig's sensors must pass it.
+    """
     warm_up(reality)
     return MasterLoop(
         setting,
-        build_rig(reality),
+        build_rig(reality, SensorsAtRest(gate, setting) if gate else None),
         master_step(reality),
         {role: link_model(reality.of(role)) for role in setting.plan.roles},
         session=session if session is not None else secrets.randbelow(2**62) + 1,

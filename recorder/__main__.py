@@ -30,6 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="the recording (default: a name in the plan's folder)",
     )
+    cli.accept_argument(parser)
     cli.json_argument(parser, "report as JSON lines on standard output")
 
 
@@ -42,6 +43,7 @@ def run(args: argparse.Namespace) -> int:
 
     stopping = Stopper()
     report = cli.reporter(args.json)
+    cli.accepted_risks(args)
     plan = cli.load_plan(args)
     motion = substructure.motion(plan)
     ground = substructure.ground_rows(plan, motion)

@@ -21,9 +21,9 @@ from common.tables import TableCompensator
 from master import assembly as master
 from models import excitation
 from models.excitation import POSITION, Programme, Segment
+from models.follower import Follower
 from recorder import files
 from recorder.sink import FileSink, Item, Sink, ThreadedSink
-from rths.follower import Follower
 from slave import assembly as slave
 
 LEAD_NS = 100_000_000

@@ -15,6 +15,7 @@ from common.drive import Stopper
 from common.errors import RthsError
 from common.exchange import State
 from common.plan import Plan
+from common.preflight import PASSED, Check, Gate
 from common.reality import Reality
 from common.realtime import assign, freeze
 from common.roles import MASTER, RECORDER
@@ -27,7 +28,13 @@ if TYPE_CHECKING:
 
 POLL_S = 0.1
 AGREED = State.SCHEDULED.value  # with which the master reports that all know the start
-UNSAID = ("machine", "bare_loop", "mode", "exchange")  # for the recording
+UNSAID = (
+    "machine",
+    "bare_loop",
+    "mode",
+    "exchange",
+    PASSED,
+)  # for the recording; what was passed is said before
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -35,6 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     cli.plan_arguments(parser, optional=True)
     cli.reality_argument(parser)
     cli.rt_arguments(parser)
+    cli.accept_argument(parser)
     clock = parser.add_mutually_exclusive_group()
     clock.add_argument("--real-time", action="store_true", help="a process each, wall clock (default)")
     clock.add_argument(
@@ -50,14 +58,15 @@ def run(args: argparse.Namespace) -> int:
     """Run a test; its exit code."""
     from recorder.files import choose_path
 
+    gate = Gate(cli.accepted_risks(args))
     plan = cli.load_plan(args)
     reality = cli.load_reality(args.reality, plan)
     output = choose_path(args.output, plan)
     stopping = Stopper()
     error = (
-        in_virtual_time(plan, reality, output, stopping)
+        in_virtual_time(plan, reality, output, stopping, gate)
         if args.virtual
-        else in_real_time(args, plan, reality, output, stopping)
+        else in_real_time(args, plan, reality, output, stopping, gate)
     )
     if output.exists() and output.stat().st_size:
         show(output, args.json)
@@ -66,12 +75,15 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def in_virtual_time(plan: Plan, reality: Reality, output: Path, stopping: Stopper) -> RthsError | None:
+def in_virtual_time(
+    plan: Plan, reality: Reality, output: Path, stopping: Stopper, gate: Gate
+) -> RthsError | None:
     """The test in this process; the error that ended it."""
     from rths import virtual
 
-    bench = virtual.assemble(plan, reality, output, virtual_report)
-    sys.stderr.write(f"{before_the_start(plan)}\n")
+    said = before_the_start(plan, gate)
+    bench = virtual.assemble(plan, reality, output, virtual_report, gate=gate)
+    sys.stderr.write(f"{said}\n")
     freeze()
     started = time.monotonic()
     error = virtual.run(bench, stopping)
@@ -80,11 +92,25 @@ def in_virtual_time(plan: Plan, reality: Reality, output: Path, stopping: Stoppe
     return error
 
 
-def before_the_start(plan: Plan) -> str:
-    """What the nominal models say about the loop that is about to be closed."""
-    from rths.partition import assess, sentence
+def before_the_start(plan: Plan, gate: Gate) -> str:
+    """Judge what can be judged before anything starts: what was passed and what is overruled, in words.
 
-    return f"before the start: {sentence(assess(plan))}"
+    Raises:
+        RefusedError: a risk that the gate does not accept.
+        InputError: a model or parameter of the plan cannot be.
+    """
+    made = checks(plan)
+    gate.judge(made)
+    return "pre-flight: " + "; ".join(
+        f"risk '{one.risk.name}' accepted" if one.risk else one.text for one in made
+    )
+
+
+def checks(plan: Plan) -> list[Check]:
+    """What is judged before anything starts."""
+    from models import preflight
+
+    return preflight.checks(plan)
 
 
 def virtual_report(kind: str, data: Any) -> None:
@@ -94,7 +120,7 @@ def virtual_report(kind: str, data: Any) -> None:
 
 
 def in_real_time(
-    args: argparse.Namespace, plan: Plan, reality: Reality, output: Path, stopping: Stopper
+    args: argparse.Namespace, plan: Plan, reality: Reality, output: Path, stopping: Stopper, gate: Gate
 ) -> RthsError | None:
     """The test in a process each; the error that ended it."""
     from common.zenoh_link import listenable
@@ -106,7 +132,7 @@ def in_real_time(
     progress = Progress(plan.test.duration)
     endpoint = listenable()
     warm_up(progress)
-    progress.say(before_the_start(plan))
+    progress.say(before_the_start(plan, gate))
     progress.say(f"{plan.test.name}: {plan.test.duration:g} s, starting master, {crew(plan)} and recorder")
     try:
         with announced(plan, endpoint):
@@ -160,6 +186,8 @@ def start_all(
         value = getattr(args, option)
         if value is not None:
             words += [f"--{option}", repr(value)]
+    for name in cli.accepted_risks(args):
+        words += ["--accept-risk", name]
     secret = ["--reality", str(args.reality)] if args.reality else []
     places = [real_time_words(args.rt, processor) for processor in assign(1 + len(roles))]
     processes.start("master", [*words, *secret, *places[0], "--listen", endpoint])

@@ -113,11 +113,11 @@ def beyond(plan: Plan, columns: dict[str, Any], ticks: int) -> str:
     """A sentence on the first value beyond a limit of the plan, empty where there is none."""
     import numpy as np
 
+    from models import limited
+
     first = (ticks, "")
-    for name, most in vars(plan.limits).items():
-        if name not in columns:  # of the laboratories' own checks, which a rollout does without
-            continue
-        values = np.abs(columns[name]).reshape(ticks, -1).max(axis=1, initial=0.0)
+    for name, values in limited.magnitudes(plan, columns).items() if ticks else ():
+        most = getattr(plan.limits, name)
         over = np.flatnonzero(~(values <= most))
         if over.size and over[0] < first[0]:
             t = over[0] * plan.test.interval

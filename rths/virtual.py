@@ -14,6 +14,7 @@ from common.errors import RthsError
 from common.laboratory import Report, Setting, silent
 from common.memory_link import MemoryHub
 from common.plan import Plan
+from common.preflight import Gate
 from common.reality import Reality, as_planned
 from common.recording.reader import Run, read
 from common.roles import MASTER, RECORDER
@@ -41,6 +42,7 @@ class Bench(NamedTuple):
     slaves: dict[str, SlaveLoop]
     recorder: RecorderLoop | None
     endpoints: dict[str, Endpoint]
+    gates: dict[str, Gate]  # of master and slaves by role, where they must pass one
 
     @property
     def slave(self) -> SlaveLoop:
@@ -53,20 +55,35 @@ class Bench(NamedTuple):
         return {MASTER: self.master, **self.slaves}
 
 
-def assemble(plan: Plan, reality: Reality, output: Path | None, report: Report = silent) -> Bench:
-    """All laboratories over a link in memory, recording into `output` where one is given."""
+def assemble(
+    plan: Plan,
+    reality: Reality,
+    output: Path | None,
+    report: Report = silent,
+    *,
+    gate: Gate | None = None,
+) -> Bench:
+    """All laboratories over a link in memory, recording into `output` where one is given.
+
+    With a master's `gate` all sensors are judged as the rigs are armed, the slaves' with the same risks accepted, and
+    the recording is told what was passed and overruled; without one nothing is judged.
+    """
     clock = VirtualClock()
     hub = MemoryHub(clock, plan.roles)
     roles = (MASTER, *plan.roles) if output is None else (MASTER, *plan.roles, RECORDER)
     endpoints: dict[str, Endpoint] = {role: hub.join(role) for role in roles}
+    gates = {MASTER: gate} | {role: Gate(gate.accepted) for role in plan.roles} if gate else {}
     master = build_master(
         Setting(plan, endpoints["master"], clock, report),
         reality,
         session=SESSION,
         epoch_ns=0,
+        gate=gate,
     )
     slaves = {
-        role: build_slave(Setting(plan, endpoints[role], clock, report), reality.of(role))
+        role: build_slave(
+            Setting(plan, endpoints[role], clock, report), reality.of(role), gate=gates.get(role)
+        )
         for role in plan.roles
     }
     recorder = None
@@ -76,7 +93,7 @@ def assemble(plan: Plan, reality: Reality, output: Path | None, report: Report =
         recorder = RecorderLoop(
             Setting(plan, endpoints["recorder"], clock, report), FileSink(recording, clock)
         )
-    return Bench(clock, master, slaves, recorder, endpoints)
+    return Bench(clock, master, slaves, recorder, endpoints, gates)
 
 
 def run(bench: Bench, stopping: Callable[[], str]) -> RthsError | None:
@@ -91,6 +108,9 @@ def run(bench: Bench, stopping: Callable[[], str]) -> RthsError | None:
         bench.clock.time += ROUND_NS
         _exchange(bench, poll=True)
         rounds += 1
+    if bench.master.lab.running:
+        for role, gate in bench.gates.items():
+            gate.note(bench.loops[role].lab)
     ticks = bench.master.lab.plan.ticks
     for tick in range(ticks):
         if reason := stopping():

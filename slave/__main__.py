@@ -14,6 +14,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     cli.reality_argument(parser)
     cli.rt_arguments(parser)
     cli.processor_argument(parser)
+    cli.accept_argument(parser)
     cli.connect_argument(parser)
     parser.add_argument("--name", metavar="NAME", help="which slave this is, where the plan names several")
     cli.json_argument(parser, "report as JSON lines on standard output")

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import secrets
+from functools import partial
 from typing import Any
 
 from common import schema
 from common.laboratory import Setting
 from common.links import link_model
+from common.plan import Plan
 from common.plugins import construct, find
+from common.preflight import Check, Gate, SensorsAtRest
 from common.reality import Reality
-from common.rig import GuardedRig, TableMeasurement
+from common.rig import AtRest, GuardedRig, TableMeasurement
 from common.roles import name_of, title
 from models.closed_loop import build_b
 from models.labs import noise, readings, table_lab
@@ -20,8 +23,17 @@ from slave.rig import TableLab
 from slave.step import SlaveStep
 
 
-def build_rig(reality: Reality) -> GuardedRig:
-    """A slave's laboratory as the plan and its reality have it; raises InputError where it cannot be constructed."""
+def preflight(_plan: Plan) -> list[Check]:
+    """The master judges the test as a whole; a slave its own rig, as it arms."""
+    return []
+
+
+def build_rig(reality: Reality, at_rest: AtRest | None = None) -> GuardedRig:
+    """A slave's laboratory as the plan and its reality have it, judged `at_rest` as it is armed.
+
+    Raises:
+        InputError: it cannot be constructed.
+    """
     plan, rig, where = reality.plan, reality.slave, f"[{reality.role}.rig]"
     lab = f"laboratory B of the {title(reality.role)}" if name_of(reality.role) else "laboratory B"
     arguments: dict[str, Any] = {
@@ -33,11 +45,13 @@ def build_rig(reality: Reality) -> GuardedRig:
         plan = system.plan
         arguments |= {"effects": system.effects}
         arguments |= {name: schema.plain(getattr(plan, name)) for name in ("table", "damper", "sensors")}
-        return GuardedRig(TableLab(**arguments), lab, TableMeasurement)
+        twin = partial(TableLab, **arguments)
+        return GuardedRig(twin(), lab, TableMeasurement, at_rest=at_rest, twin=twin)
     kind = find(rig.class_, reality.base, where)
     name = lab if reality.role in reality.hidden else f"{lab} ({kind.__name__})"
     built = construct(kind, arguments | rig.options, where)
-    return GuardedRig(built, name, TableMeasurement, hidden=reality.role in reality.hidden)
+    hidden = reality.role in reality.hidden
+    return GuardedRig(built, name, TableMeasurement, hidden=hidden, at_rest=at_rest)
 
 
 def check(reality: Reality) -> None:
@@ -48,15 +62,18 @@ def check(reality: Reality) -> None:
         find(reality.slave.class_, reality.base, f"[{reality.role}.rig]")
 
 
-def build_loop(setting: Setting, reality: Reality, *, instance: int | None = None) -> SlaveLoop:
+def build_loop(
+    setting: Setting, reality: Reality, *, instance: int | None = None, gate: Gate | None = None
+) -> SlaveLoop:
     """The loop of the slave whose reality is given, its kernels compiled; the setting's plan is the whole test's.
 
-    The number that tells this process from others of its role is drawn where none is given.
+    The number that tells this process from others of its role is drawn where none is given. With a `gate` its rig's
+    sensors must pass it.
     """
     warm_up(reality)
     return SlaveLoop(
         setting,
-        build_rig(reality),
+        build_rig(reality, SensorsAtRest(gate, setting) if gate else None),
         link_model(reality),
         role=reality.role,
         instance=instance if instance is not None else secrets.randbelow(2**62) + 1,

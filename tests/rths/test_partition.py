@@ -14,7 +14,8 @@ from common.plan import Plan
 from common.tables import Compensator
 from models import substructure
 from models.closed_loop import signals, simulate
-from rths.partition import assess, critical_delay_of, sentence
+from models.preflight import partition_text
+from rths.partition import assess, critical_delay_of
 from rths.reproduction.experiments import delayed, pulse
 from tests.helpers import with_table
 
@@ -25,7 +26,7 @@ def test_the_default_partition(default_plan: Plan) -> None:
     assert found.critical_delay == pytest.approx(0.0329, abs=1e-4)
     assert found.delay == pytest.approx(0.0002, abs=1e-4)
     assert found.amplitude == pytest.approx(1.028, abs=2e-3)
-    assert "critical delay of the column's path 32.9 ms" in sentence(found)
+    assert "critical 32.9 ms, expected 2.2 ms (× 15)" in partition_text(default_plan, found)
 
 
 @pytest.mark.parametrize(("lead", "points"), [(0.0088, 1.9), (0.044, 0.0)])
@@ -40,9 +41,10 @@ def test_without_compensation_the_path_is_beyond_what_the_loop_bears(default_pla
 
 
 def test_a_specimen_without_stiffness_bears_any_delay(default_plan: Plan) -> None:
-    found = assess(with_table(default_plan, "column", stiffness=0.0))
+    plan = with_table(default_plan, "column", stiffness=0.0)
+    found = assess(plan)
     assert math.isinf(found.critical_delay)
-    assert "no delay makes this loop unstable" in sentence(found)
+    assert "stable at any delay" in partition_text(plan, found)
 
 
 def test_two_storeys_diverge_beyond_their_critical_delay_only(default_plan: Plan) -> None:
