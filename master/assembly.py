@@ -96,6 +96,7 @@ def build_loop(
         {role: link_model(reality.of(role)) for role in setting.plan.roles},
         session=session if session is not None else secrets.randbelow(2**62) + 1,
         epoch_ns=epoch_ns if epoch_ns is not None else unix_ns(),
+        gate=gate,
     )
 
 

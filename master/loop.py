@@ -32,6 +32,7 @@ from common.messages import (
 )
 from common.operation import obey
 from common.plan import PROTOCOL_VERSION
+from common.preflight import LINK, Gate, RefusedError, link_check
 from common.rig import ColumnCommand, GuardedRig
 from common.roles import MASTER
 from common.safety.modes import Turn
@@ -57,11 +58,15 @@ class MasterLoop:
         *,
         session: int,
         epoch_ns: int,
+        gate: Gate | None = None,
     ) -> None:
         self.lab = Laboratory(MASTER, setting)
         plan = setting.plan
         self.partners = {role: Partner(role, self.lab, links[role]) for role in plan.roles}
         self._partners = tuple(self.partners.values())
+        self._gate = gate
+        for partner in self._partners if gate else ():
+            partner.pass_gate(plan.preflight.exchanges)
         self._alone = len(self._partners) == 1
         self._rig = rig
         self._step = step
@@ -190,8 +195,19 @@ class MasterLoop:
         if not partner.take_sync(reply, received_ns):
             return
         self.lab.heard_ns = received_ns
-        if self._synchronised:
+        if self._synchronised and self._link_serves():
             self._ask_anew(received_ns)
+
+    def _link_serves(self) -> bool:
+        """Whether every slave's link has passed the gate; ends the test where one has not."""
+        try:
+            if self._gate is not None:
+                plan = self.lab.plan
+                self._gate.judge([link_check(one.trips, one.lost, plan) for one in self._partners], LINK)
+        except RefusedError as error:
+            self._trip(error, "refused")
+            return False
+        return True
 
     @property
     def _synchronised(self) -> bool:

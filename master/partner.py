@@ -35,7 +35,11 @@ class Partner:
         self._offset = ClockOffset(length=OFFSET_BLOCK, blocks=OFFSET_BLOCKS)
         self._first_offset = 0
         self._sync_sent_ns = 0
+        self._asked_seq = -1
         self._syncs = 0
+        self._exchanges = SYNC_EXCHANGES
+        self.trips: list[float] = []  # of the exchanges before the start, s
+        self.lost = 0  # of them, those asked again
         self._asked_ns = -REPEAT_NS
         self._watchdog = Watchdog(lab.plan.safety, interval)
         self.tally = Tally(lab.plan.ticks, lab.plan.window)
@@ -66,7 +70,11 @@ class Partner:
     @property
     def synchronised(self) -> bool:
         """Whether enough is known of its clock."""
-        return self._syncs >= SYNC_EXCHANGES
+        return self._syncs >= self._exchanges
+
+    def pass_gate(self, exchanges: int) -> None:
+        """So many exchanges must be made before the start."""
+        self._exchanges = max(exchanges, SYNC_EXCHANGES)
 
     @property
     def start_option(self) -> str:
@@ -90,6 +98,8 @@ class Partner:
 
     def synchronise(self, now: int) -> None:
         """Ask for one exchange of clock readings."""
+        self.lost += self._asked_seq == self._syncs
+        self._asked_seq = self._syncs
         self._sync_sent_ns = now
         self._lab.endpoint.send(Sync(self._lab.exchange.session, self._syncs, now), self._address)
 
@@ -99,6 +109,7 @@ class Partner:
             return False
         self._offset.add(self._sync_sent_ns, reply.received_ns, reply.sent_ns, received_ns)
         self._syncs += 1
+        self.trips.append((received_ns - self._sync_sent_ns) * 1e-9)
         self.ask_anew(received_ns)
         return True
 
