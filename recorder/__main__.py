@@ -12,6 +12,7 @@ from common.clock import MonotonicClock, unix_ns
 from common.drive import Stopper
 from common.endpoint import Endpoint, FrameEndpoint
 from common.laboratory import Setting
+from common.preflight import Gate
 
 if TYPE_CHECKING:
     from recorder.loop import RecorderLoop
@@ -37,20 +38,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the recorder; its exit code."""
     from models import substructure
-    from recorder import files
+    from recorder import files, space
     from recorder.loop import RecorderLoop
     from recorder.sink import FileSink, ThreadedSink
 
     stopping = Stopper()
     report = cli.reporter(args.json)
-    cli.accepted_risks(args)
     plan = cli.load_plan(args)
+    path = files.choose_path(args.output, plan)
+    gate = Gate(cli.accepted_risks(args))
+    gate.judge([space.check(plan, path.parent)])
     motion = substructure.motion(plan)
     ground = substructure.ground_rows(plan, motion)
-    path = files.choose_path(args.output, plan)
     link = process.join(plan, "recorder", stopping, report, connect=args.connect)
     try:
-        recording = files.begin(path, plan, motion, ground, unix_ns())
+        recording = files.begin(path, plan, motion, ground, unix_ns(), gate.overruled)
         setting = Setting(plan, FrameEndpoint(link, plan.digest()), MonotonicClock(), report)
         loop = RecorderLoop(setting, ThreadedSink(FileSink(recording, setting.clock)))
         try:

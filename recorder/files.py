@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import platform
 import time
+from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from common.clock import unix_ns
 from common.errors import InputError
 from common.machine import facts
 from common.plan import Plan
+from common.preflight import ACCEPTED, Risk
 from common.recording.reader import GROUND
 from common.recording.writer import Recording
 from common.signals import topics
@@ -52,10 +54,15 @@ def checked(path: Path) -> Path:
     return path
 
 
-def begin(path: Path, plan: Plan, record: GroundMotion, ground: Array, at_ns: int = 0) -> Recording:
+def begin(
+    path: Path, plan: Plan, record: GroundMotion, ground: Array, at_ns: int = 0, accepted: Sequence[Risk] = ()
+) -> Recording:
     """A recording with schemas, plan, versions, host, ground motion and a first event at `at_ns` (Unix), flushed.
 
-    The schemas reach the file with the first message only, so that event must not wait.
+    The first chunk and the metadata reach the file with the first message only, so that event must not wait.
+
+    Raises:
+        InputError: the disk does not take it.
     """
     recording = Recording(path, plan.test.name, plan.storeys, topics(plan.roles), plan.roles)
     recording.metadata("plan", {"toml": plan.toml(), "digest": plan.digest()})
@@ -64,7 +71,16 @@ def begin(path: Path, plan: Plan, record: GroundMotion, ground: Array, at_ns: in
     recording.metadata(GROUND, {"record": record.describe(), "scale": repr(plan.ground_motion.scale)})
     recording.attach(GROUND, ground.astype("<f8").tobytes(), "application/octet-stream")
     recording.add("event", at_ns, at_ns, (0.0, "recorder", "info", "begin", "recording begun", {}))
-    recording.flush()
+    for risk in accepted:
+        text = f"risk '{risk.name}' accepted: {risk.sentence}."
+        recording.add("event", at_ns, at_ns, (0.0, "recorder", "warning", ACCEPTED, text, {}))
+    try:
+        recording.flush()
+    except OSError as error:
+        recording.abandon()
+        raise InputError(
+            f"Cannot begin the recording {path}: {error.strerror}; make room or give another place with -o."
+        ) from None
     return recording
 
 

@@ -11,7 +11,7 @@ import msgpack
 from common import signals
 from common.outlet import PIECE
 from common.plan import Plan
-from common.roles import MASTER, latency_topic
+from common.roles import MASTER, latency_topic, ramp_topic
 from common.signals import Kind, Signal
 
 Item = list[Any]
@@ -26,8 +26,9 @@ class Items:
 
     def __init__(self, plan: Plan, lab: str) -> None:
         topics = signals.topics(plan.roles)
-        own = {"event", *((MASTER, *map(latency_topic, plan.roles)) if lab == MASTER else (lab,))}
+        own = {"event", lab, ramp_topic(lab), *(map(latency_topic, plan.roles) if lab == MASTER else ())}
         self._ticks = range(plan.ticks)
+        self._unbounded = ("event", ramp_topic(lab))  # the way to rest goes on after the last tick
         self._rows = {topic: checks(topics[topic], plan) for topic in own}
         self._plain = {topic: Plain(topics[topic]) for topic in own if is_plain(topics[topic], plan)}
 
@@ -50,7 +51,7 @@ class Items:
             return False
         if log_ns not in STAMPS or publish_ns not in STAMPS:
             return False
-        if topic != "event" and values[0] not in self._ticks:
+        if topic not in self._unbounded and values[0] not in self._ticks:
             return False
         if topic in self._plain and self._plain[topic].fits(values):
             return True

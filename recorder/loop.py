@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 from common import signals
 from common.clock import Clock
@@ -11,7 +11,7 @@ from common.endpoint import Endpoint
 from common.errors import InputError, LostError
 from common.laboratory import REPEAT_NS, Report, Setting
 from common.messages import Finished, Message, Recorder, Register, Resend, Samples
-from common.outlet import Inlet, pack_nexts
+from common.outlet import BURST, PIECE, Inlet, pack_nexts
 from common.plan import Plan
 from common.roles import LATENCY, MASTER, kind_of
 from common.surroundings import CODES, described
@@ -21,8 +21,18 @@ from recorder.sink import Item, Sink
 PATIENCE_NS = 1_000_000_000  # a hole that is not filled by then is lost
 SILENCE_NS = 5_000_000_000  # a test from which nothing is heard for so long is over
 ITEMS_PER_TICK, SPARE_TICKS = 4, 100_000  # bounds a stream's items: its topics of every tick, and events
+ASK_NS = 20_000_000  # from asking a laboratory to asking it again, where the answer has come
+STALL_NS = 1_000_000_000  # a recorder that did nothing for so long was held up itself
 CONSEQUENCE = "remote_trip"  # the other laboratory's cause counts
 MISSED_AT = [row.name for row in signals.LATENCY].index("deadline_missed")
+
+
+class Hole(NamedTuple):
+    """Where a stream is broken: its first missing item, since when it is that one, and when it was asked for."""
+
+    first: int
+    since_ns: int
+    asked_ns: int
 
 
 class RecorderLoop:
@@ -38,10 +48,12 @@ class RecorderLoop:
         labs = (MASTER, *setting.plan.roles)
         most = ITEMS_PER_TICK * len(labs) * (setting.plan.ticks + SPARE_TICKS)
         self._inlets = {lab: Inlet(Items(setting.plan, lab).unpack, most) for lab in labs}
-        self._holes: dict[str, tuple[int, int]] = {}  # first missing item, and since when it is missed
+        self._holes: dict[str, Hole] = {}
         self._session = 0
         self._said_ns = -REPEAT_NS
-        self._heard_ns = setting.clock.now()
+        self._heard_ns = self._polled_ns = setting.clock.now()
+        self._stalled_ns = 0
+        self._filled_ns = -ASK_NS
         self._seen: dict[str, set[int]] = {
             topic: set()
             for topic in signals.topics(setting.plan.roles)
@@ -120,11 +132,22 @@ class RecorderLoop:
     def poll(self) -> None:
         """Say how far it is, ask for what is missing, notice when all is there or nobody is left."""
         now = self._clock.now()
+        self._notice_stall(now)
+        if self._session and now - self._filled_ns >= ASK_NS:
+            self._filled_ns = now
+            self._fill_holes(now)
         if now - self._said_ns >= REPEAT_NS:
             self._said_ns = now
-            self._fill_holes(now)
             self._say()
         self._end(now)
+
+    def _notice_stall(self, now: int) -> None:
+        """While this process was held up it could hear nobody: no silence of others."""
+        held = now - self._polled_ns
+        self._polled_ns = now
+        if held > STALL_NS:
+            self._stalled_ns += held
+            self._heard_ns = now
 
     def _say(self) -> None:
         failure = self._sink.failure or (str(self.error) if self.error else "")
@@ -139,18 +162,28 @@ class RecorderLoop:
 
     def _fill_holes(self, now: int) -> None:
         for lab, inlet in self._inlets.items():
-            hole = inlet.missing()
-            if hole is None:
+            missing, hole = inlet.missing(), self._holes.get(lab)
+            if missing is None:
                 self._holes.pop(lab, None)
-                continue
-            first, since = self._holes.setdefault(lab, (hole[0], now))
-            if first != hole[0]:
-                self._holes[lab] = (hole[0], now)
-            if first == hole[0] and now - since > PATIENCE_NS:
-                self._holes.pop(lab)
+            elif hole is not None and hole.first == missing[0] and now - hole.since_ns > PATIENCE_NS:
+                del self._holes[lab]
                 self._write(inlet.give_up())
             else:
-                self._endpoint.send(Resend(self._session, lab, *hole))
+                self._ask(lab, missing[0], hole, now)
+
+    def _ask(self, lab: str, first: int, hole: Hole | None, now: int) -> None:
+        """Ask for what is missing first, again at once where the last answer has come."""
+        moved = hole is None or hole.first != first
+        if hole is not None and now - hole.asked_ns < (ASK_NS if moved else REPEAT_NS):
+            return
+        self._holes[lab] = Hole(first, now if hole is None or moved else hole.since_ns, now)
+        left = BURST * PIECE  # what a laboratory sends again at once is bounded: it does so between its ticks
+        for begin, end in self._inlets[lab].holes():
+            last = min(end, begin + left - 1)
+            self._endpoint.send(Resend(self._session, lab, begin, last))
+            left -= last + 1 - begin
+            if left <= 0:
+                break
 
     def _end(self, now: int) -> None:
         silent = now - self._heard_ns
@@ -177,10 +210,14 @@ class RecorderLoop:
         self.done = True
 
     def close(self) -> Mapping[str, str]:
-        """Say goodbye, write the summary, close the file; the summary as written."""
+        """Say goodbye, write the summary, close the file; the summary as written, and in `error` what is lost of it."""
         self._say()
         summary = self.summary()
         self._sink.close(summary, self._machines)
+        if self._sink.failure:
+            self.error = LostError(
+                f"The recording is lost from some point on: {self._sink.failure} What came before is in the file."
+            )
         return summary
 
     def summary(self) -> dict[str, str]:
@@ -192,6 +229,8 @@ class RecorderLoop:
         result["items_lost"] = sum(inlet.lost for inlet in self._inlets.values())
         result["pieces_rejected"] = sum(inlet.rejected for inlet in self._inlets.values())
         result["items_dropped"] = self._sink.dropped
+        result["items_waiting_most"] = self._sink.most_waiting
+        result["recorder_stalled_s"] = f"{self._stalled_ns * 1e-9:.3f}"
         result["deadline_misses"] = self._missed
         result["outcome"], result["cause"] = self._outcome[0] or "unknown", self._outcome[1]
         return {name: str(value) for name, value in result.items()}

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import threading
-from queue import Empty, Full, Queue
+from queue import Empty, Queue
 from typing import Any, Protocol
 
 from common.clock import Clock
 from common.recording.reader import MACHINES
 from common.recording.writer import Recording
 
-FLUSH_NS = 100_000_000
+FLUSH_NS = 50_000_000  # with a piece of a laboratory's stream on its way, less than 0.1 s is not in the file
 SYNC_NS = 1_000_000_000
 QUEUE_ITEMS = 60_000  # forty seconds of a default test
+CLOSE_S = 25.0  # less than `rths run` allows the recorder to write what it holds
 
 Item = list[Any]
 
@@ -28,6 +29,10 @@ class Sink(Protocol):
     def dropped(self) -> int:
         """Items that were not written."""
 
+    @property
+    def most_waiting(self) -> int:
+        """The most items that ever waited to be written."""
+
     def put(self, items: list[Item]) -> None:
         """Take items; never waits for the disk in real time."""
 
@@ -36,7 +41,7 @@ class Sink(Protocol):
 
 
 class FileSink:
-    """Writes straight away, flushing ten times a second and syncing once."""
+    """Writes straight away, flushing twenty times a second and syncing once."""
 
     def __init__(self, recording: Recording, clock: Clock) -> None:
         self._recording = recording
@@ -44,6 +49,7 @@ class FileSink:
         self._flushed_ns = self._synced_ns = clock.now()
         self.failure = ""
         self.dropped = 0
+        self.most_waiting = 0
 
     def put(self, items: list[Item]) -> None:
         """Write items; after a failure of the disk they are only counted."""
@@ -85,10 +91,15 @@ class ThreadedSink:
 
     def __init__(self, sink: FileSink, capacity: int = QUEUE_ITEMS) -> None:
         self._sink = sink
-        self._queue: Queue[list[Item]] = Queue(maxsize=max(capacity // 10, 1))
+        self._capacity = capacity
+        self._queue: Queue[list[Item]] = Queue()
+        self._lock = threading.Lock()
+        self._waiting = 0  # items in the queue and in the thread's hands
         self._overflow = 0
+        self.most_waiting = 0
+        self._hung = ""
         self._ending = threading.Event()
-        self._thread = threading.Thread(target=self._work, name="rths-recorder-disk")
+        self._thread = threading.Thread(target=self._work, name="rths-recorder-disk", daemon=True)
         self._thread.start()
 
     @property
@@ -96,7 +107,7 @@ class ThreadedSink:
         """Why nothing can be written any more."""
         if self._overflow and not self._sink.failure:
             return f"the disk is too slow: {self._overflow} samples were dropped."
-        return self._sink.failure
+        return self._sink.failure or self._hung
 
     @property
     def dropped(self) -> int:
@@ -105,20 +116,30 @@ class ThreadedSink:
 
     def put(self, items: list[Item]) -> None:
         """Queue items, or count them where the queue is full."""
-        try:
-            self._queue.put_nowait(items)
-        except Full:
-            self._overflow += len(items)
+        with self._lock:
+            if self._waiting + len(items) > self._capacity:
+                self._overflow += len(items)
+                return
+            self._waiting += len(items)
+            self.most_waiting = max(self.most_waiting, self._waiting)
+        self._queue.put(items)
 
     def _work(self) -> None:
         while not (self._ending.is_set() and self._queue.empty()):
             try:
-                self._sink.put(self._queue.get(timeout=0.05))
+                items = self._queue.get(timeout=0.05)
             except Empty:
                 self._sink.keep_up()
+                continue
+            self._sink.put(items)
+            with self._lock:
+                self._waiting -= len(items)
 
     def close(self, summary: dict[str, str], machines: dict[str, str]) -> None:
-        """Write what is queued, then the summary and what is known of the machines."""
+        """Write what is queued, then the summary and what is known of the machines; not for ever on a hanging disk."""
         self._ending.set()
-        self._thread.join()
+        self._thread.join(CLOSE_S)
+        if self._thread.is_alive():
+            self._hung = f"the disk has not taken the last {self._waiting} samples within {CLOSE_S:g} s."
+            return
         self._sink.close(summary, machines)

@@ -34,11 +34,7 @@ def run(args: argparse.Namespace) -> int:
 def write_report(summary: dict[str, Any]) -> None:
     """The report as text."""
     say = sys.stdout.write
-    say(
-        f"\n{summary['file']}: test '{summary['test']}'"
-        + ("" if summary["finished"] else ", cut off before its end")
-        + "\n"
-    )
+    say(f"\n{summary['file']}: test '{summary['test']}'{ending(summary)}\n")
     motion = summary["ground_motion"]
     if motion:
         say(f"ground motion: {motion['record']}, scaled by {motion['scale']}\n")
@@ -62,6 +58,15 @@ def write_report(summary: dict[str, Any]) -> None:
     say(
         f"open it: rths plot {summary['file']}, or any MCAP viewer (Foxglove, Lichtblick, PlotJuggler, Rerun)\n"
     )
+
+
+def ending(summary: dict[str, Any]) -> str:
+    """Whether a recording is whole, and what to do where it is not."""
+    if summary["damage"]:
+        return f", damaged {summary['damage']}; rths recover {summary['file']} saves what is whole behind it"
+    if not summary["finished"]:
+        return f", cut off before its end; rths recover {summary['file']} makes a finished one of it"
+    return ""
 
 
 def write_completeness(summary: dict[str, Any]) -> None:

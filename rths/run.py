@@ -81,7 +81,7 @@ def in_virtual_time(
     """The test in this process; the error that ended it."""
     from rths import virtual
 
-    said = before_the_start(plan, gate)
+    said = before_the_start(plan, output, gate)
     bench = virtual.assemble(plan, reality, output, virtual_report, gate=gate)
     sys.stderr.write(f"{said}\n")
     freeze()
@@ -92,25 +92,26 @@ def in_virtual_time(
     return error
 
 
-def before_the_start(plan: Plan, gate: Gate) -> str:
+def before_the_start(plan: Plan, output: Path, gate: Gate) -> str:
     """Judge what can be judged before anything starts: what was passed and what is overruled, in words.
 
     Raises:
         RefusedError: a risk that the gate does not accept.
         InputError: a model or parameter of the plan cannot be.
     """
-    made = checks(plan)
+    made = checks(plan, output)
     gate.judge(made)
     return "pre-flight: " + "; ".join(
         f"risk '{one.risk.name}' accepted" if one.risk else one.text for one in made
     )
 
 
-def checks(plan: Plan) -> list[Check]:
+def checks(plan: Plan, output: Path) -> list[Check]:
     """What is judged before anything starts."""
     from models import preflight
+    from recorder import space
 
-    return preflight.checks(plan)
+    return [*preflight.checks(plan), space.check(plan, output.parent)]
 
 
 def virtual_report(kind: str, data: Any) -> None:
@@ -132,7 +133,7 @@ def in_real_time(
     progress = Progress(plan.test.duration)
     endpoint = listenable()
     warm_up(progress)
-    progress.say(before_the_start(plan, gate))
+    progress.say(before_the_start(plan, output, gate))
     progress.say(f"{plan.test.name}: {plan.test.duration:g} s, starting master, {crew(plan)} and recorder")
     try:
         with announced(plan, endpoint):

@@ -50,6 +50,7 @@ def summarize(run: Run) -> dict[str, Any]:
         "file": str(run.path),
         "test": run.test,
         "finished": run.finished,
+        "damage": run.damage,
         "slaves": [name_of(role) for role in run.roles if name_of(role)],
         "ground_motion": run.metadata.get("ground_motion", {}),
         "ticks_expected": plan.ticks if plan else None,

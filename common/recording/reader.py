@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -14,25 +13,23 @@ import numpy as np
 import zstandard
 from google.protobuf import descriptor_pb2
 from google.protobuf.message import DecodeError
-from mcap.exceptions import McapError
-from mcap.records import Attachment, Channel, Chunk, Footer, Message, Metadata, Schema
+from mcap.records import Attachment, Channel, Chunk, Footer, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader, breakup_chunk
 from numpy.typing import NDArray
 
 from common import signals
 from common.errors import InputError
+from common.recording.checksums import CHECKSUMS, fits, opened
+from common.recording.salvage import DAMAGE, HEAD, RECORD_LIMIT
 from common.recording.schema import message_class
 from common.roles import LATENCY, MASTER, SLAVE, latency_topic, ramp_topic, title
 
 Values = NDArray[Any]
 
-RECORD_LIMIT = 64 << 20
 GROUND = "ground_motion"
 MACHINES = (
     "real_time"  # metadata: real-time shape and time of the laboratories' machines, and the bare timing loop
 )
-# what the libraries raise on damage: in records, where sizes can be any number, and in what records describe
-DAMAGE = (McapError, ValueError, struct.error, zstandard.ZstdError, MemoryError, OverflowError)
 MISFIT = (DecodeError, TypeError, ValueError, KeyError, AttributeError)
 
 
@@ -40,9 +37,9 @@ MISFIT = (DecodeError, TypeError, ValueError, KeyError, AttributeError)
 class Run:
     """A recording read back: columns by topic and name, metadata, attachments; `roles` are those of its slaves.
 
-    The ways to rest after the last tick are in `ramps`, by role.
-
-    `part_of` is the role of the slave of several whose part of the recording it is, empty for a whole one.
+    The ways to rest after the last tick are in `ramps`, by role. `part_of` is the role of the slave of several whose
+    part of the recording it is, empty for a whole one; `damage` says where the file is damaged, which is read up to
+    there only.
     """
 
     path: Path
@@ -58,6 +55,7 @@ class Run:
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
     attachments: dict[str, bytes] = field(default_factory=dict)
     finished: bool = False
+    damage: str = ""
 
     def has(self, topic: str) -> bool:
         """Whether the recording holds any message of a topic."""
@@ -133,12 +131,21 @@ def read(path: Path) -> Run:
                 run.attachments[record.name] = record.data
             case _:
                 pass
+    _check(run)
     for _, channel in sorted(channels.items()):  # in the order in which they were registered
         if channel.topic.startswith("rths/"):
             _take(run, channel, schemas, table.get(channel.topic, []))
     if not run.columns and not run.events:
         raise InputError(f"{path} is an MCAP file, but holds no topic rths/<test>/<name>.")
     return run
+
+
+def _check(run: Run) -> None:
+    """Hold the metadata against their checksums, which are none of the user's."""
+    checksums = opened(run.metadata.pop(CHECKSUMS, {})) or {}
+    wrong = [name for name, values in run.metadata.items() if not fits(name, values, checksums)]
+    if wrong and not run.damage:
+        run.damage = f"in its metadata '{wrong[0]}'"
 
 
 def _records(path: Path, run: Run) -> Iterator[Any]:
@@ -149,34 +156,51 @@ def _records(path: Path, run: Run) -> Iterator[Any]:
         raise InputError(f"Cannot read the recording {path}: {error.strerror}.") from None
     except DAMAGE as error:
         raise InputError(
-            f"{path} is not a readable MCAP recording: {error or type(error).__name__}."
+            f"{path} is not a readable MCAP recording: {error or type(error).__name__}; "
+            "if it was one, rths recover saves what is whole."
         ) from None
 
 
 def _up_to_damage(stream: io.BufferedReader, run: Run) -> Iterator[Any]:
     records = StreamReader(stream, emit_chunks=True, record_size_limit=RECORD_LIMIT).records
-    first = True
+    place = 0  # behind the newest whole record
     while True:
         try:
             record = next(records)
-            inner = _inner(record) if isinstance(record, Chunk) else [record]
+            inner = list(_content(record))
         except StopIteration:
             return
         except DAMAGE:
-            if first:
+            if not place:
                 raise
+            run.damage = "" if _torn(stream, place) else f"at byte {place}"
             return
-        first = False
+        place = stream.tell()
         run.finished = isinstance(record, Footer)
         yield from inner
 
 
-def _inner(chunk: Chunk) -> list[Any]:
-    """The records in a chunk; raises ValueError where it would unpack to more than any recording has in one."""
-    unpacked = zstandard.frame_content_size(chunk.data) if chunk.compression == "zstd" else 0
-    if max(unpacked, chunk.uncompressed_size) > RECORD_LIMIT:
-        raise ValueError("a chunk is larger than any of a recording")
-    return list(breakup_chunk(chunk, validate_crc=True))
+def _torn(stream: io.BufferedReader, place: int) -> bool:
+    """Whether a file ends within the record at a place, as one does whose writer was cut off."""
+    size = stream.seek(0, io.SEEK_END)
+    stream.seek(place)
+    head = stream.read(HEAD.size)
+    return len(head) < HEAD.size or size - place - HEAD.size < HEAD.unpack(head)[1] <= RECORD_LIMIT
+
+
+def _content(record: McapRecord) -> Iterator[McapRecord]:
+    """What counts of a record: definitions and messages are those of chunks, which have a checksum.
+
+    Raises:
+        ValueError: a chunk would unpack to more than any of a recording holds.
+    """
+    if isinstance(record, Chunk):
+        unpacked = zstandard.frame_content_size(record.data) if record.compression == "zstd" else 0
+        if max(unpacked, record.uncompressed_size) > RECORD_LIMIT:
+            raise ValueError("a chunk is larger than any of a recording")
+        yield from breakup_chunk(record, validate_crc=True)
+    elif not isinstance(record, Schema | Channel | Message):
+        yield record
 
 
 def _take(run: Run, channel: Channel, schemas: dict[int, Schema], messages: list[Message]) -> None:

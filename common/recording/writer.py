@@ -11,14 +11,18 @@ from pathlib import Path
 from typing import Any, cast
 
 from google.protobuf import descriptor_pb2
+from mcap.data_stream import RecordBuilder
+from mcap.records import Channel, McapRecord, Schema
 from mcap.writer import CompressionType, Writer
 
 from common.errors import InputError
+from common.recording.checksums import CHECKSUMS, checksum, sealed
 from common.recording.schema import message_class, message_name, schema_file
 from common.roles import SLAVE
 from common.signals import Signal
 
 CHUNK_SIZE = 64 * 1024
+REPEAT_BYTES = 1 << 20  # schemas and channels, some kilobytes, stand in the file again after so much of it
 SYNC = getattr(os, "fdatasync", os.fsync)  # not every system has the cheaper one
 
 
@@ -60,6 +64,9 @@ class Recording:
     """A recording being written.
 
     `topics` are the channels it holds, in the names of the signal table; `slaves` the roles of the test's slaves.
+    Schemas and channels stand in the first chunk, and outside chunks at the begin and once per `REPEAT_BYTES`, so that
+    no damage at one place makes the rest unreadable; metadata, which the format does not protect, have a checksum in
+    one of their own.
     """
 
     def __init__(
@@ -86,18 +93,40 @@ class Recording:
         self._classes: dict[str, type[Any]] = {}
         self._channels: dict[str, int] = {}
         self._numbers = dict.fromkeys(topics, 0)
+        self._checksums: dict[str, str] = {}
+        self._sealed = True
+        self._definitions: list[McapRecord] = []
         schemas: dict[bytes, int] = {}
         for topic, rows in topics.items():
             file, name = schema_file(topic, rows, storeys, len(slaves)), f"rths.{message_name(topic)}"
             self._classes[topic] = message_class(file, name)
             description = descriptor_pb2.FileDescriptorSet(file=[file]).SerializeToString()
             if description not in schemas:
-                schemas[description] = self._writer.register_schema(name, "protobuf", description)
+                schemas[description] = self._schema(name, description)
             units = json.dumps({row.name: row.unit for row in rows}, ensure_ascii=False)
             named = {"slaves": " ".join(slaves)} if list(slaves) != [SLAVE] else {}
-            self._channels[topic] = self._writer.register_channel(
-                f"rths/{test}/{topic}", "protobuf", schemas[description], {"units": units} | named
+            self._channels[topic] = self._channel(
+                f"rths/{test}/{topic}", schemas[description], {"units": units} | named
             )
+        self._define()
+
+    def _schema(self, name: str, description: bytes) -> int:
+        number: int = self._writer.register_schema(name, "protobuf", description)
+        self._definitions.append(Schema(number, description, "protobuf", name))
+        return number
+
+    def _channel(self, topic: str, schema: int, metadata: dict[str, str]) -> int:
+        number = self._writer.register_channel(topic, "protobuf", schema, metadata)
+        self._definitions.append(Channel(number, topic, "protobuf", metadata, schema))
+        return number
+
+    def _define(self) -> None:
+        """Write schemas and channels outside chunks."""
+        builder = RecordBuilder()
+        for record in self._definitions:
+            record.write(builder)
+        self._spool.write(builder.end())  # type: ignore[no-untyped-call]
+        self._define_at = self._spool.tell() + REPEAT_BYTES
 
     def add(self, topic: str, log_ns: int, publish_ns: int, values: tuple[Any, ...] | list[Any]) -> None:
         """Write one message; `values` in the order of the signal table. The sequence is the message's seq."""
@@ -116,6 +145,14 @@ class Recording:
     def metadata(self, name: str, values: Mapping[str, str]) -> None:
         """Write a metadata record."""
         self._writer.add_metadata(name, dict(values))
+        self._checksums[name] = f"{self._checksums.get(name, '')} {checksum(name, values)}".strip()
+        self._sealed = False
+
+    def _seal(self) -> None:
+        """Write the checksums of all metadata so far."""
+        if not self._sealed:
+            self._writer.add_metadata(CHECKSUMS, sealed(self._checksums))
+            self._sealed = True
 
     def attach(self, name: str, data: bytes, media_type: str) -> None:
         """Write an attachment; its times are zero so that the same test gives the same file."""
@@ -126,7 +163,10 @@ class Recording:
 
         What a failed write left half-done is cut off, so that the file stays readable up to there.
         """
+        self._seal()
         self._writer.flush()  # type: ignore[no-untyped-call]
+        if self._spool.tell() >= self._define_at:
+            self._define()
         self._spool.drain()
 
     def sync(self) -> None:
@@ -136,6 +176,7 @@ class Recording:
     def close(self, summary: Mapping[str, str]) -> None:
         """Write the summary and the index, and close."""
         self.metadata("summary", summary)
+        self._seal()
         self._writer.finish()  # type: ignore[no-untyped-call]
         self._spool.drain()
         self.sync()

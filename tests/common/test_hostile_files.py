@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from common.errors import InputError, PlanError, RthsError
 from common.plan import Plan, parse
-from common.recording.reader import RECORD_LIMIT, read
+from common.recording.reader import read
+from common.recording.salvage import RECORD_LIMIT
 from common.recording.writer import Recording
 from common.signals import TOPICS
 from rths.summary import rejected

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.messages import Resend, Samples
-from common.outlet import PIECE, Inlet, Outlet
+from common.outlet import BURST, KEPT, PIECE, Inlet, Outlet
 
 
 def filled(count: int) -> tuple[Outlet, list[Samples]]:
@@ -74,3 +74,31 @@ def test_a_missing_end_is_noticed_once_the_length_is_known() -> None:
     inlet.total = outlet.total
     assert inlet.missing() == (PIECE, 2 * PIECE - 1)
     assert not inlet.complete
+
+
+def test_a_laboratory_sends_a_bounded_number_of_pieces_again_at_once() -> None:
+    outlet, pieces = filled(100 * PIECE)
+    assert outlet.again(Resend(1, "master", 0, outlet.total - 1)) == pieces[:BURST]
+    assert outlet.again(Resend(1, "master", 3 * PIECE, 4 * PIECE - 1)) == [pieces[3]]
+    assert outlet.again(Resend(1, "master", 3 * PIECE + 4, 3 * PIECE + 4)) == [pieces[3]]
+    for first, last in ((-1, 5), (7, 6), (0, outlet.total)):
+        assert outlet.again(Resend(1, "master", first, last)) == []
+
+
+def test_what_is_no_longer_kept_is_not_sent_and_what_follows_it_is() -> None:
+    outlet, pieces = filled((KEPT + 3) * PIECE)
+    assert outlet.again(Resend(1, "master", 0, outlet.total - 1)) == pieces[3 : 3 + BURST]
+    assert outlet.again(Resend(1, "master", 0, 3 * PIECE - 1)) == []
+
+
+def test_all_holes_are_known_at_once() -> None:
+    outlet, pieces = filled(9 * PIECE)
+    inlet = Inlet()
+    for place in (0, 2, 3, 6):
+        inlet.take(pieces[place])
+    inlet.total = outlet.total
+    assert list(inlet.holes()) == [
+        (PIECE, 2 * PIECE - 1),
+        (4 * PIECE, 6 * PIECE - 1),
+        (7 * PIECE, 9 * PIECE - 1),
+    ]

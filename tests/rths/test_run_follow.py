@@ -274,6 +274,7 @@ class NoSink:
 
     failure = ""
     dropped = 0
+    most_waiting = 0
 
     def put(self, items: Any) -> None: ...
 

@@ -1,0 +1,67 @@
+"""Whether a disk has room for a recording: its size estimated from the table of signals."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+from common import signals
+from common.plan import Plan
+from common.preflight import Check, Risk
+from common.roles import kind_of
+from common.signals import Kind, Signal
+
+# bytes of a protobuf field: its value, with a stamp's at seven bytes of seven bits, and of flags and texts none
+VALUES = {Kind.NUMBER: 8, Kind.STOREYS: 8, Kind.COUNT: 2, Kind.INDEX: 2, Kind.STAMP: 7, Kind.FLAG: -1}
+ONE_BYTE_TAGS = 15  # fields up to this number
+MESSAGE_HEAD = 31  # bytes before a message in a chunk
+INDEX_ENTRY = 16  # bytes of the chunk's index for a message
+COMPRESSED = 0.7  # of a chunk of measurements with noise, zstd; constant ones take less
+GROUND_ROWS = 2 * 8  # bytes of the ground motion per tick
+FIXED = 50_000  # bytes of plan, schemas and host
+SPARE = 1.1  # for events and the index
+
+
+def need(plan: Plan) -> float:
+    """Expected size of a test's recording, bytes."""
+    per_tick = sum(
+        COMPRESSED * (MESSAGE_HEAD + payload(rows, plan.storeys, len(plan.roles))) + INDEX_ENTRY
+        for topic, rows in signals.topics(plan.roles).items()
+        if kind_of(topic) in signals.TICK_TOPICS
+    )
+    return FIXED + SPARE * plan.ticks * (per_tick + GROUND_ROWS)
+
+
+def payload(rows: tuple[Signal, ...], storeys: int, slaves: int) -> int:
+    """Bytes of a message."""
+    return sum(field(number, row, storeys, slaves) for number, row in enumerate(rows, start=1))
+
+
+def field(number: int, row: Signal, storeys: int, slaves: int) -> int:
+    """Bytes of one of its fields; several values stand behind one tag and their length."""
+    tag = 1 if number <= ONE_BYTE_TAGS else 2
+    count = storeys if row.kind is Kind.STOREYS else slaves if row.per_slave else 1
+    value = VALUES.get(row.kind, 0)
+    return max(tag + value, 0) if count == 1 else tag + 1 + (count * value >= 128) + count * value
+
+
+def check(plan: Plan, folder: Path) -> Check:
+    """Whether a folder has room for the recording of a test."""
+    wanted = plan.preflight.disk_factor * need(plan)
+    try:
+        disk = shutil.disk_usage(folder)
+    except OSError as error:
+        return Check(
+            "", Risk("disk", f"nobody can see how much room the folder {folder} has: {error.strerror}")
+        )
+    if disk.free >= wanted or not disk.total:  # what has no size is no disk, and writing there will say so
+        return Check(f"disk {disk.free / 1e6:.0f} MB free for {need(plan) / 1e6:.1f} MB")
+    return Check(
+        "",
+        Risk(
+            "disk",
+            f"the folder {folder} has {disk.free / 1e6:.1f} MB free, and the recording needs {wanted / 1e6:.1f} MB "
+            f"({plan.preflight.disk_factor:g} times its expected {need(plan) / 1e6:.1f} MB), so make room, give "
+            "another place with -o, or lower disk_factor in [preflight]",
+        ),
+    )

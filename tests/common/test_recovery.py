@@ -1,0 +1,409 @@
+"""Recovering damaged recordings: cut, flipped, overwritten, with bytes put in or taken out."""
+
+from __future__ import annotations
+
+import json
+import random
+import tracemalloc
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mcap.reader import make_reader
+from mcap.records import Chunk, Message
+from mcap.stream_reader import StreamReader, breakup_chunk
+
+from common.errors import InputError, RthsError
+from common.recording.reader import read
+from common.recording.recovery import recover
+from common.recording.salvage import HEAD
+from common.recording.writer import REPEAT_BYTES, Recording
+from common.signals import TICK_TOPICS, TOPICS, Kind
+from rths.recover import write_account
+
+TICKS = 600
+PER_FLUSH = 25
+Key = tuple[int, int, int, int, bytes]
+Spot = tuple[str, int, int, Any]  # kind of a record, its place, its end, the record
+
+NOISE = random.Random(1)
+DEFAULTS: dict[Kind, Any] = {Kind.FLAG: False, Kind.INDEX: 3, Kind.STAMP: 2**44}
+
+
+def values(topic: str, seq: int) -> list[Any]:
+    return [seq, *(DEFAULTS.get(row.kind, NOISE.random()) for row in TOPICS[topic][1:])]
+
+
+def write(path: Path, ticks: int = TICKS, *, close: bool = True, skip: range = range(0)) -> None:
+    recording = Recording(path, "trial", 1, TOPICS)
+    recording.metadata("plan", {"toml": "x = 1"})
+    recording.attach("ground_motion", bytes(range(256)) * 8, "application/octet-stream")
+    recording.add("event", 0, 0, (0.0, "recorder", "info", "begin", "begun", {}))
+    recording.flush()
+    for seq in range(ticks):
+        for topic in TICK_TOPICS:
+            if seq not in skip:
+                recording.add(topic, seq * 2_000_000, seq * 2_000_000 + 5, values(topic, seq))
+        if seq % PER_FLUSH == PER_FLUSH - 1:
+            recording.flush()
+    if close:
+        recording.close({"outcome": "completed"})
+    else:
+        recording.flush()
+        recording.abandon()
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("whole") / "a.mcap"
+    write(path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def unfinished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("unfinished") / "a.mcap"
+    write(path, close=False)
+    return path
+
+
+def spots(path: Path) -> list[Spot]:
+    """Every record outside chunks, with its place."""
+    found: list[Spot] = []
+    with path.open("rb") as stream:
+        records = StreamReader(stream, emit_chunks=True).records
+        begin = 8
+        while True:
+            try:
+                record = next(records)
+            except Exception:
+                return found
+            found.append((type(record).__name__, begin, stream.tell(), record))
+            begin = stream.tell()
+
+
+@cache
+def chunks_of(path: Path) -> list[tuple[bytes, set[Key]]]:
+    """Bytes of every chunk of an undamaged file, and its messages."""
+    data = path.read_bytes()
+    return [(data[spot[1] : spot[2]], set(keys(spot[3]))) for spot in spots(path) if spot[0] == "Chunk"]
+
+
+def keys(chunk: Chunk) -> list[Key]:
+    return [key(record) for record in breakup_chunk(chunk) if isinstance(record, Message)]
+
+
+def key(message: Message) -> Key:
+    return (
+        message.channel_id,
+        message.sequence,
+        message.log_time,
+        message.publish_time,
+        message.data,
+    )
+
+
+def read_by_the_library(path: Path) -> list[Key]:
+    with path.open("rb") as stream:
+        reader = make_reader(stream, validate_crcs=True)
+        summary = reader.get_summary()
+        assert summary is not None
+        assert summary.statistics is not None
+        found = [key(message) for _, _, message in reader.iter_messages(log_time_order=False)]
+        assert summary.statistics.message_count == len(found)
+        return found
+
+
+def damaged(path: Path, tmp_path: Path, change: Callable[[bytearray], Any]) -> tuple[Path, Path]:
+    data = bytearray(path.read_bytes())
+    change(data)
+    broken = tmp_path / "broken.mcap"
+    broken.write_bytes(data)
+    return broken, tmp_path / "out.mcap"
+
+
+def test_a_whole_recording_is_the_same_after_recovery(whole: Path, tmp_path: Path) -> None:
+    before = whole.read_bytes()
+    found = recover(whole, tmp_path / "out.mcap")
+    assert found.complete
+    assert found.holes == []
+    assert whole.read_bytes() == before
+    assert read_by_the_library(tmp_path / "out.mcap") == read_by_the_library(whole)
+    one, other = read(whole), read(tmp_path / "out.mcap")
+    assert other.finished
+    assert not other.damage
+    recovery = other.metadata.pop("recovery")
+    assert recovery == {"file": "a.mcap", "complete": "true", "bytes_lost": "0", "chunks_lost": "0"}
+    assert (other.metadata, other.attachments, other.units) == (one.metadata, one.attachments, one.units)
+    again = recover(tmp_path / "out.mcap", tmp_path / "again.mcap")
+    assert again.complete
+
+
+def test_a_cut_off_recording_loses_nothing_that_was_flushed(unfinished: Path, tmp_path: Path) -> None:
+    found = recover(unfinished, tmp_path / "out.mcap")
+    assert found.complete
+    assert not found.finished
+    run = read(tmp_path / "out.mcap")
+    assert run.finished
+    assert all(run.sequences[topic].tolist() == list(range(TICKS)) for topic in TICK_TOPICS)
+
+
+@pytest.mark.parametrize("place", [0.02, 0.4, 0.97])
+def test_a_flipped_bit_costs_one_chunk_and_names_what_was_in_it(
+    unfinished: Path, tmp_path: Path, place: float
+) -> None:
+    chunks = [spot for spot in spots(unfinished) if spot[0] == "Chunk"][1:]
+    _, begin, end, chunk = chunks[int(place * len(chunks))]
+    broken, output = damaged(unfinished, tmp_path, lambda data: data.__setitem__(end - 7, data[end - 7] ^ 16))
+    found = recover(broken, output)
+    assert not found.complete
+    assert [(hole.offset, hole.end, hole.chunks) for hole in found.holes] == [(begin, end, 1)]
+    assert found.chunks_lost == 1
+    gone = [message[1] for message in keys(chunk)]
+    for topic in TICK_TOPICS:
+        account = found.topics[topic]
+        if end < chunks[-1][1]:
+            (hole,) = account.missing
+            assert (hole.first, hole.last) == (min(gone), max(gone))
+            assert hole.after_ns == (min(gone) - 1) * 2_000_000 or min(gone) == 0
+            assert hole.before_ns == (max(gone) + 1) * 2_000_000
+        assert account.kept == TICKS - PER_FLUSH
+
+
+def test_the_summary_tells_what_is_lost_at_the_end(whole: Path, tmp_path: Path) -> None:
+    _, _, end, chunk = [spot for spot in spots(whole) if spot[0] == "Chunk"][-1]
+    broken, output = damaged(whole, tmp_path, lambda data: data.__setitem__(end - 7, data[end - 7] ^ 16))
+    found = recover(broken, output)
+    gone = sorted({message[1] for message in keys(chunk)})
+    (hole,) = found.topics["slave"].missing
+    assert (hole.first, hole.last, hole.before_ns) == (gone[0], gone[-1], None)
+    assert found.chunks_lost == 1
+
+
+@pytest.mark.parametrize("finished", [True, False])
+@pytest.mark.parametrize("kind", ["noise", "zeros"])
+def test_without_its_beginning_a_recording_is_read_by_the_copies_of_its_schemas(
+    tmp_path: Path, finished: bool, kind: str
+) -> None:
+    path = tmp_path / "long.mcap"
+    write(path, 3000, close=finished)
+    assert path.stat().st_size > REPEAT_BYTES
+    filling = bytes(60_000) if kind == "zeros" else NOISE.randbytes(60_000)
+    broken, output = damaged(path, tmp_path, lambda data: data.__setitem__(slice(0, 60_000), filling))
+    with pytest.raises(InputError, match="rths recover saves what is whole"):
+        read(broken)
+    found = recover(broken, output)
+    run = read(output)
+    first = int(run.sequences["master"][0])
+    assert 0 < first < 300
+    assert run.sequences["master"].tolist() == list(range(first, 3000))
+    assert found.topics["master"].missing[0][:2] == (0, first - 1)
+    assert found.topics["master"].missing[0].before_ns == first * 2_000_000
+    assert found.origin_ns == 0
+
+
+def test_a_first_chunk_with_a_flipped_bit_leaves_the_rest_readable(unfinished: Path, tmp_path: Path) -> None:
+    _, _, end, _ = next(spot for spot in spots(unfinished) if spot[0] == "Chunk")
+    broken, output = damaged(unfinished, tmp_path, lambda data: data.__setitem__(end - 7, data[end - 7] ^ 1))
+    assert read(unfinished).ticks("master") == TICKS
+    found = recover(broken, output)
+    assert found.topics["master"].lost == 0
+    assert found.topics["event"].kept == 0
+    assert read(output).ticks("master") == TICKS
+
+
+def test_a_definition_without_a_checksum_does_not_win_over_one_with_it(whole: Path, tmp_path: Path) -> None:
+    data = whole.read_bytes()
+    place = data.index(b"rths/trial/master")
+    broken, output = damaged(whole, tmp_path, lambda data: data.__setitem__(place + 12, ord("M")))
+    assert recover(broken, output).complete
+    assert set(read(output).columns) == set(TICK_TOPICS) == set(read(broken).columns)
+
+
+def test_damaged_metadata_and_attachments_are_named_and_nobody_uses_them(
+    whole: Path, tmp_path: Path, capsys: Any
+) -> None:
+    data = whole.read_bytes()
+    toml, ground = data.index(b"x = 1"), data.index(bytes(range(256)))
+
+    def change(data: bytearray) -> None:
+        data[toml + 4] = ord("2")
+        data[ground + 9] ^= 1
+
+    broken, output = damaged(whole, tmp_path, change)
+    assert read(broken).damage == "in its metadata 'plan'"
+    found = recover(broken, output)
+    assert found.parts == ["metadata 'plan' (damaged)", "attachment 'ground_motion'"]
+    run = read(output)
+    assert "plan" not in run.metadata
+    assert run.metadata["plan (damaged)"] == {"toml": "x = 2"}
+    assert run.ticks("master") == TICKS
+    write_account(found)
+    assert "lost: metadata 'plan' (damaged)\n" in capsys.readouterr().out
+
+
+def test_lost_metadata_are_named(whole: Path, tmp_path: Path) -> None:
+    kind, begin, _, record = next(spot for spot in spots(whole) if spot[0] == "Metadata")
+    assert (kind, record.name) == ("Metadata", "plan")
+    broken, output = damaged(whole, tmp_path, lambda data: data.__setitem__(begin, 0x7F))
+    found = recover(broken, output)
+    assert found.parts == ["metadata 'plan'"]
+    assert not found.complete
+
+
+def test_nothing_is_lost_with_an_index(whole: Path, tmp_path: Path) -> None:
+    indices = [spot for spot in spots(whole) if spot[0] == "MessageIndex"]
+    summary = next(spot for spot in spots(whole) if spot[0] == "Statistics")
+
+    def change(data: bytearray) -> None:
+        data[indices[10][1] + 5] ^= 64  # the length of one
+        data[summary[1] + 20] ^= 1
+
+    broken, output = damaged(whole, tmp_path, change)
+    found = recover(broken, output)
+    assert found.holes
+    assert found.complete
+    assert found.bytes_lost == 0
+    assert read_by_the_library(output) == read_by_the_library(whole)
+
+
+def test_what_was_never_recorded_is_not_lost_with_the_damage(tmp_path: Path) -> None:
+    path = tmp_path / "gap.mcap"
+    write(path, skip=range(110, 115))
+    found = recover(path, tmp_path / "out.mcap")
+    assert found.complete
+    assert found.topics["master"].unrecorded == 5
+
+
+def test_garbage_of_any_length_in_the_middle_costs_no_chunk_but_its_own(whole: Path, tmp_path: Path) -> None:
+    chunks = [spot for spot in spots(whole) if spot[0] == "Chunk"]
+    _, begin, end, _ = chunks[5]
+    middle = (begin + end) // 2
+    broken, output = damaged(
+        whole, tmp_path, lambda data: data.__setitem__(slice(middle, middle), NOISE.randbytes(12_345))
+    )
+    found = recover(broken, output)
+    assert found.chunks == len(chunks) - 1
+    assert found.chunks_lost == 1
+    broken, output = damaged(whole, tmp_path, lambda data: data.__delitem__(slice(middle, middle + 777)))
+    output.unlink()
+    assert recover(broken, output).chunks == len(chunks) - 1
+
+
+def test_input_and_existing_files_are_never_overwritten(whole: Path, tmp_path: Path) -> None:
+    before = whole.read_bytes()
+    link = tmp_path / "link.mcap"
+    link.hardlink_to(whole)
+    for output in (whole, link):
+        with pytest.raises(InputError, match="exists already"):
+            recover(whole, output)
+    assert whole.read_bytes() == before
+    with pytest.raises(InputError, match="Cannot write .*No such file"):
+        recover(whole, tmp_path / "no" / "out.mcap")
+
+
+@pytest.mark.parametrize("data", [b"", b"\x89MCAP0\r\n", b"hello " * 1000, bytes(3_000_000)])
+def test_where_nothing_can_be_recovered_it_is_said(tmp_path: Path, data: bytes) -> None:
+    (tmp_path / "a.mcap").write_bytes(data)
+    with pytest.raises(InputError, match="Nothing can be recovered"):
+        recover(tmp_path / "a.mcap", tmp_path / "out.mcap")
+    assert not (tmp_path / "out.mcap").exists()
+    with pytest.raises(InputError, match="No such file"):
+        recover(tmp_path / "missing.mcap", tmp_path / "out.mcap")
+
+
+Change = tuple[str, float, int, int]
+CHANGES = st.lists(
+    st.tuples(
+        st.sampled_from(["cut", "flip", "overwrite", "insert", "delete"]),
+        st.floats(0.0, 1.0),
+        st.integers(1, 5000),
+        st.integers(0, 255),
+    ),
+    min_size=1,
+    max_size=4,
+)
+
+
+def apply(data: bytearray, change: Change) -> None:
+    kind, share, length, byte = change
+    place = min(int(share * len(data)), len(data) - 1)
+    match kind:
+        case "cut":
+            del data[place:]
+        case "flip":
+            data[place] ^= byte or 1
+        case "overwrite":
+            data[place : place + length] = bytes([byte]) * min(length, len(data) - place)
+        case "insert":
+            data[place:place] = random.Random(byte).randbytes(length)
+        case "delete":
+            del data[place : place + length]
+
+
+@settings(max_examples=60, deadline=None)
+@given(changes=CHANGES, finished=st.booleans())
+def test_whatever_happens_to_a_file_all_of_its_whole_chunks_are_recovered(
+    whole: Path, unfinished: Path, tmp_path_factory: Any, changes: list[Change], finished: bool
+) -> None:
+    tmp_path = tmp_path_factory.mktemp("damaged")
+    original = whole if finished else unfinished
+
+    def change(data: bytearray) -> None:
+        for one in changes:
+            if data:
+                apply(data, one)
+
+    broken, output = damaged(original, tmp_path, change)
+    after = broken.read_bytes()
+    everything: set[Key] = set().union(*(messages for _, messages in chunks_of(original)))
+    expected: set[Key] = set().union(*(messages for chunk, messages in chunks_of(original) if chunk in after))
+    try:
+        found = recover(broken, output)
+    except RthsError as error:
+        assert "\n" not in str(error)
+        assert not output.exists()
+        assert describes_nothing(after) or not expected
+        return
+    assert broken.read_bytes() == after
+    read(output)
+    json.dumps(found.plain(), allow_nan=False)
+    got = set(read_by_the_library(output))
+    assert got <= everything
+    assert found.undefined or expected <= got
+    if found.complete:
+        assert got == expected
+
+
+def describes_nothing(data: bytes) -> bool:
+    """Whether no copy of a schema is left whole."""
+    return b"\nrths.Master" not in data
+
+
+def test_memory_stays_far_below_the_size_of_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "big.mcap"
+    recording = Recording(path, "trial", 1, TOPICS)
+    for seq in range(60_000):
+        recording.add("master", seq * 2_000_000, 0, values("master", seq))
+        if seq % 500 == 0:
+            recording.flush()
+    recording.close({})
+    tracemalloc.start()
+    try:
+        assert recover(path, tmp_path / "out.mcap").complete
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert path.stat().st_size > 8_000_000
+    assert peak < 4_000_000
+
+
+def test_the_place_of_a_record_is_that_of_its_opcode(whole: Path) -> None:
+    data = whole.read_bytes()
+    for kind, begin, end, _ in spots(whole):
+        if kind == "Chunk":
+            assert HEAD.unpack_from(data, begin) == (6, end - begin - HEAD.size)
