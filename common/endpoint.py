@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple, Protocol
 
 from common import codec
-from common.clock import MonotonicClock
+from common.clock import Clock, MonotonicClock
 from common.codec import Reject, RejectedFrame
 from common.inbox import Inbox
 from common.messages import (
@@ -127,9 +127,9 @@ class FrameEndpoint:
     understood without one, is under the key that all share, and only those of `OPEN` are accepted under it.
     """
 
-    def __init__(self, transport: Transport, plan_digest: str) -> None:
+    def __init__(self, transport: Transport, plan_digest: str, clock: Clock | None = None) -> None:
         self._transport = transport
-        self._now = MonotonicClock().now
+        self._now = (clock or MonotonicClock()).now
         self._digest = plan_digest
         self._open_key = codec.session_key(0, plan_digest)
         self._place = (0, self._open_key)  # session and its key; replaced as one, read by the link's threads
