@@ -74,14 +74,18 @@ class Loop(Protocol):
 
 def drive(loop: Loop, stopping: Callable[[], str], surroundings: Surroundings) -> None:
     """Run a test to its end; `stopping` gives the reason to end it early, empty while there is none."""
-    handshake(loop, stopping)
-    if loop.lab.running:
-        surroundings.begin()
-    freeze()
-    if run(loop, stopping):
-        loop.finish()
-    come_to_rest(loop)
-    stay(loop, stopping)
+    try:
+        handshake(loop, stopping)
+        if loop.lab.running:
+            surroundings.begin()
+        freeze()
+        if run(loop, stopping):
+            loop.finish()
+        come_to_rest(loop)
+        stay(loop, stopping)
+    except Exception:  # whatever goes wrong in this program, the rig does not stay armed
+        loop.disarm()
+        raise
     loop.disarm()
     surroundings.end(loop.ticks)
     depart(loop)

@@ -73,7 +73,7 @@ EXAMPLES = {
     "slave": "rths slave default --connect tcp/192.0.2.1:7447",
     "record": "rths record default --connect tcp/192.0.2.1:7447 -o test.mcap",
     "stop": "rths stop --emergency",
-    "reset": "rths reset --reason 'specimen looked at'",
+    "reset": "rths reset --reason inspected",
     "simulate": "rths simulate default --ideal --no-amd",
     "bench": "rths bench actuator paper -o actuator.mcap",
     "identify": "rths identify actuator.mcap",

@@ -249,7 +249,8 @@ def test_the_recorder_tells_each_laboratory_how_far_it_is() -> None:
 def test_a_recording_has_a_topic_per_slave_and_an_array_per_command(tmp_path: Path) -> None:
     slaves, path = two().roles, tmp_path / "a.mcap"
     table = topics(slaves)
-    assert list(table) == ["master", "slave.roof", "slave.cellar", "latency.roof", "latency.cellar", "event"]
+    labs = ["master", "slave.roof", "slave.cellar", "latency.roof", "latency.cellar"]
+    assert list(table) == [*labs, "master_ramp", "slave_ramp.roof", "slave_ramp.cellar", "event"]
     recording = Recording(path, "trial", 1, table, slaves)
     kinds = {signals.Kind.INDEX: [1, 2]}
     values = [kinds.get(row.kind, [1.0, 2.0]) if row.per_slave else 0 for row in signals.MASTER]

@@ -19,6 +19,7 @@ from common.messages import Command, Feedback, Register, Trip
 from common.plan import PROTOCOL_VERSION, Plan, from_tables
 from common.reality import Reality
 from common.recording.reader import Run, read
+from common.safety.modes import Mode
 from common.signals import TOPICS
 from common.tables import Rig
 from models import substructure
@@ -314,20 +315,26 @@ def test_a_silent_slave_is_lost_and_nothing_more_moves(bench: Bench) -> None:
             break
     assert bench.master.lab.exchange.state is State.LOST
     assert isinstance(bench.master.lab.error, LostError)
-    assert tick == pytest.approx(100 + 500, abs=2)
+    assert tick == 104  # the fifth interval in which nothing of the slave's was new
+    assert bench.master.lab.safety.mode is Mode.RAMPING
+    assert bench.master.lab.safety.cause is not None
+    assert bench.master.lab.safety.cause.code == "watchdog"
 
 
-def test_a_slave_without_commands_keeps_the_last_one_and_goes_on_measuring(bench: Bench) -> None:
+def test_a_slave_without_commands_keeps_the_last_one_and_goes_on_measuring_until_it_ramps(
+    bench: Bench,
+) -> None:
     before = bench.slave._command
-    for tick in range(100, 110):
+    for tick in range(100, 105):
         bench.clock.sleep_until(bench.slave.tick_ns(tick))
         bench.slave.tick(tick)
     answers = []
     while (heard := bench.endpoints["master"].receive()) is not None:
         answers.append(heard.message)
     feedback = [answer for answer in answers if isinstance(answer, Feedback) and answer.seq >= 100]
-    assert [answer.seq for answer in feedback] == list(range(100, 110))
+    assert [answer.seq for answer in feedback] == list(range(100, 104))
     assert {answer.command_seq for answer in feedback} == {before.seq}
+    assert bench.slave.lab.safety.mode is Mode.RAMPING
 
 
 def test_a_tick_that_comes_a_whole_interval_late_moves_nothing_and_sends_nothing(bench: Bench) -> None:

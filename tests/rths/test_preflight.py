@@ -70,7 +70,7 @@ def test_what_is_passed_is_one_line_and_recorded(call: Any, capsys: Any, tmp_pat
     assert "; peaks ≤ " in lines[0]
     assert sum("partition" in line for line in lines) == 1
     run = read(path)
-    assert [lab for lab, _, _ in noted(run, "preflight")] == ["master", "master"]
+    assert [lab for lab, _, _ in noted(run, "preflight")] == ["master"] * 3
     assert [(lab, level) for lab, level, _ in noted(run, "sensors")] == [
         ("master", "info"),
         ("slave", "info"),
