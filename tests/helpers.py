@@ -12,6 +12,24 @@ from common.plan import Plan
 
 ROOT = Path(__file__).resolve().parent.parent
 
+# for tests of something else on machines that are shared: a laboratory that is held up goes on, though its rig jumps
+PATIENT = """
+[safety]
+hold_after = 3000
+ramp_after = 5000
+overrun = 5000
+[preflight]
+late_share = 1.0
+[limits]
+actuator_velocity = inf
+actuator_acceleration = inf
+actuator_step = inf
+table_velocity = inf
+table_step = inf
+damper_step = inf
+table_acceleration = 1000.0
+"""
+
 
 def with_table(base: Plan, table: str, **values: object) -> Plan:
     """A plan with some keys of one table changed."""
@@ -28,3 +46,10 @@ def without_recorder(base: Plan) -> Plan:
 def largest(values: object) -> float:
     """Largest magnitude of an array."""
     return float(np.max(np.abs(np.asarray(values))))
+
+
+def patient(folder: Path) -> Path:
+    """A file with the default test, which no machine that is held up ends."""
+    path = folder / "patient.toml"
+    path.write_text(PATIENT)
+    return path

@@ -18,7 +18,7 @@ import pytest
 
 from common.recording.reader import read
 from common.zenoh_link import listenable
-from tests.helpers import ROOT
+from tests.helpers import ROOT, patient
 
 PLANTED = 0.003
 SECONDS, SINCE = 8, 4.0  # s of test, and from when on the delay is there
@@ -100,7 +100,7 @@ def test_a_delay_in_one_direction_shows_as_that_segment(
     tmp_path: Path, way: str, segment: str, other: str
 ) -> None:
     listen, path = listenable(), tmp_path / "delayed.mcap"
-    words = ("default", "--duration", str(SECONDS))
+    words = (str(patient(tmp_path)), "--duration", str(SECONDS))
     master = start("master", *words, "--listen", listen, "--json")
     relay = DelayingRelay(int(listen.rpartition(":")[2]), way)
     recorder = start("record", *words, "--connect", listen, "-o", path)

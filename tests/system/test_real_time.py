@@ -19,7 +19,7 @@ import pytest
 
 from common.plan import Plan
 from common.recording.reader import Run, read
-from tests.helpers import ROOT
+from tests.helpers import PATIENT, ROOT, patient
 
 RTHS = [sys.executable, "-m", "rths"]
 TIMES = ("wake_lateness", "compute_time", "clock_offset", "clock_offset_bound")
@@ -55,7 +55,9 @@ def free_port() -> int:
 def plan_file(folder: Path, **link: float) -> Path:
     path = folder / "plan.toml"
     keys = "\n".join(f"{name} = {value}" for name, value in link.items())
-    path.write_text(f"[test]\nname = 'trial'\nduration = 4.0\n[recording]\npatience = 1.0\n[link]\n{keys}\n")
+    path.write_text(
+        f"[test]\nname = 'trial'\nduration = 4.0\n[recording]\npatience = 1.0\n{PATIENT}[link]\n{keys}\n"
+    )
     return path
 
 
@@ -63,7 +65,7 @@ def plan_file(folder: Path, **link: float) -> Path:
 def real_run(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], Run]:
     """Four seconds of the default test in real time: its summary and its recording."""
     path = tmp_path_factory.mktemp("real") / "real.mcap"
-    code, out, err = finish(start("run", "--duration", "4", "-o", path, "--json"))
+    code, out, err = finish(start("run", patient(path.parent), "--duration", "4", "-o", path, "--json"))
     assert code == 0, err
     return json.loads(out), read(path)
 
@@ -90,7 +92,7 @@ def test_real_time_equals_virtual_time_to_the_last_bit_until_a_message_is_late(
         if (ticks := ticks_in_time(real)) >= 200:
             break
         path = tmp_path / f"{attempt}.mcap"  # a machine that is shared may be late early; then once more
-        assert finish(start("run", "--duration", "4", "-o", path))[0] == 0
+        assert finish(start("run", patient(path.parent), "--duration", "4", "-o", path))[0] == 0
         real = read(path)
     assert ticks >= 200
     for topic in ("master", "slave"):
@@ -130,7 +132,7 @@ def test_the_accounts_of_latency_add_up(real_run: tuple[dict[str, Any], Run]) ->
 
 def test_ctrl_c_stops_in_order_and_keeps_the_recording(tmp_path: Path) -> None:
     path = tmp_path / "stopped.mcap"
-    process = start("run", "--duration", "60", "-o", path)
+    process = start("run", patient(path.parent), "--duration", "60", "-o", path)
     wait_for_ticks(path)
     process.send_signal(signal.SIGINT)
     code, out, err = finish(process, 20.0)
@@ -146,7 +148,7 @@ def test_ctrl_c_stops_in_order_and_keeps_the_recording(tmp_path: Path) -> None:
 
 def test_a_killed_front_door_ends_the_test_in_order(tmp_path: Path) -> None:
     path = tmp_path / "orphan.mcap"
-    process = start("run", "--duration", "60", "-o", path)
+    process = start("run", patient(path.parent), "--duration", "60", "-o", path)
     wait_for_ticks(path)
     process.kill()
     process.communicate()
@@ -192,7 +194,7 @@ LINUX = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 @LINUX
 @pytest.mark.parametrize("seconds", [0.0, 0.7])
 def test_ctrl_c_in_the_first_moments_ends_soon(seconds: float, tmp_path: Path) -> None:
-    process = start("run", "--duration", "60", "-o", tmp_path / "a.mcap")
+    process = start("run", patient(tmp_path), "--duration", "60", "-o", tmp_path / "a.mcap")
     crew(process)
     time.sleep(seconds)
     process.send_signal(signal.SIGINT)
@@ -205,7 +207,7 @@ def test_ctrl_c_in_the_first_moments_ends_soon(seconds: float, tmp_path: Path) -
 @LINUX
 @pytest.mark.parametrize("seconds", [0.0, 0.7])
 def test_a_front_door_killed_in_the_first_moments_leaves_nobody(seconds: float, tmp_path: Path) -> None:
-    process = start("run", "--duration", "60", "-o", tmp_path / "a.mcap")
+    process = start("run", patient(tmp_path), "--duration", "60", "-o", tmp_path / "a.mcap")
     numbers = crew(process).values()
     time.sleep(seconds)
     process.kill()
@@ -219,7 +221,7 @@ def test_a_front_door_killed_in_the_first_moments_leaves_nobody(seconds: float, 
 @LINUX
 def test_a_killed_slave_is_noticed_by_the_master_and_named(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
-    process = start("run", "--duration", "60", "-o", path)
+    process = start("run", patient(path.parent), "--duration", "60", "-o", path)
     numbers = crew(process)
     wait_for_ticks(path)
     os.kill(numbers["slave"], signal.SIGKILL)
@@ -237,7 +239,7 @@ def test_a_killed_slave_is_noticed_by_the_master_and_named(tmp_path: Path) -> No
 @LINUX
 def test_a_second_ctrl_c_ends_a_run_that_hangs(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
-    process = start("run", "--duration", "60", "-o", path)
+    process = start("run", patient(path.parent), "--duration", "60", "-o", path)
     numbers = crew(process)
     wait_for_ticks(path)
     os.kill(numbers["slave"], signal.SIGSTOP)
@@ -268,7 +270,7 @@ class Loud:
 def test_a_rig_that_prints_holds_nobody_up(tmp_path: Path) -> None:
     (tmp_path / "loud.py").write_text(LOUD)
     plan = tmp_path / "loud.toml"
-    plan.write_text("[test]\nduration = 1.0\n[master.rig]\nclass = 'loud.py:Loud'\n")
+    plan.write_text(f"[test]\nduration = 1.0\n{PATIENT}[master.rig]\nclass = 'loud.py:Loud'\n")
     code, _, err = finish(start("run", plan, "-o", tmp_path / "a.mcap"), 30.0)
     assert code == 0, err[-1000:]
     assert "master: valve 9999\n" in err

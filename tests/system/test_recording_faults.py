@@ -17,20 +17,21 @@ from common.recording.reader import read
 from common.signals import TICK_TOPICS
 from recorder import space
 from rths.summary import plan_of
+from tests.helpers import PATIENT
 from tests.system.test_real_time import crew, finish, start, wait_for_ticks
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc and mounts a tmpfs")
 
 # the processes share a machine with others: a laboratory that is held up shall not end a test of the recorder
-PATIENT = "[safety]\nhold_after = 3000\nramp_after = 5000\noverrun = 5000\n[link]\nloss_timeout = 5.0\n"
+LOSS = "[link]\nloss_timeout = 5.0\n"
 KILLS = 2
 
 
 def plan_file(folder: Path, duration: float, preflight: str = "", recording: str = "") -> Path:
     path = folder / "plan.toml"
     path.write_text(
-        f"[test]\nname = 'trial'\nduration = {duration}\n{PATIENT}"
-        f"[preflight]\n{preflight}\n[recording]\n{recording}\n"
+        f"[test]\nname = 'trial'\nduration = {duration}\n{PATIENT}{preflight}\n{LOSS}"
+        f"[recording]\n{recording}\n"
     )
     return path
 

@@ -16,6 +16,7 @@ from common import plan as plans
 from common import reality
 from common.recording.reader import Run, read
 from rths import virtual
+from tests.helpers import PATIENT
 from tests.system.test_real_time import finish, free_port, start, wait_for_ticks
 
 TEXT = """
@@ -28,8 +29,6 @@ stiffness = [126e6, 126e6, 126e6]
 damping = [1e6, 1e6, 1e6]
 [column]
 stiffness = 63e6
-[limits] # a shared machine that pauses for many ticks makes a table jump
-table_acceleration = 1000.0
 """
 IMPATIENT = "[link]\nloss_timeout = 0.5\n[recording]\npatience = 1.0\n"
 
@@ -37,7 +36,7 @@ IMPATIENT = "[link]\nloss_timeout = 0.5\n[recording]\npatience = 1.0\n"
 def plan_file(folder: Path, *names: str, more: str = "") -> Path:
     path = folder / "several.toml"
     slaves = "".join(f"[slave.{name}.damper]\nfloor = {1 + place % 3}\n" for place, name in enumerate(names))
-    path.write_text(TEXT + slaves + more)
+    path.write_text(TEXT + slaves + PATIENT + more)
     return path
 
 

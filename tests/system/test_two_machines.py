@@ -12,7 +12,7 @@ import pytest
 
 from benchmarks.cable import ADDRESSES, NoCableError, cable, ip
 from common.recording.reader import read
-from tests.helpers import ROOT
+from tests.helpers import PATIENT, ROOT, patient
 
 ADDRESS_A, ADDRESS_B = ADDRESSES
 
@@ -52,7 +52,7 @@ def await_all(processes: dict[str, subprocess.Popen[str]]) -> None:
 def test_a_test_on_two_machines_is_recorded_whole(machines: tuple[str, str], tmp_path: Path) -> None:
     first, second = machines
     path = tmp_path / "two.mcap"
-    words = ("default", "--duration", "4")
+    words = (patient(tmp_path), "--duration", "4")
     endpoint = f"tcp/{ADDRESS_A}:7447"
     processes = {
         "slave": start(second, "slave", *words, "--connect", endpoint),
@@ -89,7 +89,8 @@ def test_a_cable_that_is_pulled_ends_both_with_exit_code_4(machines: tuple[str, 
     first, second = machines
     plan = tmp_path / "plan.toml"
     plan.write_text(
-        "[test]\nname = 'cable'\nduration = 60.0\n[link]\nloss_timeout = 0.3\n[recording]\nrequired = false\n"
+        PATIENT
+        + "[test]\nname = 'cable'\nduration = 60.0\n[link]\nloss_timeout = 0.3\n[recording]\nrequired = false\n"
     )
     slave = start(second, "slave", plan, "--connect", f"tcp/{ADDRESS_A}:7447")
     master = start(first, "master", plan, "--listen", "tcp/0.0.0.0:7447")
