@@ -49,6 +49,11 @@ def write_report(summary: dict[str, Any]) -> None:
     for event in summary["events"]:
         if event["level"] != "info" and event["code"] != "rejected":
             say(f"{event['level']} at t {event['t']:.3f} s ({event['lab']}): {event['text']}\n")
+    for name, counts in summary["exchange"].items():
+        say(
+            f"{name.replace('/', ', ')}: {counts['sent']} sent = {counts['used']} used + {counts['rejected']} rejected "
+            f"+ {counts['lost']} lost\n"
+        )
     for lab, counts in summary["rejected"].items():
         reasons = ", ".join(f"{count} by {reason}" for reason, count in counts.items())
         say(f"frames rejected by the {lab}: {reasons} (docs/rejections.md)\n")

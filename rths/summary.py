@@ -14,6 +14,7 @@ from common.recording.reader import Run, Values
 from common.roles import LATENCY, MASTER, SLAVE, kind_of, latency_topic, name_of
 from common.signals import Kind
 from models import indicators
+from rths.accounts import accounts
 
 PERCENTILES = (50, 90, 99, 99.9)
 LEAST_TICKS = 500
@@ -67,6 +68,7 @@ def summarize(run: Run) -> dict[str, Any]:
         "late_ticks": late_ticks(run),
         "missed_ticks": missed_ticks(run),
         "rejected": rejected(run),
+        "exchange": accounts(run),
         "events": run.events,
     }
 
