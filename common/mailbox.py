@@ -13,7 +13,11 @@ Frame = TypeVar("Frame")
 
 
 class LinkModel(Protocol):
-    """A link plug-in, constructed as `Class(seed=…, **options)`."""
+    """A link plug-in, constructed as `Class(seed=…, **options)`.
+
+    The watchdogs see what it does, unless it says `watched = False`: then they see the messages as they came over the
+    real link, and a test over an emulated network goes on however bad that is.
+    """
 
     def fate(self, direction: str, seq: int, t: float) -> float | None:
         """Seconds of extra delay of a message sent at test time `t`, None for lost."""
@@ -41,17 +45,24 @@ class Mailbox(Generic[Frame]):
         self._interval = interval
         self._nominal = nominal
         self._waiting: list[tuple[int, int, Frame]] = []
+        self._watched = getattr(link, "watched", True)
+        self._newest: Frame | None = None  # that came over the wire
         self.newest_seen = -1
         self._taken = -1
 
     def put(self, seq: int, frame: Frame) -> float | None:
         """Take in a message of the tick `seq` as it comes from the wire; its extra delay (s), None for lost."""
-        self.newest_seen = max(self.newest_seen, seq)
+        if seq > self.newest_seen:
+            self.newest_seen, self._newest = seq, frame
         extra = self._link.fate(self._direction, seq, seq * self._interval)
         if extra is not None:
             ticks = ticks_late(extra, self._interval)
             self._waiting.append((seq + self._nominal + ticks, seq, frame))
         return extra
+
+    def judged(self, used: Frame) -> Frame:
+        """The message that a watchdog judges: the one in use, or the newest of the wire behind an unwatched link."""
+        return used if self._watched or self._newest is None else self._newest
 
     def take(self, tick: int) -> Frame | None:
         """The newest message that is there at this tick; None where there is none newer than the last."""

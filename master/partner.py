@@ -150,7 +150,8 @@ class Partner:
 
     def look(self, tick: int) -> Finding:
         """What the watchdog says at a tick that came in time."""
-        return self._watchdog.look(tick - 1, self.used.seq, self.used.heard_seq)
+        judged = self._feedback.judged(self.used)
+        return self._watchdog.look(tick - 1, judged.seq, judged.heard_seq)
 
     def send(self, tick: int) -> tuple[int, int]:
         """Send the command that is `sent`; when its turn came, and when its frame was handed to the link, ns."""

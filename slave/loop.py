@@ -264,7 +264,8 @@ class SlaveLoop:
             return True
         if held:  # the silence may be this loop's own
             return False
-        finding = self._watchdog.look(tick, self._command.seq, self._command.heard_seq)
+        judged = self._commands.judged(self._command)
+        finding = self._watchdog.look(tick, judged.seq, judged.heard_seq)
         if finding is Finding.RAMP:
             lab.silent("master", tick)
             return True

@@ -21,7 +21,12 @@ DRAWN = 256  # messages drawn at once: some ten microseconds
 
 
 class ImpairedLink:
-    """The network of a test; what becomes of a message depends on seed, direction and number alone."""
+    """The network of a test; what becomes of a message depends on seed, direction and number alone.
+
+    The catalogue's effects on the link are there to be diagnosed: the watchdogs look at the real link beneath.
+    """
+
+    watched = False
 
     def __init__(
         self, seed: int, delay: float = 0.0, jitter: float = 0.0, loss: float = 0.0, burst: float = 1.0
