@@ -10,6 +10,7 @@ from common.clock import Clock
 from common.endpoint import Endpoint
 from common.errors import EmergencyStopError, InterlockError, LostError, RthsError
 from common.exchange import Event, Exchange, State
+from common.limits import Violation
 from common.messages import Message, Recorder, Resend, Trip
 from common.outlet import Outlet, next_of
 from common.plan import Plan
@@ -119,13 +120,22 @@ class Laboratory:
             figures = ", ".join(f"{name} {value:.4g}" for name, value in values.items())
             self.note("safe", f"At rest after {self.safety.cause.code}: {figures}.", tick=tick, values=values)
 
-    def fail(self, event: Event, error: RthsError, *, code: str, tick: int = 0, remote: bool = False) -> None:
-        """End the test for this laboratory; the first cause stays."""
+    def fail(
+        self,
+        event: Event,
+        error: RthsError,
+        *,
+        code: str,
+        tick: int = 0,
+        remote: bool = False,
+        values: Mapping[str, float] = NO_VALUES,
+    ) -> None:
+        """End the test for this laboratory; the first cause stays, with the `values` that belong to it."""
         if self.exchange.ended:
             return
         self.exchange.happen(event, remote=remote, cause=str(error))
         self.error = error
-        self.note(code, str(error), level="error", tick=tick)
+        self.note(code, str(error), level="error", tick=tick, values=values)
         if event is not Event.REFUSE:
             turn = Turn.EMERGENCY if isinstance(error, EmergencyStopError) else Turn.TRIP
             self.tick = tick
@@ -148,6 +158,11 @@ class Laboratory:
         """An error as the cause of a latched state."""
         return Cause(code, str(error), self.tick * self.plan.test.interval, self.name)
 
+    def violated(self, violation: Violation, tick: int) -> None:
+        """End the test because a value is beyond its limit."""
+        values = {violation.name: violation.value, "limit": violation.limit}
+        self.fail(Event.TRIP, InterlockError(str(violation)), code="limit", tick=tick, values=values)
+
     def overrun(self, late_ns: int, tick: int) -> bool:
         """End the test where a tick comes too many intervals late: nobody knows what the rig did meanwhile."""
         most = self.plan.safety.overrun
@@ -157,7 +172,7 @@ class Laboratory:
             f"The {title(self.name)} was held up for {late_ns * 1e-6:.1f} ms, more than {most} intervals: free its "
             "processor or give it real-time priority (`rths doctor`), or raise overrun in [safety]."
         )
-        self.fail(Event.TRIP, error, code="overrun", tick=tick)
+        self.fail(Event.TRIP, error, code="overrun", tick=tick, values={"late": late_ns * 1e-9})
         return True
 
     def silent(self, who: str, tick: int) -> None:
@@ -165,7 +180,7 @@ class Laboratory:
         most = self.plan.safety.ramp_after
         milliseconds = most * self.plan.test.interval * 1e3
         error = LostError(f"Nothing fresh came from the {who} for {most} intervals ({milliseconds:g} ms).")
-        self.fail(Event.LOSE, error, code="watchdog", tick=tick)
+        self.fail(Event.LOSE, error, code="watchdog", tick=tick, values={"intervals": float(most)})
 
     def tripped(self, lab: str, text: str, tick: int) -> None:
         """End the test because the other laboratory has stopped its rig."""

@@ -299,7 +299,7 @@ class MasterLoop:
             outputs = self._step(tick, measured.column_displacement, measured.column_force, forces)
             violation = self._limits.violation(measured, outputs)
             if violation:
-                self._trip(InterlockError(str(violation)), "limit", tick)
+                lab.violated(violation, tick)
                 self._descent.step(tick, measured)
             else:
                 self._write(outputs, held=held)

@@ -237,7 +237,7 @@ class SlaveLoop:
             wanted = TableCommand(self._step(command, measured), command.damper_command)
             violation = self._limits.violation(measured, command, wanted)
             if violation:
-                lab.fail(Event.TRIP, InterlockError(str(violation)), code="limit", tick=tick)
+                lab.violated(violation, tick)
                 self._descent.step(tick, measured)
             else:
                 self._descent.wrote(wanted)
