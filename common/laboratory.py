@@ -21,6 +21,7 @@ REPEAT_NS = 100_000_000  # an unanswered request is sent again after this long
 
 NO_VALUES: Mapping[str, float] = MappingProxyType({})
 
+HANDSHAKE = {Event.REGISTER: Turn.CONFIGURE, Event.ARM: Turn.ARM}  # what they are to the rig
 MODES = {mode: number for number, mode in enumerate(Mode)}  # as an event's values have them
 
 Report = Callable[[str, Mapping[str, Any]], None]
@@ -66,6 +67,13 @@ class Laboratory:
         self.exchange.session = session
         self.endpoint.enter(session)
         self.outlet = Outlet(session, self.name)
+
+    def move(self, event: Event) -> None:
+        """One step of the handshake, agreed with the others."""
+        self.exchange.happen(event)
+        if event in HANDSHAKE:
+            self.safety.take(HANDSHAKE[event])
+        self.report("state", {"lab": self.name, "state": self.exchange.state.value})
 
     def tick_ns(self, tick: int) -> int:
         """Nominal time of a tick on this laboratory's clock."""

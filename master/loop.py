@@ -10,40 +10,33 @@ from collections.abc import Mapping
 from typing import Any
 
 from common.endpoint import Received
-from common.errors import EmergencyStopError, InputError, InterlockError, LostError, RigError
+from common.errors import EmergencyStopError, InterlockError, RigError
 from common.exchange import Event, State
 from common.laboratory import REPEAT_NS, Laboratory, Setting
 from common.mailbox import LinkModel
 from common.messages import (
-    Armed,
     Feedback,
     Message,
     Operator,
     Recorder,
-    Refused,
     Register,
-    Registered,
-    Scheduled,
     Stop,
     Stopped,
-    SyncReply,
     Trip,
     Waiting,
 )
 from common.operation import obey
 from common.plan import PROTOCOL_VERSION
-from common.preflight import LINK, Gate, RefusedError, link_check
+from common.preflight import Gate
 from common.rig import ColumnCommand, GuardedRig
 from common.roles import MASTER
 from common.safety.modes import Turn
 from common.safety.watchdog import Finding
 from master.descent import ColumnDescent
+from master.handshake import Handshake
 from master.limits import MasterLimits
 from master.partner import Partner
 from master.step import MasterStep, Outputs
-
-SAFETY = {Event.REGISTER: Turn.CONFIGURE, Event.ARM: Turn.ARM}
-LEAD_NS = 250_000_000  # from the agreement on the start to the start
 
 
 class MasterLoop:
@@ -64,9 +57,7 @@ class MasterLoop:
         plan = setting.plan
         self.partners = {role: Partner(role, self.lab, links[role]) for role in plan.roles}
         self._partners = tuple(self.partners.values())
-        self._gate = gate
-        for partner in self._partners if gate else ():
-            partner.pass_gate(plan.preflight.exchanges)
+        self._handshake = Handshake(self.lab, self._partners, rig, epoch_ns - setting.clock.now(), gate)
         self._alone = len(self._partners) == 1
         self._rig = rig
         self._step = step
@@ -75,9 +66,8 @@ class MasterLoop:
         self._disarmed = False
         self._command = 0.0
         self._drift = 0.0
-        self._asked_ns = -REPEAT_NS
+        self._said_ns = -REPEAT_NS
         self._sent_ns = 0  # when the newest command went out
-        self._wall_ns = epoch_ns - setting.clock.now()
         self._digest = plan.digest()
         self.ticks = 0
         self.lab.enter(session)
@@ -100,7 +90,7 @@ class MasterLoop:
         if role not in self.partners:
             return
         if isinstance(message, Waiting):
-            self._one_too_many(self.partners[role], message.instance)
+            self._handshake.one_too_many(self.partners[role], message.instance)
         elif lab.exchange.belongs(message.session):
             self._take_answer(self.partners[role], message, received.received_ns)
 
@@ -108,14 +98,10 @@ class MasterLoop:
         match message:
             case Trip() if not self.lab.exchange.ended:
                 self.lab.tripped(partner.role, message.text, self.ticks)
-            case Refused():
-                self._refused(partner, message.reason)
-            case SyncReply() if self.lab.exchange.state is State.ARMED:
-                self._take_sync(partner, message, received_ns)
-            case Registered() | Armed() | Scheduled() | Stopped():
-                self._agree(partner, message, received_ns)
+            case Stopped():
+                partner.stopped = True
             case _:
-                pass
+                self._handshake.take(partner, message, received_ns)
 
     def _welcome(self, recorder: Recorder) -> None:
         """A recorder that comes while the test runs without one may record the rest."""
@@ -123,162 +109,9 @@ class MasterLoop:
         if lab.running and not lab.recorded and recorder.session == 0 and recorder.plan == self._digest:
             lab.endpoint.send(Register(lab.exchange.session, PROTOCOL_VERSION, self._digest))
 
-    def _one_too_many(self, partner: Partner, instance: int) -> None:
-        """A process waits to take part: it is told where another one has its place."""
-        over = self.lab.exchange.ended or self.lab.exchange.state is State.STOPPING
-        if partner.registered and not over and instance != partner.instance:
-            partner.arm()
-
-    def _refused(self, partner: Partner, reason: str) -> None:
-        error = InputError(f"The {partner.title} refuses the test: {reason}")
-        if self.lab.exchange.state is State.IDLE:
-            self.lab.fail(Event.REFUSE, error, code="refused", remote=True)
-        else:
-            self.lab.fail(Event.TRIP, RigError(reason), code="not_armed", remote=True)
-
-    def _agree(
-        self, partner: Partner, message: Registered | Armed | Scheduled | Stopped, received_ns: int
-    ) -> None:
-        """Move on where all have given the answer that the present state waits for; repeated ones change nothing."""
-        state, partners = self.lab.exchange.state, self._partners
-        match message:
-            case Registered() if state is State.IDLE:
-                partner.register(message.instance, received_ns)
-                if all(one.registered for one in partners) and self._recorder_is_here():
-                    self._move(Event.REGISTER)
-                    self._arm()
-            case Armed() if state is State.REGISTERED:
-                partner.armed = True
-                if all(one.armed for one in partners):
-                    self._move(Event.ARM)
-            case Scheduled() if state is State.ARMED:
-                partner.scheduled = True
-                if all(one.scheduled for one in partners):
-                    self._move(Event.SCHEDULE)
-            case Stopped():
-                partner.stopped = True
-            case _:
-                pass
-
-    def _move(self, event: Event) -> None:
-        self.lab.exchange.happen(event)
-        if event in SAFETY:
-            self.lab.safety.take(SAFETY[event])
-        self.lab.heard_ns = self.lab.clock.now()
-        self._ask_anew(self.lab.heard_ns)
-        self.lab.report("state", {"lab": self.lab.name, "state": self.lab.exchange.state.value})
-
-    def _ask_anew(self, now: int) -> None:
-        self._asked_ns = now - REPEAT_NS
-        for partner in self._partners:
-            partner.ask_anew(now)
-
-    def _recorder_is_here(self) -> bool:
-        recorder = self.lab.recorder
-        if recorder is not None and recorder.plan != self._digest:
-            self.lab.fail(
-                Event.REFUSE,
-                InputError("The recorder was started with another plan: give all the same."),
-                code="refused",
-            )
-            return False
-        here = recorder is not None and recorder.session == self.lab.exchange.session
-        return here or not self.lab.plan.recording.required
-
-    def _arm(self) -> None:
-        try:
-            self._rig.arm()
-        except RigError as error:
-            self._trip(error, "not_armed")
-
-    def _take_sync(self, partner: Partner, reply: SyncReply, received_ns: int) -> None:
-        if not partner.take_sync(reply, received_ns):
-            return
-        self.lab.heard_ns = received_ns
-        if self._synchronised and self._link_serves():
-            self._ask_anew(received_ns)
-
-    def _link_serves(self) -> bool:
-        """Whether every slave's link has passed the gate; ends the test where one has not."""
-        try:
-            if self._gate is not None:
-                plan = self.lab.plan
-                self._gate.judge([link_check(one.trips, one.lost, plan) for one in self._partners], LINK)
-        except RefusedError as error:
-            self._trip(error, "refused")
-            return False
-        return True
-
-    @property
-    def _synchronised(self) -> bool:
-        return all(partner.synchronised for partner in self._partners)
-
-    # -- handshake --------------------------------------------------------------------------------
-
     def poll(self) -> None:
-        """Before the first tick: ask for what comes next, again where no answer came; give up in time."""
-        lab = self.lab
-        if lab.exchange.ended or lab.exchange.state is State.SCHEDULED:
-            return
-        now = lab.clock.now()
-        if now - lab.heard_ns > lab.plan.link.connect_timeout * 1e9:
-            self._nobody()
-        elif lab.exchange.state is State.IDLE:
-            if now - self._asked_ns >= REPEAT_NS:
-                self._asked_ns = now
-                lab.endpoint.send(Register(lab.exchange.session, PROTOCOL_VERSION, self._digest))
-        else:
-            for partner in self._partners:
-                if partner.due(now):
-                    self._ask(partner, now)
-
-    def _nobody(self) -> None:
-        if self.lab.exchange.state is not State.IDLE:
-            self._hesitant()
-            return
-        missing = next((partner for partner in self._partners if not partner.registered), None)
-        who, option = (missing.title, missing.start_option) if missing else ("recorder", "")
-        seconds = self.lab.plan.link.connect_timeout
-        error = LostError(
-            f"No {who} joined the test within {seconds:g} s: start it with the same plan{option} and --connect."
-        )
-        self.lab.fail(Event.LOSE, error, code="nobody")
-
-    def _hesitant(self) -> None:
-        """All are there, and one does not go on."""
-        arming = self.lab.exchange.state is State.REGISTERED
-        who = next(one for one in self._partners if not (one.armed if arming else one.scheduled))
-        seconds = self.lab.plan.link.connect_timeout
-        what = "arm its rig" if arming else "agree on the start"
-        self.lab.fail(
-            Event.LOSE,
-            LostError(
-                f"The {who.title} did not {what} within {seconds:g} s: look what its laboratory waits for, "
-                "or raise connect_timeout in [link]."
-            ),
-            code="hesitant",
-        )
-
-    def _ask(self, partner: Partner, now: int) -> None:
-        match self.lab.exchange.state:
-            case State.REGISTERED if not partner.armed:
-                partner.arm()
-            case State.ARMED if not partner.synchronised:
-                partner.synchronise(now)
-            case State.ARMED if self._synchronised and not partner.scheduled:
-                self._schedule(now)
-                partner.schedule()
-            case _:
-                pass
-
-    def _schedule(self, now: int) -> None:
-        """Choose the start, once."""
-        lab = self.lab
-        if not lab.start_ns:
-            lab.start_ns = now + LEAD_NS
-            lab.epoch_ns = lab.start_ns + self._wall_ns
-            for partner in self._partners:
-                partner.settle()
+        """Before the first tick: move the handshake on."""
+        self._handshake.poll()
 
     # -- ticks ------------------------------------------------------------------------------------
 
@@ -441,9 +274,9 @@ class MasterLoop:
         if lab.exchange.state is State.STOPPING and not waited:
             lab.exchange.happen(Event.FINISH)
         now = lab.clock.now()
-        if now - self._asked_ns < REPEAT_NS // 2:
+        if now - self._said_ns < REPEAT_NS // 2:
             return
-        self._asked_ns = now
+        self._said_ns = now
         self._say_end()
         lab.send_samples(everything=True)
         lab.endpoint.send(lab.outlet.finished())
@@ -451,8 +284,8 @@ class MasterLoop:
     def tell(self) -> None:
         """Tell the slaves that the test ends, again after a while."""
         now = self.lab.clock.now()
-        if now - self._asked_ns >= REPEAT_NS // 2:
-            self._asked_ns = now
+        if now - self._said_ns >= REPEAT_NS // 2:
+            self._said_ns = now
             self._say_end()
 
     def _say_end(self) -> None:

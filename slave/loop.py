@@ -7,43 +7,34 @@ in real time, and virtual time calls the same two.
 from __future__ import annotations
 
 from common.endpoint import Received
-from common.errors import EmergencyStopError, InputError, InterlockError, LostError, RigError
+from common.errors import EmergencyStopError, InterlockError, RigError
 from common.exchange import Event, State
 from common.laboratory import REPEAT_NS, Laboratory, Setting
 from common.mailbox import LinkModel, Mailbox
 from common.messages import (
     Arm,
-    Armed,
     Command,
     Feedback,
     Message,
     Operator,
     Recorder,
-    Refused,
     Register,
-    Registered,
     Resend,
-    Scheduled,
-    Start,
     Stop,
     Stopped,
-    Sync,
-    SyncReply,
     Trip,
-    Waiting,
 )
 from common.operation import obey
-from common.plan import PROTOCOL_VERSION
 from common.rig import GuardedRig, TableCommand, TableMeasurement
-from common.roles import SLAVE, name_of, title
+from common.roles import SLAVE
 from common.safety.modes import Turn
 from common.safety.watchdog import Finding, Watchdog
 from common.tally import Tally
 from slave.descent import TableDescent
+from slave.handshake import Handshake
 from slave.limits import SlaveLimits
 from slave.step import SlaveStep
 
-SAFETY = {Event.REGISTER: Turn.CONFIGURE, Event.ARM: Turn.ARM}
 NO_COMMAND = Command(0, -1, 0, 0, -1, 0.0, 0.0, 0.0, 0.0, 0.0)
 NOTHING_HEARD = (-1, 0)
 
@@ -56,6 +47,7 @@ class SlaveLoop:
     ) -> None:
         self.lab = Laboratory(role, setting)
         self._instance = instance
+        self._handshake = Handshake(self.lab, rig, instance)
         self._rig = rig
         self._limits = SlaveLimits(setting.plan)
         self._commands: Mailbox[Command] = Mailbox(link, "command", setting.plan.test.interval, nominal=0)
@@ -65,7 +57,6 @@ class SlaveLoop:
         self._command = NO_COMMAND
         self._shift_ns = 0
         self._said_ns = -REPEAT_NS
-        self._digest = setting.plan.digest()
         self._descent = TableDescent(self.lab, rig)
         self._watchdog = Watchdog(setting.plan.safety, setting.plan.test.interval)
         self._tally = Tally(setting.plan.ticks, setting.plan.window)
@@ -88,9 +79,9 @@ class SlaveLoop:
                 obey(self, message)
                 return
             case Register():
-                self._register(message)
+                self._handshake.register(message)
             case Arm() if message.instance != self._instance:
-                self._make_way(message.session)
+                self._handshake.make_way(message.session)
                 return
             case Recorder() | Resend():
                 return
@@ -102,20 +93,12 @@ class SlaveLoop:
         """Do what the master of this session wants."""
         lab = self.lab
         match message:
-            case Arm():
-                self._arm()
-            case Sync() | Start() if lab.exchange.state is State.REGISTERED:
-                pass  # for another process of this role: this one was never armed
-            case Sync():
-                lab.endpoint.send(SyncReply(message.session, message.seq, received_ns, lab.clock.now()))
-            case Start():
-                self._schedule(message)
             case Stop():
                 self._stop(message)
             case Trip() if not lab.exchange.ended:
                 lab.tripped(message.lab, message.text, self.ticks)
             case _:
-                pass
+                self._handshake.follow(message, received_ns)
 
     def _take_command(self, command: Command, received_ns: int) -> None:
         expected = (received_ns - self.tick_ns(0)) // self.lab.interval_ns
@@ -130,87 +113,14 @@ class SlaveLoop:
         else:
             self._received_ns[command.seq] = received_ns + round(extra * 1e9)
 
-    def _register(self, request: Register) -> None:
-        lab = self.lab
-        if lab.exchange.state is State.IDLE:
-            complaint = self._complaint(request)
-            if complaint:
-                lab.endpoint.send(Refused(request.session, complaint))
-                lab.fail(
-                    Event.REFUSE, InputError(f"This slave refuses the test: {complaint}"), code="refused"
-                )
-                return
-            lab.enter(request.session)
-            self._move(Event.REGISTER)
-        if lab.exchange.belongs(request.session):
-            lab.endpoint.send(Registered(request.session, self._instance))
-        else:
-            lab.endpoint.send(Refused(request.session, "it takes part in another test already."))
-
-    def _make_way(self, session: int) -> None:
-        """Leave without a word that could disturb the test: another process takes part in it under this role."""
-        lab = self.lab
-        if not lab.exchange.allows(Event.REFUSE) or lab.exchange.session not in (0, session):
-            return
-        lab.enter(0)
-        error = InputError(
-            f"Another {title(lab.name)} takes part in this test already: stop one of the two"
-            + (", or start this one under a name of its own." if name_of(lab.name) else ".")
-        )
-        lab.fail(Event.REFUSE, error, code="refused")
-
-    def _complaint(self, request: Register) -> str:
-        if request.protocol != PROTOCOL_VERSION:
-            return f"the master speaks protocol {request.protocol}, the slave {PROTOCOL_VERSION}: install one version."
-        if request.plan != self._digest:
-            return (
-                f"the plans differ (master {request.plan}, slave {self._digest}): "
-                "give both laboratories the same file and options."
-            )
-        return ""
-
-    def _arm(self) -> None:
-        lab = self.lab
-        if lab.exchange.state is State.REGISTERED:
-            try:
-                self._rig.arm()
-            except RigError as error:
-                lab.endpoint.send(Refused(lab.exchange.session, str(error)))
-                lab.fail(Event.TRIP, error, code="not_armed")
-                return
-            self._move(Event.ARM)
-        lab.endpoint.send(Armed(lab.exchange.session))
-
-    def _schedule(self, start: Start) -> None:
-        if self.lab.exchange.state is State.ARMED:
-            self.lab.start_ns = start.start_ns
-            self.lab.epoch_ns = start.epoch_ns
-            self._move(Event.SCHEDULE)
-        self.lab.endpoint.send(Scheduled(self.lab.exchange.session))
+    def poll(self) -> None:
+        """Before the first tick: move the handshake on."""
+        self._handshake.poll()
 
     def _stop(self, request: Stop) -> None:
         if self.lab.exchange.allows(Event.STOP):
             self.lab.exchange.happen(Event.STOP, remote=True, cause=request.reason)
             self.lab.safety.follow(Turn.END)
-
-    def _move(self, event: Event) -> None:
-        self.lab.exchange.happen(event)
-        if event in SAFETY:
-            self.lab.safety.take(SAFETY[event])
-        self.lab.report("state", {"lab": self.lab.name, "state": self.lab.exchange.state.value})
-
-    def poll(self) -> None:
-        """Before the first tick: give up when nobody comes, or when the master has fallen silent."""
-        lab = self.lab
-        seconds = lab.plan.link.connect_timeout
-        if lab.exchange.ended or lab.exchange.state is State.SCHEDULED:
-            return
-        if lab.clock.now() - lab.heard_ns > seconds * 1e9:
-            error = LostError(f"No master was heard within {seconds:g} s: check the address after --connect.")
-            lab.fail(Event.LOSE, error, code="nobody")
-        elif lab.exchange.state is State.IDLE and lab.clock.now() - self._said_ns >= REPEAT_NS:
-            self._said_ns = lab.clock.now()
-            lab.endpoint.send(Waiting(0, self._instance))
 
     # -- ticks ------------------------------------------------------------------------------------
 

@@ -1,0 +1,202 @@
+"""The master's part of the handshake: slaves register, arm, show their clocks, agree on the start."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from common.errors import InputError, LostError, RigError
+from common.exchange import Event, State
+from common.laboratory import REPEAT_NS, Laboratory
+from common.messages import Armed, Message, Refused, Register, Registered, Scheduled, SyncReply
+from common.plan import PROTOCOL_VERSION
+from common.preflight import LINK, Gate, RefusedError, link_check
+from common.rig import GuardedRig
+from master.partner import Partner
+
+LEAD_NS = 250_000_000  # from the agreement on the start to the start
+
+
+class Handshake:
+    """From the first call for slaves to the start; `wall_ns` is the wall clock minus the laboratory's.
+
+    With a `gate` the link to every slave must pass its exchanges.
+    """
+
+    def __init__(
+        self,
+        lab: Laboratory,
+        partners: Sequence[Partner],
+        rig: GuardedRig,
+        wall_ns: int,
+        gate: Gate | None,
+    ) -> None:
+        self._lab = lab
+        self._partners = partners
+        self._rig = rig
+        self._wall_ns = wall_ns
+        self._gate = gate
+        self._digest = lab.plan.digest()
+        self._asked_ns = -REPEAT_NS
+        for partner in partners if gate else ():
+            partner.pass_gate(lab.plan.preflight.exchanges)
+
+    def take(self, partner: Partner, message: Message, received_ns: int) -> None:
+        """Act on a slave's answer."""
+        match message:
+            case Refused():
+                self._refused(partner, message.reason)
+            case SyncReply() if self._lab.exchange.state is State.ARMED:
+                self._take_sync(partner, message, received_ns)
+            case Registered() | Armed() | Scheduled():
+                self._agree(partner, message, received_ns)
+            case _:
+                pass
+
+    def one_too_many(self, partner: Partner, instance: int) -> None:
+        """A process waits to take part: it is told where another one has its place."""
+        over = self._lab.exchange.ended or self._lab.exchange.state is State.STOPPING
+        if partner.registered and not over and instance != partner.instance:
+            partner.arm()
+
+    def _refused(self, partner: Partner, reason: str) -> None:
+        error = InputError(f"The {partner.title} refuses the test: {reason}")
+        if self._lab.exchange.state is State.IDLE:
+            self._lab.fail(Event.REFUSE, error, code="refused", remote=True)
+        elif self._lab.exchange.state in (State.REGISTERED, State.ARMED):  # later there is nothing to refuse
+            reason = reason or f"The {partner.title} did not arm its rig."
+            self._lab.fail(Event.TRIP, RigError(reason), code="not_armed", remote=True)
+
+    def _agree(self, partner: Partner, message: Registered | Armed | Scheduled, received_ns: int) -> None:
+        """Move on where all have given the answer that the present state waits for; repeated ones change nothing."""
+        state, partners = self._lab.exchange.state, self._partners
+        match message:
+            case Registered() if state is State.IDLE:
+                partner.register(message.instance, received_ns)
+                if all(one.registered for one in partners) and self._recorder_is_here():
+                    self._move(Event.REGISTER)
+                    self._arm()
+            case Armed() if state is State.REGISTERED:
+                partner.armed = True
+                if all(one.armed for one in partners):
+                    self._move(Event.ARM)
+            case Scheduled() if state is State.ARMED:
+                partner.scheduled = True
+                if all(one.scheduled for one in partners):
+                    self._move(Event.SCHEDULE)
+            case _:
+                pass
+
+    def _move(self, event: Event) -> None:
+        self._lab.move(event)
+        self._lab.heard_ns = self._lab.clock.now()
+        self._ask_anew(self._lab.heard_ns)
+
+    def _ask_anew(self, now: int) -> None:
+        self._asked_ns = now - REPEAT_NS
+        for partner in self._partners:
+            partner.ask_anew(now)
+
+    def _recorder_is_here(self) -> bool:
+        recorder = self._lab.recorder
+        if recorder is not None and recorder.plan != self._digest:
+            self._lab.fail(
+                Event.REFUSE,
+                InputError("The recorder was started with another plan: give all the same."),
+                code="refused",
+            )
+            return False
+        here = recorder is not None and recorder.session == self._lab.exchange.session
+        return here or not self._lab.plan.recording.required
+
+    def _arm(self) -> None:
+        try:
+            self._rig.arm()
+        except RigError as error:
+            self._lab.fail(Event.TRIP, error, code="not_armed")
+
+    def _take_sync(self, partner: Partner, reply: SyncReply, received_ns: int) -> None:
+        if not partner.take_sync(reply, received_ns):
+            return
+        self._lab.heard_ns = received_ns
+        if self._synchronised and self._link_serves():
+            self._ask_anew(received_ns)
+
+    def _link_serves(self) -> bool:
+        """Whether every slave's link has passed the gate; ends the test where one has not."""
+        try:
+            if self._gate is not None:
+                plan = self._lab.plan
+                self._gate.judge([link_check(one.trips, one.lost, plan) for one in self._partners], LINK)
+        except RefusedError as error:
+            self._lab.fail(Event.TRIP, error, code="refused")
+            return False
+        return True
+
+    @property
+    def _synchronised(self) -> bool:
+        return all(partner.synchronised for partner in self._partners)
+
+    def poll(self) -> None:
+        """Before the first tick: ask for what comes next, again where no answer came; give up in time."""
+        lab = self._lab
+        if lab.exchange.ended or lab.exchange.state is State.SCHEDULED:
+            return
+        now = lab.clock.now()
+        if now - lab.heard_ns > lab.plan.link.connect_timeout * 1e9:
+            self._nobody()
+        elif lab.exchange.state is State.IDLE:
+            if now - self._asked_ns >= REPEAT_NS:
+                self._asked_ns = now
+                lab.endpoint.send(Register(lab.exchange.session, PROTOCOL_VERSION, self._digest))
+        else:
+            for partner in self._partners:
+                if partner.due(now):
+                    self._ask(partner, now)
+
+    def _nobody(self) -> None:
+        if self._lab.exchange.state is not State.IDLE:
+            self._hesitant()
+            return
+        missing = next((partner for partner in self._partners if not partner.registered), None)
+        who, option = (missing.title, missing.start_option) if missing else ("recorder", "")
+        seconds = self._lab.plan.link.connect_timeout
+        error = LostError(
+            f"No {who} joined the test within {seconds:g} s: start it with the same plan{option} and --connect."
+        )
+        self._lab.fail(Event.LOSE, error, code="nobody")
+
+    def _hesitant(self) -> None:
+        """All are there, and one does not go on."""
+        arming = self._lab.exchange.state is State.REGISTERED
+        who = next(one for one in self._partners if not (one.armed if arming else one.scheduled))
+        seconds = self._lab.plan.link.connect_timeout
+        what = "arm its rig" if arming else "agree on the start"
+        self._lab.fail(
+            Event.LOSE,
+            LostError(
+                f"The {who.title} did not {what} within {seconds:g} s: look what its laboratory waits for, "
+                "or raise connect_timeout in [link]."
+            ),
+            code="hesitant",
+        )
+
+    def _ask(self, partner: Partner, now: int) -> None:
+        match self._lab.exchange.state:
+            case State.REGISTERED if not partner.armed:
+                partner.arm()
+            case State.ARMED if not partner.synchronised:
+                partner.synchronise(now)
+            case State.ARMED if self._synchronised and not partner.scheduled:
+                self._schedule(now)
+                partner.schedule()
+            case _:
+                pass
+
+    def _schedule(self, now: int) -> None:
+        """Choose the start, once."""
+        lab = self._lab
+        if not lab.start_ns:
+            lab.start_ns = now + LEAD_NS
+            lab.epoch_ns = lab.start_ns + self._wall_ns
+            for partner in self._partners:
+                partner.settle()

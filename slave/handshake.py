@@ -1,0 +1,125 @@
+"""A slave's part of the handshake: it waits, registers, arms, shows its clock, agrees on the start."""
+
+from __future__ import annotations
+
+from common.errors import InputError, LostError, RigError
+from common.exchange import Event, State
+from common.laboratory import REPEAT_NS, Laboratory
+from common.messages import (
+    Arm,
+    Armed,
+    Message,
+    Refused,
+    Register,
+    Registered,
+    Scheduled,
+    Start,
+    Sync,
+    SyncReply,
+    Waiting,
+)
+from common.plan import PROTOCOL_VERSION
+from common.rig import GuardedRig
+from common.roles import name_of, title
+
+
+class Handshake:
+    """From waiting for a master to the start; `instance` tells this process from others of its role."""
+
+    def __init__(self, lab: Laboratory, rig: GuardedRig, instance: int) -> None:
+        self._lab = lab
+        self._rig = rig
+        self._instance = instance
+        self._digest = lab.plan.digest()
+        self._said_ns = -REPEAT_NS
+
+    def follow(self, message: Message, received_ns: int) -> None:
+        """Do what the master of this session wants before the start."""
+        lab = self._lab
+        match message:
+            case Arm():
+                self._arm()
+            case Sync() | Start() if lab.exchange.state is State.REGISTERED:
+                pass  # for another process of this role: this one was never armed
+            case Sync():
+                lab.endpoint.send(SyncReply(message.session, message.seq, received_ns, lab.clock.now()))
+            case Start():
+                self._schedule(message)
+            case _:
+                pass
+
+    def register(self, request: Register) -> None:
+        """The master calls: take part in its test, or say why not."""
+        lab = self._lab
+        if lab.exchange.state is State.IDLE:
+            complaint = self._complaint(request)
+            if complaint:
+                lab.endpoint.send(Refused(request.session, complaint))
+                lab.fail(
+                    Event.REFUSE, InputError(f"This slave refuses the test: {complaint}"), code="refused"
+                )
+                return
+            lab.enter(request.session)
+            lab.move(Event.REGISTER)
+        if lab.exchange.belongs(request.session):
+            lab.endpoint.send(Registered(request.session, self._instance))
+        elif lab.safety.latched:
+            lab.endpoint.send(
+                Refused(request.session, "it stopped a test and is latched: `rths reset` lets it go.")
+            )
+        else:
+            lab.endpoint.send(Refused(request.session, "it takes part in another test already."))
+
+    def make_way(self, session: int) -> None:
+        """Leave without a word that could disturb the test: another process takes part in it under this role."""
+        lab = self._lab
+        if not lab.exchange.allows(Event.REFUSE) or lab.exchange.session not in (0, session):
+            return
+        lab.enter(0)
+        error = InputError(
+            f"Another {title(lab.name)} takes part in this test already: stop one of the two"
+            + (", or start this one under a name of its own." if name_of(lab.name) else ".")
+        )
+        lab.fail(Event.REFUSE, error, code="refused")
+
+    def _complaint(self, request: Register) -> str:
+        if request.protocol != PROTOCOL_VERSION:
+            return f"the master speaks protocol {request.protocol}, the slave {PROTOCOL_VERSION}: install one version."
+        if request.plan != self._digest:
+            return (
+                f"the plans differ (master {request.plan}, slave {self._digest}): "
+                "give both laboratories the same file and options."
+            )
+        return ""
+
+    def _arm(self) -> None:
+        lab = self._lab
+        if lab.exchange.state is State.REGISTERED:
+            try:
+                self._rig.arm()
+            except RigError as error:
+                lab.endpoint.send(Refused(lab.exchange.session, str(error)))
+                lab.fail(Event.TRIP, error, code="not_armed")
+                return
+            lab.move(Event.ARM)
+        lab.endpoint.send(Armed(lab.exchange.session))
+
+    def _schedule(self, start: Start) -> None:
+        if self._lab.exchange.state is State.ARMED:
+            self._lab.start_ns = start.start_ns
+            self._lab.epoch_ns = start.epoch_ns
+            self._lab.move(Event.SCHEDULE)
+        self._lab.endpoint.send(Scheduled(self._lab.exchange.session))
+
+    def poll(self) -> None:
+        """Before the first tick: give up when nobody comes, or when the master has fallen silent."""
+        lab = self._lab
+        seconds = lab.plan.link.connect_timeout
+        if lab.exchange.ended or lab.exchange.state is State.SCHEDULED:
+            return
+        if lab.clock.now() - lab.heard_ns > seconds * 1e9:
+            error = LostError(f"No master was heard within {seconds:g} s: check the address after --connect.")
+            lab.fail(Event.LOSE, error, code="nobody")
+        elif lab.exchange.state is State.IDLE and lab.clock.now() - self._said_ns >= REPEAT_NS:
+            self._said_ns = lab.clock.now()
+            lab.endpoint.send(Waiting(0, self._instance))
