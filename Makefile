@@ -2,7 +2,9 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: setup run test check benchmark blind clean
+FAULT_ROWS := runs/faults.jsonl
+
+.PHONY: setup run test check faults docs benchmark blind clean
 
 setup: $(READY)
 
@@ -26,6 +28,16 @@ check: setup
 test: check
 	$(BIN)/pytest -n 2 --ignore=tests/system
 	$(BIN)/pytest tests/system
+
+faults: setup
+	mkdir -p runs
+	rm -f $(FAULT_ROWS)
+	RTHS_FAULT_ROWS=$(CURDIR)/$(FAULT_ROWS) $(BIN)/pytest tests/faults tests/system/faults
+	$(BIN)/python -m tests.faults.rows $(FAULT_ROWS) docs/faults.md
+
+docs: setup
+	$(BIN)/python -m docs.generate
+	test ! -f $(FAULT_ROWS) || $(BIN)/python -m tests.faults.rows $(FAULT_ROWS) docs/faults.md
 
 benchmark: setup
 	$(BIN)/python -m benchmarks

@@ -201,7 +201,7 @@ class Safety:
         most=100_000,
     )
     message_age: float = key(
-        "age beyond which a message is not fresh, by the echo of one's own", default=0.1, unit="s", above=0.0
+        "age beyond which a message is not fresh, by its number", default=0.1, unit="s", above=0.0
     )
     velocity: float = key("largest velocity of the ramp", default=0.05, unit="m/s", above=0.0)
     acceleration: float = key("largest acceleration of the ramp", default=10.0, unit="m/s²", above=0.0)

@@ -1,0 +1,137 @@
+"""The parts of the documents that come from the code: `python -m docs.generate` writes them between their marks.
+
+A part stands between `<!-- name -->` and `<!-- end of name -->`; tests/test_docs.py holds that it is up to date.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from common.messages import Command
+from common.plan import Plan
+from common.rig import ColumnMeasurement, TableCommand, TableMeasurement
+from common.safety.modes import MEANING, TURNS, mermaid
+from common.signals import TOPICS
+from common.tables import Limits, Preflight, Safety
+from master.step import Outputs
+
+FOLDER = Path(__file__).resolve().parent
+
+# limits on what is no field of a command or a measurement
+MASTER_DERIVED = (
+    "actuator_velocity",
+    "actuator_acceleration",
+    "actuator_step",
+    "column_error",
+    "numerical_drift",
+    "error_energy",
+)
+SLAVE_DERIVED = ("table_velocity", "table_step", "table_error", "damper_step")
+
+CHECKED_BY = {
+    "A": frozenset({*ColumnMeasurement._fields, *Outputs._fields, *MASTER_DERIVED}),
+    "B": frozenset({*TableMeasurement._fields, *Command._fields, *TableCommand._fields, *SLAVE_DERIVED}),
+}
+
+
+def parts() -> dict[str, dict[str, str]]:
+    """The text of every part, by document and name."""
+    return {
+        "safety.md": {
+            "modes": f"```mermaid\n{mermaid()}\n```\n",
+            "turns": turns(),
+            "watchdog and ramp": keys(Safety),
+            "motion": motion(Plan()),
+            "limits": limits(),
+            "pre-flight": keys(Preflight),
+        },
+        "recordings.md": {"topics": topics()},
+    }
+
+
+def table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
+    """A Markdown table."""
+    lines = [f"| {' | '.join(cells)} |\n".replace("|  |", "| |") for cells in (head, *rows)]
+    return "".join([lines[0], f"|{'---|' * len(head)}\n", *lines[1:]])
+
+
+def turns() -> str:
+    """What each turn of the state machine means, and where it leads from and to."""
+    rows = []
+    for turn, meaning in MEANING.items():
+        ways = [f"{mode.value} → {row[turn].value}" for mode, row in TURNS.items() if turn in row]
+        rows.append((f"`{turn.value}`", meaning, ", ".join(ways)))
+    return table(("turn", "happens when", "from → to"), rows)
+
+
+def keys(cls: type[Any]) -> str:
+    """The keys of a table of the plan."""
+    fields = ((field, field.metadata["rule"]) for field in dataclasses.fields(cls))
+    rows = ((f"`{field.name}`", shown(field.default), rule.unit, rule.text) for field, rule in fields)
+    return table(("key", "default", "unit", "meaning"), rows)
+
+
+def limits() -> str:
+    """The limits, and the laboratories that check them."""
+    rows = []
+    for field in dataclasses.fields(Limits):
+        rule = field.metadata["rule"]
+        labs = " and ".join(lab for lab, names in CHECKED_BY.items() if field.name in names)
+        rows.append((f"`{field.name}`", shown(field.default), rule.unit, rule.text, labs))
+    return table(("key", "default", "unit", "on", "checked by"), rows)
+
+
+def motion(plan: Plan) -> str:
+    """The most that a displacement command goes on after the last fresh message, at the speed its limit allows."""
+    safety, rows = plan.safety, []
+    for title, speed in (
+        ("actuator", plan.limits.actuator_velocity),
+        ("table", plan.limits.table_velocity),
+    ):
+        ways = (
+            speed * safety.ramp_after * plan.test.interval,
+            speed**2 / (2.0 * safety.acceleration),
+            speed * safety.acceleration / (2.0 * safety.jerk),
+        )
+        figures = (f"{way * 1e3:.2f} mm" for way in (*ways, sum(ways)))
+        rows.append((title, f"{speed:g} m/s", *figures))
+    return table(("", "v_lim", "v_lim·W2", "v_lim²/(2·a)", "v_lim·a/(2·j)", "together"), rows)
+
+
+def topics() -> str:
+    """Every topic with its signals."""
+    texts = []
+    for topic, signals in TOPICS.items():
+        rows = ((f"`{signal.name}`", signal.unit, signal.text) for signal in signals)
+        texts.append(f"### `{topic}`\n\n{table(('signal', 'unit', 'meaning'), rows)}")
+    return "\n".join(texts)
+
+
+def shown(value: object) -> str:
+    """A value as a plan has it."""
+    return str(value).lower() if isinstance(value, bool) else f"{value:g}"
+
+
+def renewed(text: str, named: dict[str, str]) -> str:
+    """A document with its parts as they are now; raises ValueError where one has no place in it."""
+    for name, part in named.items():
+        before, begin, rest = text.partition(f"<!-- {name} -->\n")
+        _, end, after = rest.partition(f"<!-- end of {name} -->\n")
+        if not begin or not end:
+            raise ValueError(f"The document has no place for '{name}'.")
+        text = f"{before}{begin}\n{part}\n{end}{after}"
+    return text
+
+
+def main() -> None:
+    """Write the parts into the documents."""
+    for name, named in parts().items():
+        path = FOLDER / name
+        path.write_text(renewed(path.read_text(encoding="utf-8"), named), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,144 @@
+"""What the documents have from the code is what the code says."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import math
+import random
+import re
+
+import pytest
+
+from common import preflight
+from common.limits import PATIENCE
+from common.messages import Command
+from common.plan import Plan
+from common.rig import ColumnMeasurement, TableCommand, TableMeasurement
+from common.tables import Limits
+from docs import generate
+from master.limits import MasterLimits
+from master.step import Outputs
+from slave.limits import SlaveLimits
+from tests.faults.rows import motion_bound
+from tests.helpers import ROOT
+
+NAMES = [field.name for field in dataclasses.fields(Limits)]
+SHOWN_ONLY = {"open_link", "stranger"}  # before anything is recorded
+BY_CONSTANT = {preflight.PASSED, preflight.SENSORS, preflight.LINK, preflight.ACCEPTED}
+
+
+@pytest.mark.parametrize("name", generate.parts())
+def test_a_document_has_what_the_code_generates(name: str) -> None:
+    text = (generate.FOLDER / name).read_text(encoding="utf-8")
+    assert generate.renewed(text, generate.parts()[name]) == text, "run `make docs`"
+
+
+def test_a_part_without_a_place_is_refused() -> None:
+    with pytest.raises(ValueError, match="no place for 'modes'"):
+        generate.renewed("<!-- modes -->\n", {"modes": ""})
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_limit_is_checked_by_the_laboratories_that_the_table_says(name: str) -> None:
+    checked = {"A": master_trips(name), "B": slave_trips(name)}
+    assert {lab for lab, trips in checked.items() if trips} == {
+        lab for lab, names in generate.CHECKED_BY.items() if name in names
+    }
+
+
+def only(name: str) -> Plan:
+    """A plan with one limit, and that next to nothing."""
+    most = dict.fromkeys(NAMES, math.inf) | {"displacement": 0.15, name: 1e-12}
+    return Plan(limits=Limits(**most))
+
+
+def master_trips(name: str) -> bool:
+    checks, draw = MasterLimits(only(name)), random.Random(1)
+    for _ in range(10):
+        measured = ColumnMeasurement(*(draw.random() * 0.1 for _ in ColumnMeasurement._fields))
+        outputs = Outputs(*(draw.random() * 0.1 for _ in Outputs._fields))
+        violation = checks.violation(measured, outputs)
+        if violation is not None:
+            assert violation.name == name
+            return True
+    return False
+
+
+def slave_trips(name: str) -> bool:
+    checks, draw = SlaveLimits(only(name)), random.Random(1)
+    for tick in range(2 * PATIENCE):
+        measured = TableMeasurement(*(draw.random() * 0.1 for _ in TableMeasurement._fields))
+        values = [draw.random() * 0.1 for _ in Command._fields[5:]]
+        wanted = TableCommand(draw.random() * 0.1, draw.random())
+        violation = checks.violation(measured, Command(1, tick, 0, 0, 0, *values), wanted)
+        if violation is not None:
+            assert violation.name == name
+            return True
+        checks.written(wanted)
+    return False
+
+
+def test_the_bound_of_motion_is_that_of_the_fault_matrix_and_a_little_for_the_jerk() -> None:
+    rows = [line.split("|")[1:-1] for line in generate.motion(Plan()).splitlines()[2:]]
+    for role, row in zip(("master", "slave"), rows, strict=True):
+        through, halt, jerk, together = (float(cell.split()[0]) * 1e-3 for cell in row[2:])
+        assert through + halt == pytest.approx(motion_bound(Plan(), role), abs=1e-5)
+        assert through + halt + jerk == pytest.approx(together, abs=1e-5)
+        assert jerk < 0.1 * together
+
+
+def test_every_event_of_the_processes_is_in_the_list() -> None:
+    text = (generate.FOLDER / "recordings.md").read_text(encoding="utf-8")
+    listed = set(re.findall(r"^\| `([a-z_]+)` \| (?:info|warning|error)", text, flags=re.MULTILINE))
+    assert listed == (emitted() | BY_CONSTANT | {"begin"}) - SHOWN_ONLY
+    for code in SHOWN_ONLY:
+        assert f"`{code}`" in text
+
+
+def emitted() -> set[str]:
+    """Codes that the sources of the processes give as literals."""
+    found: set[str] = set()
+    for folder in ("common", "master", "slave", "recorder"):
+        for path in (ROOT / folder).rglob("*.py"):
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                found |= set(codes(node))
+    return found
+
+
+def codes(node: ast.AST) -> list[str]:
+    """Codes of events in one node: `note("…")`, `warn("…")`, `_trip(…, "…")`, `code="…"`, `{"code": "…"}`."""
+    values: list[ast.expr | None] = []
+    if isinstance(node, ast.Call):
+        called = getattr(node.func, "attr", getattr(node.func, "id", ""))
+        place = {"note": 0, "warn": 0, "_trip": 1}.get(called, len(node.args))
+        values += node.args[place : place + 1]
+        values += [keyword.value for keyword in node.keywords if keyword.arg == "code"]
+    elif isinstance(node, ast.Dict):
+        named = zip(node.keys, node.values, strict=True)
+        values += [value for key, value in named if isinstance(key, ast.Constant) and key.value == "code"]
+    return [
+        value.value for value in values if isinstance(value, ast.Constant) and isinstance(value.value, str)
+    ]
+
+
+def test_the_plan_that_documents_the_keys_is_the_default_plan() -> None:
+    from common.plan import load
+
+    assert load(ROOT / "rths/plans/default.toml").digest() == Plan().digest()
+
+
+@pytest.mark.parametrize("name", ["README.md", "docs/safety.md", "docs/faults.md", "docs/recordings.md"])
+def test_a_link_leads_to_a_file_and_a_heading_that_exist(name: str) -> None:
+    path = ROOT / name
+    for link in re.findall(r"\]\(([^)]+)\)", path.read_text(encoding="utf-8")):
+        file, _, anchor = link.partition("#")
+        target = path.parent / file if file else path
+        assert target.exists(), link
+        assert not anchor or anchor in anchors(target.read_text(encoding="utf-8")), link
+
+
+def anchors(text: str) -> set[str]:
+    """What the headings of a Markdown text are called in links."""
+    headings = re.findall(r"^#+ (.+)$", text, flags=re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
