@@ -57,6 +57,9 @@ class Loop(Protocol):
     def stop(self, reason: str) -> None:
         """Somebody wants the test to end."""
 
+    def stop_rig(self) -> None:
+        """Disarm the rig, once."""
+
     def disarm(self) -> None:
         """Bring the rig to a stop."""
 
@@ -82,6 +85,8 @@ def drive(loop: Loop, stopping: Callable[[], str], surroundings: Surroundings) -
         if run(loop, stopping):
             loop.finish()
         come_to_rest(loop)
+        if loop.lab.safety.mode is Mode.EMERGENCY_STOP:
+            loop.stop_rig()
         stay(loop, stopping)
     except Exception:  # whatever goes wrong in this program, the rig does not stay armed
         loop.disarm()

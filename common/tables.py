@@ -203,11 +203,18 @@ class Safety:
     message_age: float = key(
         "age beyond which a message is not fresh, by its number", default=0.1, unit="s", above=0.0
     )
-    velocity: float = key("largest velocity of the ramp", default=0.05, unit="m/s", above=0.0)
+    velocity: float = key("speed at which the specimen is unloaded", default=0.01, unit="m/s", above=0.0)
     acceleration: float = key("largest acceleration of the ramp", default=10.0, unit="m/s²", above=0.0)
     jerk: float = key("largest jerk of the ramp", default=2000.0, unit="m/s³", above=0.0)
     release: float = key(
         "time in which the damper's force is taken to zero", default=0.02, unit="s", above=0.0, most=10.0
+    )
+    settle: float = key(
+        "time at rest before the rig is disarmed, for the transfer system to follow",
+        default=0.1,
+        unit="s",
+        least=0.0,
+        most=60.0,
     )
     unload: bool = key("whether the specimen is unloaded once it has come to a hold", default=True)
     wait_for_reset: bool = key(

@@ -7,6 +7,7 @@ in real time, and virtual time calls the same two.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 from common.endpoint import Received
@@ -28,11 +29,12 @@ from common.messages import (
 from common.operation import obey
 from common.plan import PROTOCOL_VERSION
 from common.preflight import Gate
-from common.rig import ColumnCommand, GuardedRig
+from common.rig import ColumnCommand, ColumnMeasurement, GuardedRig
 from common.roles import MASTER
+from common.safety.descent import Descent
 from common.safety.modes import Turn
 from common.safety.watchdog import Finding
-from master.descent import ColumnDescent
+from master.descent import ColumnRamp
 from master.handshake import Handshake
 from master.limits import MasterLimits
 from master.partner import Partner
@@ -62,7 +64,8 @@ class MasterLoop:
         self._rig = rig
         self._step = step
         self._limits = MasterLimits(plan)
-        self._descent = ColumnDescent(self.lab, rig)
+        begin = partial(ColumnRamp, plan)
+        self._descent = Descent(self.lab, rig, begin, ColumnCommand(0.0), len(ColumnMeasurement._fields))
         self._disarmed = False
         self._command = 0.0
         self._drift = 0.0
@@ -125,7 +128,7 @@ class MasterLoop:
         held = wake >= lab.tick_ns(tick + 1)
         forces = [partner.begin(tick, wake) for partner in self._partners]
         if self._alarmed(tick, wake, held=held):
-            self._descent.ease(tick)
+            self.ease(tick)
             return
         try:
             measured = self._rig.read()
@@ -167,13 +170,16 @@ class MasterLoop:
             for partner, sent in zip(self._partners, outputs.sent(), strict=True):
                 partner.sent = sent
         command = ColumnCommand(self._command)
-        self._descent.wrote(self._command)
+        self._descent.wrote(command)
         self._rig.write(command)
         self._limits.written(command)
 
     def ease(self, tick: int) -> None:
         """One interval on the way to rest."""
-        self._descent.ease(tick)
+        try:
+            self._descent.ease(tick)
+        except EmergencyStopError as error:
+            self.emergency(error)
 
     def _rig_failed(self, error: RigError, tick: int) -> None:
         if isinstance(error, EmergencyStopError):
@@ -255,10 +261,11 @@ class MasterLoop:
         """Stop the rig at once."""
         lab = self.lab
         if lab.exchange.ended:
+            lab.note("emergency", str(error), level="error", tick=lab.tick)
             lab.safety.trip(lab.cause("emergency", error), Turn.EMERGENCY)
         else:
             lab.fail(Event.TRIP, error, code="emergency", tick=lab.tick)
-        self._stop_rig()
+        self.stop_rig()
 
     def standing(self) -> str:
         """Why the cause of a latched state is not gone, empty where it is."""
@@ -297,14 +304,15 @@ class MasterLoop:
 
     def disarm(self) -> None:
         """Bring the rig to a safe stop and close the accounts; once, before leaving."""
-        self._stop_rig()
+        self.stop_rig()
         if self.ticks:
             for partner in self._partners:
                 partner.account.finish(self.ticks - 1, self.lab.clock.now())
                 text, values = partner.exchanged()
                 self.lab.note("exchange", text, tick=self.ticks, values=values)
 
-    def _stop_rig(self) -> None:
+    def stop_rig(self) -> None:
+        """Disarm the rig, once."""
         if not self._disarmed:
             self._disarmed = True
             if complaint := self._rig.disarm():

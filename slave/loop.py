@@ -6,6 +6,8 @@ in real time, and virtual time calls the same two.
 
 from __future__ import annotations
 
+from functools import partial
+
 from common.endpoint import Received
 from common.errors import EmergencyStopError, InterlockError, RigError
 from common.exchange import Event, State
@@ -27,10 +29,11 @@ from common.messages import (
 from common.operation import obey
 from common.rig import GuardedRig, TableCommand, TableMeasurement
 from common.roles import SLAVE
+from common.safety.descent import Descent
 from common.safety.modes import Turn
 from common.safety.watchdog import Finding, Watchdog
 from common.tally import Tally
-from slave.descent import TableDescent
+from slave.descent import TableRamp
 from slave.handshake import Handshake
 from slave.limits import SlaveLimits
 from slave.step import SlaveStep
@@ -57,7 +60,8 @@ class SlaveLoop:
         self._command = NO_COMMAND
         self._shift_ns = 0
         self._said_ns = -REPEAT_NS
-        self._descent = TableDescent(self.lab, rig)
+        begin = partial(TableRamp, setting.plan)
+        self._descent = Descent(self.lab, rig, begin, TableCommand(0.0, 0.0), len(TableMeasurement._fields))
         self._watchdog = Watchdog(setting.plan.safety, setting.plan.test.interval)
         self._tally = Tally(setting.plan.ticks, setting.plan.window)
         self._feedbacks = 0  # sent
@@ -139,7 +143,7 @@ class SlaveLoop:
             self._command = command
             self._tally.use(command.seq)
         if self._alarmed(tick, now, held=held):
-            self._descent.ease(tick)
+            self.ease(tick)
             return
         command = self._command
         try:
@@ -184,7 +188,10 @@ class SlaveLoop:
 
     def ease(self, tick: int) -> None:
         """One interval on the way to rest."""
-        self._descent.ease(tick)
+        try:
+            self._descent.ease(tick)
+        except EmergencyStopError as error:
+            self.emergency(error)
 
     def _rig_failed(self, error: RigError, tick: int) -> None:
         if isinstance(error, EmergencyStopError):
@@ -260,10 +267,11 @@ class SlaveLoop:
         """Stop the rig at once."""
         lab = self.lab
         if lab.exchange.ended:
+            lab.note("emergency", str(error), level="error", tick=lab.tick)
             lab.safety.trip(lab.cause("emergency", error), Turn.EMERGENCY)
         else:
             lab.fail(Event.TRIP, error, code="emergency", tick=lab.tick)
-        self._stop_rig()
+        self.stop_rig()
 
     def standing(self) -> str:
         """Why the cause of a latched state is not gone, empty where it is."""
@@ -274,13 +282,14 @@ class SlaveLoop:
 
     def disarm(self) -> None:
         """Bring the rig to a safe stop; once, before leaving."""
-        self._stop_rig()
+        self.stop_rig()
         if self.ticks:
             text = f"{self._feedbacks} feedbacks sent, {self._tally.used} commands used."
             values = {"feedbacks_sent": float(self._feedbacks)} | self._tally.values("commands")
             self.lab.note("exchange", text, tick=self.ticks, values=values)
 
-    def _stop_rig(self) -> None:
+    def stop_rig(self) -> None:
+        """Disarm the rig, once."""
         if not self._disarmed:
             self._disarmed = True
             if complaint := self._rig.disarm():
