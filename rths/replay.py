@@ -146,7 +146,8 @@ def replay_exchange(whole: Run, role: str) -> dict[str, Match]:
     sent = {seq: place for place, seq in enumerate(master["seq"])}
     read = {seq: place for place, seq in enumerate(slave["seq"])}
     matches = {name: Match() for name in (*SENT, "table_command", "damper_force_used")}
-    replay_table(recording, slave, matches["table_command"])
+    ramp = whole.ramps.get(role, {}).get("seq", ())
+    replay_table(recording, slave, matches["table_command"], set(map(int, ramp)))
     for place, t in enumerate(slave["t"]):
         if (source := sent.get(slave["command_seq"][place])) is not None:
             for name in SENT:
@@ -159,8 +160,8 @@ def replay_exchange(whole: Run, role: str) -> dict[str, Match]:
     return matches
 
 
-def replay_table(recording: Run, slave: dict[str, Any], match: Match) -> None:
-    """The table's compensator again, from the first tick to the first hole."""
+def replay_table(recording: Run, slave: dict[str, Any], match: Match, ramped: set[int]) -> None:
+    """The table's compensator again, from the first tick to the first hole; not where it was `ramped` to rest."""
     from common.messages import Command
     from common.rig import TableMeasurement
     from rths.summary import plan_of
@@ -175,7 +176,9 @@ def replay_table(recording: Run, slave: dict[str, Any], match: Match) -> None:
             break
         command = Command(0, seq, 0, 0, -1, *(slave[name][place] for name in SENT))
         measured = TableMeasurement(*(slave[name][place] for name in TableMeasurement._fields))
-        match.take(t, step(command, measured), slave["table_command"][place])
+        computed = step(command, measured)
+        if seq not in ramped:
+            match.take(t, computed, slave["table_command"][place])
 
 
 def show(matches: dict[str, Match], same: bool) -> None:

@@ -54,6 +54,11 @@ class Descent(Generic[Command]):
         """A command went to the rig."""
         self._before, self._last = self._last, command
 
+    @property
+    def last(self) -> Command:
+        """The last command before the ramp."""
+        return self._last
+
     def ease(self, tick: int) -> None:
         """One interval: read, move on, write; raises EmergencyStopError where the rig says so."""
         try:

@@ -1,0 +1,207 @@
+"""How both laboratories come to rest, in virtual time: after limits, failures, stops, and at an orderly end."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from common import reality
+from common.endpoint import Received
+from common.errors import EmergencyStopError, RigError
+from common.messages import Answer, Operator
+from common.plan import Plan
+from common.recording.reader import Run, read
+from common.safety.modes import Mode
+from rths import virtual
+from rths.accounts import accounts
+from rths.virtual import Bench
+from tests.faults.rows import motion_after, motion_bound
+from tests.helpers import with_table, without_recorder
+
+TRIP = 300  # tick
+
+
+def played(plan: Plan, path: Path, upset: Any = None) -> tuple[Bench, Run]:
+    """A test in virtual time; `upset` is told of every tick before it."""
+    bench = virtual.assemble(plan, reality.as_planned(plan), path)
+    if upset is not None:
+        ticking = bench.master.tick
+
+        def upsetting(tick: int) -> None:
+            upset(bench, tick)
+            ticking(tick)
+
+        bench.master.tick = upsetting  # type: ignore[method-assign]
+    virtual.run(bench, str)
+    return bench, read(path)
+
+
+def codes(run: Run, lab: str) -> list[str]:
+    return [event["code"] for event in run.events if event["lab"] == lab]
+
+
+def turns(run: Run, lab: str) -> list[str]:
+    return [event["text"] for event in run.events if event["lab"] == lab and event["code"] == "mode"]
+
+
+def test_an_orderly_end_is_a_ramp_to_an_unloaded_specimen(short_plan: Plan, tmp_path: Path) -> None:
+    bench, run = played(short_plan, tmp_path / "a.mcap")
+    for role, loop in bench.loops.items():
+        assert loop.lab.safety.mode is Mode.IDLE
+        assert turns(run, role)[-2:] == ["running → ramping (end)", "ramping → idle (settled)"]
+    ramp = run.ramps["master"]
+    assert ramp["seq"][0] == short_plan.ticks
+    assert set(ramp["mode"][:-1]) == {"ramping"}
+    assert abs(ramp["column_force"][-1]) < 0.1 * abs(run.columns["master"]["column_force"]).max()
+    assert run.ramps["slave"]["damper_command"][-1] == 0.0
+    assert run.ticks("master") == short_plan.ticks
+
+
+@pytest.mark.parametrize("lab", ["master", "slave"])
+def test_a_violated_limit_is_never_written_and_both_come_to_rest(
+    lab: str, short_plan: Plan, tmp_path: Path
+) -> None:
+    limit, most = {"master": ("column_force", 12e3), "slave": ("damper_stroke", 0.01)}[lab]
+    plan = with_table(short_plan, "limits", **{limit: most})
+    bench, run = played(plan, tmp_path / "a.mcap")
+    other = "slave" if lab == "master" else "master"
+    assert {loop.lab.safety.mode for loop in bench.loops.values()} == {Mode.SAFE}
+    event = next(event for event in run.events if event["code"] == "limit")
+    assert event["lab"] == lab
+    assert event["values"]["limit"] == most
+    assert abs(event["values"][limit]) == pytest.approx(most, rel=0.2)
+    assert codes(run, lab)[-1] != "remote_trip"
+    assert "remote_trip" in codes(run, other)
+    for role in ("master", "slave"):
+        assert "running → ramping (trip)" in turns(run, role)
+        assert motion_after(run, role, round(event["t"] / 0.002)) <= motion_bound(plan, role)
+        safe = next(one for one in run.events if one["lab"] == role and one["code"] == "safe")
+        assert safe["values"]["duration"] > 0.0
+
+
+def test_the_ramp_begins_where_the_last_command_was_without_a_step(short_plan: Plan, tmp_path: Path) -> None:
+    plan = with_table(short_plan, "limits", column_force=12e3)
+    _, run = played(plan, tmp_path / "a.mcap")
+    for role, name in (("master", "actuator_command"), ("slave", "table_command")):
+        ramp = run.ramps[role][name]
+        commands = run.columns[role][name][run.columns[role]["seq"] < run.ramps[role]["seq"][0]]
+        whole = np.concatenate([commands, ramp])
+        before = np.abs(np.diff(commands)).max()
+        assert np.abs(np.diff(whole)).max() <= before * 1.01
+    release = run.ramps["slave"]["damper_command"]
+    assert np.flatnonzero(release == 0.0)[0] <= round(0.02 / 0.002)
+
+
+def test_a_rig_that_fails_comes_to_rest_blind(short_plan: Plan, tmp_path: Path) -> None:
+    def fail(bench: Bench, tick: int) -> None:
+        if tick == TRIP:
+            bench.master._rig.read = broken  # type: ignore[method-assign]
+
+    def broken() -> Any:
+        raise RigError("load cell gone")
+
+    bench, run = played(short_plan, tmp_path / "a.mcap", fail)
+    assert bench.master.lab.safety.mode is bench.slave.lab.safety.mode is Mode.SAFE
+    assert np.isnan(run.ramps["master"]["column_force"]).all()
+    commands = run.ramps["master"]["actuator_command"]
+    assert np.ptp(commands[-20:]) == 0.0
+
+
+def test_an_emergency_stop_of_a_rig_stops_it_at_once_and_the_other_by_its_ramp(
+    short_plan: Plan, tmp_path: Path
+) -> None:
+    disarmed: list[int] = []
+
+    def press(bench: Bench, tick: int) -> None:
+        if tick == TRIP:
+            bench.slave._rig.read = button  # type: ignore[method-assign]
+            bench.slave._rig.disarm = disarm  # type: ignore[method-assign]
+
+    def button() -> Any:
+        raise EmergencyStopError("mushroom button")
+
+    def disarm() -> str:
+        disarmed.append(TRIP)
+        return ""
+
+    bench, run = played(short_plan, tmp_path / "a.mcap", press)
+    assert bench.slave.lab.safety.mode is Mode.EMERGENCY_STOP
+    assert bench.master.lab.safety.mode is Mode.SAFE
+    assert disarmed == [TRIP]
+    assert "slave" not in run.ramps or run.ramps["slave"]["seq"].size == 0
+    assert "emergency" in codes(run, "slave")
+
+
+# -- operators --------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def latched(short_plan: Plan) -> Bench:
+    """Both laboratories at rest after a limit, still there."""
+    plan = without_recorder(replace(short_plan, limits=replace(short_plan.limits, column_force=12e3)))
+    bench = virtual.assemble(plan, reality.as_planned(plan), None)
+    bench.master.leave = bench.slave.leave = lambda: None  # type: ignore[method-assign]
+    virtual.run(bench, str)
+    assert bench.master.lab.safety.latched
+    return bench
+
+
+def pressed(bench: Bench, word: str, press: int, lab: str = "master") -> Answer:
+    loop = bench.loops[lab]
+    sent: list[Any] = []
+
+    def send(message: Any, to: str = "") -> int:
+        sent.append(message)
+        return 0
+
+    loop.lab.endpoint.send = send  # type: ignore[method-assign]
+    wish = Operator(0, loop.lab.plan.digest(), word, press, "test")
+    loop.take(Received(wish, "operator", bench.clock.now()))
+    return next(message for message in sent if isinstance(message, Answer))
+
+
+def test_a_reset_needs_the_cause_to_be_gone_and_a_new_press(latched: Bench, monkeypatch: Any) -> None:
+    loop = latched.master
+    monkeypatch.setattr(loop, "standing", lambda: "column_force is beyond its limit.")
+    refused = pressed(latched, "reset", 1)
+    assert not refused.accepted
+    assert "column_force is beyond" in refused.text
+    monkeypatch.setattr(loop, "standing", lambda: "")
+    assert not pressed(latched, "reset", 1).accepted  # held
+    assert loop.lab.safety.latched
+    assert pressed(latched, "reset", 2).accepted
+    assert not loop.lab.safety.latched
+
+
+def test_a_press_before_the_trip_resets_nothing(short_plan: Plan) -> None:
+    plan = without_recorder(short_plan)
+    bench = virtual.assemble(plan, reality.as_planned(plan), None)
+    answer = pressed(bench, "reset", 7)
+    assert not answer.accepted
+    assert "nothing to reset" in answer.text
+
+
+def test_an_operator_of_another_plan_is_not_heard(latched: Bench) -> None:
+    wish = Operator(0, "another", "reset", 3, "")
+    latched.master.take(Received(wish, "operator", latched.clock.now()))
+    assert latched.master.lab.safety.latched
+
+
+def test_an_emergency_stop_works_at_rest_too(latched: Bench) -> None:
+    assert pressed(latched, "emergency", 4).accepted
+    assert latched.master.lab.safety.mode is Mode.EMERGENCY_STOP
+
+
+# -- accounts ---------------------------------------------------------------------------------------
+
+
+def test_every_message_is_accounted_for(short_plan: Plan, tmp_path: Path) -> None:
+    _, run = played(short_plan, tmp_path / "a.mcap")
+    found = accounts(run)
+    ticks = short_plan.ticks
+    assert found["slave/commands"] == {"sent": ticks, "used": ticks, "rejected": 0, "lost": 0}
+    assert found["slave/feedbacks"] == {"sent": ticks, "used": ticks - 1, "rejected": 1, "lost": 0}
