@@ -97,7 +97,7 @@ class Safety:
         self.mode = Mode.IDLE
         self.cause: Cause | None = None
         self._told = told
-        self._press = 0
+        self._presses: set[int] = set()
 
     def allows(self, turn: Turn) -> bool:
         """Whether a turn may be taken now."""
@@ -127,9 +127,9 @@ class Safety:
         self.take(Turn.SECURED if self.cause is not None else Turn.SETTLED)
 
     def pressed(self, press: int) -> bool:
-        """Take note of an operator's press of reset; whether it is a new one, which a repeated or held one is not."""
-        new = press != self._press
-        self._press = press
+        """Take note of an operator's press; whether it is a new one, which a repeated, held or replayed one is not."""
+        new = press not in self._presses
+        self._presses.add(press)
         return new
 
     def reset(self) -> None:

@@ -85,11 +85,12 @@ def test_reset_needs_to_be_admitted_and_forgets_the_cause() -> None:
     assert (safety.mode, safety.cause) == (Mode.IDLE, None)
 
 
-def test_a_press_that_is_held_or_repeated_is_one_press() -> None:
+def test_a_press_that_is_held_repeated_or_replayed_is_one_press() -> None:
     safety = Safety(silent)
     assert safety.pressed(5)
     assert not safety.pressed(5)
     assert safety.pressed(6)
+    assert not safety.pressed(5)
 
 
 @given(st.lists(st.sampled_from(Turn)))
