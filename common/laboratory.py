@@ -125,8 +125,11 @@ class Laboratory:
         self.tick = tick
         self.safety.at_rest()
         if self.safety.cause is not None:
-            figures = ", ".join(f"{name} {value:.4g}" for name, value in values.items())
-            self.note("safe", f"At rest after {self.safety.cause.code}: {figures}.", tick=tick, values=values)
+            text = (
+                f"At rest after '{self.safety.cause.code}': {values['duration']:.3g} s, "
+                f"{values['travel'] * 1e3:.3g} mm of way."
+            )
+            self.note("safe", text, tick=tick, values=values)
 
     def fail(
         self,

@@ -47,7 +47,7 @@ def write_report(summary: dict[str, Any]) -> None:
         )
     write_latency(summary)
     for event in summary["events"]:
-        if event["level"] != "info" and event["code"] != "rejected":
+        if (event["level"] != "info" and event["code"] != "rejected") or event["code"] == "safe":
             say(f"{event['level']} at t {event['t']:.3f} s ({event['lab']}): {event['text']}\n")
     for name, counts in summary["exchange"].items():
         say(

@@ -102,7 +102,7 @@ class ForceRelease:
         """The force for the coming interval, N."""
         if self._left:
             self._left -= 1
-            self.command = self._part * self._left
+            self.command = self._part * self._left + 0.0  # not minus zero
         return self.command
 
     @property
