@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from benchmarks import closed_loop, codec, exchange, loops, real_time, recorder, scale, start
+from benchmarks import closed_loop, codec, exchange, false_trips, loops, real_time, recorder, scale, start
 from benchmarks.result import Figure
 
 BENCHMARKS: dict[str, Callable[[], list[Figure]]] = {
@@ -16,4 +16,5 @@ BENCHMARKS: dict[str, Callable[[], list[Figure]]] = {
     "recorder": recorder.run,
     "codec": codec.run,
     "start": start.run,
+    "false_trips": false_trips.run,
 }

@@ -27,6 +27,7 @@ from collections import deque
 from typing import NamedTuple
 
 MAX_DRIFT = 200e-6  # ns per ns: two crystals of 100 ppm each
+IMPOSSIBLE = 0.5  # of the time between t1 and t4: no drift makes a round trip so negative, a wrong stamp does
 RESOLUTION = 1.0  # ns: of the four stamps together
 QUEUED = 4.0  # a minimum that waited h₀/4 more than the best one counts a quarter
 
@@ -96,9 +97,11 @@ class ClockOffset:
         return math.ceil(max(self._high - value, value - self._low) + wander)
 
     def add(self, t1: int, t2: int, t3: int, t4: int) -> None:
-        """Take in one exchange; stamps in ns."""
-        self._newest = t4
+        """Take in one exchange; stamps in ns. One that came back before it can have gone there says nothing."""
         trip = (t4 - t1) - (t3 - t2)
+        if trip < -IMPOSSIBLE * (t4 - t1) - RESOLUTION:
+            return
+        self._newest = t4
         if trip <= self._shortest:  # of equal ones the newest
             self._shortest = trip
             self._keep(t1, t2, t3, t4)

@@ -128,7 +128,7 @@ def come_to_rest(loop: Loop) -> None:
     """The ramp to rest, an interval at a time; intervals that were missed are left out, never caught up."""
     lab, tick = loop.lab, loop.ticks
     while lab.safety.mode is Mode.RAMPING:
-        tick += max((lab.clock.now() - loop.nominal(tick)) // lab.interval_ns, 0)
+        tick += max(-(-(lab.clock.now() - loop.nominal(tick)) // lab.interval_ns), 0)
         lab.clock.sleep_until(loop.nominal(tick))
         while fetch(loop, 0):
             pass
@@ -149,11 +149,17 @@ def stay(loop: Loop, stopping: Callable[[], str]) -> None:
 
 
 def wait(loop: Loop, tick: int) -> None:
-    """Sleep until the time of a tick, take what has come, and wait for its message as long as it may be waited for."""
-    loop.lab.clock.sleep_until(loop.earliest(tick))
+    """Sleep until the time of a tick, take what has come, and wait for its message as long as it may be waited for.
+
+    Who was held up himself says so before he reads what the others made of it.
+    """
+    lab = loop.lab
+    lab.clock.sleep_until(loop.earliest(tick))
+    if tick < lab.plan.ticks and lab.overrun(lab.clock.now() - loop.nominal(tick), tick):
+        return
     while fetch(loop, 0):
         pass
-    while not loop.heard(tick) and loop.lab.running and loop.lab.clock.now() < loop.latest(tick):
+    while not loop.heard(tick) and lab.running and lab.clock.now() < loop.latest(tick):
         fetch(loop, loop.latest(tick))
 
 

@@ -7,15 +7,17 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable
-from operator import itemgetter, le
+from collections.abc import Callable, Sequence
+from operator import itemgetter, le, ne
 from typing import Any, NamedTuple
 
+from common.plan import Plan
 from common.tables import Limits
 
 UNITS: dict[str, str] = {field.name: field.metadata["rule"].unit for field in dataclasses.fields(Limits)}
 
 PATIENCE = 3  # intervals in a row by which an error must be beyond its limit
+TRAVEL = 10.0  # by so many times its nominal noise a command has moved
 
 
 class Violation(NamedTuple):
@@ -33,6 +35,21 @@ class Violation(NamedTuple):
 
     def __str__(self) -> str:
         return self.sentence
+
+
+class Standstill(NamedTuple):
+    """A sensor that has given one value so many times in a row."""
+
+    channel: str
+    value: float
+    times: int
+    name: str = "frozen"
+
+    def __str__(self) -> str:
+        return (
+            f"{self.channel} is frozen: {self.times} readings in a row of {self.value:.6g} while its rig moved; look "
+            "at its cable and its driver, or set its noise in [sensors] to 0."
+        )
 
 
 def violated(limits: Limits, **values: float) -> Violation | None:
@@ -128,3 +145,65 @@ class Lasting:
             return None
         self._beyond += 1
         return Violation(self._name, error, self._most) if self._beyond >= PATIENCE else None
+
+
+class _Channel:
+    """One sensor: the finest step that it has shown, and its present run of equal readings."""
+
+    def __init__(self, name: str, noise: float) -> None:
+        self.name, self.noise = name, noise
+        self.step = math.inf if noise > 0.0 else -math.inf
+        self.begin(math.nan, 0.0)
+
+    def begin(self, reading: float, command: float) -> None:
+        self.reading, self.same = reading, 1
+        self.low = self.high = command
+
+    def take(self, reading: float, command: float) -> None:
+        if reading != self.reading:
+            change = abs(reading - self.reading)
+            self.step = min(self.step, change) if change > 0.0 else self.step  # the first reading is none
+            self.begin(reading, command)
+            return
+        self.same += 1
+        self.low, self.high = min(self.low, command), max(self.high, command)
+
+    @property
+    def judged(self) -> bool:
+        """Whether its steps are known to be finer than its noise, so that it does not repeat itself."""
+        return 0.0 < self.step < self.noise
+
+
+class Frozen:
+    """Checks that the readings of one part of a rig go on to differ while its command moves.
+
+    White noise makes each reading another one, wherever the sensor's steps are finer: equal neighbours then have a
+    chance below 0.3. A channel without nominal noise, or one that has shown no such step, is not judged, as it may
+    repeat itself honestly; nor is any while the command stays within `TRAVEL` times the noise of the channel `moved`,
+    which reads what the command is about.
+    """
+
+    def __init__(self, plan: Plan, names: tuple[str, ...], moved: str) -> None:
+        self._channels = [_Channel(name, getattr(plan.sensors, name)) for name in names]
+        self._count = plan.safety.frozen_readings
+        self._travel = TRAVEL * getattr(plan.sensors, moved)
+        self._last: Sequence[float] = ()
+        self._plain = False  # every channel is known, and none repeats itself
+
+    def violation(self, readings: Sequence[float], command: float) -> Standstill | None:
+        """The first channel that is frozen; `command` is the one in force over the interval just over."""
+        last, self._last = self._last, readings
+        if self._plain and all(map(ne, readings, last)):
+            return None
+        return self._look(readings, last, command)
+
+    def _look(self, readings: Sequence[float], last: Sequence[float], command: float) -> Standstill | None:
+        for channel, reading, before in zip(self._channels, readings, last or readings, strict=True):
+            if self._plain:  # nobody has followed it since
+                channel.begin(before, command)
+            channel.take(reading, command)
+        self._plain = all(one.same == 1 and (one.judged or one.noise <= 0.0) for one in self._channels)
+        for one in self._channels:
+            if one.same >= self._count and one.judged and one.high - one.low > self._travel:
+                return Standstill(one.name, one.reading, one.same)
+        return None

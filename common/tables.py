@@ -200,6 +200,12 @@ class Safety:
         least=1,
         most=100_000,
     )
+    frozen_readings: int = key(
+        "readings in a row, the same to the last bit while the rig's command moves, by which a sensor is frozen",
+        default=25,
+        least=2,
+        most=100_000,
+    )
     message_age: float = key(
         "age beyond which a message is not fresh, by its number", default=0.1, unit="s", above=0.0
     )

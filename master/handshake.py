@@ -62,7 +62,7 @@ class Handshake:
         error = InputError(f"The {partner.title} refuses the test: {reason}")
         if self._lab.exchange.state is State.IDLE:
             self._lab.fail(Event.REFUSE, error, code="refused", remote=True)
-        elif self._lab.exchange.state in (State.REGISTERED, State.ARMED):  # later there is nothing to refuse
+        elif self._lab.exchange.state is State.REGISTERED:  # later there is nothing to refuse
             reason = reason or f"The {partner.title} did not arm its rig."
             self._lab.fail(Event.TRIP, RigError(reason), code="not_armed", remote=True)
 
@@ -79,7 +79,7 @@ class Handshake:
                 partner.armed = True
                 if all(one.armed for one in partners):
                     self._move(Event.ARM)
-            case Scheduled() if state is State.ARMED:
+            case Scheduled() if state is State.ARMED and self._lab.start_ns:  # it was asked
                 partner.scheduled = True
                 if all(one.scheduled for one in partners):
                     self._move(Event.SCHEDULE)

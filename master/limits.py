@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from common.limits import Change, Guard, Lasting, Violation
+from common.limits import Change, Frozen, Guard, Lasting, Standstill, Violation
 from common.plan import Plan
 from common.rig import ColumnCommand, ColumnMeasurement
 from master.energy import EnergyMonitor
@@ -30,22 +30,27 @@ class MasterLimits:
         )
         self._error = Lasting(limits, "column_error")
         self._energy = EnergyMonitor(plan)
+        self._frozen = Frozen(plan, ColumnMeasurement._fields, "column_displacement")
+        self._present = 0.0  # command in force over the interval just over
 
-    def violation(self, measured: ColumnMeasurement, outputs: Outputs) -> Violation | None:
+    def violation(self, measured: ColumnMeasurement, outputs: Outputs) -> Violation | Standstill | None:
         """The first value beyond its limit, None where there is none."""
         error = outputs.column_target - measured.column_displacement
         lasting = self._error.violation(error)
         energy = self._energy.violation(measured, outputs)
+        frozen = self._frozen.violation(measured, self._present)
         return (
             self._measurements.violation(measured)
             or self._outputs.violation(outputs)
             or self._actuator.violation(outputs.actuator_command)
             or lasting
             or energy
+            or frozen
         )
 
     def written(self, command: ColumnCommand) -> None:
         """The rig was given this command."""
+        self._present = command.actuator_command
         self._actuator.written(command.actuator_command)
 
     def standing(self, measured: ColumnMeasurement) -> str:

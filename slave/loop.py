@@ -152,7 +152,7 @@ class SlaveLoop:
             violation = self._limits.violation(measured, command, wanted)
             if violation:
                 lab.violated(violation, tick)
-                wanted = self._descent.last  # of this tick nothing was written but the ramp's
+                wanted = self._descent.last  # the rig never saw the other one
                 self._descent.step(tick, measured)
             else:
                 self._descent.wrote(wanted)

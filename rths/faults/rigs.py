@@ -37,13 +37,17 @@ def named(mode: Enum) -> str:
 
 
 class Log:
-    """What reached a rig at each write: world time (ns), command, mode, and what feedbacks the master then used."""
+    """What reached a rig at each write: world time (ns), command, mode.
+
+    Of the master also what feedbacks it then used, and the storey drift of the tick before (m).
+    """
 
     def __init__(self) -> None:
         self.times: list[int] = []
         self.commands: list[tuple[float, ...]] = []
         self.modes: list[Enum] = []
         self.used: list[tuple[int, ...]] = []
+        self.drifts: list[float] = []
 
 
 class Wrong(NamedTuple):
@@ -99,6 +103,7 @@ class Probe:
         log.modes.append(mode_of(loop.lab))
         if self.partners:
             log.used.append(tuple([partner.used.seq for partner in self.partners]))
+            log.drifts.append(loop.progress["drift"])
         self.inner.write(command)
 
     def disarm(self) -> None:

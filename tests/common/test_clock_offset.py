@@ -202,3 +202,12 @@ def test_a_drift_beyond_the_assumed_one_is_followed_too() -> None:
             # half a round trip, and 300 ppm too much for as long as it takes to see a block's minimum
             assert abs(clocks.error(estimate)) < (45 + 300e-6 * 200_000) * US
     assert estimate.drift == pytest.approx(500e-6, abs=20e-6)
+
+
+def test_an_exchange_that_came_back_before_it_can_have_gone_there_says_nothing() -> None:
+    clock = ClockOffset(length=5, blocks=4)
+    for k in range(40):
+        late = 10**9 if k >= 20 else 0  # the other end's second stamp lies in the future
+        clock.add(k * 10**6, k * 10**6 + 1050, k * 10**6 + 1060 + late, k * 10**6 + 110)
+    assert clock.offset == 1000
+    assert clock.bound_at(40 * 10**6) > clock.bound_at(20 * 10**6)

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
-from common.limits import PATIENCE, Change, Guard, Lasting, Violation, violated
+from common.limits import PATIENCE, TRAVEL, Change, Frozen, Guard, Lasting, Standstill, Violation, violated
+from common.plan import Plan
 from common.tables import Limits
+from tests.helpers import with_table
 
 INTERVAL = 0.002
 NAMES = {"step": "actuator_step", "velocity": "actuator_velocity", "acceleration": "actuator_acceleration"}
@@ -98,3 +101,82 @@ def test_nan_is_beyond_any_limit_and_nothing_else_beyond_an_infinite_one() -> No
     lasting = Lasting(limits, "column_error")
     assert all(lasting.violation(1e9) is None for _ in range(2 * PATIENCE))
     assert [lasting.violation(math.nan) is not None for _ in range(PATIENCE)] == [False, False, True]
+
+
+# -- frozen sensors -------------------------------------------------------------------------------
+
+CHANNELS = ("column_displacement", "column_force")
+NOISE = Plan().sensors.column_displacement
+COUNT = Plan().safety.frozen_readings
+
+
+def watched(
+    displacements: object, plan: Plan | None = None, *, speed: float = NOISE
+) -> tuple[int, Standstill | None]:
+    """How many ticks it took, and what was found, with a command that moves by `speed` in every tick."""
+    chosen = plan or Plan()
+    guard = Frozen(chosen, CHANNELS, "column_displacement")
+    forces = np.random.default_rng(2).normal(0.0, 100.0, 10_000)
+    for tick, value in enumerate(np.asarray(displacements).tolist()):
+        if found := guard.violation((value, float(forces[tick])), tick * speed):
+            return tick, found
+    return len(np.asarray(displacements)), None
+
+
+def noisy(count: int) -> np.ndarray:
+    return np.random.default_rng(1).normal(0.0, NOISE, count)
+
+
+def test_a_sensor_that_freezes_is_found_after_so_many_equal_readings() -> None:
+    values = noisy(100)
+    values[60:] = values[60]
+    tick, found = watched(values)
+    assert tick == 60 + COUNT - 1
+    assert found == Standstill("column_displacement", values[60], COUNT)
+    assert str(found).startswith("column_displacement is frozen: 25 readings in a row of ")
+    tick, found = watched(values, with_table(Plan(), "safety", frozen_readings=7), speed=5.0 * NOISE)
+    assert tick == 60 + 6
+
+
+def test_a_sensor_that_goes_on_again_in_time_is_none() -> None:
+    values = noisy(200)
+    for first in (30, 60, 120):
+        values[first : first + COUNT - 1] = values[first]
+    assert watched(values) == (200, None)
+
+
+def test_nothing_is_judged_while_the_command_rests() -> None:
+    values = noisy(300)
+    values[60:] = values[60]
+    assert watched(values, speed=0.0) == (300, None)
+    tick, found = watched(values, speed=NOISE / 10.0)
+    assert found is not None
+    assert tick == pytest.approx(60 + 10 * TRAVEL, abs=2)
+
+
+def test_a_sensor_without_nominal_noise_may_repeat_itself() -> None:
+    values = noisy(300)
+    values[60:] = values[60]
+    assert watched(values, with_table(Plan(), "sensors", column_displacement=0.0)) == (300, None)
+
+
+@pytest.mark.parametrize("step", [2.0, 10.0, 100.0])
+def test_a_sensor_with_steps_above_its_noise_may_repeat_itself(step: float) -> None:
+    moving = noisy(5000) + 0.002 * np.sin(0.001 * np.arange(5000))
+    quantum = step * NOISE
+    values = quantum * np.floor(moving / quantum + 0.5)
+    assert len(set(values.tolist())) > 1
+    assert watched(values) == (5000, None)
+
+
+@pytest.mark.parametrize("step", [0.1, 0.5, 0.9])
+def test_a_sensor_with_steps_below_its_noise_does_not_and_is_judged(step: float) -> None:
+    quantum = step * NOISE
+    values = quantum * np.floor(noisy(8000) / quantum + 0.5)
+    assert watched(values) == (8000, None)
+    values[5000:] = values[4999]
+    assert watched(values)[1] is not None
+
+
+def test_a_rig_that_always_gives_the_same_has_no_noise_that_could_be_missed() -> None:
+    assert watched(np.zeros(500)) == (500, None)

@@ -1,0 +1,134 @@
+"""Trips without a cause in an hour of virtual time, over a link with 1 % loss and 1 ms of jitter, and the gap it adds.
+
+The loops, drive, endpoints and codec run on a simulated clock and link (`rths faults`) in pieces of a minute, each with
+seeds of its own for noise and link. A piece is held against the same test over a cable alone.
+"""
+
+from __future__ import annotations
+
+import os
+import statistics
+import sys
+import time
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from benchmarks.result import Figure
+from common.plan import Plan
+from common.reality import as_planned
+from common.roles import MASTER
+from common.tables import Recording
+from models.indicators import nrmse, peak_error
+from models.registry import Array
+from rths.faults.invariants import judge
+from rths.faults.lab import Simulation, Surrounding
+from rths.faults.wire import CABLE, Conditions
+
+MINUTES = int(os.environ.get("RTHS_FALSE_TRIPS_MINUTES", "60"))
+PIECE = 60.0  # s
+# jitter: exponential, of mean 1 ms; a frame may overtake another, as over UDP, or waits behind it, as over TCP
+IN_ORDER = Conditions(minimum=CABLE.minimum, mean=1e-3, loss=0.01)
+FREE = "frames may overtake"
+LINKS = {FREE: IN_ORDER._replace(reorder=1.0), "frames keep their order": IN_ORDER}
+
+
+class Piece(NamedTuple):
+    """One piece over one link: how it ended, and how far its storey drift is from that over the cable alone."""
+
+    link: str
+    seed: int
+    seconds: float  # played
+    trips: int
+    violations: int  # of what must hold in every simulated test
+    holds: int  # of both laboratories
+    lost: int  # messages of the ticks
+    nrmse: float | None  # None where it did not reach its end
+    peak: float | None  # largest difference over the largest drift
+
+
+def planned(seed: int) -> Plan:
+    """The default test over a piece's length, without a recorder."""
+    plan = Plan().with_test(duration=PIECE)
+    return replace(plan, test=replace(plan.test, seed=seed), recording=Recording(required=False))
+
+
+def played(plan: Plan, conditions: Conditions) -> Simulation:
+    """The test over a link."""
+    simulation = Simulation(plan, as_planned(plan), Surrounding(plan.test.seed, conditions))
+    simulation.run()
+    return simulation
+
+
+def drift(simulation: Simulation) -> Array:
+    """Storey drift of every tick, m."""
+    return np.array(simulation.probes[MASTER].log.drifts[1 : simulation.plan.ticks])
+
+
+def pieces_of(seed: int) -> list[Piece]:
+    """One piece over each link."""
+    plan = planned(seed)
+    perfect = drift(played(plan, CABLE))
+    return [piece(link, played(plan, conditions), perfect) for link, conditions in LINKS.items()]
+
+
+def piece(link: str, poor: Simulation, perfect: Array) -> Piece:
+    """What came of one piece."""
+    plan, master = poor.plan, poor.loops[MASTER]
+    tripped = any(loop.lab.error is not None for loop in poor.loops.values())
+    holds = sum(
+        one.data["code"] == "mode" and one.data["text"].endswith("(hold)")
+        for told in poor.events.values()
+        for one in told
+    )
+    lost = sum(len(way.ledger.numbers["lost"]) for way in poor.wire.directions)
+    gaps = (None, None) if tripped else (nrmse(perfect, drift(poor)), peak_error(perfect, drift(poor)))
+    seconds = master.ticks * plan.test.interval
+    return Piece(link, plan.test.seed, seconds, int(tripped), len(judge(poor)), holds, lost, *gaps)
+
+
+def gap_figure(name: str, values: list[float]) -> Figure:
+    """Smallest and median of the pieces; the worst stands in the name."""
+    worst = f", worst {max(values):.3g}" if values else ""
+    middle = statistics.median(values) if values else None
+    return Figure(f"{name}{worst}", "of the drift", min(values, default=None), middle)
+
+
+def figures(pieces: list[Piece]) -> list[Figure]:
+    """Trips, holds and the added gap over one link; only where frames may overtake is a trip one without a cause."""
+    hours = sum(one.seconds for one in pieces) / 3600.0
+    trips, link = sum(one.trips for one in pieces), pieces[0].link
+    holds = sum(one.holds for one in pieces) / hours
+    judged = link == FREE
+    met = trips == 0 and not any(one.violations for one in pieces)
+    points = [one._asdict() for one in pieces]
+    return [
+        Figure(
+            f"trips in {hours:.2g} h, {link}",
+            "trips",
+            float(trips),
+            float(trips),
+            "0" if judged else "",
+            met if judged else None,
+            points=points,
+        ),
+        Figure(f"holds of either laboratory, {link}", "per hour", holds, holds),
+        gap_figure(
+            "added gap in the storey drift, NRMSE", [one.nrmse for one in pieces if one.nrmse is not None]
+        ),
+        gap_figure(
+            "added gap in the storey drift, largest", [one.peak for one in pieces if one.peak is not None]
+        ),
+    ]
+
+
+def run() -> list[Figure]:
+    """All pieces, a line of progress after each."""
+    began, pieces = time.monotonic(), []
+    for seed in range(1, MINUTES + 1):
+        pieces += pieces_of(seed)
+        trips = {link: sum(one.trips for one in pieces if one.link == link) for link in LINKS}
+        told = ", ".join(f"{count} trips where {link}" for link, count in trips.items())
+        sys.stderr.write(f"{seed} of {MINUTES} min: {told}, {time.monotonic() - began:.0f} s\n")
+    return [figure for link in LINKS for figure in figures([one for one in pieces if one.link == link])]
