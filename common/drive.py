@@ -71,6 +71,10 @@ class Loop(Protocol):
         """Whether they were heard."""
 
     @property
+    def needed(self) -> bool:
+        """Whether other laboratories that are latched are reached through this one alone."""
+
+    @property
     def progress(self) -> Mapping[str, float]:
         """What a user watches."""
 
@@ -140,9 +144,9 @@ def come_to_rest(loop: Loop) -> None:
 
 
 def stay(loop: Loop, stopping: Callable[[], str]) -> None:
-    """Where the plan wants it, a latched laboratory stays until an operator resets it."""
+    """Where the plan wants it, a latched laboratory stays until an operator resets it, the master until all are."""
     lab = loop.lab
-    while lab.plan.safety.wait_for_reset and lab.safety.latched and not stopping():
+    while lab.plan.safety.wait_for_reset and (lab.safety.latched or loop.needed) and not stopping():
         fetch(loop, lab.clock.now() + IDLE_NS)
         loop.tell()
         lab.send_samples()

@@ -10,7 +10,7 @@ from common.clock import Clock
 from common.endpoint import Endpoint
 from common.errors import EmergencyStopError, InterlockError, LostError, RthsError
 from common.exchange import Event, Exchange, State
-from common.limits import Violation
+from common.limits import Standstill, Violation
 from common.messages import Message, Recorder, Resend, Trip
 from common.outlet import Outlet, next_of
 from common.plan import Plan
@@ -169,10 +169,10 @@ class Laboratory:
         """An error as the cause of a latched state."""
         return Cause(code, str(error), self.tick * self.plan.test.interval, self.name)
 
-    def violated(self, violation: Violation, tick: int) -> None:
-        """End the test because a value is beyond its limit."""
-        values = {violation.name: violation.value, "limit": violation.limit}
-        self.fail(Event.TRIP, InterlockError(str(violation)), code="limit", tick=tick, values=values)
+    def violated(self, violation: Violation | Standstill, tick: int) -> None:
+        """End the test because a value is beyond its limit, or a sensor stands still."""
+        error = InterlockError(str(violation))
+        self.fail(Event.TRIP, error, code="limit", tick=tick, values=violation.values)
 
     def overrun(self, late_ns: int, tick: int) -> bool:
         """End the test where a tick comes too many intervals late: nobody knows what the rig did meanwhile."""

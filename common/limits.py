@@ -28,6 +28,11 @@ class Violation(NamedTuple):
     limit: float
 
     @property
+    def values(self) -> dict[str, float]:
+        """What is recorded with it."""
+        return {self.name: self.value, "limit": self.limit}
+
+    @property
     def sentence(self) -> str:
         """What was violated, by how much, in a sentence."""
         limit = f"{self.limit:g} {UNITS.get(self.name, '')}".rstrip()
@@ -44,6 +49,11 @@ class Standstill(NamedTuple):
     value: float
     times: int
     name: str = "frozen"
+
+    @property
+    def values(self) -> dict[str, float]:
+        """What is recorded with it."""
+        return {self.channel: self.value, "readings": float(self.times)}
 
     def __str__(self) -> str:
         return (

@@ -11,6 +11,7 @@ from common.messages import Armed, Message, Refused, Register, Registered, Sched
 from common.plan import PROTOCOL_VERSION
 from common.preflight import LINK, Gate, RefusedError, link_check
 from common.rig import GuardedRig
+from common.safety.modes import STILL_LATCHED
 from master.partner import Partner
 
 LEAD_NS = 250_000_000  # from the agreement on the start to the start
@@ -59,12 +60,22 @@ class Handshake:
             partner.arm()
 
     def _refused(self, partner: Partner, reason: str) -> None:
+        if reason == STILL_LATCHED and self._lab.exchange.state is State.IDLE:
+            self._await_reset(partner)
+            return
         error = InputError(f"The {partner.title} refuses the test: {reason}")
         if self._lab.exchange.state is State.IDLE:
             self._lab.fail(Event.REFUSE, error, code="refused", remote=True)
         elif self._lab.exchange.state is State.REGISTERED:  # later there is nothing to refuse
             reason = reason or f"The {partner.title} did not arm its rig."
             self._lab.fail(Event.TRIP, RigError(reason), code="not_armed", remote=True)
+
+    def _await_reset(self, partner: Partner) -> None:
+        """A slave is latched: the operator reaches it through this session, so that it is asked again until it goes."""
+        if not partner.latched:
+            partner.latched = True
+            text = f"The {partner.title} refuses the test: {STILL_LATCHED}"
+            self._lab.note("latched", text, level="warning")
 
     def _agree(self, partner: Partner, message: Registered | Armed | Scheduled, received_ns: int) -> None:
         """Move on where all have given the answer that the present state waits for; repeated ones change nothing."""
@@ -160,6 +171,10 @@ class Handshake:
         missing = next((partner for partner in self._partners if not partner.registered), None)
         who, option = (missing.title, missing.start_option) if missing else ("recorder", "")
         seconds = self._lab.plan.link.connect_timeout
+        if missing is not None and missing.latched:
+            refusal = InputError(f"The {who} refuses the test: {STILL_LATCHED}")
+            self._lab.fail(Event.REFUSE, refusal, code="refused", remote=True)
+            return
         error = LostError(
             f"No {who} joined the test within {seconds:g} s: start it with the same plan{option} and --connect."
         )

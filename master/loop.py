@@ -37,7 +37,7 @@ from common.safety.watchdog import Finding
 from master.descent import ColumnRamp
 from master.handshake import Handshake
 from master.limits import MasterLimits
-from master.partner import Partner
+from master.partner import GIVEN_UP_NS, Partner
 from master.step import MasterStep, Outputs
 
 
@@ -98,6 +98,8 @@ class MasterLoop:
             self._take_answer(self.partners[role], message, received.received_ns)
 
     def _take_answer(self, partner: Partner, message: Message, received_ns: int) -> None:
+        if isinstance(message, Trip):
+            partner.tripped_ns = received_ns
         match message:
             case Trip() if not self.lab.exchange.ended:
                 self.lab.tripped(partner.role, message.text, self.ticks)
@@ -323,6 +325,12 @@ class MasterLoop:
         """Whether slaves and recorder know and have all."""
         settled = self.lab.exchange.ended
         return settled and (self.lab.recorder_has_all() or not self.lab.recorded)
+
+    @property
+    def needed(self) -> bool:
+        """Whether a slave that has tripped still says so: an operator reaches it through this session."""
+        now = self.lab.clock.now()
+        return any(now - partner.tripped_ns < GIVEN_UP_NS for partner in self._partners)
 
     @property
     def progress(self) -> dict[str, float]:

@@ -49,6 +49,8 @@ class Partner:
         self.scheduled = False
         self.stopped = False
         self.heard_ns = 0
+        self.tripped_ns = -GIVEN_UP_NS  # when it said last that it has stopped its rig
+        self.latched = False  # since a test before, so that it refuses this one
         self.commands = 0  # sent
         self.used = NO_FEEDBACK
         self.sent: Sent = NOTHING_SENT

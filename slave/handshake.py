@@ -21,6 +21,7 @@ from common.messages import (
 from common.plan import PROTOCOL_VERSION
 from common.rig import GuardedRig
 from common.roles import name_of, title
+from common.safety.modes import STILL_LATCHED
 
 
 class Handshake:
@@ -64,10 +65,8 @@ class Handshake:
         if lab.exchange.belongs(request.session):
             lab.endpoint.send(Registered(request.session, self._instance))
         elif lab.safety.latched:
-            lab.endpoint.send(
-                Refused(request.session, "it stopped a test and is latched: `rths reset` lets it go.")
-            )
-        else:
+            lab.endpoint.send(Refused(request.session, STILL_LATCHED))
+        elif not lab.exchange.ended:  # one that leaves speaks for nobody: another process may be here already
             lab.endpoint.send(Refused(request.session, "it takes part in another test already."))
 
     def make_way(self, session: int) -> None:

@@ -328,6 +328,11 @@ class SlaveLoop:
         return lab.exchange.ended and (nothing or lab.recorder_has_all())
 
     @property
+    def needed(self) -> bool:
+        """Nobody is reached through a slave."""
+        return False
+
+    @property
     def progress(self) -> dict[str, float]:
         """What a user watches while it runs."""
         return {}

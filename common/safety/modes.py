@@ -80,6 +80,10 @@ TURNS: dict[Mode, dict[Turn, Mode]] = {
 
 LATCHED = frozenset({Mode.SAFE, Mode.EMERGENCY_STOP})
 
+STILL_LATCHED = (
+    "it is latched in its safe state since the test before: `rths reset` lets it go."  # refuses a test
+)
+
 
 class Cause(NamedTuple):
     """Why a laboratory came to a latched state: the first reason, which stays."""

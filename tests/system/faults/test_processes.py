@@ -1,0 +1,81 @@
+"""Fault rows F15, F20 and F21: a process of a laboratory is killed or held up."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from pathlib import Path
+
+from tests.faults.rows import Row, passed
+from tests.system.faults.bench import (
+    WATCHDOG,
+    Bench,
+    evidence,
+    exchanged,
+    judge,
+    undisturbed,
+    worst,
+)
+
+
+def test_f20_a_killed_slave_brings_the_master_to_rest(tmp_path: Path) -> None:
+    def scenario(folder: Path) -> None:
+        with Bench(folder) as bench:
+            bench.start_all()
+            bench.slave.signal(signal.SIGKILL)
+            bench.rest("master")
+            found = {"master": judge(bench.finish("master"), bench, "master", ["watchdog"])}
+        state = "master safe; the killed one's rig is left to its own watchdog"
+        passed(Row("F20", "slave killed", "kill -9 of its process", state, *worst(found), evidence(found)))
+
+    undisturbed(scenario, tmp_path)
+
+
+def test_f21_a_master_that_is_held_up_finds_both_at_rest(tmp_path: Path) -> None:
+    def scenario(folder: Path) -> None:
+        with Bench(folder) as bench:
+            bench.start_all()
+            hold_up(bench.master.pid, 0.05)
+            bench.rest("master", "slave")
+            run = bench.finish()
+            found = {
+                "slave": judge(run, bench, "slave", ["watchdog"]),
+                "master": judge(run, bench, "master", ["overrun", "remote_trip"], most=0.05 + 2 * WATCHDOG),
+            }
+        passed(Row("F21", "master held up 50 ms", "SIGSTOP", "both safe", *worst(found), evidence(found)))
+
+    undisturbed(scenario, tmp_path)
+
+
+def test_f15_a_slave_that_was_held_up_uses_no_stale_command(tmp_path: Path) -> None:
+    def scenario(folder: Path) -> None:
+        with Bench(folder) as bench:
+            bench.start_all()
+            hold_up(bench.slave.pid, 0.5)
+            bench.rest("master", "slave")
+            run = bench.finish()
+            found = {
+                "master": judge(run, bench, "master", ["watchdog"]),
+                "slave": judge(run, bench, "slave", ["overrun"], most=0.5 + 2 * WATCHDOG),
+            }
+        assert exchanged(run, "slave")["commands.turned_away.stale"] > 0
+        passed(
+            Row(
+                "F15",
+                "slave held up 500 ms",
+                "SIGSTOP",
+                "both safe, stale commands turned away",
+                *worst(found),
+                evidence(found),
+            )
+        )
+
+    undisturbed(scenario, tmp_path)
+
+
+def hold_up(number: int, seconds: float) -> None:
+    """Stop a process for a while."""
+    os.kill(number, signal.SIGSTOP)
+    time.sleep(seconds)
+    os.kill(number, signal.SIGCONT)
