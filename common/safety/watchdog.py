@@ -19,29 +19,39 @@ class Finding(Enum):
     RAMP = "ramp"
 
 
-class Watchdog:
-    """Counts own intervals without a fresh message.
+ROUND_TRIP = 2  # intervals that an echo may be later than a message: it has gone both ways
 
-    A message is fresh where both its number and the number it echoes are ahead of those before: that the other end
-    speaks does not show that it hears. Intervals in which the own loop came too late are not counted; the
-    limit `overrun` is for those.
+
+class Watchdog:
+    """Counts own intervals without a fresh message, and those in which the echo of one's own has not moved.
+
+    That the other end speaks does not show that it hears: the number that its messages echo must go on as well, for
+    which it has a round trip more. Intervals in which the own loop came too late are not counted; the limit `overrun`
+    is for those.
     """
 
     def __init__(self, safety: Safety, interval: float) -> None:
         self._hold, self._ramp = safety.hold_after, safety.ramp_after
         self._age = max(round(safety.message_age / interval), 1)
         self._seq = self._echo = -1
-        self.missed = 0
+        self._unheard = self._unechoed = 0
+
+    @property
+    def missed(self) -> int:
+        """Intervals of silence, by messages or by echoes beyond their round trip."""
+        return max(self._unheard, self._unechoed - ROUND_TRIP)
 
     def look(self, tick: int, seq: int, echo: int) -> Finding:
         """One interval: the tick whose message is due, the newest one's own number, and the one it echoes.
 
         Before the first message has come it may be as late as a message may be old: a link's delay is no silence.
         """
-        if seq > self._seq and echo > self._echo and tick - seq <= self._age:
-            self._seq, self._echo, self.missed = seq, echo, 0
-            return Finding.FINE
-        self.missed += 1
-        if self.missed >= (self._ramp if self._seq >= 0 else max(self._ramp, self._age)):
+        fresh = seq > self._seq and tick - seq <= self._age
+        self._unheard = 0 if fresh else self._unheard + 1
+        self._unechoed = 0 if fresh and echo > self._echo else self._unechoed + 1
+        if fresh:
+            self._seq, self._echo = seq, max(echo, self._echo)
+        begun = self._seq >= 0 and self._echo >= 0
+        if self.missed >= (self._ramp if begun else max(self._ramp, self._age)):
             return Finding.RAMP
-        return Finding.HOLD if self.missed >= self._hold and self._seq >= 0 else Finding.FINE
+        return Finding.HOLD if self.missed >= self._hold and begun else Finding.FINE

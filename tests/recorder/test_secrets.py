@@ -19,7 +19,7 @@ from common import reality
 from common.plan import Plan
 from common.zenoh_link import listenable
 from rths import virtual
-from tests.helpers import ROOT
+from tests.helpers import PATIENT, ROOT
 
 SESSION = 0x1D3A_57C9_E2B4_6F81  # no run of its bytes comes about by chance
 
@@ -77,9 +77,8 @@ MODULE = "runpy.run_module(sys.argv[0], run_name='__main__', alter_sys=True)"
 
 @pytest.mark.parametrize("as_json", [True, False], ids=["json", "text"])
 def test_the_processes_say_nothing_of_their_session(tmp_path: Path, as_json: bool) -> None:
-    plan = Plan().with_ticks(100)
     path, recorded, endpoint = tmp_path / "plan.toml", tmp_path / "a.mcap", listenable()
-    path.write_text(plan.toml(), encoding="utf-8")
+    path.write_text(PATIENT + "[test]\nduration = 0.2\n", encoding="utf-8")
     options = ["--json"] if as_json else []
     (tmp_path / "draw.py").write_text(DRAWN.format(SESSION - 1) + MODULE, encoding="utf-8")
     words = {

@@ -33,7 +33,9 @@ def test_a_fresh_message_starts_the_count_again() -> None:
 
 def test_one_who_speaks_but_does_not_hear_is_silent() -> None:
     watchdog = started()
-    assert [watchdog.look(tick, tick, 0) for tick in range(1, 6)][-1] is Finding.RAMP
+    found = [watchdog.look(tick, tick, 0) for tick in range(1, 8)]
+    assert found.index(Finding.HOLD) == 4
+    assert found.index(Finding.RAMP) == 6  # a round trip of two intervals later than one who says nothing
 
 
 def test_a_constant_delay_within_the_age_is_no_silence() -> None:
@@ -54,3 +56,11 @@ def test_it_ramps_exactly_where_five_in_a_row_are_missing(there: list[bool]) -> 
     for tick, came in enumerate(there, start=1):
         newest, run = (tick, 0) if came else (newest, run + 1)
         assert (watchdog.look(tick, newest, newest) is Finding.RAMP) == (run >= 5)
+
+
+@given(st.lists(st.booleans(), max_size=60))
+def test_echoes_that_stand_still_for_seven_in_a_row_are_silence(heard: list[bool]) -> None:
+    watchdog, echo, run = started(), 0, 0
+    for tick, came in enumerate(heard, start=1):
+        echo, run = (tick, 0) if came else (echo, run + 1)
+        assert (watchdog.look(tick, tick, echo) is Finding.RAMP) == (run >= 7)
