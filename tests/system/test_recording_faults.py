@@ -30,9 +30,9 @@ KILLS = 2
 
 def plan_file(folder: Path, duration: float, preflight: str = "", recording: str = "") -> Path:
     path = folder / "plan.toml"
+    patient = PATIENT.replace("[preflight]", f"[preflight]\n{preflight}")
     path.write_text(
-        f"[test]\nname = 'trial'\nduration = {duration}\n{PATIENT}{preflight}\n{LOSS}"
-        f"[recording]\n{recording}\n"
+        f"[test]\nname = 'trial'\nduration = {duration}\n{patient}{LOSS}[recording]\n{recording}\n"
     )
     return path
 
@@ -95,8 +95,8 @@ def test_a_full_disk_stops_the_test_in_order_and_leaves_what_was_written(
 ) -> None:
     path = small_disk / "a.mcap"
     code, _, err = finish(start("run", plan_file(tmp_path, 20.0), "-o", path))
-    assert code == 2
-    assert f"rths: The folder {small_disk} has 0.7 MB free, and the recording needs" in err
+    assert code == 3
+    assert f"the folder {small_disk} has 0.7 MB free, and the recording needs" in err
     plan = plan_file(tmp_path, 20.0, preflight="disk_factor = 0.0")
     code, out, err = finish(start("run", plan, "-o", path, "--rt", "off"))
     assert code == 3, out + err

@@ -67,19 +67,18 @@ def test_a_real_test_of_two_slaves_replays_to_the_last_bit(real_run: tuple[dict[
     assert "slave.middle/table_command" in out
 
 
-def test_real_time_equals_virtual_time_until_a_message_of_any_slave_is_late(
-    real_run: tuple[dict[str, Any], Run], tmp_path: Path
-) -> None:
+def test_real_time_equals_virtual_time_until_a_message_of_any_slave_is_late(tmp_path: Path) -> None:
     path = plan_file(tmp_path, "roof", "middle")
+    path.write_text(path.read_text().replace("duration =", "interval = 0.008\nduration ="))
     chosen = plans.load(path)
     assert virtual.run(virtual.assemble(chosen, reality.as_planned(chosen), tmp_path / "v.mcap"), str) is None
-    expected, real = read(tmp_path / "v.mcap"), real_run[1]
-    for attempt in range(5):
-        if (ticks := ticks_in_time(real)) >= 100:
-            break
-        again = tmp_path / f"{attempt}.mcap"  # a machine that is shared may be late early; then once more
+    expected = read(tmp_path / "v.mcap")
+    for attempt in range(3):  # a machine that is shared may be late early; then once more
+        again = tmp_path / f"{attempt}.mcap"
         assert finish(start("run", path, "-o", again))[0] == 0
         real = read(again)
+        if (ticks := ticks_in_time(real)) >= 100:
+            break
     assert ticks >= 100
     for topic in ("master", "slave.roof", "slave.middle"):
         for name, values in expected.columns[topic].items():
