@@ -29,10 +29,12 @@ test: check
 	$(BIN)/pytest -n 2 --ignore=tests/system
 	$(BIN)/pytest tests/system
 
+FAULT_TESTS := tests/system/faults tests/system/test_recording_faults.py tests/system/test_security.py
+
 faults: setup
 	mkdir -p runs
 	rm -f $(FAULT_ROWS)
-	RTHS_FAULT_ROWS=$(CURDIR)/$(FAULT_ROWS) $(BIN)/pytest tests/faults tests/system/faults
+	RTHS_FAULT_ROWS=$(CURDIR)/$(FAULT_ROWS) $(BIN)/pytest tests/faults $(FAULT_TESTS)
 	$(BIN)/python -m tests.faults.rows $(FAULT_ROWS) docs/faults.md
 
 docs: setup

@@ -137,6 +137,7 @@ def test_the_interpreter_is_as_it_was_afterwards() -> None:
         gc.disable()
         sys.setswitchinterval(1e-4)
 
+    gc.enable()  # a command that another test called may have left it off
     interval, frozen = sys.getswitchinterval(), gc.get_freeze_count()
     one = world()
     one.process("any").start(body)
