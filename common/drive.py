@@ -8,6 +8,7 @@ from types import FrameType
 from typing import Protocol
 
 from common.endpoint import Received
+from common.exchange import State
 from common.laboratory import Laboratory
 from common.realtime import freeze
 from common.safety.modes import Mode
@@ -86,9 +87,10 @@ def drive(loop: Loop, stopping: Callable[[], str], surroundings: Surroundings) -
         if loop.lab.running:
             surroundings.begin()
         freeze()
-        if run(loop, stopping):
+        following = run(loop, stopping)
+        if loop.lab.running:
             loop.finish()
-        come_to_rest(loop)
+        come_to_rest(loop, following)
         if loop.lab.safety.mode is Mode.EMERGENCY_STOP:
             loop.stop_rig()
         stay(loop, stopping)
@@ -103,13 +105,13 @@ def drive(loop: Loop, stopping: Callable[[], str], surroundings: Surroundings) -
 def handshake(loop: Loop, stopping: Callable[[], str]) -> None:
     """Until the start is agreed or the test is over."""
     lab = loop.lab
-    while not lab.running and not lab.exchange.ended and not stopping():
+    while lab.exchange.state in (State.IDLE, State.REGISTERED, State.ARMED) and not stopping():
         loop.poll()
         fetch(loop, lab.clock.now() + IDLE_NS)
 
 
-def run(loop: Loop, stopping: Callable[[], str]) -> bool:
-    """All ticks; False where the test ended before the last."""
+def run(loop: Loop, stopping: Callable[[], str]) -> int:
+    """All ticks, fewer where the test ends before the last; the one that would come next."""
     lab = loop.lab
     reported = 0
     for tick in range(lab.plan.ticks):
@@ -117,7 +119,7 @@ def run(loop: Loop, stopping: Callable[[], str]) -> bool:
         if reason := stopping():
             loop.stop(reason)
         if not lab.running:
-            return False
+            return tick
         loop.tick(tick)
         lab.tell_news(tick)
         lab.send_samples()
@@ -125,14 +127,18 @@ def run(loop: Loop, stopping: Callable[[], str]) -> bool:
             reported = lab.clock.now()
             lab.report("progress", {"tick": tick, "t": tick * lab.plan.test.interval, **loop.progress})
     wait(loop, lab.plan.ticks)
-    return lab.running
+    return lab.plan.ticks
 
 
-def come_to_rest(loop: Loop) -> None:
-    """The ramp to rest, an interval at a time; intervals that were missed are left out, never caught up."""
-    lab, tick = loop.lab, loop.ticks
+def come_to_rest(loop: Loop, tick: int) -> None:
+    """The ramp to rest from a tick on, an interval at a time; those that were missed are left out, never caught up.
+
+    A tick that is late by more than a part is left out too: two commands in quick succession would be a step.
+    """
+    lab = loop.lab
+    late = lab.interval_ns // 4
     while lab.safety.mode is Mode.RAMPING:
-        tick += max(-(-(lab.clock.now() - loop.nominal(tick)) // lab.interval_ns), 0)
+        tick += max(-((loop.nominal(tick) + late - lab.clock.now()) // lab.interval_ns), 0)
         lab.clock.sleep_until(loop.nominal(tick))
         while fetch(loop, 0):
             pass
@@ -159,7 +165,7 @@ def wait(loop: Loop, tick: int) -> None:
     """
     lab = loop.lab
     lab.clock.sleep_until(loop.earliest(tick))
-    if tick < lab.plan.ticks and lab.overrun(lab.clock.now() - loop.nominal(tick), tick):
+    if lab.running and tick < lab.plan.ticks and lab.overrun(lab.clock.now() - loop.nominal(tick), tick):
         return
     while fetch(loop, 0):
         pass

@@ -52,7 +52,7 @@ class Laboratory:
         self.exchange = Exchange()
         self.safety = Safety(self._turned)
         self.tick = 0  # the newest one that has begun
-        self.answer = (False, "")  # to the operator's newest press
+        self.answers: dict[int, tuple[bool, str]] = {}  # to the operator's presses
         self.interval_ns = round(setting.plan.test.interval * 1e9)
         self.start_ns = 0  # own clock, tick 0
         self.epoch_ns = 0  # Unix time of tick 0 on the master's base

@@ -33,9 +33,9 @@ def obey(loop: Operated, wish: Operator) -> None:
     if wish.plan != lab.plan.digest() or wish.word not in WORDS:
         return
     if lab.safety.pressed(wish.press):
-        lab.answer = _done(loop, wish)
-        lab.note("operator", f"{wish.word}: {lab.answer[1]}", tick=lab.tick)
-    accepted, text = lab.answer
+        lab.answers[wish.press] = _done(loop, wish)
+        lab.note("operator", f"{wish.word}: {lab.answers[wish.press][1]}", tick=lab.tick)
+    accepted, text = lab.answers[wish.press]
     lab.endpoint.send(Answer(0, wish.press, int(accepted), text))
 
 

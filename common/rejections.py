@@ -36,9 +36,9 @@ class Rejections:
         """Count one frame, from one who speaks as this role."""
         name = reason.value
         with self._lock:
-            self.counts[name] += 1
             first_ns = self.seen[name].first_ns if name in self.seen else now_ns
             self.seen[name] = Seen(first_ns, now_ns, role)
+            self.counts[name] += 1  # last: `news` looks for who was seen
         self._fresh = self._fresh or name not in UNTOLD
 
     def news(self, now_ns: int) -> dict[str, Any] | None:

@@ -118,12 +118,13 @@ class GuardedRig:
     def read(self) -> Any:
         """The measurements as the NamedTuple; raises RigError where they are no finite numbers of the right count."""
         try:
-            values = self._rig.read()
+            given = self._rig.read()
+            values = tuple(given) if isinstance(given, Iterable) else given
         except Exception as error:  # a plug-in may raise anything; the user gets a sentence
             raise self._failure("read", error) from error
         try:
             reading = self._measurement(*map(float, values))
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise RigError(self._complaint(values)) from None
         if not math.isfinite(sum(reading)):
             raise RigError(f"{self._name}: read() returned {tuple(reading)}, which is not finite.")
@@ -156,6 +157,6 @@ class GuardedRig:
         fields: tuple[str, ...] = self._measurement._fields  # type: ignore[attr-defined]
         try:
             count = len(list(map(float, values)))
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             return f"{self._name}: read() returned {values!r}, not numbers."
         return f"{self._name}: read() returned {count} numbers, not {len(fields)} ({', '.join(fields)})."

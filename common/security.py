@@ -19,7 +19,7 @@ from cryptography.x509.oid import NameOID
 from common import tls
 from common.errors import InputError
 from common.plan import Plan, resolve
-from common.roles import title
+from common.roles import OBSERVER, OPERATOR, title
 
 TLS = "transport/link/tls"
 
@@ -65,7 +65,8 @@ def identity(plan: Plan, role: str, now: datetime | None = None) -> Identity:
     """
     folder = resolve(plan, plan.link.security.folder)
     found = Identity(role, folder / "authority.pem", folder / f"{role}.pem", folder / f"{role}.key")
-    lasting = timedelta(seconds=plan.link.connect_timeout + plan.test.duration)
+    seconds = 0.0 if role in (OPERATOR, OBSERVER) else plan.link.connect_timeout + plan.test.duration
+    lasting = timedelta(seconds=seconds)
     check(found, now or datetime.now(UTC), lasting)
     return found
 

@@ -38,7 +38,7 @@ class Ending:
     """
 
     def __init__(self, plan: Plan) -> None:
-        self._notice = plan.link.loss_timeout + LEAVE_S
+        self._notice = plan.link.loss_timeout + LEAVE_S + resting(plan)
         self._miss_recorder = plan.recording.patience + LEAVE_S if plan.recording.required else math.inf
         self._wished = self._ask = self._alone = math.inf  # since when, from when, since when
         self.agreed = False  # the start: from now on there are ticks
@@ -69,6 +69,12 @@ class Ending:
         if name == RECORDER:
             return self._alone + (WRITE_S if self.agreed else MARGIN_S + KILL_S)
         return self._ask + (KILL_S if self.agreed else LEAVE_S + KILL_S)
+
+
+def resting(plan: Plan) -> float:
+    """The longest way to rest, s: from the actuator's limit, at the speed of the unloading."""
+    safety = plan.safety
+    return plan.limits.actuator_command / safety.velocity + safety.settle + safety.release + MARGIN_S
 
 
 class Ended(Protocol):

@@ -40,7 +40,8 @@ def announced(plan: Plan, endpoint: str) -> Iterator[None]:
     try:
         yield
     finally:
-        path.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            path.unlink(missing_ok=True)
 
 
 def found() -> list[Running]:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from common.clock import VirtualClock
 from common.endpoint import Endpoint
-from common.errors import RthsError
+from common.errors import InterlockError, RthsError
 from common.laboratory import Report, Setting, silent
 from common.memory_link import MemoryHub
 from common.plan import Plan
@@ -103,8 +103,8 @@ def run(bench: Bench, stopping: Callable[[], str]) -> RthsError | None:
     several causes the master's.
     """
     codes = _listening(bench)
-    rounds = 0
-    while not bench.master.lab.running and not _over(bench) and rounds < MOST_ROUNDS:
+    rounds, most = 0, MOST_ROUNDS + bench.master.lab.plan.preflight.exchanges
+    while not bench.master.lab.running and not _over(bench) and rounds < most:
         bench.clock.time += ROUND_NS
         _exchange(bench, poll=True)
         rounds += 1
@@ -124,6 +124,8 @@ def run(bench: Bench, stopping: Callable[[], str]) -> RthsError | None:
     _leave(bench)
     failed = {role: loop.lab.error for role, loop in bench.loops.items() if loop.lab.error}
     causes = [error for role, error in failed.items() if codes.get(role) != CONSEQUENCE]
+    if not failed and bench.master.ticks < ticks:
+        return InterlockError(bench.master.lab.exchange.cause or "The test never began.")
     return next(iter([*causes, *failed.values()]), None)
 
 
@@ -179,7 +181,8 @@ def _tick(bench: Bench, tick: int) -> None:
 
 def _come_to_rest(bench: Bench) -> None:
     """The ramps of all laboratories, an interval at a time."""
-    tick = bench.master.ticks
+    lab = bench.master.lab
+    tick = (bench.clock.now() - lab.start_ns) // lab.interval_ns + 1  # after the one that has been
     while True:
         bench.clock.sleep_until(bench.master.lab.tick_ns(tick))
         _exchange(bench, poll=False)

@@ -104,6 +104,9 @@ class Handshake:
         lab.endpoint.send(Armed(lab.exchange.session))
 
     def _schedule(self, start: Start) -> None:
+        far = abs(start.start_ns - self._lab.clock.now()) > self._lab.plan.link.connect_timeout * 1e9
+        if far:  # no time that anybody could have meant
+            return
         if self._lab.exchange.state is State.ARMED:
             self._lab.start_ns = start.start_ns
             self._lab.epoch_ns = start.epoch_ns

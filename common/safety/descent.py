@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any, Generic, Protocol, TypeVar
 
 from common.errors import EmergencyStopError, RigError
+from common.exchange import Event
 from common.laboratory import Laboratory
 from common.rig import GuardedRig
 from common.roles import ramp_topic
@@ -65,7 +66,8 @@ class Descent(Generic[Command]):
             measured = self._rig.read()
         except EmergencyStopError:
             raise
-        except RigError:  # it comes to a hold blind; its cause is known
+        except RigError as error:  # it comes to a hold blind
+            self._failed(error, tick)
             measured = None
         self.step(tick, measured)
 
@@ -89,8 +91,14 @@ class Descent(Generic[Command]):
             raise
         except RigError as error:
             self._lab.note("ramp", str(error), level="warning", tick=tick)
+            self._failed(error, tick)
             return True
         return False
+
+    def _failed(self, error: RigError, tick: int) -> None:
+        """After an orderly end a rig's failure is the cause that latches; after a trip the first cause stays."""
+        if self._lab.safety.cause is None:
+            self._lab.fail(Event.TRIP, error, code="rig", tick=tick)
 
     def _begin(self, tick: int) -> Ramp[Command]:
         self._begun = tick

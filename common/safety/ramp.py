@@ -60,7 +60,8 @@ class MotionRamp:
         """At a constant speed: unload after the hold, end the unloading in time, be done at the end."""
         if self._phase is _Phase.STOPPING and self._unload and force is not None:
             self._held_force = force
-            self._slow = self._unloading_speed()
+            loaded = force * self.command > 0.0  # where not, the way to zero does not take the force away
+            self._slow = self._unloading_speed() if loaded else 0.0
             self._change(_Phase.UNLOADING if self._slow else _Phase.ENDING, 0.0, self._slow)
         elif self._phase is _Phase.UNLOADING:
             most = self._distance(self._slow) + abs(self._slow) * self._interval

@@ -467,7 +467,7 @@ def test_early_stop_by_the_user_is_orderly(short_plan: Plan, tmp_path: Path) -> 
     bench = virtual.assemble(short_plan, reality.as_planned(short_plan), path)
     error = virtual.run(bench, lambda: "stopped by the user." if bench.master.ticks == 700 else "")
     found = read(path)
-    assert error is None
+    assert str(error) == "stopped by the user."
     assert bench.master.lab.exchange.state is bench.slave.lab.exchange.state is State.DONE
     assert found.ticks("master") == found.ticks("slave") == 700
     assert found.metadata["summary"]["cause"] == "stopped by the user."

@@ -22,7 +22,7 @@ from common.plan import Plan
 from common.tables import Rig
 from recorder.loop import RecorderLoop
 from rths import virtual
-from rths.ending import KILL_S, LEAVE_S, MARGIN_S, SILENCE_S, WRITE_S, Ending, verdict
+from rths.ending import KILL_S, LEAVE_S, MARGIN_S, SILENCE_S, WRITE_S, Ending, resting, verdict
 from rths.processes import Leash, Processes, understood
 from rths.run import follow
 from rths.terminal import Progress
@@ -106,11 +106,11 @@ def test_a_failure_before_the_start_reaches_the_others_after_a_moment(short_plan
 
 def test_a_wish_during_ticks_reaches_the_master_alone_and_who_hangs_is_killed(short_plan: Plan) -> None:
     times = Times(ending(short_plan, agreed=True), {"master": 2.0, "recorder": 18.0}, wish=1.0)
-    notice = short_plan.link.loss_timeout + LEAVE_S
+    notice = short_plan.link.loss_timeout + LEAVE_S + resting(short_plan)
     assert times.asked["master"] == near(1.0)
     assert times.asked["slave"] == near(1.0 + notice)
     assert times.killed == {"slave": near(1.0 + notice + KILL_S)}
-    assert notice + KILL_S == pytest.approx(10.0, abs=1.0)
+    assert notice + KILL_S == pytest.approx(16.0, abs=1.0)
 
 
 def test_a_lost_slave_is_the_masters_to_notice_and_the_recorder_ends_by_itself(short_plan: Plan) -> None:
