@@ -12,14 +12,8 @@ from common.plan import Plan
 
 ROOT = Path(__file__).resolve().parent.parent
 
-# for tests of something else on machines that are shared: a laboratory that is held up goes on, though its rig jumps
-PATIENT = """
-[safety]
-hold_after = 3000
-ramp_after = 5000
-overrun = 5000
-[preflight]
-late_share = 1.0
+# no limit on how far a rig may jump after a pause
+JUMPS = """
 [limits]
 actuator_velocity = inf
 actuator_acceleration = inf
@@ -29,6 +23,19 @@ table_step = inf
 damper_step = inf
 table_acceleration = 1000.0
 """
+
+# for tests of something else on machines that are shared: a laboratory that is held up goes on, though its rig jumps
+PATIENT = (
+    """
+[safety]
+hold_after = 3000
+ramp_after = 5000
+overrun = 5000
+[preflight]
+late_share = 1.0
+"""
+    + JUMPS
+)
 
 
 def with_table(base: Plan, table: str, **values: object) -> Plan:

@@ -47,6 +47,7 @@ exchanges = 200
 {preflight}
 [safety]
 wait_for_reset = {stay}
+{safety}
 [master.rig]
 class = "{rigs}:Column"
 options = {{ log = "{folder}/master.log" }}
@@ -209,6 +210,7 @@ class Bench:
         recorder: str = "recorder",
         stay: bool = True,
         preflight: str = "",
+        safety: str = "",
     ) -> None:
         self.folder = folder
         self.place = place or loopback()
@@ -216,7 +218,12 @@ class Bench:
         self.path = folder / "plan.toml"
         rigs = Path(__file__).with_name("rigs.py")
         text = PLAN.format(
-            duration=duration, folder=folder, rigs=rigs, stay=str(stay).lower(), preflight=preflight
+            duration=duration,
+            folder=folder,
+            rigs=rigs,
+            stay=str(stay).lower(),
+            preflight=preflight,
+            safety=safety,
         )
         self.path.write_text(text + more)
         self.plan: Plan = plans.load(self.path)
