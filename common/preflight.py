@@ -120,7 +120,7 @@ def link_risk(round_trips_s: Sequence[float], lost: int, plan: Plan) -> Risk | N
         return Risk(
             "link", f"of {lost} exchanges over the link none came back, so look at network and firewall"
         )
-    if lost == 0 and late <= share * len(round_trips_s):
+    if lost <= plan.preflight.lost and late <= share * len(round_trips_s):
         return None
     return Risk(
         "link",
@@ -130,16 +130,18 @@ def link_risk(round_trips_s: Sequence[float], lost: int, plan: Plan) -> Risk | N
     )
 
 
-def link_text(round_trips_s: Sequence[float], plan: Plan) -> str:
+def link_text(round_trips_s: Sequence[float], lost: int, plan: Plan) -> str:
     """What a link has passed, in words."""
     late = sum(trip > plan.test.interval for trip in round_trips_s)
-    return f"link {len(round_trips_s)} exchanges, none lost, {late} late, {quantiles(round_trips_s)}"
+    return (
+        f"link {len(round_trips_s)} exchanges, {lost or 'none'} lost, {late} late, {quantiles(round_trips_s)}"
+    )
 
 
 def link_check(round_trips_s: Sequence[float], lost: int, plan: Plan) -> Check:
     """The link's check, for a gate."""
     risk = link_risk(round_trips_s, lost, plan)
-    return Check("" if risk else link_text(round_trips_s, plan), risk)
+    return Check("" if risk else link_text(round_trips_s, lost, plan), risk)
 
 
 def quantiles(round_trips_s: Sequence[float]) -> str:

@@ -234,6 +234,7 @@ class Preflight:
 
     disk_factor: float = key("free disk over the recording's expected size", default=2.0, least=0.0)
     exchanges: int = key("exchanges that the link must pass", default=1000, least=10, most=1_000_000)
+    lost: int = key("exchanges of them that may be lost", default=0, least=0)
     late_share: float = key(
         "share of them that may take longer than the interval", default=0.05, least=0.0, most=1.0
     )

@@ -32,6 +32,7 @@ hold_after = 3000
 ramp_after = 5000
 overrun = 5000
 [preflight]
+lost = 1000
 late_share = 1.0
 """
     + JUMPS
