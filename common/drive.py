@@ -72,6 +72,10 @@ class Loop(Protocol):
         """Whether they were heard."""
 
     @property
+    def completed(self) -> bool:
+        """Whether the test had all its ticks."""
+
+    @property
     def needed(self) -> bool:
         """Whether other laboratories that are latched are reached through this one alone."""
 
@@ -205,3 +209,9 @@ class Stopper:
     def __call__(self) -> str:
         """The reason, empty while there is none."""
         return self._reason
+
+    @staticmethod
+    def ignore() -> None:
+        """From now on: a process that has done its work ends with its own exit code, not with a late signal's."""
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.SIG_IGN)

@@ -154,6 +154,14 @@ class Laboratory:
         if event is not Event.REFUSE and not remote:
             self.say_why()
 
+    def emergency(self, error: EmergencyStopError) -> None:
+        """Latch the emergency stop, also where the test has ended before."""
+        if self.exchange.ended:
+            self.note("emergency", str(error), level="error", tick=self.tick)
+            self.safety.trip(self.cause("emergency", error), Turn.EMERGENCY)
+        else:
+            self.fail(Event.TRIP, error, code="emergency", tick=self.tick)
+
     def say_why(self) -> None:
         """Tell the other laboratory that this one has stopped, and why."""
         if self.exchange.session:

@@ -70,9 +70,10 @@ def conduct(
         drive(loop, stopping, Surroundings(loop.lab, granted, endpoint.rejected, timed=timed, gate=gate))
     finally:
         link.close()
+        stopping.ignore()
     if loop.lab.error is not None:
         raise loop.lab.error
-    if loop.ticks < plan.ticks:
+    if not loop.completed:
         raise InterlockError(loop.lab.exchange.cause or "The test was stopped before its end.")
     return 0
 

@@ -261,12 +261,7 @@ class MasterLoop:
 
     def emergency(self, error: EmergencyStopError) -> None:
         """Stop the rig at once."""
-        lab = self.lab
-        if lab.exchange.ended:
-            lab.note("emergency", str(error), level="error", tick=lab.tick)
-            lab.safety.trip(lab.cause("emergency", error), Turn.EMERGENCY)
-        else:
-            lab.fail(Event.TRIP, error, code="emergency", tick=lab.tick)
+        self.lab.emergency(error)
         self.stop_rig()
 
     def standing(self) -> str:
@@ -325,6 +320,11 @@ class MasterLoop:
         """Whether slaves and recorder know and have all."""
         settled = self.lab.exchange.ended
         return settled and (self.lab.recorder_has_all() or not self.lab.recorded)
+
+    @property
+    def completed(self) -> bool:
+        """Whether the test had all its ticks."""
+        return self.ticks >= self.lab.plan.ticks
 
     @property
     def needed(self) -> bool:

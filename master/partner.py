@@ -35,11 +35,10 @@ class Partner:
         self._offset = ClockOffset(length=OFFSET_BLOCK, blocks=OFFSET_BLOCKS)
         self._first_offset = 0
         self._sync_sent_ns = 0
-        self._asked_seq = -1
         self._syncs = 0
         self._exchanges = SYNC_EXCHANGES
         self.trips: list[float] = []  # of the exchanges before the start, s
-        self.lost = 0  # of them, those asked again
+        self._asked = self._answered = 0  # how often for an exchange, how often it came back
         self._asked_ns = -REPEAT_NS
         self._watchdog = Watchdog(lab.plan.safety, interval)
         self.tally = Tally(lab.plan.ticks, lab.plan.window)
@@ -100,13 +99,18 @@ class Partner:
 
     def synchronise(self, now: int) -> None:
         """Ask for one exchange of clock readings."""
-        self.lost += self._asked_seq == self._syncs
-        self._asked_seq = self._syncs
+        self._asked += 1
         self._sync_sent_ns = now
         self._lab.endpoint.send(Sync(self._lab.exchange.session, self._syncs, now), self._address)
 
+    @property
+    def lost(self) -> int:
+        """Exchanges asked for that never came back; one that was asked again and came twice is not lost."""
+        return self._asked - self._answered
+
     def take_sync(self, reply: SyncReply, received_ns: int) -> bool:
         """Take in the answer to the last one asked for; whether it was that."""
+        self._answered += 0 <= reply.seq <= self._syncs and self._answered < self._asked
         if reply.seq != self._syncs:
             return False
         self._offset.add(self._sync_sent_ns, reply.received_ns, reply.sent_ns, received_ns)

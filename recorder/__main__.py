@@ -61,6 +61,7 @@ def run(args: argparse.Namespace) -> int:
             summary = loop.close()
     finally:
         link.close()
+        stopping.ignore()
     report("recording", {"file": str(path), "summary": dict(summary)})
     if loop.error is not None:
         raise loop.error

@@ -66,6 +66,7 @@ class SlaveLoop:
         self._tally = Tally(setting.plan.ticks, setting.plan.window)
         self._feedbacks = 0  # sent
         self._disarmed = False
+        self._master_ticks = 0  # those it says it has done
         self.ticks = 0
 
     # -- messages ---------------------------------------------------------------------------------
@@ -125,6 +126,7 @@ class SlaveLoop:
     def _stop(self, request: Stop) -> None:
         if self.lab.exchange.allows(Event.STOP):
             self.lab.exchange.happen(Event.STOP, remote=True, cause=request.reason)
+            self._master_ticks = request.ticks
             self.lab.safety.follow(Turn.END)
 
     # -- ticks ------------------------------------------------------------------------------------
@@ -267,12 +269,7 @@ class SlaveLoop:
 
     def emergency(self, error: EmergencyStopError) -> None:
         """Stop the rig at once."""
-        lab = self.lab
-        if lab.exchange.ended:
-            lab.note("emergency", str(error), level="error", tick=lab.tick)
-            lab.safety.trip(lab.cause("emergency", error), Turn.EMERGENCY)
-        else:
-            lab.fail(Event.TRIP, error, code="emergency", tick=lab.tick)
+        self.lab.emergency(error)
         self.stop_rig()
 
     def standing(self) -> str:
@@ -327,6 +324,11 @@ class SlaveLoop:
         lab = self.lab
         nothing = not lab.exchange.session or not lab.recorded
         return lab.exchange.ended and (nothing or lab.recorder_has_all())
+
+    @property
+    def completed(self) -> bool:
+        """Whether the test had all its ticks, if not here, where this laboratory has fallen behind, at the master."""
+        return max(self.ticks, self._master_ticks) >= self.lab.plan.ticks
 
     @property
     def needed(self) -> bool:

@@ -265,3 +265,20 @@ def test_one_processor_of_each_core_comes_first_and_processor_0_last(monkeypatch
     monkeypatch.setattr(realtime, "first_line", lambda path: twins[int(path.parts[-3].removeprefix("cpu"))])
     monkeypatch.setattr(os, "sched_getaffinity", lambda _pid: {0, 1, 4, 5})
     assert realtime.preferred() == [1, 0, 5, 4]
+
+
+def test_a_process_that_has_done_its_work_keeps_its_exit_code_under_late_signals() -> None:
+    late = child("""
+import signal
+from common.drive import Stopper
+class Late:
+    def __del__(self): os.kill(os.getpid(), signal.SIGTERM)
+stopping = Stopper()
+os.kill(os.getpid(), signal.SIGTERM)
+assert stopping() == 'stopped by the user (SIGTERM).'
+stopping.ignore()
+late = Late()
+sys.late = late  # until the interpreter itself is taken down
+sys.exit(3)
+""")
+    assert late.returncode == 3, late.stderr

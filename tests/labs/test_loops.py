@@ -14,8 +14,9 @@ from common.clock import VirtualClock
 from common.endpoint import Received
 from common.errors import InputError, InterlockError, LostError, RigError, RthsError
 from common.exchange import State
+from common.laboratory import REPEAT_NS
 from common.memory_link import MemoryEndpoint
-from common.messages import Command, Feedback, Register, Trip
+from common.messages import Command, Feedback, Register, Stop, SyncReply, Trip
 from common.plan import PROTOCOL_VERSION, Plan, from_tables
 from common.reality import Reality
 from common.recording.reader import Run, read
@@ -319,6 +320,31 @@ def test_a_silent_slave_is_lost_and_nothing_more_moves(bench: Bench) -> None:
     assert bench.master.lab.safety.mode is Mode.RAMPING
     assert bench.master.lab.safety.cause is not None
     assert bench.master.lab.safety.cause.code == "watchdog"
+
+
+@pytest.mark.parametrize(("done", "completed"), [(1000, True), (999, False)])
+def test_a_slave_that_has_fallen_behind_knows_a_test_that_the_master_completed(
+    done: int, completed: bool, bench: Bench
+) -> None:
+    assert not bench.slave.completed
+    plan, session = bench.slave.lab.plan, bench.slave.lab.exchange.session
+    request = Stop(session, plan.ticks - 1000 + done, "completed")
+    bench.slave.take(Received(request, "master"))
+    assert bench.slave.ticks < plan.ticks
+    assert bench.slave.completed is completed
+
+
+def test_an_exchange_that_was_asked_again_and_answered_twice_is_not_lost(short_plan: Plan) -> None:
+    bench = virtual.assemble(short_plan, reality.as_planned(short_plan), None)
+    partner = bench.master.partners["slave"]
+    partner.synchronise(0)
+    partner.synchronise(REPEAT_NS)
+    assert partner.lost == 2
+    answer = SyncReply(bench.master.lab.exchange.session, 0, 0, 0)
+    assert partner.take_sync(answer, REPEAT_NS + 1)
+    assert not partner.take_sync(answer, REPEAT_NS + 2)
+    assert not partner.take_sync(answer, REPEAT_NS + 3)
+    assert partner.lost == 0
 
 
 def test_a_slave_without_commands_keeps_the_last_one_and_goes_on_measuring_until_it_ramps(
