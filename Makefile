@@ -34,7 +34,7 @@ FAULT_TESTS := tests/system/faults tests/system/test_recording_faults.py tests/s
 faults: setup
 	mkdir -p runs
 	rm -f $(FAULT_ROWS)
-	RTHS_FAULT_ROWS=$(CURDIR)/$(FAULT_ROWS) $(BIN)/pytest tests/faults $(FAULT_TESTS)
+	RTHS_FAULT_INTERVAL=0.002 RTHS_FAULT_ROWS=$(CURDIR)/$(FAULT_ROWS) $(BIN)/pytest tests/faults $(FAULT_TESTS)
 	$(BIN)/python -m tests.faults.rows $(FAULT_ROWS) docs/faults.md
 
 docs: setup

@@ -17,6 +17,7 @@ from types import TracebackType
 from typing import Any, NamedTuple, Self, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from common import plan as plans
 from common.plan import Plan
@@ -28,18 +29,23 @@ from tests.system.faults.rigs import Log, Wish
 
 LABS = ("master", "slave")
 LOST = ("watchdog", "lost")  # causes with exit code 4
-INTERVAL = 0.002
+INTERVAL = float(
+    os.environ.get("RTHS_FAULT_INTERVAL", "0.01")
+)  # s; a shared machine seldom pauses for five of it
 WATCHDOG = 5 * INTERVAL  # W2
 AT = 1.3  # s of test at which faults come: the building moves as much as it ever does
 SPARE = 10_000  # entries of a rig's log beyond the ticks, for the ramp
-ATTEMPTS = 3
+ATTEMPTS = 5
 STILL = 0.2  # s for which nothing must move
-PAUSE_NS = 3_000_000  # between two commands of a rig; more is a pause of this machine
+PAUSE = (
+    0.9 * INTERVAL
+)  # s that a command may be late; from there on a tick counts as the laboratory's own pause
 
 PLAN = """
 [test]
 name = "fault"
 duration = {duration}
+interval = {interval}
 [ground_motion]
 scale = 0.3
 [preflight]
@@ -219,6 +225,7 @@ class Bench:
         rigs = Path(__file__).with_name("rigs.py")
         text = PLAN.format(
             duration=duration,
+            interval=INTERVAL,
             folder=folder,
             rigs=rigs,
             stay=str(stay).lower(),
@@ -407,7 +414,7 @@ def by_rig(bench: Bench, lab: str, last: int, first: int, *, held: bool) -> tupl
     if held:
         first = last + int(np.argmax(np.diff(written.ns[last:]))) + 1
     between = np.diff(written.ns[last - 20 : first + 1])
-    if not held and between.max(initial=0) > PAUSE_NS + INTERVAL * 1e9:
+    if not held and between.max(initial=0) > (PAUSE + INTERVAL) * 1e9:
         raise DisturbedError(f"the {lab} paused for {between.max() * 1e-6:.1f} ms")
     motion = np.max(np.abs(written.displacement[last:] - written.displacement[last]))
     return float(written.ns[first] - written.ns[last]) * 1e-9, float(motion)
@@ -445,11 +452,22 @@ def judge(
     assert any("ramping (trip)" in text for text in found.modes), found
     assert found.modes[-1] in ("ramping → safe (secured)", "safe → idle (reset)"), found
     assert found.seconds <= most + 1e-9, found
-    assert found.rig_seconds <= most + PAUSE_NS * 1e-9, found
+    assert found.rig_seconds <= most + PAUSE, found
     bound = motion_bound(bench.plan, lab)
     assert found.motion <= bound, found
     assert found.rig_motion <= bound, found
     return found
+
+
+def later(upset: NDArray[np.bool_], quiet: NDArray[np.bool_], name: str) -> None:
+    """Raise DisturbedError where more of the ticks were late under a fault than without it, beyond what chance does.
+
+    A machine that is shared makes ticks late in both: three standard deviations of the difference, and one tick in
+    a thousand, count as the same.
+    """
+    chance = np.sqrt(quiet.mean() * (1.0 / upset.size + 1.0 / quiet.size))
+    if upset.mean() > quiet.mean() + 0.001 + 3.0 * chance:
+        raise DisturbedError(f"{upset.mean():.4f} of the ticks late with {name}, {quiet.mean():.4f} without")
 
 
 def worst(found: Mapping[str, Reaction]) -> tuple[float, float]:

@@ -31,6 +31,7 @@ from tests.system.faults.network import ADDRESSES, Network, inside, network
 from tests.system.faults.relay import TO_SLAVE, Relay, untouched
 
 LEASE = LEASE_MS * 1e-3  # s of silence after which zenoh closes a session
+RATE = round(0.4 / INTERVAL)  # kbit/s, a third of what a test sends
 RECONNECT = LEASE + 0.5  # s from where the link works again to the next word of the other laboratory
 
 
@@ -71,19 +72,19 @@ def heard_after(listener: Process, since: float) -> float:
     )
 
 
-def test_f05_a_black_hole_of_50_ms(machines: Network, tmp_path: Path) -> None:
+def test_f05_a_short_black_hole(machines: Network, tmp_path: Path) -> None:
     def scenario(folder: Path) -> None:
         with Bench(folder, machines.place("tcp")).start_all() as bench:
             try:
                 machines.cut()
-                time.sleep(0.05)
+                time.sleep(25 * INTERVAL)
             finally:
                 machines.mend()
             bench.rest(*LABS)
             found, _ = both(bench)
         apart = abs(found["master"].seconds - found["slave"].seconds)
         assert apart <= 2 * INTERVAL
-        row("F05", "black hole of 50 ms", "switch port cut, tcp", found)
+        row("F05", f"black hole of {25e3 * INTERVAL:.0f} ms", "switch port cut, tcp", found)
 
     undisturbed(scenario, tmp_path)
 
@@ -143,7 +144,7 @@ def test_f09_a_flapping_link_is_back_soon(machines: Network, tmp_path: Path) -> 
             time.sleep(0.7)  # until it listens
             try:
                 machines.unplug()
-                time.sleep(0.05)
+                time.sleep(25 * INTERVAL)
             finally:
                 plugged = machines.plug()
             again = heard_after(listener, plugged)
@@ -152,7 +153,7 @@ def test_f09_a_flapping_link_is_back_soon(machines: Network, tmp_path: Path) -> 
         assert again <= RECONNECT
         row(
             "F09",
-            "link flaps for 50 ms",
+            f"link flaps for {25e3 * INTERVAL:.0f} ms",
             "interface down and up, udp",
             found,
             f"link back after {again:.2f} s",
@@ -184,7 +185,7 @@ def test_f18_a_slow_link_trips_on_age(machines: Network, tmp_path: Path) -> None
     def scenario(folder: Path) -> None:
         with Bench(folder, machines.place("udp")).start_all() as bench:
             try:
-                machines.slow("200kbit")
+                machines.slow(f"{RATE}kbit")
                 bench.rest(*LABS)
             finally:
                 machines.fast()
@@ -196,7 +197,7 @@ def test_f18_a_slow_link_trips_on_age(machines: Network, tmp_path: Path) -> None
         stale = exchanged(run, "slave").get("commands.turned_away.stale", 0.0)
         assert stale > 0
         how = "token bucket at the switch, udp"
-        row("F18", "bandwidth of 200 kbit/s", how, found, f"{stale:.0f} stale commands turned away")
+        row("F18", f"bandwidth of {RATE} kbit/s", how, found, f"{stale:.0f} stale commands turned away")
 
     undisturbed(scenario, tmp_path)
 
@@ -216,7 +217,7 @@ def test_f17_flipped_bits_in_the_headers_of_zenoh(tmp_path: Path) -> None:
             listener = ear(bench)
             time.sleep(0.7)
             relay.change = lambda datagram, _: bytes([datagram[0] ^ 0x10]) + datagram[1:]
-            time.sleep(0.1)
+            time.sleep(50 * INTERVAL)
             relay.change = untouched
             again = heard_after(listener, time.monotonic())
             bench.rest(*LABS)
@@ -226,7 +227,7 @@ def test_f17_flipped_bits_in_the_headers_of_zenoh(tmp_path: Path) -> None:
         row(
             "F17",
             "bit flips in zenoh's headers",
-            "relay, udp, 100 ms",
+            f"relay, udp, {50e3 * INTERVAL:.0f} ms",
             found,
             f"link back after {again:.2f} s",
         )

@@ -22,7 +22,7 @@ from tests.faults.rows import Row, motion_bound, passed
 from tests.system.faults.bench import (
     INTERVAL,
     LABS,
-    PAUSE_NS,
+    PAUSE,
     WATCHDOG,
     Bench,
     DisturbedError,
@@ -104,7 +104,7 @@ def test_f19_f22_a_killed_master_and_the_next_one(tmp_path: Path) -> None:
             bench.slave.signal(signal.SIGTERM)
             bench.rest(*LABS)
             run = bench.finish()
-            assert run.ticks("slave") > 100
+            assert run.ticks("slave") > 0.2 / INTERVAL - 1
             passed(
                 Row(
                     "F22",
@@ -128,7 +128,7 @@ def by_log(bench: Bench, killed: float) -> tuple[float, float]:
     assert cause["code"] == "watchdog"
     ramp = round(cause["t"] / INTERVAL)
     written = bench.logs["slave"].written()
-    if np.diff(written.ns[ramp - 8 : ramp + 1]).max() > PAUSE_NS + INTERVAL * 1e9:
+    if np.diff(written.ns[ramp - 8 : ramp + 1]).max() > (PAUSE + INTERVAL) * 1e9:
         raise DisturbedError("the slave paused")
     last = ramp - bench.plan.safety.ramp_after
     seconds = float(written.ns[ramp]) * 1e-9 - killed

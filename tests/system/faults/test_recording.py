@@ -8,13 +8,12 @@ import numpy as np
 
 from common.recording.reader import Run
 from tests.faults.rows import Row, passed
-from tests.system.faults.bench import AT, INTERVAL, LABS, Bench, DisturbedError, Process, undisturbed
+from tests.system.faults.bench import AT, INTERVAL, LABS, Bench, Process, later, undisturbed
 from tests.system.faults.hostile import Stranger
 from tests.system.faults.impostor import FAR
 
 QUIET = 2.0  # s without strangers
 DOUBLES = 6.0  # s for a second slave and a second master
-MORE_LATE = 0.001  # share of ticks that may be late beyond that of a quiet time
 
 
 def test_f47_f51_neither_a_slow_disk_nor_strangers_hold_up_the_loop(tmp_path: Path) -> None:
@@ -37,13 +36,12 @@ def test_f47_f51_neither_a_slow_disk_nor_strangers_hold_up_the_loop(tmp_path: Pa
         latency, summary = run.columns["latency"], run.metadata["summary"]
         t, late = latency["seq"] * INTERVAL, latency["deadline_missed"]
         loud, quiet = late[(t >= begin) & (t < end)], late[(t >= since) & (t < begin)]
-        if loud.mean() > quiet.mean() + MORE_LATE:
-            raise DisturbedError(f"{loud.mean():.4f} late with strangers, {quiet.mean():.4f} without")
+        later(loud, quiet, "strangers")
         assert summary["items_lost"] == summary["items_dropped"] == "0"
         for topic in ("master", "slave", "latency"):
             assert run.sequences[topic].tolist() == list(range(bench.plan.ticks))
         waiting = summary["items_waiting_most"]
-        assert int(waiting) > 100
+        assert int(waiting) > 0.2 / INTERVAL  # of some items a tick, while the disk stalls for 0.3 s
         passed(
             Row(
                 "F47",
