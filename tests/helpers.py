@@ -38,6 +38,26 @@ late_share = 1.0
     + JUMPS
 )
 
+# a heavy building that sways so slowly that an interval of 40 ms computes it well: no machine is held up for as long
+SLOW = """
+[test]
+name = "slow"
+duration = 8.0
+interval = 0.04
+[ground_motion]
+scale = 0.01
+[structure]
+mass = 16e6
+damping = 2e6
+"""
+SLOW_TOWER = (
+    SLOW.replace("16e6", "[16e6, 16e6, 16e6]").replace("2e6", "[1e7, 1e7, 1e7]")
+    + """stiffness = [126e6, 126e6, 126e6]
+[column]
+stiffness = 63e6
+"""
+)
+
 
 def with_table(base: Plan, table: str, **values: object) -> Plan:
     """A plan with some keys of one table changed."""

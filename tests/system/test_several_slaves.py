@@ -9,15 +9,11 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
-from common import plan as plans
-from common import reality
 from common.recording.reader import Run, read
-from rths import virtual
-from tests.helpers import PATIENT
-from tests.system.test_real_time import finish, free_port, start, wait_for_ticks
+from tests.helpers import PATIENT, SLOW_TOWER
+from tests.system.test_real_time import equal_to_virtual_time, finish, free_port, start, wait_for_ticks
 
 TEXT = """
 [test]
@@ -68,31 +64,11 @@ def test_a_real_test_of_two_slaves_replays_to_the_last_bit(real_run: tuple[dict[
 
 
 def test_real_time_equals_virtual_time_until_a_message_of_any_slave_is_late(tmp_path: Path) -> None:
-    path = plan_file(tmp_path, "roof", "middle")
-    path.write_text(path.read_text().replace("duration =", "interval = 0.008\nduration ="))
-    chosen = plans.load(path)
-    assert virtual.run(virtual.assemble(chosen, reality.as_planned(chosen), tmp_path / "v.mcap"), str) is None
-    expected = read(tmp_path / "v.mcap")
-    for attempt in range(3):  # a machine that is shared may be late early; then once more
-        again = tmp_path / f"{attempt}.mcap"
-        assert finish(start("run", path, "-o", again))[0] == 0
-        real = read(again)
-        if (ticks := ticks_in_time(real)) >= 100:
-            break
-    assert ticks >= 100
-    for topic in ("master", "slave.roof", "slave.middle"):
-        for name, values in expected.columns[topic].items():
-            assert np.array_equal(real.columns[topic][name][:ticks], values[:ticks]), f"{topic}/{name}"
-
-
-def ticks_in_time(recording: Run) -> int:
-    """Ticks before the first late one of any slave."""
-    late = [
-        np.flatnonzero(columns["deadline_missed"])
-        for topic, columns in recording.columns.items()
-        if topic.startswith("latency")
-    ]
-    return min((int(found[0]) for found in late if found.size), default=recording.ticks("master"))
+    path = tmp_path / "slow.toml"
+    path.write_text(
+        f"{SLOW_TOWER}[slave.roof.damper]\nfloor = 3\n[slave.middle.damper]\nfloor = 2\n{PATIENT}"
+    )
+    equal_to_virtual_time(path)
 
 
 @pytest.mark.parametrize("count", [4, 8])
