@@ -12,7 +12,7 @@ from common.errors import EmergencyStopError, InterlockError, LostError, RthsErr
 from common.exchange import Event, Exchange, State
 from common.limits import Standstill, Violation
 from common.messages import Message, Recorder, Resend, Trip
-from common.outlet import Outlet, next_of
+from common.outlet import Outlet, kept_items, next_of
 from common.plan import Plan
 from common.roles import title
 from common.safety.modes import Cause, Mode, Safety, Turn
@@ -56,7 +56,7 @@ class Laboratory:
         self.interval_ns = round(setting.plan.test.interval * 1e9)
         self.start_ns = 0  # own clock, tick 0
         self.epoch_ns = 0  # Unix time of tick 0 on the master's base
-        self.outlet = Outlet(0, name)
+        self.outlet = Outlet(0, name, kept_items(self.plan, name))
         self.error: RthsError | None = None
         self.heard_ns = setting.clock.now()
         self.recorder: Recorder | None = None
@@ -66,7 +66,7 @@ class Laboratory:
         """Take part in a session."""
         self.exchange.session = session
         self.endpoint.enter(session)
-        self.outlet = Outlet(session, self.name)
+        self.outlet = Outlet(session, self.name, kept_items(self.plan, self.name))
 
     def move(self, event: Event) -> None:
         """One step of the handshake, agreed with the others."""

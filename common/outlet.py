@@ -1,32 +1,52 @@
 """A laboratory's stream to the recorder: items in order, sent in pieces, kept for sending again.
 
 An item is `[topic, log_ns, publish_ns, values…]`; the pieces are sent between ticks, so that nothing is
-written in the loop and a slow recorder costs it nothing.
+written in the loop and a slow recorder costs it nothing. What is kept is bounded by the plan, so that every laboratory
+is full after the same time of test and grows no more, however long that is.
 """
 
 from __future__ import annotations
 
+from bisect import bisect_right
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import msgpack
 
 from common.messages import Finished, Message, Resend, Samples
+from common.plan import Plan
+from common.roles import MASTER
 
 PIECE = 10  # items; at 500 ticks per second a piece leaves every 10 to 20 ms
-KEPT = 4_000  # pieces kept for sending again, a minute or more
-EARLY_BYTES = 32 << 20  # of pieces that wait for one before them; what comes beyond is asked for again
+PATIENCES = 6  # of the plan's with its recorder are kept for sending again: at the default a minute
+KEPT_BYTES = 64 << 20  # of them at most, which tall buildings with many slaves reach
+EARLY = 4_000  # pieces that wait for one before them; what comes beyond is asked for again
+EARLY_BYTES = 32 << 20  # of them
 BURST = 5  # pieces sent again at one request: they leave between ticks, and each costs some 50 µs
 
 
-class Outlet:
-    """Sending end of one laboratory's stream."""
+def kept_seconds(plan: Plan) -> float:
+    """How much of a test a laboratory keeps for sending again, s."""
+    return PATIENCES * plan.recording.patience
 
-    def __init__(self, session: int, lab: str) -> None:
+
+def kept_items(plan: Plan, lab: str) -> float:
+    """The items of that time: each tick gives one of the laboratory's own, and the master's one more per slave."""
+    per_tick = 1 + len(plan.roles) if lab == MASTER else 1
+    return kept_seconds(plan) / plan.test.interval * per_tick
+
+
+class Outlet:
+    """Sending end of one laboratory's stream; its newest `kept` items can be sent again, up to `KEPT_BYTES`."""
+
+    def __init__(self, session: int, lab: str, kept: float) -> None:
         self._session = session
         self._lab = lab
+        self._kept = kept
         self._pending: list[list[Any]] = []
-        self._sent: dict[int, Samples] = {}  # by first item, in order
+        self._sent: deque[Samples] = deque()  # one joining the other
+        self._sent_bytes = 0
         self.total = 0
 
     def add(self, topic: str, log_ns: int, publish_ns: int, values: tuple[Any, ...]) -> None:
@@ -46,19 +66,20 @@ class Outlet:
         return messages
 
     def _keep(self, piece: Samples) -> None:
-        self._sent[piece.first] = piece
-        if len(self._sent) > KEPT:
-            del self._sent[next(iter(self._sent))]
+        sent = self._sent
+        sent.append(piece)
+        self._sent_bytes += len(piece.items)
+        while len(sent) > 1 and (piece.first - sent[1].first >= self._kept or self._sent_bytes > KEPT_BYTES):
+            self._sent_bytes -= len(sent.popleft().items)
 
     def again(self, request: Resend) -> list[Message]:
         """The first pieces, at most `BURST`, that hold items asked for, as far as they are still kept."""
-        if not self._sent or not 0 <= request.first <= request.last < self.total:
+        if not 0 <= request.first <= request.last < self.total:
             return []
-        first = max(request.first, next(iter(self._sent)))
-        begin = next((item for item in range(first, first - PIECE, -1) if item in self._sent), first)
-        end = min(request.last + 1, begin + BURST * PIECE)
-        held: list[Message] = [self._sent[item] for item in range(begin, end) if item in self._sent]
-        return held[:BURST]
+        sent = self._sent
+        begin = max(bisect_right(sent, request.first, key=lambda piece: piece.first) - 1, 0)
+        pieces = [sent[place] for place in range(begin, min(begin + BURST, len(sent)))]
+        return [piece for piece in pieces if piece.first <= request.last]
 
     def finished(self) -> Finished:
         """The message that says how long the stream is."""
@@ -111,7 +132,7 @@ class Inlet:
         if piece.first == self.next:
             self.next += len(items)
             return items + self._ready()
-        if len(self._early) < KEPT and self._held + len(piece.items) <= EARLY_BYTES:
+        if len(self._early) < EARLY and self._held + len(piece.items) <= EARLY_BYTES:
             self._early[piece.first] = (items, len(piece.items))
             self._held += len(piece.items)
         return []

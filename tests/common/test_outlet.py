@@ -1,16 +1,21 @@
 from __future__ import annotations
 
+import math
 from typing import Any
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from common import outlet
 from common.messages import Resend, Samples
-from common.outlet import BURST, KEPT, PIECE, Inlet, Outlet
+from common.outlet import BURST, PATIENCES, PIECE, Inlet, Outlet, kept_items
+from common.plan import Plan
+from tests.helpers import with_table
 
 
-def filled(count: int) -> tuple[Outlet, list[Samples]]:
-    outlet = Outlet(1, "master")
+def filled(count: int, kept: float = math.inf) -> tuple[Outlet, list[Samples]]:
+    outlet = Outlet(1, "master", kept)
     pieces: list[Any] = []
     for number in range(count):
         outlet.add("master", number, number, (number, 0.5))
@@ -46,7 +51,7 @@ def test_whatever_is_lost_swapped_or_repeated_the_stream_comes_whole_and_in_orde
 
 
 def test_pieces_leave_when_they_are_full() -> None:
-    outlet = Outlet(1, "slave")
+    outlet = Outlet(1, "slave", math.inf)
     for number in range(PIECE - 1):
         outlet.add("slave", 0, 0, (number,))
     assert outlet.pieces() == []
@@ -86,9 +91,31 @@ def test_a_laboratory_sends_a_bounded_number_of_pieces_again_at_once() -> None:
 
 
 def test_what_is_no_longer_kept_is_not_sent_and_what_follows_it_is() -> None:
-    outlet, pieces = filled((KEPT + 3) * PIECE)
+    outlet, pieces = filled(103 * PIECE, kept=99 * PIECE)
     assert outlet.again(Resend(1, "master", 0, outlet.total - 1)) == pieces[3 : 3 + BURST]
     assert outlet.again(Resend(1, "master", 0, 3 * PIECE - 1)) == []
+
+
+@given(st.integers(1, 500), st.integers(1, 300))
+def test_the_newest_items_are_kept_and_hardly_more(count: int, kept: int) -> None:
+    outlet, _ = filled(count, kept)
+    again = [item for item in range(count) if outlet.again(Resend(1, "master", item, item))]
+    assert again == list(range(count - len(again), count))
+    assert min(count, kept) <= len(again) < kept + 2 * PIECE
+
+
+def test_what_is_kept_is_bounded_in_bytes_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(outlet, "KEPT_BYTES", 5_000)
+    sender, _ = filled(1_000 * PIECE)
+    assert 4_000 < sum(len(piece.items) for piece in sender._sent) == sender._sent_bytes <= 5_000
+
+
+def test_all_laboratories_keep_the_same_time_of_a_test(default_plan: Plan) -> None:
+    ticks = 60.0 / default_plan.test.interval
+    assert kept_items(default_plan, "slave") == pytest.approx(ticks)
+    assert kept_items(default_plan, "master") == pytest.approx(2 * ticks)  # and its latency
+    hasty = with_table(default_plan, "recording", patience=1.5)
+    assert kept_items(hasty, "slave") == pytest.approx(PATIENCES * 1.5 / default_plan.test.interval)
 
 
 def test_all_holes_are_known_at_once() -> None:

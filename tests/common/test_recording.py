@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import tracemalloc
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from mcap.reader import make_reader
 
 from common import signals
 from common.errors import InputError
+from common.recording import index
 from common.recording.reader import read
 from common.recording.writer import Recording
 from common.signals import TOPICS, Kind
@@ -125,6 +127,53 @@ def test_a_recording_that_was_not_closed_holds_all_that_was_flushed(tmp_path: Pa
     assert run.ticks("slave") == 50
     assert run.metadata["plan"] == {"toml": "x"}
     recording.abandon()
+
+
+def in_chunks(path: Path, chunks: int, ticks: int = 2) -> Recording:
+    """A recording, still open, of so many chunks beyond its first with so many ticks each."""
+    recording = write(path, 0, close=False)
+    for seq in range(chunks * ticks):
+        for topic in ("master", "slave", "latency"):
+            recording.add(topic, seq * 2_000_000, seq * 2_000_000 + 5, example(topic, seq))
+        if seq % ticks == ticks - 1:
+            recording.flush()
+    return recording
+
+
+def test_the_packed_index_is_the_librarys_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    in_chunks(tmp_path / "packed.mcap", 200).close({})
+    monkeypatch.setattr(index, "LIST", "_none")
+    in_chunks(tmp_path / "own.mcap", 200).close({})
+    assert (tmp_path / "packed.mcap").read_bytes() == (tmp_path / "own.mcap").read_bytes()
+
+
+def test_the_public_reader_finds_a_time_by_the_index(tmp_path: Path) -> None:
+    in_chunks(tmp_path / "a.mcap", 200).close({})
+    with (tmp_path / "a.mcap").open("rb") as stream:
+        reader = make_reader(stream)
+        summary = reader.get_summary()
+        assert summary is not None
+        assert summary.statistics is not None
+        assert len(summary.chunk_indexes) == summary.statistics.chunk_count == 200
+        found = list(reader.iter_messages(starting_at=100 * 2_000_000, ending_before=103 * 2_000_000))
+    assert sorted(message.sequence for _, _, message in found) == [100] * 3 + [101] * 3 + [102] * 3
+
+
+def test_a_recording_does_not_grow_with_the_test(tmp_path: Path) -> None:
+    recording = in_chunks(tmp_path / "a.mcap", 1)
+    chunks = 4_000
+    tracemalloc.start()
+    try:
+        for seq in range(chunks):
+            recording.add("slave", seq, seq, example("slave", seq))
+            recording.flush()
+            if seq == chunks // 2:
+                before, _ = tracemalloc.get_traced_memory()
+        after, _ = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+        recording.abandon()
+    assert (after - before) / (chunks // 2) < 64.0  # bytes a chunk; objects would take 700
 
 
 def test_schemas_and_plan_are_there_before_the_first_sample(tmp_path: Path) -> None:

@@ -1,0 +1,41 @@
+"""What all three processes together take more of as a test goes on, in virtual time."""
+
+from __future__ import annotations
+
+import gc
+import tracemalloc
+from pathlib import Path
+
+from common import reality
+from common.outlet import kept_seconds
+from common.plan import Plan
+from models.labs.noise import BLOCK
+from rths import virtual
+from tests.helpers import with_table
+
+# ticks: noise is drawn in blocks, of which as much is left then; before 2^32 ns a packed stamp is shorter than after
+FROM, TO = 4 * BLOCK, 7 * BLOCK
+KEPT_FROM = 2**32 * 1e-9  # s
+MOST = 8.0  # bytes a tick; the recording's index takes 1.5
+
+
+def test_a_test_that_goes_on_takes_no_more_memory(default_plan: Plan, tmp_path: Path) -> None:
+    plan = with_table(default_plan.with_ticks(TO + 10), "recording", patience=0.5)
+    assert KEPT_FROM + kept_seconds(plan) < FROM * plan.test.interval
+    bench = virtual.assemble(plan, reality.as_planned(plan), tmp_path / "a.mcap")
+    held: dict[int, int] = {}
+
+    def measured() -> str:
+        if bench.master.ticks in (FROM, TO):
+            held[bench.master.ticks] = tracemalloc.get_traced_memory()[0]
+        return ""
+
+    gc.collect()
+    gc.disable()  # as the laboratories do: what refers to itself would stay
+    tracemalloc.start()
+    try:
+        assert virtual.run(bench, measured) is None
+    finally:
+        tracemalloc.stop()
+        gc.enable()
+    assert (held[TO] - held[FROM]) / (TO - FROM) < MOST
