@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ Columns = dict[str, NDArray[np.float64]]
 
 READABLE = (".csv", ".parquet", ".mat", ".npz")
 WRITABLE = (".csv", ".parquet", ".mat")
+MAT_NAME = 63  # characters that MATLAB allows
 
 
 def read(path: Path) -> Columns:
@@ -34,9 +36,9 @@ def read(path: Path) -> Columns:
 
 
 def _read_csv(path: Path) -> Columns:
-    from pyarrow import csv
+    from pyarrow.csv import read_csv
 
-    return _numeric(csv.read_csv(path))
+    return _numeric(read_csv(path))
 
 
 def _read_parquet(path: Path) -> Columns:
@@ -75,30 +77,62 @@ def _read_npz(path: Path) -> Columns:
         return {name: archive[name].astype(np.float64) for name in archive.files if archive[name].ndim == 1}
 
 
-def write(path: Path, columns: dict[str, NDArray[Any]]) -> None:
-    """Write columns of equal length; raises InputError where the format is unknown or the file not writable."""
+def write(
+    path: Path, columns: dict[str, NDArray[Any]], units: dict[str, str] | None = None, **more: Any
+) -> None:
+    """Write columns of equal length; raises InputError where the format is unknown or the file not writable.
+
+    Parquet has the `units` of columns in the metadata of its fields, MAT in a struct `units`. MAT has `more` variables.
+    """
     suffix = path.suffix.lower()
     if suffix not in WRITABLE:
         raise InputError(f"Cannot write {path}: give a file that ends in {', '.join(WRITABLE)}.")
     try:
         if suffix == ".mat":
-            from scipy.io import savemat
-
-            savemat(path, columns, oned_as="column")
+            _write_mat(path, columns, {"units": units or {}, **more})
+        elif suffix == ".parquet":
+            _write_parquet(path, columns, units or {})
         else:
-            _write_arrow(path, suffix, columns)
+            _write_csv(path, columns)
     except OSError as error:
         raise InputError(
             f"Cannot write {path}: {error.strerror or error}; give a writable place with -o."
         ) from None
 
 
-def _write_arrow(path: Path, suffix: str, columns: dict[str, NDArray[Any]]) -> None:
+def _write_mat(path: Path, columns: dict[str, NDArray[Any]], more: dict[str, Any]) -> None:
+    from scipy.io import savemat
+
+    long = [name for name in columns if len(name) > MAT_NAME]
+    if long:
+        raise InputError(
+            f"Cannot write {path}: MATLAB has no name as long as '{long[0]}' ({len(long[0])} characters, at most "
+            f"{MAT_NAME}); write .parquet or .csv."
+        )
+    savemat(
+        path,
+        columns | {name: value for name, value in more.items() if len(value)},
+        True,
+        long_field_names=True,
+        oned_as="column",
+    )
+
+
+def _write_csv(path: Path, columns: dict[str, NDArray[Any]]) -> None:
+    # pyarrow would write 4.0 as 4, of which others make a whole number
+    with path.open("w", encoding="utf-8", newline="") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))
+
+
+def _write_parquet(path: Path, columns: dict[str, NDArray[Any]], units: dict[str, str]) -> None:
     import pyarrow as pa
-    from pyarrow import csv, parquet
+    from pyarrow import parquet
 
     table = pa.table(columns)
-    if suffix == ".csv":
-        csv.write_csv(table, path)
-    else:
-        parquet.write_table(table, path)
+    fields = [
+        field.with_metadata({"unit": units[field.name]}) if field.name in units else field
+        for field in table.schema
+    ]
+    parquet.write_table(table.cast(pa.schema(fields)), path)
