@@ -121,7 +121,7 @@ def main() -> int:
 
         sys.stderr.write(f"rths: unknown command '{verb}': {nearest(verb, VERBS)}\n")
         return 2
-    args = parser_for(verb).parse_args(words[1:])
+    args = parser_for(verb).parse_intermixed_args(words[1:])
     return cli.guarded(lambda: int(args.run(args)))
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Callable, Sequence
+import textwrap
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from common import cli
 from common.errors import InputError
@@ -15,46 +15,140 @@ from common.roles import name_of, title
 
 if TYPE_CHECKING:
     from common.recording.reader import Run
+    from rths.pictures import Picture
 
 FORMATS = ("png", "svg", "pdf")
-LEGEND_ROWS = 4  # as many stand beside one of six axes
+OTHER_FORMATS = {".jpg", ".jpeg", ".gif", ".eps", ".ps", ".tif", ".tiff", ".bmp", ".webp"}
+WIDTHS = ("single", "double")
+
+
+class Place(NamedTuple):
+    """Where pictures go: each under its name into a folder, or the only one into a file."""
+
+    folder: Path
+    format: str
+    stem: str = ""  # of the file
+
+    def path(self, name: str, role: str) -> Path:
+        """The file of a picture that concerns a slave."""
+        return self.folder / f"{labelled(self.stem or name, role)}.{self.format}"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `plot`."""
+    from rths.pictures import PICTURES
+
     parser.add_argument("file", type=Path, metavar="FILE", help="a recording (MCAP)")
     parser.add_argument(
-        "-o", "--output", type=Path, metavar="FOLDER", help="where to (default: beside the recording)"
+        "names", nargs="*", metavar="NAME", help="pictures to draw (default: all that there are signals for)"
     )
     parser.add_argument(
-        "--format", choices=FORMATS, default="png", help="format of the pictures (default: png)"
+        "-o",
+        "--output",
+        type=Path,
+        metavar="PLACE",
+        help="a folder (default: beside the recording), or for one picture a file: its ending says the format",
     )
-    cli.json_argument(parser, "name the pictures as JSON on standard output")
+    parser.add_argument("--format", choices=FORMATS, help="format of the pictures (default: png)")
+    parser.add_argument(
+        "--width", choices=WIDTHS, default="single", help="columns of a page (default: single, 85 mm)"
+    )
+    cli.json_argument(parser, "name the pictures, and those left out, as JSON on standard output")
+    rows = [described(picture.name, picture.text) for picture in PICTURES.values()]
+    parser.add_argument_group("pictures", "\n".join(rows))
+
+
+def described(name: str, text: str) -> str:
+    """A picture's rows in the help."""
+    return textwrap.fill(text, 78, initial_indent=f"{name:<18}", subsequent_indent=" " * 20)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Draw whatever the recording has signals for."""
+    """Draw what was asked for, or whatever the recording has signals for."""
     from common.recording.reader import read
 
+    chosen = choose(args.names)
+    place = place_of(args)
     recording = read(args.file)
-    folder = args.output or args.file.with_suffix("")
+    made: list[str] = []
+    left_out: dict[str, str] = {}
+    for picture in chosen:
+        drawn = {
+            str(path)
+            for role in recording.roles
+            if save(recording, role, picture, path := place.path(picture.name, role), args.width)
+        }
+        made += sorted(drawn)
+        if not drawn:
+            left_out[picture.name] = picture.needs
+    complain(args, made, left_out)
+    result = {"pictures": made, "left_out": left_out}
+    sys.stdout.write(json.dumps(result) if args.json else "\n".join(made))
+    sys.stdout.write("\n")
+    return 0
+
+
+def choose(names: list[str]) -> list[Picture]:
+    """The pictures of these names, each once; all where none is named."""
+    from common.schema import nearest
+    from rths.pictures import PICTURES
+
+    for name in names:
+        if name not in PICTURES:
+            hint, known = nearest(name, PICTURES), ", ".join(PICTURES)
+            hint = hint if known in hint or hint.startswith("known") else f"{hint} Known here: {known}."
+            raise InputError(f"There is no picture '{name}': {hint}")
+    return [PICTURES[name] for name in dict.fromkeys(names or PICTURES)]
+
+
+def complain(args: argparse.Namespace, made: list[str], left_out: dict[str, str]) -> None:
+    """Raise InputError where nothing was drawn, or a picture was named that cannot be."""
+    if args.names and left_out:
+        missing = "; ".join(f"'{name}' needs {needs}" for name, needs in left_out.items())
+        raise InputError(f"{args.file} lacks signals: {missing} (see rths inspect {args.file}).")
+    if not made:
+        raise InputError(f"{args.file} has no signals for any picture: see rths inspect {args.file}.")
+
+
+def place_of(args: argparse.Namespace) -> Place:
+    """Where the command line wants its pictures, the folder made.
+
+    Raises:
+        InputError: a file for several pictures, in another format than asked for or an unknown one, or no folder.
+    """
+    path: Path = args.output or args.file.with_suffix("")
+    ending = path.suffix.lower()
+    folder = args.output is None or is_folder(path)
+    if folder or ending.removeprefix(".") not in FORMATS:
+        if ending in OTHER_FORMATS and not folder:
+            raise InputError(f"Cannot write {path}: give a file that ends in .{', .'.join(FORMATS)}.")
+        return Place(folder_at(path), args.format or FORMATS[0])
+    if len(set(args.names)) != 1:
+        raise InputError(f"{path} is one file: name the one picture that shall be in it, or give a folder.")
+    if args.format not in (None, ending[1:]):
+        raise InputError(
+            f"{path} is no {args.format} file: leave --format away or end the file's name in it."
+        )
+    return Place(folder_at(path.parent), ending[1:], path.stem)
+
+
+def is_folder(path: Path) -> bool:
+    """Whether there is a folder; none has a name that no file can have."""
+    try:
+        return path.is_dir()
+    except OSError:
+        return False
+
+
+def folder_at(folder: Path) -> Path:
+    """A folder that is there; raises InputError where it cannot be made."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(
             f"Cannot make the folder {folder}: {error.strerror}; give another with -o."
         ) from None
-    paths = [
-        str(path)
-        for role in recording.roles
-        for name, draw in PICTURES.items()
-        if picture(recording, role, draw, path := folder / f"{labelled(name, role)}.{args.format}")
-    ]
-    if not paths:
-        raise InputError(f"{args.file} has no signals for any picture: see rths inspect {args.file}.")
-    sys.stdout.write(json.dumps({"pictures": paths}) if args.json else "\n".join(paths))
-    sys.stdout.write("\n")
-    return 0
+    return folder
 
 
 def labelled(name: str, role: str) -> str:
@@ -62,18 +156,29 @@ def labelled(name: str, role: str) -> str:
     return f"{name}-{name_of(role)}" if name_of(role) else name
 
 
-def picture(recording: Run, role: str, draw: Callable[[Run, Any], bool], path: Path) -> bool:
-    """Draw one picture of what concerns a slave into a file; False where the recording lacks its signals."""
-    from rths.figure import figure
+def draw(recording: Run, role: str, picture: Picture, width: str = "single") -> Any | None:
+    """The figure of what concerns a slave, with its caption; None where the recording lacks its signals."""
+    from rths import figure
+    from rths.pictures import layout
 
-    canvas = figure()
-    if not draw(recording.of(role), canvas):
+    canvas = figure.figure(*(picture.double if width == "double" else picture.size))
+    if not picture.draw(recording.of(role), canvas):
+        return None
+    layout.caption(canvas, caption(recording, role))
+    return canvas
+
+
+def save(recording: Run, role: str, picture: Picture, path: Path, width: str = "single") -> bool:
+    """Draw one picture into a file; False where the recording lacks its signals."""
+    from rths import figure
+
+    canvas = draw(recording, role, picture, width)
+    if canvas is None:
         return False
-    canvas.suptitle(caption(recording, role), fontsize=8, x=0.01, ha="left", wrap=True)
     try:
-        canvas.savefig(path)
+        figure.save(canvas, path)
     except OSError as error:
-        raise InputError(f"Cannot write {path}: {error.strerror}; give another folder with -o.") from None
+        raise InputError(f"Cannot write {path}: {error.strerror}; give another place with -o.") from None
     return True
 
 
@@ -81,151 +186,5 @@ def caption(recording: Run, role: str) -> str:
     """What was tested, which slave is shown where it has a name; under it, under which motion."""
     motion = recording.metadata.get("ground_motion", {})
     test = f"{recording.test}, {title(role)}" if name_of(role) else recording.test
-    lines = [test, f"{motion['record']}, × {motion['scale']}"] if motion else [test]
-    return "\n".join(lines)
-
-
-def histories(recording: Run, canvas: Any) -> bool:
-    """Time histories: ground, drift, forces, damper."""
-    rows = [
-        ("ground_acceleration", 1.0, "ground\nm/s²"),
-        ("column_displacement", 1e3, "column\nmm"),
-        ("column_force", 1e-3, "column\nkN"),
-        ("absolute_acceleration", 1.0, "floor\nm/s²"),
-        ("damper_stroke", 1e3, "damper\nmm"),
-        ("damper_force", 1.0, "damper\nN"),
-    ]
-    present = [(name, factor, label) for name, factor, label in rows if recording.signal(name) is not None]
-    if not present:
-        return False
-    axes = canvas.subplots(len(present), 1, sharex=True, squeeze=False)[:, 0]
-    for axis, (name, factor, label) in zip(axes, present, strict=True):
-        lines = axis.plot(time_of(recording, name), factor * values(recording, name), linewidth=0.7)
-        axis.set_ylabel(label)
-        if len(lines) > 1:
-            number_floors(axis, lines)
-    axes[-1].set_xlabel("time, s")
-    return True
-
-
-def number_floors(axis: Any, lines: Sequence[Any]) -> None:
-    """A colour and a number for each floor's line, the lowest in front, and their legend beside the axis."""
-    import matplotlib as mpl
-
-    from rths.figure import COLOURS
-
-    count = len(lines)
-    many = mpl.colormaps["viridis"].resampled(count)
-    for place, line in enumerate(lines):
-        line.set(zorder=3.0 - place / count)  # the upper floors move more and would cover it
-        if count > len(COLOURS):
-            line.set(color=many(place))
-    axis.legend(
-        lines,
-        range(1, count + 1),
-        title="floor",
-        loc="center left",
-        bbox_to_anchor=(1.0, 0.5),
-        fontsize=7,
-        title_fontsize=7,
-        labelspacing=0.2,
-        handlelength=1.2,
-        columnspacing=0.8,
-        ncols=-(-count // LEGEND_ROWS),
-    )
-
-
-def values(recording: Run, name: str) -> Any:
-    """A signal that is known to be there."""
-    return recording.signal(name)
-
-
-def time_of(recording: Run, name: str) -> Any:
-    """Test time of a signal's messages."""
-    for topic in ("slave", "master"):
-        if name in recording.columns.get(topic, {}) and recording.columns[topic][name] is recording.signal(
-            name
-        ):
-            return recording.columns[topic]["t"]
-    return recording.columns["master"]["t"]
-
-
-def hysteresis(recording: Run, canvas: Any) -> bool:
-    """Force against deformation of the column, and against stroke of the damper."""
-    loops = [
-        ("column_displacement", 1e3, "column deformation, mm", "column_force", 1e-3, "column force, kN"),
-        ("damper_stroke", 1e3, "damper stroke, mm", "damper_force", 1.0, "damper force, N"),
-    ]
-    present = [
-        row for row in loops if recording.signal(row[0]) is not None and recording.signal(row[3]) is not None
-    ]
-    if not present:
-        return False
-    axes = canvas.subplots(1, len(present), squeeze=False)[0]
-    for axis, (x, x_factor, x_label, y, y_factor, y_label) in zip(axes, present, strict=True):
-        axis.plot(x_factor * values(recording, x), y_factor * values(recording, y), linewidth=0.5)
-        axis.set_xlabel(x_label)
-        axis.set_ylabel(y_label)
-    return True
-
-
-def tracking(recording: Run, canvas: Any) -> bool:
-    """Target and measurement of both transfer systems around the strongest motion, and their error."""
-    import numpy as np
-
-    pairs = [
-        ("master", "column_target", "column_displacement", "column deformation, mm", 0),
-        ("slave", "table_command", "table_displacement", "table displacement, mm", 1),
-    ]
-    present = [row for row in pairs if {row[1], row[2]} <= recording.columns.get(row[0], {}).keys()]
-    if not present:
-        return False
-    axes = canvas.subplots(2, len(present), sharex="col", squeeze=False)
-    for place, (topic, target, measured, label, shift) in enumerate(present):
-        columns = recording.columns[topic]
-        t = columns["t"][shift:]
-        wanted, got = columns[target][: t.size] * 1e3, columns[measured][shift:] * 1e3
-        middle = t[int(np.argmax(np.abs(wanted)))]
-        window = (t >= middle - 1.5) & (t <= middle + 1.5)
-        axes[0, place].plot(t[window], wanted[window], label="target")
-        axes[0, place].plot(t[window], got[window], "--", label="measured")
-        axes[0, place].set_ylabel(label)
-        axes[0, place].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
-        axes[1, place].plot(t[window], (got - wanted)[window])
-        axes[1, place].set_ylabel("measured − target, mm")
-        axes[1, place].set_xlabel("time, s")
-    return True
-
-
-def latency(recording: Run, canvas: Any) -> bool:
-    """Where the time of a tick goes: distribution of every segment, and the round trip over the test."""
-    import numpy as np
-
-    from rths.figure import COLOURS
-    from rths.summary import SEGMENTS
-
-    columns = recording.columns.get("latency", {})
-    measured = {name: columns[name][np.isfinite(columns[name])] * 1e6 for name in SEGMENTS if name in columns}
-    measured = {name: column for name, column in measured.items() if column.size and column.max() > 0.0}
-    if "round_trip" not in measured:  # virtual time, or nothing came back
-        return False
-    upper, lower = canvas.subplots(2, 1)
-    for place, (name, column) in enumerate(measured.items()):
-        ordered = np.sort(np.maximum(column, 1.0))
-        above = 1.0 - np.arange(ordered.size) / ordered.size
-        style = "-" if place < len(COLOURS) else "--"  # from there on colours come again
-        upper.plot(ordered, above, style, label=name.replace("_", " "))
-    upper.set(xscale="log", yscale="log", xlabel="time, µs", ylabel="share of ticks above")
-    upper.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
-    seq = columns["seq"][np.isfinite(columns["round_trip"])]
-    lower.plot(seq, measured["round_trip"], ".", markersize=1)
-    lower.set(yscale="log", xlabel="tick", ylabel="round trip, µs")
-    return True
-
-
-PICTURES: dict[str, Callable[[Any, Any], bool]] = {
-    "histories": histories,
-    "hysteresis": hysteresis,
-    "tracking": tracking,
-    "latency": latency,
-}
+    record, scale = motion.get("record"), motion.get("scale")
+    return f"{test}\n{record}, × {scale}" if record and scale else test

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rths.diagnosis_report import wording
 from rths.diagnosis_report.values import bare_percent, known, scale
-from rths.figure import COLOURS, figure
+from rths.figure import COLOURS, STAMPS, figure
 
 Piece = Mapping[str, Any]
 Values = NDArray[np.float64]
@@ -30,11 +30,8 @@ ZOOM = 4.0  # s around the worst seconds
 
 def svg(canvas: Any) -> str:
     """A figure as SVG to stand inside a page: black and blue follow the page's colours, no background."""
-    import matplotlib as mpl
-
     stream = io.StringIO()
-    with mpl.rc_context({"svg.hashsalt": "rths", "svg.fonttype": "path"}):
-        canvas.savefig(stream, format="svg", transparent=True, metadata={"Date": None})
+    canvas.savefig(stream, format="svg", transparent=True, metadata=STAMPS[".svg"])
     text = stream.getvalue()
     text = text[text.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)

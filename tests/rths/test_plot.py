@@ -1,69 +1,37 @@
-"""What stands in the pictures of `rths plot`, and where."""
+"""What `rths plot` draws where, and what it says to words it does not know."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import json
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
-from common.recording.reader import Run
 from common.roles import SLAVE
-from rths import plot
-from rths.figure import COLOURS, figure
-from rths.summary import SEGMENTS
-
-RECORD = "El Centro 1940 NS (1,559-point version after a zero at t = 0), dt 0.02 s, 1560 points, PGA 0.3188 g"
-
-
-def made_up(storeys: int = 1, role: str = SLAVE, record: str = RECORD) -> Run:
-    """A second of a test whose targets have their peak in the upper right corner of the picture."""
-    t = np.arange(500) * 2e-3
-    rising = 1e-3 * t * np.sin(20.0 * t)
-    floors = np.outer(rising, np.arange(1, storeys + 1))
-    run = Run(Path("made_up.mcap"), "test", (role,))
-    run.columns = {
-        "master": {
-            "t": t,
-            "absolute_acceleration": floors if storeys > 1 else rising,
-            "column_target": rising,
-            "column_displacement": rising,
-        },
-        role: {"t": t, "table_command": t, "table_displacement": t},
-    }
-    for topic in run.columns:
-        run.sequences[topic], run.log_ns[topic], run.units[topic] = np.arange(t.size), np.arange(t.size), {}
-    run.metadata["ground_motion"] = {"record": record, "scale": "0.1"}
-    return run
+from rths import import_, plot, tabular
+from rths.pictures import PICTURES
+from tests.helpers import ROOT
+from tests.rths.pictures.made_up import RECORD, made_up
+from tests.rths.test_commands import rths
 
 
 @pytest.fixture
-def drawn(monkeypatch: Any, tmp_path: Path) -> Callable[[Run, str, Callable[[Run, Any], bool]], Any]:
-    """The figure of a picture, laid out."""
-    made: list[Any] = []
-
-    def keep() -> Any:
-        made.append(figure())
-        return made[-1]
-
-    def draw(run: Run, role: str, picture: Callable[[Run, Any], bool]) -> Any:
-        monkeypatch.setattr("rths.figure.figure", keep)
-        assert plot.picture(run, role, picture, tmp_path / "picture.png")
-        made[-1].draw_without_rendering()  # places in the figure's own resolution, not the file's
-        return made[-1]
-
-    return draw
+def call(monkeypatch: Any) -> Any:
+    return lambda *words: rths(monkeypatch, "plot", *words)
 
 
-@pytest.mark.parametrize("record", [RECORD, f"{RECORD}, {RECORD}", "W" * 50 + " " + "W" * 50])
+@pytest.mark.parametrize("record", [RECORD, f"{RECORD}, {RECORD}", "W" * 50 + " " + "W" * 50, "$x$ a_b"])
 @pytest.mark.parametrize("role", [SLAVE, "slave.a_table_with_quite_a_long_name_of_its_own"])
-def test_the_caption_stays_inside_the_picture_and_off_the_axes(role: str, record: str, drawn: Any) -> None:
-    canvas = drawn(made_up(role=role, record=record), role, plot.tracking)
+@pytest.mark.parametrize("width", plot.WIDTHS)
+def test_the_caption_stays_inside_the_picture_and_off_the_axes(record: str, role: str, width: str) -> None:
+    canvas = plot.draw(made_up(role=role, record=record), role, PICTURES["tracking"], width)
+    assert canvas is not None
+    canvas.draw_without_rendering()
     (caption,) = [text for text in canvas.texts if text.get_text().startswith("test")]
     box = caption.get_window_extent()
-    assert caption.get_text().splitlines()[1] == f"{record}, × 0.1"
+    words = caption.get_text().replace("\n", "").replace(" ", "")
+    assert words.endswith(f"{record}, × 0.1".replace(" ", ""))
     assert box.x0 >= 0.0
     assert box.x1 <= canvas.bbox.x1
     assert box.y1 <= canvas.bbox.y1
@@ -75,47 +43,86 @@ def test_without_a_motion_the_caption_is_the_test_alone() -> None:
     run.metadata = {}
     assert plot.caption(run, SLAVE) == "test"
     assert plot.caption(run, "slave.roof") == "test, slave 'roof'"
+    run.metadata["ground_motion"] = {"record": "a file of another program"}
+    assert plot.caption(run, SLAVE) == "test"
 
 
-@pytest.mark.parametrize("storeys", [2, 3, 12])
-def test_floors_have_numbers_and_colours_of_their_own(storeys: int, drawn: Any) -> None:
-    canvas = drawn(made_up(storeys), SLAVE, plot.histories)
-    (axis,) = [axis for axis in canvas.axes if axis.get_ylabel().startswith("floor")]
-    legend = axis.get_legend()
-    colours = [line.get_color() for line in axis.lines]
-    assert legend.get_title().get_text() == "floor"
-    assert [text.get_text() for text in legend.get_texts()] == [str(place + 1) for place in range(storeys)]
-    assert [line.get_color() for line in legend.get_lines()] == colours
-    assert len({str(colour) for colour in colours}) == storeys
-    assert (colours[0] == COLOURS[0]) == (storeys <= len(COLOURS))
-    heights = [line.get_zorder() for line in axis.lines]
-    assert heights == sorted(heights, reverse=True)
-    assert legend.get_window_extent().x0 >= axis.bbox.x1
-    assert legend.get_window_extent().x1 <= canvas.bbox.x1
+def test_named_pictures_are_drawn_and_no_others(call: Any, virtual_recording: Path, tmp_path: Path) -> None:
+    assert call(virtual_recording, "-o", tmp_path / "some", "spectra", "tracking", "spectra") == 0
+    assert {path.name for path in (tmp_path / "some").iterdir()} == {"spectra.png", "tracking.png"}
 
 
-def test_one_storey_needs_no_legend(drawn: Any) -> None:
-    canvas = drawn(made_up(1), SLAVE, plot.histories)
-    assert all(axis.get_legend() is None for axis in canvas.axes)
+@pytest.mark.parametrize(
+    ("ending", "head"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF"), ("SVG", b"<?xml")]
+)
+def test_one_picture_goes_into_a_file_of_its_format(
+    ending: str, head: bytes, call: Any, virtual_recording: Path, tmp_path: Path
+) -> None:
+    path = tmp_path / "new" / f"figure 3.{ending}"
+    assert call(virtual_recording, "-o", path, "tracking", "--width", "double") == 0
+    assert [item.name.lower() for item in path.parent.iterdir()] == [path.name.lower()]
+    assert next(path.parent.iterdir()).read_bytes().startswith(head)
 
 
-def test_the_legends_of_tracking_stand_above_the_curves(drawn: Any) -> None:
-    canvas = drawn(made_up(), SLAVE, plot.tracking)
-    legends = [(axis, axis.get_legend()) for axis in canvas.axes if axis.get_legend()]
-    assert len(legends) == 2
-    for axis, legend in legends:
-        assert [text.get_text() for text in legend.get_texts()] == ["target", "measured"]
-        texts = [text.get_window_extent() for text in legend.get_texts()]
-        assert min(box.y0 for box in texts) >= axis.bbox.y1
-        assert max(box.x1 for box in texts) <= canvas.bbox.x1
+def test_what_is_left_out_is_said_in_json_only(
+    call: Any, capsys: Any, virtual_recording: Path, tmp_path: Path
+) -> None:
+    assert call(virtual_recording, "-o", tmp_path, "--json") == 0
+    shown = capsys.readouterr()
+    result = json.loads(shown.out)
+    assert shown.err == ""
+    assert result["left_out"].keys() == {"latency"}
+    assert [Path(path).stem for path in result["pictures"]] == [
+        name for name in PICTURES if name != "latency"
+    ]
+    assert call(virtual_recording, "-o", tmp_path) == 0
+    shown = capsys.readouterr()
+    assert shown.err == ""
+    assert shown.out.split("\n")[:-1] == result["pictures"]
 
 
-def test_the_parts_of_a_tick_can_be_told_apart(drawn: Any) -> None:
-    run = made_up()
-    spread = np.random.default_rng(1).lognormal(-9.0, 0.5, 500)
-    run.columns["latency"] = dict.fromkeys(SEGMENTS, spread) | {"seq": np.arange(500)}
-    upper = drawn(run, SLAVE, plot.latency).axes[0]
-    looks = {(line.get_color(), line.get_linestyle()) for line in upper.lines}
-    assert len(looks) == len(SEGMENTS)
-    assert len(upper.get_legend().get_texts()) == len(SEGMENTS)
-    assert upper.get_legend().get_window_extent().x0 >= upper.bbox.x1
+WRONG: dict[str, tuple[list[str], str]] = {
+    "unknown": (["traking"], "There is no picture 'traking': did you mean tracking? Known here: histories, "),
+    "far from any": (["zzz"], "There is no picture 'zzz': known here: histories, "),
+    "lacking": (["latency"], "lacks signals: 'latency' needs latency of a test in real time"),
+    "several in a file": (["-o", "{tmp}/a.svg"], "name the one picture"),
+    "two in a file": (["-o", "{tmp}/a.svg", "tracking", "spectra"], "name the one picture"),
+    "two formats": (["-o", "{tmp}/a.svg", "--format", "png", "tracking"], "a.svg is no png file"),
+    "other format": (["-o", "{tmp}/a.jpg", "tracking"], "give a file that ends in .png, .svg, .pdf"),
+    "no folder": (["-o", "{tmp}/file/a.svg", "tracking"], "Cannot make the folder"),
+    "no file": (["-o", "{tmp}/" + 300 * "n" + ".svg", "tracking"], "Cannot write"),
+}
+
+
+@pytest.mark.parametrize("words_and_message", WRONG.values(), ids=WRONG.keys())
+def test_a_wrong_word_is_one_sentence(
+    words_and_message: tuple[list[str], str], call: Any, capsys: Any, virtual_recording: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "file").write_text("")
+    words, message = words_and_message
+    assert call(virtual_recording, *[word.format(tmp=tmp_path) for word in words]) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
+
+
+def test_help_says_what_to_look_for_in_each_picture(call: Any, capsys: Any) -> None:
+    assert call("--help") == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    for name, picture in PICTURES.items():
+        assert f"{name} {picture.text}" in shown
+
+
+def test_measurements_of_others_are_drawn_as_far_as_they_go(call: Any, tmp_path: Path) -> None:
+    examples = ROOT / "examples" / "real_data"
+    chosen = import_.load_map(examples / "force_rig_map.toml")
+    t, values = import_.resampled(
+        chosen, tabular.read(examples / "force_rig.csv"), examples / "force_rig.csv"
+    )
+    part = slice(0, 4000)
+    import_.write(
+        tmp_path / "rig.mcap", chosen, t[part], {name: column[part] for name, column in values.items()}, "rig"
+    )
+    assert call(tmp_path / "rig.mcap") == 0
+    drawn = {path.stem for path in (tmp_path / "rig").iterdir()}
+    assert drawn == {"histories", "synchronisation", "tracking", "spectra"}

@@ -1,0 +1,193 @@
+"""Every picture at either width: named axes with units, letters that can be read, nothing cut, the same file twice."""
+
+from __future__ import annotations
+
+import re
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from common.recording.reader import Run, read
+from common.roles import SLAVE
+from rths import figure, plot
+from rths.pictures import PICTURES
+from tests.rths.pictures.made_up import made_up, with_latency
+
+LEAST_LETTER = 6.0  # pt in print
+UNITS = ("s", "Hz", "m/s²", "mm", "kN", "N", "m/s²/√Hz", "mm/√Hz", "µs")
+OF_WORDS = {"part of a tick"}  # axes whose ticks are names
+TOLERANCE = 0.5  # of a pixel of the figure's own resolution
+
+
+@pytest.fixture(scope="module", params=plot.WIDTHS)
+def width(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.fixture(scope="module")
+def recording(virtual_recording: Path) -> Run:
+    """A whole test, with times that virtual ones have not."""
+    return with_latency(read(virtual_recording))
+
+
+@pytest.fixture(scope="module")
+def canvases(recording: Run, width: str) -> dict[str, Any]:
+    """Every picture, laid out in its own resolution."""
+    made: dict[str, Any] = {
+        name: plot.draw(recording, SLAVE, picture, width) for name, picture in PICTURES.items()
+    }
+    assert all(made.values())
+    for canvas in made.values():
+        canvas.draw_without_rendering()
+    return made
+
+
+def texts(canvas: Any) -> list[Any]:
+    """All text of a figure that is seen."""
+    from matplotlib.text import Text
+
+    found = [item for item in canvas.findobj(Text) if item.get_visible() and item.get_text()]
+    unseen = {id(label) for axis in canvas.axes for label in hidden(axis)}
+    return [item for item in found if id(item) not in unseen]
+
+
+def hidden(axis: Any) -> list[Any]:
+    """Labels of ticks beyond an axis' ends, which are never drawn."""
+    ticks = [(axis.xaxis, tick) for tick in [*axis.xaxis.get_major_ticks(), *axis.xaxis.get_minor_ticks()]]
+    ticks += [(axis.yaxis, tick) for tick in [*axis.yaxis.get_major_ticks(), *axis.yaxis.get_minor_ticks()]]
+    beyond = []
+    for line, tick in ticks:
+        low, high = sorted(line.get_view_interval())
+        if not low <= tick.get_loc() <= high:
+            beyond += [tick.label1, tick.label2]
+    return beyond
+
+
+def test_every_axis_says_what_it_shows_and_in_which_unit(canvases: dict[str, Any]) -> None:
+    for name, canvas in canvases.items():
+        for axis in canvas.axes:
+            below = axis.xaxis.get_tick_params()["labelbottom"]
+            labels = [axis.get_ylabel(), *([axis.get_xlabel()] if below else [])]
+            for label in labels:
+                unit = re.split(r", |\n", label)[-1]
+                assert label in OF_WORDS or unit in UNITS, f"{name}: '{label}'"
+                assert label not in UNITS
+
+
+def test_no_letter_is_smaller_than_can_be_read_in_print(canvases: dict[str, Any], width: str) -> None:
+    inches = {"single": figure.SINGLE, "double": figure.DOUBLE}[width]
+    for name, canvas in canvases.items():
+        assert canvas.get_figwidth() == inches  # or the page would scale it
+        for text in texts(canvas):
+            assert text.get_fontsize() >= LEAST_LETTER, f"{name}: {text.get_text()}"
+            assert "$" not in text.get_text(), "mathematical text has smaller superscripts"
+
+
+def test_nothing_is_cut_off(canvases: dict[str, Any]) -> None:
+    for name, canvas in canvases.items():
+        for text in texts(canvas):
+            box = text.get_window_extent()
+            inside = box.x0 >= -TOLERANCE and box.x1 <= canvas.bbox.x1 + TOLERANCE
+            inside = inside and box.y0 >= -TOLERANCE and box.y1 <= canvas.bbox.y1 + TOLERANCE
+            assert inside, f"{name}: {text.get_text()} {box} {canvas.bbox.size}"
+
+
+def test_labels_of_one_axis_do_not_run_into_each_other(canvases: dict[str, Any]) -> None:
+    for name, canvas in canvases.items():
+        for axis in canvas.axes:
+            unseen = {id(label) for label in hidden(axis)}
+            for labels, ends in ((axis.get_xticklabels(), "x"), (axis.get_yticklabels(), "y")):
+                boxes = [
+                    getattr(label.get_window_extent(), f"interval{ends}")
+                    for label in labels
+                    if label.get_text() and id(label) not in unseen and label.get_visible()
+                ]
+                boxes.sort(key=lambda pair: pair[0])
+                assert all(a[1] <= b[0] for a, b in pairwise(boxes)), f"{name}: {ends}"
+
+
+def test_lines_of_one_axis_differ_without_their_colour(canvases: dict[str, Any]) -> None:
+    for name in ("tracking", "spectra", "latency"):
+        for axis in canvases[name].axes:
+            found = [line for line in axis.lines if not line.get_label().startswith("_")]
+            looks = [(line.get_linestyle(), line.get_marker(), str(line._dash_pattern)) for line in found]
+            shared = [look for look in looks if looks.count(look) > 1]
+            assert len(shared) in (0, 2), (
+                f"{name}: {looks}"
+            )  # errors are dotted both, in their system's colours
+
+
+@pytest.mark.parametrize("ending", plot.FORMATS)
+def test_the_same_recording_gives_the_same_file(ending: str, tmp_path: Path) -> None:
+    run = with_latency(made_up(3))
+    for name, picture in PICTURES.items():
+        files = [tmp_path / f"{name}-{place}.{ending}" for place in (1, 2)]
+        drawn = [plot.save(run, SLAVE, picture, file) for file in files]
+        assert drawn == [name != "hysteresis"] * 2  # it needs forces
+        if all(drawn):
+            assert files[0].read_bytes() == files[1].read_bytes()
+
+
+def test_a_saved_picture_is_as_wide_as_a_column(tmp_path: Path) -> None:
+    plot.save(made_up(), SLAVE, PICTURES["tracking"], tmp_path / "a.svg")
+    plot.save(made_up(), SLAVE, PICTURES["tracking"], tmp_path / "a.png")
+    wide = re.search(r'<svg[^>]* width="([\d.]+)pt"', (tmp_path / "a.svg").read_text())
+    assert wide is not None
+    assert float(wide[1]) == pytest.approx(72.0 * figure.SINGLE)
+    header = (tmp_path / "a.png").read_bytes()[16:20]
+    assert int.from_bytes(header) == round(figure.SINGLE * figure.DOTS)
+
+
+@pytest.mark.parametrize("name", PICTURES)
+def test_a_recording_without_a_pictures_signals_has_none(name: str) -> None:
+    run = made_up()
+    for topic in run.columns:
+        run.columns[topic] = {"t": run.columns[topic]["t"]}
+    assert plot.draw(run, SLAVE, PICTURES[name]) is None
+    run.columns = {}
+    assert plot.draw(run, SLAVE, PICTURES[name]) is None
+
+
+@pytest.mark.parametrize("name", PICTURES)
+@pytest.mark.parametrize("value", [np.nan, 0.0])
+def test_signals_that_say_nothing_do_no_harm(name: str, value: float) -> None:
+    run = with_latency(made_up())
+    for columns in run.columns.values():
+        for signal in columns.keys() - {"t", "seq", "deadline_missed"}:
+            columns[signal] = np.full(500, value)
+    canvas = plot.draw(run, SLAVE, PICTURES[name])
+    assert (canvas is not None) == (name == "histories" and value == 0.0)
+
+
+@pytest.mark.parametrize("name", PICTURES)
+@pytest.mark.parametrize("count", [0, 1, 2, 40])
+def test_a_test_that_ended_at_once_does_no_harm(name: str, count: int, tmp_path: Path) -> None:
+    run = with_latency(made_up())
+    for topic, columns in run.columns.items():
+        run.columns[topic] = {signal: values[:count] for signal, values in columns.items()}
+        if topic in run.sequences:
+            run.sequences[topic] = run.sequences[topic][:count]
+    plot.save(run, SLAVE, PICTURES[name], tmp_path / "short.png")
+
+
+@pytest.mark.parametrize("name", PICTURES)
+def test_single_readings_may_be_unknown(name: str, tmp_path: Path) -> None:
+    run = with_latency(made_up())
+    for columns in run.columns.values():
+        for signal in columns.keys() - {"t", "seq", "deadline_missed"}:
+            columns[signal] = columns[signal].copy()
+            columns[signal][100:130] = np.nan
+    assert plot.save(run, SLAVE, PICTURES[name], tmp_path / "gaps.png") == (name != "hysteresis")
+
+
+@pytest.mark.parametrize("name", ["histories", "synchronisation", "tracking", "spectra"])
+def test_a_picture_of_fewer_signals_is_lower(name: str) -> None:
+    whole, part = made_up(), made_up()
+    part.columns["slave"] = {"t": part.columns["slave"]["t"]}
+    del part.columns["master"]["absolute_acceleration"]
+    canvases: list[Any] = [plot.draw(run, SLAVE, PICTURES[name]) for run in (whole, part)]
+    heights = [canvas.get_figheight() for canvas in canvases]
+    assert (heights[1] < heights[0]) == (name != "spectra")  # of which both have displacements only
