@@ -69,6 +69,7 @@ class MasterLoop:
         self._disarmed = False
         self._command = 0.0
         self._drift = 0.0
+        self._column_force = 0.0
         self._said_ns = -REPEAT_NS
         self._sent_ns = 0  # when the newest command went out
         self._digest = plan.digest()
@@ -149,6 +150,7 @@ class MasterLoop:
             self._sample(tick, measured, outputs)
         self.ticks = tick + 1
         self._drift = outputs.column_target / lab.plan.column.deformation_ratio
+        self._column_force = measured.column_force
         self._watch(tick, wake)
 
     def _alarmed(self, tick: int, wake_ns: int, *, held: bool) -> bool:
@@ -334,13 +336,15 @@ class MasterLoop:
 
     @property
     def progress(self) -> dict[str, float]:
-        """What a user watches while it runs: drift of the specimen's storey (m), round trip (s), missed deadlines.
+        """What a user watches: drift of the specimen's storey (m), forces (N), round trip (s), missed deadlines.
 
-        Of several slaves the longest round trip and the most deadlines missed.
+        Of several slaves the largest damper force, the longest round trip and the most deadlines missed.
         """
         accounts = [partner.account for partner in self._partners]
         return {
             "drift": self._drift,
+            "column_force": self._column_force,
+            "damper_force": max((partner.used.damper_force for partner in self._partners), key=abs),
             "round_trip": max(account.round_trip for account in accounts),
             "missed": float(max(account.missed for account in accounts)),
         }

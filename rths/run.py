@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from common import cli
 from common.drive import Stopper
-from common.errors import RthsError
+from common.errors import InputError, RthsError
 from common.exchange import State
 from common.plan import Plan
 from common.preflight import PASSED, Check, Gate
@@ -24,6 +24,7 @@ from rths.terminal import Progress
 
 if TYPE_CHECKING:
     from rths.ending import Ending
+    from rths.live.child import View
     from rths.processes import Processes, Said
 
 POLL_S = 0.1
@@ -51,6 +52,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-o", "--output", type=Path, metavar="FILE", help="the recording (default: runs/<test>-<time>.mcap)"
     )
+    parser.add_argument("--live", action="store_true", help="show it in a browser page while it runs")
+    parser.add_argument(
+        "--live-port", type=int, default=0, metavar="N", help="of that page (default: a free one)"
+    )
     cli.json_argument(parser, "write the summary as JSON on standard output")
 
 
@@ -59,6 +64,10 @@ def run(args: argparse.Namespace) -> int:
     from recorder.files import choose_path
 
     gate = Gate(cli.accepted_risks(args))
+    if args.live and args.virtual:
+        raise InputError(
+            "--live shows a test in real time: leave out --virtual, or give its recording to rths live."
+        )
     plan = cli.load_plan(args)
     reality = cli.load_reality(args.reality, plan)
     output = choose_path(args.output, plan)
@@ -135,14 +144,26 @@ def in_real_time(
     warm_up(progress)
     progress.say(before_the_start(plan, output, gate))
     progress.say(f"{plan.test.name}: {plan.test.duration:g} s, starting master, {crew(plan)} and recorder")
+    view = None
     try:
         with announced(plan, endpoint):
             start_all(processes, args, plan.roles, endpoint, output)
-            follow(processes, Ending(plan), progress, stopping)
+            view = shown(output, args.live_port) if args.live else None
+            follow(processes, Ending(plan), progress, stopping, view)
     finally:
         processes.close()
         progress.end()
+        if view is not None:
+            view.close()
+            progress.say(f"live view: {view.again} shows it again")
     return verdict(processes, stopping())
+
+
+def shown(output: Path, port: int) -> View:
+    """A live view of the recording that begins."""
+    from rths.live.child import View
+
+    return View(output, port)
 
 
 def crew(plan: Plan) -> str:
@@ -203,7 +224,13 @@ def real_time_words(mode: str, processor: int | None) -> list[str]:
     return ["--rt", mode, *place]
 
 
-def follow(processes: Processes, ending: Ending, progress: Progress, stopping: Callable[[], str]) -> None:
+def follow(
+    processes: Processes,
+    ending: Ending,
+    progress: Progress,
+    stopping: Callable[[], str],
+    view: View | None = None,
+) -> None:
     """Show what the processes say, and stop them where it is time, until all have ended."""
     again: Stopper | None = None
     while not processes.all_ended():
@@ -211,6 +238,8 @@ def follow(processes: Processes, ending: Ending, progress: Progress, stopping: C
         if said is not None:
             tell(said, progress)
             ending.agreed = ending.agreed or (said.process == MASTER and said.data.get("state") == AGREED)
+        if view is not None and (news := view.news()):
+            progress.say(news)
         if stopping() and again is None:
             again = Stopper()  # from now on a second wish is told from the first
         ending.insisted = again is not None and bool(again())
@@ -222,6 +251,8 @@ def tell(said: Said, progress: Progress) -> None:
     match said.data:
         case {"kind": "progress"} if said.process == MASTER:
             progress.show(said.data)
+        case {"kind": "mode", "lab": lab, "mode": mode}:
+            progress.mode(lab, mode)
         case {"kind": "event", "code": code, "lab": lab, "text": text} if code not in UNSAID:
             progress.say(f"{lab}: {text}")
         case {"kind": "text", "text": text}:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 import sys
 from collections.abc import Mapping, Sequence
 from typing import Any, TextIO
 
-BAR = 24
+from rths.board import Board, coloured
+
 LINE_EVERY = 5.0  # s of test, where there is no terminal
 
 
@@ -22,45 +25,77 @@ def table(rows: Sequence[Sequence[str]], stream: TextIO | None = None) -> None:
 
 
 class Progress:
-    """Progress of a test on standard error: a bar on a terminal, plain lines now and then elsewhere."""
+    """Progress of a test: a bar and sparklines on a terminal, plain lines now and then elsewhere (default: stderr)."""
 
-    def __init__(self, duration: float) -> None:
+    def __init__(self, duration: float, stream: TextIO | None = None) -> None:
         self._duration = duration
-        self._stream = sys.stderr
-        self._live = sys.stderr.isatty()
+        self._stream = stream or sys.stderr
+        self._live = self._stream.isatty() and os.environ.get("TERM") != "dumb"
         self._next = 0.0
-        self._open = False
+        self._board = Board(duration)
+        self._drawn = 0  # lines of the board that stand on the terminal
 
     def show(self, data: Mapping[str, Any]) -> None:
         """Show one report of progress."""
         t = float(data["t"])
-        if not self._live and t < self._next:
-            return
-        self._next = t + LINE_EVERY
-        facts = f"t {t:6.2f}/{self._duration:g} s"
-        if "drift" in data:
-            facts += f"  drift {data['drift'] * 1e3:+7.3f} mm"
-        if "round_trip" in data:
-            facts += f"  round trip {microseconds(data['round_trip'])} µs  late {data['missed']:.0f}"
         if self._live:
-            filled = round(BAR * min(t / self._duration, 1.0))
-            self._stream.write(f"\r[{'█' * filled}{'·' * (BAR - filled)}] {facts} ")
-            self._open = True
-        else:
-            self._stream.write(facts + "\n")
-        self._stream.flush()
+            self._board.take(data)
+            self._draw()
+        elif t >= self._next:
+            self._next = t + LINE_EVERY
+            self._stream.write(facts(data, self._duration) + "\n")
+            self._stream.flush()
+
+    def mode(self, lab: str, mode: str) -> None:
+        """Show a laboratory's safety mode."""
+        self._board.modes[lab] = mode
+        if self._drawn:
+            self._draw()
 
     def say(self, text: str) -> None:
-        """A line of its own, beside the bar."""
-        self.end()
+        """A line of its own, above the board."""
+        drawn = self._drawn
+        self._clear()
         self._stream.write(text + "\n")
+        if drawn:
+            self._draw()
         self._stream.flush()
 
     def end(self) -> None:
-        """Leave the bar's line."""
-        if self._open:
-            self._stream.write("\n")
-            self._open = False
+        """Leave the board as it stands: what follows comes below."""
+        self._drawn = 0
+
+    def _draw(self) -> None:
+        columns, rows = size_of(self._stream)
+        lines = self._board.lines(columns - 1)[: max(rows - 1, 1)]  # a full last column or row would scroll
+        self._clear()
+        self._stream.write("".join(coloured(line) + "\n" for line in lines))
+        self._stream.flush()
+        self._drawn = len(lines)
+
+    def _clear(self) -> None:
+        """Take the board off the terminal."""
+        if self._drawn:
+            self._stream.write(f"\x1b[{self._drawn}A\r\x1b[J")
+            self._drawn = 0
+
+
+def facts(data: Mapping[str, Any], duration: float) -> str:
+    """A report of progress as one line."""
+    text = f"t {data['t']:6.2f}/{duration:g} s"
+    if "drift" in data:
+        text += f"  drift {data['drift'] * 1e3:+7.3f} mm"
+    if "round_trip" in data:
+        text += f"  round trip {microseconds(data['round_trip'])} µs  late {data['missed']:.0f}"
+    return text
+
+
+def size_of(stream: TextIO) -> tuple[int, int]:
+    """Columns and rows of the terminal behind a stream."""
+    try:
+        return os.get_terminal_size(stream.fileno())
+    except (OSError, ValueError):
+        return shutil.get_terminal_size()
 
 
 def microseconds(seconds: float) -> str:

@@ -6,6 +6,7 @@ import io
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -114,30 +115,50 @@ def read(path: Path) -> Run:
         InputError: the file cannot be read, is no MCAP file, or holds nothing of a hybrid test.
     """
     run = Run(path)
-    table: dict[str, list[Message]] = {}
-    channels: dict[int, Channel] = {}
-    schemas: dict[int, Schema] = {}
+    contents = Contents()
     for record in _records(path, run):
+        contents.take(record, run)
+    contents.decode(run)
+    if not run.columns and not run.events:
+        raise InputError(f"{path} is an MCAP file, but holds no topic rths/<test>/<name>.")
+    return run
+
+
+class Contents:
+    """The records of a recording, taken as they come and decoded when they are wanted."""
+
+    def __init__(self) -> None:
+        self._channels: dict[int, Channel] = {}
+        self._schemas: dict[int, Schema] = {}
+        self._messages: dict[str, list[Message]] = {}  # by topic
+
+    def take(self, record: McapRecord, run: Run) -> None:
+        """One record as `unpacked` gives it; metadata and attachments go to the run at once."""
         match record:
             case Schema():
-                schemas[record.id] = record
+                self._schemas[record.id] = record
             case Channel():
-                channels[record.id] = record
-            case Message() if record.channel_id in channels:
-                table.setdefault(channels[record.channel_id].topic, []).append(record)
+                self._channels[record.id] = record
+            case Message() if record.channel_id in self._channels:
+                self._messages.setdefault(self._channels[record.channel_id].topic, []).append(record)
             case Metadata():
                 run.metadata[record.name] = record.metadata
             case Attachment():
                 run.attachments[record.name] = record.data
             case _:
                 pass
-    _check(run)
-    for _, channel in sorted(channels.items()):  # in the order in which they were registered
-        if channel.topic.startswith("rths/"):
-            _take(run, channel, schemas, table.get(channel.topic, []))
-    if not run.columns and not run.events:
-        raise InputError(f"{path} is an MCAP file, but holds no topic rths/<test>/<name>.")
-    return run
+
+    def decode(self, run: Run) -> None:
+        """Give a run the messages taken since the last call, and hold its metadata against their checksums.
+
+        Raises:
+            InputError: messages and what describes them do not belong together.
+        """
+        _check(run)
+        messages, self._messages = self._messages, {}
+        for _, channel in sorted(self._channels.items()):  # in the order in which they were registered
+            if channel.topic.startswith("rths/"):
+                _take(run, channel, self._schemas, messages.get(channel.topic, []))
 
 
 def _check(run: Run) -> None:
@@ -167,7 +188,7 @@ def _up_to_damage(stream: io.BufferedReader, run: Run) -> Iterator[Any]:
     while True:
         try:
             record = next(records)
-            inner = list(_content(record))
+            inner = list(unpacked(record))
         except StopIteration:
             return
         except DAMAGE:
@@ -188,15 +209,15 @@ def _torn(stream: io.BufferedReader, place: int) -> bool:
     return len(head) < HEAD.size or size - place - HEAD.size < HEAD.unpack(head)[1] <= RECORD_LIMIT
 
 
-def _content(record: McapRecord) -> Iterator[McapRecord]:
+def unpacked(record: McapRecord) -> Iterator[McapRecord]:
     """What counts of a record: definitions and messages are those of chunks, which have a checksum.
 
     Raises:
         ValueError: a chunk would unpack to more than any of a recording holds.
     """
     if isinstance(record, Chunk):
-        unpacked = zstandard.frame_content_size(record.data) if record.compression == "zstd" else 0
-        if max(unpacked, record.uncompressed_size) > RECORD_LIMIT:
+        size = zstandard.frame_content_size(record.data) if record.compression == "zstd" else 0
+        if max(size, record.uncompressed_size) > RECORD_LIMIT:
             raise ValueError("a chunk is larger than any of a recording")
         yield from breakup_chunk(record, validate_crc=True)
     elif not isinstance(record, Schema | Channel | Message):
@@ -216,8 +237,7 @@ def _take(run: Run, channel: Channel, schemas: dict[int, Schema], messages: list
 def _decode(run: Run, channel: Channel, schema: Schema, messages: list[Message]) -> None:
     _, run.test, topic = channel.topic.split("/", 2)
     run.roles = tuple(channel.metadata.get("slaves", SLAVE).split())
-    files = descriptor_pb2.FileDescriptorSet.FromString(schema.data)
-    kind = message_class(files.file[0], schema.name)
+    kind = _described(schema.data, schema.name)
     decoded = [kind.FromString(message.data) for message in messages]
     if topic == "event":
         run.events = [_event(item) for item in decoded]
@@ -231,6 +251,12 @@ def _decode(run: Run, channel: Channel, schema: Schema, messages: list[Message])
     run.columns[topic] = columns
     run.sequences[topic] = np.array([message.sequence for message in messages], dtype=np.int64)
     run.log_ns[topic] = np.array([message.log_time for message in messages], dtype=np.int64)
+
+
+@lru_cache(maxsize=32)
+def _described(description: bytes, name: str) -> type[Any]:
+    """The class of a message that a schema describes, made once: a recording that grows is decoded again and again."""
+    return message_class(descriptor_pb2.FileDescriptorSet.FromString(description).file[0], name)
 
 
 def _event(item: Any) -> dict[str, Any]:

@@ -1,0 +1,26 @@
+"""What a user watches while a test runs is what the master has measured."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from common import plan, reality
+from common.plan import Plan
+from common.recording.reader import read
+from rths import virtual
+from tests.helpers import ROOT
+
+
+@pytest.mark.parametrize("name", ["default", "two_dampers"])
+def test_progress_has_the_newest_drift_forces_and_late_ticks(name: str, tmp_path: Path) -> None:
+    test: Plan = plan.load(ROOT / f"rths/plans/{name}.toml").with_test(duration=0.5)
+    bench = virtual.assemble(test, reality.as_planned(test), tmp_path / "a.mcap")
+    assert virtual.run(bench, lambda: "") is None
+    progress, master = bench.master.progress, read(tmp_path / "a.mcap").columns["master"]
+    used = master["damper_force_used"][-1].ravel().tolist()
+    assert progress["damper_force"] == max(used, key=abs) != 0.0
+    assert progress["column_force"] == master["column_force"][-1]
+    assert progress["drift"] == master["column_target"][-1] / test.column.deformation_ratio
+    assert progress["missed"] == 0.0

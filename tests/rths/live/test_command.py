@@ -1,0 +1,59 @@
+"""`rths live` and `rths run --live` as a user calls them: sentences and exit codes."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rths.__main__ import main
+from tests.helpers import ROOT
+
+
+def rths(monkeypatch: Any, *words: str | Path) -> int:
+    monkeypatch.setattr(sys, "argv", ["rths", *map(str, words)])
+    return main()
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["live", "nothing.mcap"], "There is no recording nothing.mcap: give its path, or --wait"),
+        (["live", "x", "--rate", "100"], "--rate 100 must be from 1 to 30 Hz."),
+        (["live", "x", "--window", "0"], "--window 0 must be from 1 to 3600 s."),
+        (["live", "x", "--port", "70000"], "--port 70000 must be from 1 to 65535"),
+        (["run", "--virtual", "--live"], "--live shows a test in real time: leave out --virtual"),
+    ],
+)
+def test_a_mistake_is_one_sentence(words: list[str], sentence: str, monkeypatch: Any, capsys: Any) -> None:
+    assert rths(monkeypatch, *words) == 2
+    err = capsys.readouterr().err
+    assert err.startswith(f"rths: {sentence}")
+    assert err.count("\n") == 1
+
+
+def test_what_is_no_recording_is_said_before_anything_is_served(
+    tmp_path: Path, monkeypatch: Any, capsys: Any
+) -> None:
+    path = tmp_path / "a.mcap"
+    path.write_text("no recording at all")
+    monkeypatch.setattr("os.nice", lambda _more: 0)
+    monkeypatch.setattr(signal, "signal", lambda *_: None)
+    assert rths(monkeypatch, "live", path, "--no-browser") == 2
+    assert "is no MCAP recording" in capsys.readouterr().err
+
+
+def test_ctrl_c_ends_it_with_exit_code_0(virtual_recording: Path) -> None:
+    words = [sys.executable, "-m", "rths", "live", str(virtual_recording), "--no-browser"]
+    with subprocess.Popen(
+        words, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline().startswith("live view: http://127.0.0.1:")
+        process.send_signal(signal.SIGINT)
+        assert process.communicate(timeout=30.0) == ("", "")
+        assert process.returncode == 0

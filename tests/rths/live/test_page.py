@@ -1,0 +1,225 @@
+"""The page without a browser: what its sources and texts hold while a recording grows."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterator
+from html import unescape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bokeh.document import Document
+
+from common import reality
+from common.clock import VirtualClock
+from common.plan import Plan, load
+from common.recording.reader import Run, read
+from common.recording.tail import Tail
+from common.recording.writer import Recording
+from common.signals import TOPICS
+from rths import virtual
+from rths.live.feed import EDGES, POINTS, SILENT_NS, Feed
+from rths.live.page import Page
+from rths.live.status import row
+from tests.helpers import ROOT
+
+
+class Growing:
+    """A page on a file that grows."""
+
+    def __init__(self, folder: Path, content: bytes, window: float = 10.0) -> None:
+        self.path = folder / "growing.mcap"
+        self.clock = VirtualClock()
+        self.tail = Tail(self.path)
+        self.feed = Feed(self.tail, window, self.clock)
+        self.document = Document()
+        self.page = Page(self.document, self.feed)
+        self._content = content
+
+    def to(self, share: float) -> None:
+        """Let a share of the file be there, and bring the page up to date."""
+        self.path.write_bytes(self._content[: round(share * len(self._content))])
+        self.feed.look()
+        while self.feed.behind:
+            self.feed.look()
+        self.page.update()
+
+    def source(self, name: str) -> dict[str, Any]:
+        return {key: np.asarray(value) for key, value in getattr(self.page.streams, name).source.data.items()}
+
+    @property
+    def text(self) -> str:
+        return unescape(self.page.status.tiles.text)
+
+
+Grow = Callable[..., Growing]
+
+
+@pytest.fixture
+def grow(tmp_path: Path) -> Iterator[Grow]:
+    """Makes pages whose files are closed in the end."""
+    with contextlib.ExitStack() as stack:
+
+        def made(content: bytes, window: float = 10.0) -> Growing:
+            growing = Growing(tmp_path, content, window)
+            stack.enter_context(growing.tail)
+            return growing
+
+        yield made
+
+
+@pytest.fixture
+def growing(virtual_recording: Path, grow: Grow) -> Growing:
+    return grow(virtual_recording.read_bytes())
+
+
+def thinned(run: Run, topic: str, name: str, step: int) -> Any:
+    return run.columns[topic][name][::step]
+
+
+def test_before_anything_is_recorded_the_page_says_so_and_its_axes_are_there(growing: Growing) -> None:
+    growing.to(0.0)
+    assert "waiting for the recording to begin" in growing.text
+    assert growing.source("master")["column_force"].tolist() == [0.0]
+    assert growing.document.title == "growing: live"
+
+
+def test_a_growing_recording_reaches_the_plots_in_the_units_of_their_axes(
+    growing: Growing, virtual_recording: Path
+) -> None:
+    run = read(virtual_recording)
+    for share in np.linspace(0.0, 1.0, 23):
+        growing.to(share)
+    step = 5  # ten seconds of 500 ticks each in a thousand points
+    master, slave = growing.source("master"), growing.source("slave")
+    rows = 2000 // step
+    for name, factor in (
+        ("t", 1.0),
+        ("column_target", 1e3),
+        ("column_displacement", 1e3),
+        ("column_force", 1e-3),
+    ):
+        assert np.allclose(master[name][:rows], factor * thinned(run, "master", name, step), rtol=1e-12), name
+    for name, factor in (("table_displacement", 1e3), ("damper_stroke", 1e3), ("damper_force", 1.0)):
+        assert np.allclose(slave[name][:rows], factor * thinned(run, "slave", name, step), rtol=1e-12), name
+    ramp = run.ramps["master"]["column_displacement"]
+    assert master["t"].size - rows == pytest.approx(ramp.size / step, abs=1)
+    assert np.isnan(master["column_target"][rows:]).all()
+    assert "ended: completed" in growing.text
+    assert growing.document.title == "default: ended"
+
+
+def test_late_ticks_and_the_histogram_count_every_tick(growing: Growing, virtual_recording: Path) -> None:
+    run = read(virtual_recording)
+    growing.to(1.0)
+    tops = np.asarray(growing.page.latency.source.data["top"])
+    trips = run.columns["latency"]["round_trip"]
+    assert tops[tops >= 1].sum() == np.isfinite(trips).sum()
+    assert f"{np.count_nonzero(run.columns['latency']['deadline_missed'])} (" in growing.text
+
+
+def test_events_and_modes_are_shown(growing: Growing) -> None:
+    growing.to(0.5)
+    assert growing.feed.modes == {"master": "running", "slave": "running"}
+    growing.to(1.0)
+    assert growing.feed.modes == {"master": "idle", "slave": "idle"}
+    events = unescape(growing.page.status.events.text)
+    assert "running → ramping (end)" in events
+    assert events.index("running → ramping (end)") < events.index("recording begun")
+
+
+def test_a_window_bounds_what_a_page_holds(virtual_recording: Path, grow: Grow) -> None:
+    growing = grow(virtual_recording.read_bytes(), window=1.0)
+    for share in (0.4, 0.7, 1.0):
+        growing.to(share)
+        assert growing.source("slave")["t"].size <= POINTS
+    assert growing.source("slave")["t"][-1] == pytest.approx(4.1, abs=0.1)
+
+
+def test_a_second_reader_gets_all_of_the_window_at_once(growing: Growing) -> None:
+    growing.to(1.0)
+    other = Page(Document(), growing.feed)
+    assert np.array_equal(
+        np.asarray(other.streams.slave.source.data["damper_stroke"]), growing.source("slave")["damper_stroke"]
+    )
+
+
+def test_several_slaves_are_shown_one_at_a_time(tmp_path: Path, grow: Grow) -> None:
+    plan = load(ROOT / "rths/plans/two_dampers.toml").with_test(duration=1.0)
+    path = tmp_path / "two.mcap"
+    assert virtual.run(virtual.assemble(plan, reality.as_planned(plan), path), lambda: "") is None
+    run = read(path)
+    growing = grow(path.read_bytes())
+    growing.to(0.5)
+    growing.to(1.0)
+    assert growing.page.slave.visible
+    assert growing.page.slave.options == [("slave.roof", "roof"), ("slave.middle", "middle")]
+    for role in ("slave.roof", "slave.middle"):
+        growing.page.slave.value = role
+        growing.page.update()
+        shown = growing.source("slave")["damper_stroke"][: 500 // 5]
+        assert np.allclose(shown, 1e3 * run.columns[role]["damper_stroke"][::5])
+    assert "slave 'middle'" in growing.text
+
+
+def test_a_silent_recorder_is_said(growing: Growing) -> None:
+    growing.to(0.5)
+    assert "running" in growing.feed.state
+    growing.clock.time += SILENT_NS + 1_000_000_000
+    growing.to(0.5)
+    assert growing.feed.state == "nothing new from the recorder for 3 s"
+
+
+def test_damage_is_said_and_what_came_before_stays(virtual_recording: Path, grow: Grow) -> None:
+    content = bytearray(virtual_recording.read_bytes())
+    content[len(content) // 2] ^= 0xFF
+    growing = grow(bytes(content))
+    growing.to(1.0)
+    assert growing.feed.ended
+    assert "the recording is damaged at byte" in growing.text
+    assert growing.source("master")["t"].size > 10
+
+
+def test_what_is_no_recording_is_said(grow: Grow) -> None:
+    growing = grow(b"no recording at all")
+    growing.to(1.0)
+    assert "is no MCAP recording" in growing.feed.state
+    assert growing.feed.ended
+
+
+def test_a_recording_without_plan_or_with_one_topic_is_shown_too(tmp_path: Path, grow: Grow) -> None:
+    path = tmp_path / "some.mcap"
+    recording = Recording(path, "bench", 1, {"slave": TOPICS["slave"][:2]})
+    for seq in range(200):
+        recording.add("slave", seq, seq, (seq, seq * 0.01))
+    recording.close({})
+    growing = grow(path.read_bytes())
+    growing.to(1.0)
+    assert growing.feed.interval == pytest.approx(0.01)
+    assert growing.source("slave")["t"][-1] == pytest.approx(1.99)
+    assert np.isnan(growing.source("slave")["damper_force"]).all()
+    assert growing.feed.state == "ended: nobody knows how"
+
+
+def test_a_file_of_a_test_before_is_not_shown(virtual_recording: Path, tmp_path: Path) -> None:
+    path = tmp_path / "old.mcap"
+    path.write_bytes(virtual_recording.read_bytes())
+    written = path.stat().st_mtime_ns
+    with Tail(path) as tail:
+        old, new = (Feed(tail, 10.0, VirtualClock(), since_ns=since) for since in (written + 1, written))
+        old.look()
+        assert old.state == "waiting for the recording to begin"
+        new.look()
+        assert new.changes
+
+
+def test_the_text_of_an_event_is_no_markup() -> None:
+    event = {"t": 1.0, "lab": "<b>", "level": "error", "code": "x", "text": "<script>alert(1)</script>"}
+    assert "<script>" not in row(event)
+    assert "&lt;script&gt;" in row(event)
+
+
+def test_the_classes_of_the_histogram_reach_around_the_interval(short_plan: Plan) -> None:
+    assert EDGES[0] < 1e6 * short_plan.test.interval < EDGES[-1]

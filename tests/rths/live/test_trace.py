@@ -1,0 +1,47 @@
+"""Thinning: how many points are kept, which ones, and what is new to a reader."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rths.live.trace import Trace
+
+TICKS = np.arange(1000)
+
+
+def in_pieces(trace: Trace, cuts: list[int], values: np.ndarray) -> None:
+    for begin, end in zip([0, *cuts], [*cuts, TICKS.size], strict=True):
+        trace.add(TICKS[begin:end], {"a": values[begin:end]})
+
+
+@given(cuts=st.lists(st.integers(0, 1000), max_size=20), step=st.integers(1, 30))
+def test_every_so_many_ticks_have_one_point_however_they_come(cuts: list[int], step: int) -> None:
+    trace = Trace(step, 2000)
+    in_pieces(trace, sorted(cuts), TICKS * 0.5)
+    assert trace.since(0)["a"].tolist() == (TICKS[::step] * 0.5).tolist()
+    assert trace.total == TICKS[::step].size
+
+
+@given(cuts=st.lists(st.integers(0, 1000), max_size=20), step=st.integers(1, 30), seed=st.integers(0, 99))
+def test_the_worst_of_each_group_is_kept_however_it_comes(cuts: list[int], step: int, seed: int) -> None:
+    values = np.random.default_rng(seed).normal(size=TICKS.size)
+    values[::7] = np.nan
+    trace = Trace(step, 2000, worst=True)
+    in_pieces(trace, sorted(cuts), values)
+    groups = [values[begin : begin + step] for begin in range(0, TICKS.size, step)][:-1]
+    expected = [np.nan if np.isnan(group).all() else np.nanmax(group) for group in groups]
+    assert np.array_equal(trace.since(0)["a"], expected, equal_nan=True)
+
+
+def test_a_reader_gets_what_is_new_to_it_and_no_more_than_is_kept() -> None:
+    trace = Trace(1, 10)
+    trace.add(TICKS[:4], {"a": TICKS[:4]})
+    assert trace.since(0)["a"].tolist() == [0, 1, 2, 3]
+    seen = trace.total
+    trace.add(TICKS[4:7], {"a": TICKS[4:7]})
+    assert trace.since(seen)["a"].tolist() == [4, 5, 6]
+    assert trace.since(trace.total)["a"].size == 0
+    trace.add(TICKS[7:100], {"a": TICKS[7:100]})
+    assert trace.since(seen)["a"].tolist() == list(range(90, 100))

@@ -1,0 +1,101 @@
+"""The live view in a real browser: every plot drawn, nothing complained of, nothing fetched from elsewhere."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.browser import Page, chromium, open_page
+from tests.helpers import ROOT
+
+pytestmark = pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine (Debian: chromium)")
+
+PLOTS = 7
+SECONDS = 4.0  # in which the recording grows
+# colours that a plot's canvas holds, as many as make a drawing: the canvases are in shadow trees
+DRAWN = """() => {
+  const found = [];
+  const walk = (node) => {
+    if (node.shadowRoot) walk(node.shadowRoot);
+    if (node.tagName === "CANVAS" && node.width > 50) {
+      const data = node.getContext("2d").getImageData(0, 0, node.width, node.height).data;
+      const colours = new Set();
+      for (let i = 0; i < data.length; i += 4)
+        if (data[i + 3] > 200) colours.add((data[i] << 16) | (data[i + 1] << 8) | data[i + 2]);
+      found.push([...colours]);
+    }
+    for (const child of node.children || []) walk(child);
+  };
+  walk(document.body);
+  return found;
+}"""
+TEXT = """() => {
+  let text = "";
+  const walk = (node) => {
+    if (node.shadowRoot) walk(node.shadowRoot);
+    if (node.tagName === "DIV" && node.className.includes("bk-clearfix")) text += node.textContent + "\\n";
+    for (const child of node.children || []) walk(child);
+  };
+  walk(document.body);
+  return text;
+}"""
+CURVES = {0x0072B2, 0x009E73, 0xCC79A7}  # one of them in each plot
+
+
+@pytest.fixture
+def served(tmp_path: Path, virtual_recording: Path) -> Iterator[tuple[str, threading.Thread]]:
+    """A view of a recording that does not exist yet, and what makes it grow."""
+    path, content = tmp_path / "growing.mcap", virtual_recording.read_bytes()
+
+    def grow() -> None:
+        steps = round(SECONDS / 0.05)
+        with path.open("wb", buffering=0) as stream:
+            for step in range(steps):
+                stream.write(content[len(content) * step // steps : len(content) * (step + 1) // steps])
+                time.sleep(0.05)
+
+    growing = threading.Thread(target=grow)
+    words = [sys.executable, "-m", "rths", "live", str(path), "--wait", "--no-browser"]
+    with subprocess.Popen(words, cwd=ROOT, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        try:
+            yield process.stdout.readline().split()[-1], growing
+        finally:
+            process.terminate()
+            if growing.ident:
+                growing.join()
+    assert process.returncode == 0
+
+
+@pytest.mark.parametrize(("width", "height"), [(1280, 900), (390, 844)])
+def test_a_test_is_seen_while_it_runs_and_after_its_end(
+    width: int, height: int, served: tuple[str, threading.Thread], tmp_path: Path
+) -> None:
+    url, growing = served
+    with open_page(url, width, height) as page:
+        page.wait(f"({TEXT})().includes('waiting for the recording to begin')")
+        growing.start()
+        page.wait("document.title === 'default: live'")
+        page.wait(f"({TEXT})().includes('running')")
+        page.wait("document.title === 'default: ended'", 40.0)
+        page.wait(f"({TEXT})().includes('running → ramping (end)')")
+        check(page, width)
+        assert page.screenshot(tmp_path / "page.png").stat().st_size > 20_000
+        assert page.errors == []
+        assert {request.split("/")[2] for request in page.requests} == {url.split("/")[2]}
+
+
+def check(page: Page, width: int) -> None:
+    """Every plot has its curve, and nothing is wider than the window."""
+    drawings = [set(colours) & CURVES for colours in page.evaluate(DRAWN) if len(colours) > 5]
+    assert len(drawings) >= PLOTS
+    assert (
+        sum(bool(curves) for curves in drawings) >= PLOTS - 1
+    )  # in virtual time no round trip is above zero
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
