@@ -4,7 +4,7 @@ READY := .venv/.ready
 
 FAULT_ROWS := runs/faults.jsonl
 
-.PHONY: setup run test check faults docs benchmark blind clean
+.PHONY: setup run test check faults docs site benchmark blind clean
 
 setup: $(READY)
 
@@ -35,11 +35,14 @@ faults: setup
 	mkdir -p runs
 	rm -f $(FAULT_ROWS)
 	RTHS_FAULT_INTERVAL=0.002 RTHS_FAULT_ROWS=$(CURDIR)/$(FAULT_ROWS) $(BIN)/pytest tests/faults $(FAULT_TESTS)
-	$(BIN)/python -m tests.faults.rows $(FAULT_ROWS) docs/faults.md
+	$(BIN)/python -m tests.faults.rows $(FAULT_ROWS) docs/reference/faults.md
 
 docs: setup
 	$(BIN)/python -m docs.generate
-	test ! -f $(FAULT_ROWS) || $(BIN)/python -m tests.faults.rows $(FAULT_ROWS) docs/faults.md
+	test ! -f $(FAULT_ROWS) || $(BIN)/python -m tests.faults.rows $(FAULT_ROWS) docs/reference/faults.md
+
+site: docs
+	$(BIN)/python -m mkdocs build --strict --quiet
 
 benchmark: setup
 	$(BIN)/python -m benchmarks
@@ -48,4 +51,4 @@ blind: setup
 	$(BIN)/rths blind --cases 300 --jobs 2 -o runs/blind
 
 clean:
-	rm -rf .venv build runs *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf .venv build runs site *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

@@ -30,7 +30,7 @@ KINDS = {message: kind for kind, message in enumerate(MESSAGES)}
 
 
 class Reject(Enum):
-    """Why a frame was rejected; `docs/rejections.md` says what each means and what to do."""
+    """Why a frame was rejected; `docs/reference/rejections.md` says what each means and what to do."""
 
     LENGTH = "length"
     CHECK = "check"

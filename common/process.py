@@ -106,7 +106,7 @@ def join(
     elif not loopback(listen):
         warn(
             "open_link",
-            f"The link on {listen} is open: whoever reaches it can move the rigs; see docs/security.md.",
+            f"The link on {listen} is open: whoever reaches it can move the rigs; see docs/how-to/security.md.",
         )
     return ZenohLink(
         role,

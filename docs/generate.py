@@ -6,7 +6,6 @@ A part stands between `<!-- name -->` and `<!-- end of name -->`; tests/test_doc
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,8 @@ from common.rig import ColumnMeasurement, TableCommand, TableMeasurement
 from common.safety.modes import MEANING, TURNS, mermaid
 from common.signals import TOPICS
 from common.tables import Limits, Preflight, Safety
+from docs import reference_tables
+from docs.markdown import quantity, table
 from master.step import Outputs
 
 FOLDER = Path(__file__).resolve().parent
@@ -40,7 +41,7 @@ CHECKED_BY = {
 def parts() -> dict[str, dict[str, str]]:
     """The text of every part, by document and name."""
     return {
-        "safety.md": {
+        "explanation/safety.md": {
             "modes": f"```mermaid\n{mermaid()}\n```\n",
             "turns": turns(),
             "watchdog and ramp": keys(Safety),
@@ -48,14 +49,20 @@ def parts() -> dict[str, dict[str, str]]:
             "limits": limits(),
             "pre-flight": keys(Preflight),
         },
-        "recordings.md": {"topics": topics()},
+        "decisions.md": {"decisions": decisions()},
+        "reference/plan.md": {"keys": reference_tables.plan()},
+        "reference/signals.md": {"topics": topics()},
+        "reference/commands.md": {"commands": reference_tables.commands()},
+        "reference/effects.md": {"effects": reference_tables.effects()},
+        "reference/compensators.md": {"compensators": reference_tables.compensators()},
+        "reference/models.md": {
+            "specimens": reference_tables.specimens(),
+            "integrators": reference_tables.integrators(),
+            "motions": reference_tables.motions(),
+        },
+        "reference/exit-codes.md": {"exits": reference_tables.exits()},
+        "reference/budget.md": {"budget": reference_tables.budget()},
     }
-
-
-def table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
-    """A Markdown table."""
-    lines = [f"| {' | '.join(cells)} |\n".replace("|  |", "| |") for cells in (head, *rows)]
-    return "".join([lines[0], f"|{'---|' * len(head)}\n", *lines[1:]])
 
 
 def turns() -> str:
@@ -70,7 +77,7 @@ def turns() -> str:
 def keys(cls: type[Any]) -> str:
     """The keys of a table of the plan."""
     fields = ((field, field.metadata["rule"]) for field in dataclasses.fields(cls))
-    rows = ((f"`{field.name}`", shown(field.default), rule.unit, rule.text) for field, rule in fields)
+    rows = ((f"`{field.name}`", quantity(field.default), rule.unit, rule.text) for field, rule in fields)
     return table(("key", "default", "unit", "meaning"), rows)
 
 
@@ -80,7 +87,7 @@ def limits() -> str:
     for field in dataclasses.fields(Limits):
         rule = field.metadata["rule"]
         labs = " and ".join(lab for lab, names in CHECKED_BY.items() if field.name in names)
-        rows.append((f"`{field.name}`", shown(field.default), rule.unit, rule.text, labs))
+        rows.append((f"`{field.name}`", quantity(field.default), rule.unit, rule.text, labs))
     return table(("key", "default", "unit", "on", "checked by"), rows)
 
 
@@ -106,13 +113,19 @@ def topics() -> str:
     texts = []
     for topic, signals in TOPICS.items():
         rows = ((f"`{signal.name}`", signal.unit, signal.text) for signal in signals)
-        texts.append(f"### `{topic}`\n\n{table(('signal', 'unit', 'meaning'), rows)}")
+        texts.append(f"## `{topic}`\n\n{table(('signal', 'unit', 'meaning'), rows)}")
     return "\n".join(texts)
 
 
-def shown(value: object) -> str:
-    """A value as a plan has it."""
-    return str(value).lower() if isinstance(value, bool) else f"{value:g}"
+def decisions() -> str:
+    """The records of decisions, by what each decides."""
+    titles = {path: path.read_text(encoding="utf-8").partition("\n")[0] for path in records()}
+    return "".join(f"- [{title.lstrip('# ')}](decisions/{path.name})\n" for path, title in titles.items())
+
+
+def records() -> list[Path]:
+    """The files of the records, in order."""
+    return sorted((FOLDER / "decisions").glob("[0-9]*.md"))
 
 
 def renewed(text: str, named: dict[str, str]) -> str:

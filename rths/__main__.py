@@ -60,7 +60,7 @@ def parser_for(verb: str) -> argparse.ArgumentParser:
     example = EXAMPLES[verb]
     parser = argparse.ArgumentParser(
         prog=f"rths {verb}",
-        description=f"{VERBS[verb].capitalize()}.",
+        description=f"{VERBS[verb][0].upper()}{VERBS[verb][1:]}.",
         epilog=f"example: {example}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

@@ -56,7 +56,7 @@ def write_report(summary: dict[str, Any]) -> None:
         )
     for lab, counts in summary["rejected"].items():
         reasons = ", ".join(f"{count} by {reason}" for reason, count in counts.items())
-        say(f"frames rejected by the {lab}: {reasons} (docs/rejections.md)\n")
+        say(f"frames rejected by the {lab}: {reasons} (docs/reference/rejections.md)\n")
     outcome = summary["recorder"]
     if outcome:
         say(f"outcome: {outcome.get('cause') or outcome.get('outcome', 'unknown')}\n")

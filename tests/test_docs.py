@@ -15,6 +15,7 @@ from common.limits import PATIENCE
 from common.messages import Command
 from common.plan import Plan
 from common.rig import ColumnMeasurement, TableCommand, TableMeasurement
+from common.safety.modes import TURNS, Mode
 from common.tables import Limits
 from docs import generate
 from master.limits import MasterLimits
@@ -37,6 +38,15 @@ def test_a_document_has_what_the_code_generates(name: str) -> None:
 def test_a_part_without_a_place_is_refused() -> None:
     with pytest.raises(ValueError, match="no place for 'modes'"):
         generate.renewed("<!-- modes -->\n", {"modes": ""})
+
+
+def test_the_picture_of_the_safety_machine_has_every_mode_and_turn() -> None:
+    drawn = (generate.FOLDER / "pictures/modes.svg").read_text(encoding="utf-8")
+    shown = {text for words in re.findall(r">([^<>]+)</text>", drawn) for text in re.split(r" / |: ", words)}
+    turns = {turn.value for row in TURNS.values() for turn in row}
+    assert shown == {mode.value for mode in Mode} | turns | {"from every mode"}
+    for words in re.findall(r">([^<>]+ / [^<>]+)</text>", drawn):
+        assert any(set(words.split(" / ")) <= {turn.value for turn in row} for row in TURNS.values())
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -89,7 +99,7 @@ def test_the_bound_of_motion_is_that_of_the_fault_matrix_and_a_little_for_the_je
 
 
 def test_every_event_of_the_processes_is_in_the_list() -> None:
-    text = (generate.FOLDER / "recordings.md").read_text(encoding="utf-8")
+    text = (generate.FOLDER / "reference/events.md").read_text(encoding="utf-8")
     listed = set(re.findall(r"^\| `([a-z_]+)` \| (?:info|warning|error)", text, flags=re.MULTILINE))
     assert listed == (emitted() | BY_CONSTANT | {"begin"}) - SHOWN_ONLY
     for code in SHOWN_ONLY:
@@ -126,19 +136,3 @@ def test_the_plan_that_documents_the_keys_is_the_default_plan() -> None:
     from common.plan import load
 
     assert load(ROOT / "rths/plans/default.toml").digest() == Plan().digest()
-
-
-@pytest.mark.parametrize("name", ["README.md", "docs/safety.md", "docs/faults.md", "docs/recordings.md"])
-def test_a_link_leads_to_a_file_and_a_heading_that_exist(name: str) -> None:
-    path = ROOT / name
-    for link in re.findall(r"\]\(([^)]+)\)", path.read_text(encoding="utf-8")):
-        file, _, anchor = link.partition("#")
-        target = path.parent / file if file else path
-        assert target.exists(), link
-        assert not anchor or anchor in anchors(target.read_text(encoding="utf-8")), link
-
-
-def anchors(text: str) -> set[str]:
-    """What the headings of a Markdown text are called in links."""
-    headings = re.findall(r"^#+ (.+)$", text, flags=re.MULTILINE)
-    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}

@@ -463,7 +463,7 @@ def test_a_valid_message_flipped_cut_or_stuffed(message: Message, data: st.DataO
 
 
 def test_the_documentation_has_every_reason_once_in_the_order_of_the_enum() -> None:
-    text = (ROOT / "docs" / "rejections.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "reference" / "rejections.md").read_text(encoding="utf-8")
     table, _, keys = text.partition("## Keys")
     assert re.findall(r"^\| `(\w+)` \|", table, re.MULTILINE) == [reason.value for reason in Reject]
     assert set(re.findall(r"^\| `(\w+)` \|", keys, re.MULTILINE)) == {kind.__name__ for kind in OPEN}

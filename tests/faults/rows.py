@@ -1,7 +1,7 @@
 """The fault matrix F01 to F56: what each row must show, and the results that its table in the docs is made of.
 
 A test of a row says what happened with `passed`; where `RTHS_FAULT_ROWS` names a file, the row is appended to it, and
-`python -m tests.faults.rows ROWS.jsonl docs/faults.md` makes the table of all 56.
+`python -m tests.faults.rows ROWS.jsonl docs/reference/faults.md` makes the table of all 56.
 """
 
 from __future__ import annotations

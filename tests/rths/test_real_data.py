@@ -1,4 +1,4 @@
-"""Measurements of others, imported and diagnosed as `docs/real_data.md` describes."""
+"""Measurements of others, imported and diagnosed as `docs/explanation/real_data.md` describes."""
 
 from __future__ import annotations
 

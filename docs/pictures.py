@@ -1,0 +1,101 @@
+"""The pictures of the documents: `python -m docs.pictures` makes them again.
+
+Those of the tutorial are what its own commands draw; that of the safety machine comes from its table.
+"""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from common.safety.modes import TURNS, Mode, Turn
+from docs import console
+
+FOLDER = Path(__file__).resolve().parent
+TUTORIAL = ("hysteresis.png", "histories.png")
+PLACES = {
+    Mode.IDLE: (0, 2),
+    Mode.CONFIGURED: (1, 2),
+    Mode.ARMED: (2, 2),
+    Mode.RUNNING: (3, 2),
+    Mode.HOLDING: (3, 1),
+    Mode.RAMPING: (2, 1),
+    Mode.SAFE: (1, 1),
+    Mode.EMERGENCY_STOP: (0, 0),
+}
+ACROSS, UP = 2.4, 1.5
+BEND = {
+    (Mode.RUNNING, Mode.HOLDING): 0.3,
+    (Mode.HOLDING, Mode.RUNNING): 0.3,
+    (Mode.CONFIGURED, Mode.IDLE): 0.35,
+    (Mode.ARMED, Mode.IDLE): 0.3,
+}
+BOX = {"boxstyle": "round,pad=0.5", "fc": "#e8f1f8", "ec": "#1d4f73"}
+
+
+def tutorial() -> list[str]:
+    """Run the tutorial and keep the pictures that it draws; where the page and its commands part."""
+    with tempfile.TemporaryDirectory() as folder:
+        complaints = console.play(FOLDER / "tutorial.md", Path(folder))
+        for name in TUTORIAL:
+            shutil.copy(Path(folder) / "second" / name, FOLDER / "pictures" / name)
+    return complaints
+
+
+def modes() -> None:
+    """Draw the safety machine; the emergency stop, to which every mode leads, without its arrows."""
+    import matplotlib as mpl
+
+    from rths.figure import figure
+
+    canvas = figure(8.4, 4.4)
+    axes = canvas.subplots()
+    axes.set_axis_off()
+    axes.grid(visible=False)
+    for mode in PLACES:
+        axes.text(*place(mode), mode.value, ha="center", va="center", fontsize=9, bbox=BOX)
+    for mode, row in TURNS.items():
+        ways: dict[Mode, list[str]] = {}
+        for turn, to in row.items():
+            if turn is not Turn.EMERGENCY:
+                ways.setdefault(to, []).append(turn.value)
+        for to, turns in ways.items():
+            arrow(axes, mode, to, " / ".join(turns))
+    x, y = place(Mode.EMERGENCY_STOP)
+    axes.text(x + 0.95, y, "emergency: from every mode", va="center", fontsize=8, style="italic")
+    axes.set(xlim=(-0.9, 3 * ACROSS + 1.1), ylim=(-0.5, 2 * UP + 1.1), aspect="equal")
+    with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": "rths"}):
+        canvas.savefig(FOLDER / "pictures" / "modes.svg", metadata={"Date": None})
+
+
+def place(mode: Mode) -> tuple[float, float]:
+    """Where a mode stands."""
+    column, row = PLACES[mode]
+    return column * ACROSS, row * UP
+
+
+def arrow(axes: Any, start: Mode, end: Mode, label: str) -> None:
+    """One way from a mode to another with the turns that lead there."""
+    (x0, y0), (x1, y1) = place(start), place(end)
+    bend = BEND.get((start, end), 0.0)
+    style = {"arrowstyle": "-|>", "color": "#444", "connectionstyle": f"arc3,rad={bend}"}
+    axes.annotate("", (x1, y1), (x0, y0), arrowprops=style | {"shrinkA": 28, "shrinkB": 28})
+    middle = (x0 + x1 + bend * (y1 - y0)) / 2, (y0 + y1 - bend * (x1 - x0)) / 2
+    white = {"fc": "white", "ec": "none", "pad": 0.6}
+    axes.text(*middle, label, ha="center", va="center", fontsize=7.5, bbox=white)
+
+
+def main() -> int:
+    """Make all; 1 where the tutorial is not what its commands print."""
+    (FOLDER / "pictures").mkdir(exist_ok=True)
+    modes()
+    complaints = tutorial()
+    sys.stdout.write("\n".join(complaints))
+    return 1 if complaints else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

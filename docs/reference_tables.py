@@ -1,0 +1,221 @@
+"""The reference as the code's own tables have it: keys of a plan, commands, effects, methods, exit codes."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import sys
+from collections.abc import Iterable, Mapping
+from typing import Any, get_type_hints
+
+from common import errors
+from common.plan import Plan
+from common.schema import Rule, table_fields
+from docs.markdown import quantity, table
+from models.compensators import COMPENSATORS
+from models.effects import FILES, READINGS
+from models.effects.effect import Effect, Parameter
+from models.effects.readings import SIGNALS
+from models.ground_motion import MOTIONS
+from models.integrators import INTEGRATORS
+from models.specimens import SPECIMENS
+from rths.__main__ import EXAMPLES, VERBS, parser_for
+
+KEY_HEAD = ("key", "default", "unit", "allowed", "meaning")
+SITES = ("ground", "structure", "actuator", "column", "link", "table", "damper")
+TYPES = {"float": "number", "int": "whole number", "str": "text", "bool": "true or false"}
+
+
+def plan() -> str:
+    """Every table of a plan with its keys."""
+    shared = Plan()
+    names = [field.name for field in dataclasses.fields(Plan) if field.name not in ("slaves", "base")]
+    return "\n".join(text for name in names for text in plan_table(name, getattr(shared, name)))
+
+
+def plan_table(name: str, values: Any) -> list[str]:
+    """A table of the plan and the tables within it."""
+    fields = table_fields(values)
+    rows = [key_row(field, getattr(values, field.name)) for field in fields if "rule" in field.metadata]
+    text = f"## `[{name}]`\n\n{type(values).__doc__}\n\n{table(KEY_HEAD, rows)}"
+    inner = [field.name for field in fields if "table" in field.metadata]
+    own = [text] if rows else []
+    return own + [part for field in inner for part in plan_table(f"{name}.{field}", getattr(values, field))]
+
+
+def key_row(field: dataclasses.Field[Any], default: Any) -> tuple[str, ...]:
+    """One key; those that a model takes beside its name stand in one row."""
+    rule: Rule = field.metadata["rule"]
+    if field.metadata["more"]:
+        given = ", ".join(f"`{name} = {value:g}`" for name, value in default.items())
+        return ("further numbers", given, "", "", rule.text)
+    kind = "a table" if isinstance(default, dict) else TYPES.get(str(field.type), "number, or one per storey")
+    kind = "" if rule.pattern else kind
+    return (
+        f"`{field.name.rstrip('_')}`",
+        quantity(default),
+        rule.unit,
+        f"{kind}{bounds(rule)}".removeprefix(", "),
+        rule.text,
+    )
+
+
+def bounds(rule: Rule) -> str:
+    """The range of a value after its type; empty where any will do."""
+    words = dataclasses.replace(rule, unit="").allowed()
+    ends = "" if words == "finite" else f", {words}"
+    return f"{ends}, or inf" if rule.infinite else ends
+
+
+def commands() -> str:
+    """Every command with its options and an example."""
+    return "\n".join(command(verb) for verb in VERBS)
+
+
+def command(verb: str) -> str:
+    """One command: what it does, its arguments and options, an example."""
+    parser = parser_for(verb)
+    actions = [action for action in parser._actions if action.dest != "help"]
+    words = [f"rths {verb}", *(usage(action) for action in actions if not action.option_strings)]
+    words += ["[options]"] if any(action.option_strings for action in actions) else []
+    rows = ((f"`{spelled(action)}`", default(action), said(action)) for action in actions)
+    options = table(("argument or option", "default", "meaning"), rows) if actions else ""
+    text = (
+        f"## `rths {verb}`\n\n{VERBS[verb][0].upper()}{VERBS[verb][1:]}: `{' '.join(words)}`\n\n{options}\n"
+    )
+    return f"{text}Example: `{EXAMPLES[verb]}`\n"
+
+
+def usage(action: argparse.Action) -> str:
+    """A positional argument as it stands in the usage."""
+    name = str(action.metavar or action.dest)
+    return f"[{name}]" if action.nargs == "?" else name
+
+
+def spelled(action: argparse.Action) -> str:
+    """How an argument or option is given."""
+    names = ", ".join(action.option_strings) or str(action.metavar or action.dest)
+    takes = action.option_strings and action.nargs != 0
+    choices = f"{{{','.join(map(str, action.choices))}}}" if action.choices else ""
+    value = action.metavar or choices or action.dest.upper()
+    return f"{names} {value}" if takes else names
+
+
+def default(action: argparse.Action) -> str:
+    """The value where it is not given, as far as there is one to name."""
+    plain = action.default is None or isinstance(action.default, bool) or action.default in ("", [])
+    return "" if plain or action.default is argparse.SUPPRESS else f"`{action.default}`"
+
+
+def said(action: argparse.Action) -> str:
+    """The help of an argument or option."""
+    return str(action.help or "").replace("<", "&lt;")
+
+
+def effects() -> str:
+    """The catalogue by site; effects on readings once, as they exist for every signal."""
+    texts = [
+        f"## {site.capitalize()}\n\n{effect_table(effect for effect in FILES if effect.site == site)}"
+        for site in SITES
+    ]
+    some = next(iter(SIGNALS))
+    of_one = (effect(some, "its unit") for effect in READINGS)
+    generic = (dataclasses.replace(one, name=one.name.replace(some, "<signal>")) for one in of_one)
+    names = ", ".join(f"`{name}`" for name in SIGNALS)
+    return "\n".join(
+        [*texts, f"## Sensors\n\n`<signal>` is one of {names}.\n\n{effect_table(generic, sized=False)}"]
+    )
+
+
+def effect_table(found: Iterable[Effect], *, sized: bool = True) -> str:
+    """Effects with their parameters; `sized` with the values from barely visible to strong."""
+    rows = []
+    for effect in found:
+        for place, parameter in enumerate(effect.parameters):
+            first = (f"`{effect.name}`", effect.says) if place == 0 else ("", parameter.says)
+            rows.append((*first, f"`{parameter.name}`", parameter.unit, *numbers(parameter, sized)))
+    head = ("effect", "says", "parameter", "unit", "none at", "allowed")
+    return table((*head, "from barely visible to strong") if sized else head, rows)
+
+
+def numbers(parameter: Parameter, sized: bool) -> tuple[str, ...]:
+    """Null value, bounds and sizes of a parameter."""
+    null = f"default {quantity(parameter.default)}" if parameter.shape else quantity(parameter.null)
+    allowed = f"{quantity(parameter.least)} to {quantity(parameter.most)}"
+    sizes = ", ".join(map(quantity, parameter.sizes))
+    return (null, allowed, sizes) if sized else (null, allowed)
+
+
+def compensators() -> str:
+    """Every compensator with its parameters."""
+    return methods({name: (method.params, method.rules) for name, method in COMPENSATORS.items()}, "##")
+
+
+def specimens() -> str:
+    """Every force-deformation model with its parameters."""
+    return methods({name: (model.params, model.rules) for name, model in SPECIMENS.items()}, "###")
+
+
+def methods(found: Mapping[str, tuple[type[Any], Mapping[str, Rule]]], level: str) -> str:
+    """Methods with what their file says of them first, and the parameters they take."""
+    texts = []
+    for name, (params, rules) in found.items():
+        defaults = params._field_defaults
+        rows = [
+            (
+                f"`{field}`",
+                quantity(defaults[field]) if field in defaults else "",
+                rules[field].unit,
+                bounds(rules[field]).removeprefix(", "),
+                rules[field].text,
+            )
+            for field in get_type_hints(params)
+        ]
+        given = table(KEY_HEAD, rows) if rows else "No parameters.\n"
+        texts.append(f"{level} `{name}`\n\n{first_line(params)}\n\n{given}")
+    return "\n".join(texts)
+
+
+def first_line(params: type[Any]) -> str:
+    """What the file of a method says of it first."""
+    return (sys.modules[params.__module__].__doc__ or "").splitlines()[0]
+
+
+def integrators() -> str:
+    """The integration methods with what they claim."""
+    rows = [
+        (
+            f"`{method.name}`",
+            str(method.order),
+            method.stability,
+            ", ".join(f"`{name}`" for name in method.options),
+        )
+        for method in INTEGRATORS.values()
+    ]
+    return table(("method", "order", "stability", "further keys of `[structure]`"), rows)
+
+
+def motions() -> str:
+    """The records that ship."""
+    rows = ((f"`{name}`", motion.name, motion.version) for name, motion in MOTIONS.items())
+    return table(("record", "earthquake", "version"), rows)
+
+
+def exits() -> str:
+    """The classes of errors with their exit codes."""
+    found = [
+        kind
+        for kind in vars(errors).values()
+        if isinstance(kind, type) and issubclass(kind, errors.RthsError)
+    ]
+    rows = (
+        (str(kind.exit_code), f"`{kind.__name__}`", (kind.__doc__ or "").splitlines()[0]) for kind in found
+    )
+    return table(("exit", "class in `common.errors`", "says"), sorted(rows))
+
+
+def budget() -> str:
+    """The latency budget that ships, as it is."""
+    from rths.latency_budget.limits import DEFAULT
+
+    return f"```toml\n{DEFAULT.read_text(encoding='utf-8')}```\n"

@@ -1,0 +1,169 @@
+"""Every command that a document shows is run and its output compared; what cannot run here is listed and counted."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from docs import console
+from docs.console import Block
+from rths.__main__ import EXAMPLES, VERBS, parser_for
+from tests.helpers import ROOT
+
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+NAMES = [str(path.relative_to(ROOT)) for path in PAGES]
+
+# tests in real time: a machine that is held up for long enough ends one, as it should
+TRIES = {"docs/tutorial.md": 3, "docs/how-to/two-machines.md": 3, "docs/how-to/security.md": 3}
+TRIES["docs/how-to/stop-and-reset.md"] = 3
+
+COMMAND = re.compile(
+    r"(?:\$ |[A-Z_]+=\S+ )?(?:\S*/)?(?:rths|make|python3?|pip|pytest|git|docker|ssh|scp|for|until)\b(?!:)"
+)
+# what cannot run here: it fetches, installs, needs another machine, or takes minutes and has tests of its own
+UNRUN = {
+    "README.md": ["git clone <this repository> rths && cd rths", "make run", "make test"],
+    "docs/explanation/real_data.md": [
+        "for v in 4-D22 8-D22 4-D22_bondslip 8-D22_bondslip; do",
+        "rths import tests/data/fiber_column/column_$v.csv --map examples/real_data/column_${v}_map.toml"
+        " -o runs/column_$v.mcap",
+        "rths diagnose runs/column_$v.mcap",
+    ],
+    "docs/how-to/security.md": [
+        "ssh b mkdir -m 700 test/keys",
+        "scp keys/authority.pem keys/slave.pem keys/slave.key b:test/keys/",
+        "RUST_LOG=zenoh_link_tls=warn,zenoh::net::routing::interceptor=trace rths master test.toml",
+    ],
+    "docs/how-to/several-dampers.md": [
+        "rths slave two_dampers --name roof --connect tcp/192.0.2.1:7447",
+        "rths slave two_dampers --name middle --connect tcp/192.0.2.1:7447",
+    ],
+    "docs/reference/blind.md": ["rths blind --cases 240 --set judge --seed 2026 --jobs 2 -o runs/blind"],
+    "docs/reference/faults.md": [
+        "make faults",
+        "rths faults --schedules 1000 --jobs 2",
+        "rths faults --recorded --schedules 100",
+        "pip install atheris==3.0.0",
+        "python fuzz/decode.py -max_total_time=600 -seed=1",
+        "RTHS_SOAK=600 make faults",
+        "python -m benchmarks false_trips",
+        'for seed in 1 2 3 4 5 6 7 8; do rths run --seed $seed -o runs/quiet-$seed.mcap || echo "stopped: $seed"; done',
+        "rths budget runs/quiet-1.mcap --json",
+    ],
+    "docs/tutorial.md": ["git clone <this repository> rths && cd rths", "make setup"],
+}
+
+SOURCES = {"toml", "python", "mermaid", "json"}
+OUTPUT = "text"  # of which a line after a prompt is a command all the same
+
+
+def found(path: Path) -> list[Block]:
+    """The blocks of a page."""
+    return list(console.blocks(path.read_text(encoding="utf-8")))
+
+
+def unrun(path: Path) -> list[str]:
+    """Commands of a page in blocks that are not run."""
+    kept = (block for block in found(path) if block.language not in {"console", *SOURCES})
+    lines = (
+        line.strip()
+        for block in kept
+        if not block.directive
+        for line in block.text.splitlines()
+        if block.language != OUTPUT or line.startswith("$ ")
+    )
+    return [re.split(r" +# ", line)[0] for line in lines if COMMAND.match(line)]
+
+
+RUN = [
+    name for name, path in zip(NAMES, PAGES, strict=True) if any(b.language == "console" for b in found(path))
+]
+
+
+@pytest.mark.parametrize("name", RUN)
+def test_a_page_shows_what_its_commands_print(name: str, tmp_path: Path) -> None:
+    complaints = ["not run"]
+    for attempt in range(TRIES.get(name, 1)):
+        folder = tmp_path / str(attempt)
+        folder.mkdir()
+        complaints = console.play(ROOT / name, folder)
+        if not complaints:
+            break
+    assert complaints == [], "\n\n".join(complaints)
+
+
+def test_every_command_that_is_not_run_is_listed_here() -> None:
+    assert {name: lines for name, path in zip(NAMES, PAGES, strict=True) if (lines := unrun(path))} == UNRUN
+
+
+def test_a_command_in_a_block_that_is_not_run_is_seen(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text(
+        "    rths run\n\n```sh\n$ make test  # all\n```\n\n```\nRTHS_SOAK=6 make faults\nrths: no\n```\n\n"
+        "```console\n$ rths doctor\n```\n\n```text\nrths run, p99\n$ rths run\n```\n"
+    )
+    assert unrun(page) == ["rths run", "$ make test", "RTHS_SOAK=6 make faults", "$ rths run"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_file_that_a_page_has_written_is_named_in_its_text(name: str) -> None:
+    text = (ROOT / name).read_text(encoding="utf-8")
+    for block in found(ROOT / name):
+        if block.directive == "file":
+            before = text[: text.index(f"<!-- file: {block.name} -->")]
+            assert f"`{block.name}`" in before[-600:], block.name
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_the_example_of_a_command_is_one_that_it_takes(verb: str) -> None:
+    program, name, *words = shlex.split(EXAMPLES[verb])
+    assert (program, name) == ("rths", verb)
+    parser_for(verb).parse_args(words)
+
+
+@pytest.mark.parametrize("name", ["my_lab.py", "my_test.toml"])
+def test_the_laboratory_of_the_page_is_the_example_that_ships(name: str) -> None:
+    shown = {block.name: block.text for block in found(ROOT / "docs/how-to/own-laboratory.md")}
+    assert shown[name] == (ROOT / "examples" / name).read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_link_of_a_page_leads_to_a_file_and_a_heading_that_exist(name: str) -> None:
+    path = ROOT / name
+    for link in re.findall(r"\]\(([^)\s]+)\)", path.read_text(encoding="utf-8")):
+        if re.match(r"https?:", link):
+            continue
+        file, _, anchor = link.partition("#")
+        target = path.parent / file if file else path
+        assert target.exists(), link
+        assert not anchor or anchor in anchors(target.read_text(encoding="utf-8")), link
+
+
+def anchors(text: str) -> set[str]:
+    """What the headings of a Markdown text are called in links."""
+    headings = re.findall(r"^#+ (.+)$", text, flags=re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def test_the_site_is_built_without_a_warning_and_needs_no_network(tmp_path: Path) -> None:
+    built = subprocess.run(
+        [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(tmp_path / "site")],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+    )
+    assert built.returncode == 0, built.stderr
+    pages = list((tmp_path / "site").rglob("*.html"))
+    assert len(pages) > len(PAGES) - 1
+    for path in pages:
+        html = path.read_text(encoding="utf-8")
+        loaded = re.findall(r"<(?:script|img|iframe)[^>]* src=\"(\w+:)?//", html)
+        loaded += re.findall(r"<link[^>]* href=\"((?:\w+:)?//[^\"]*)", html)
+        assert loaded == [], path
+    for path in (tmp_path / "site").rglob("*.css"):
+        assert "url(http" not in path.read_text(encoding="utf-8"), path
