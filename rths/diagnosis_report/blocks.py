@@ -1,10 +1,13 @@
-"""Building blocks of the page. What takes text escapes it; what is called `content` is HTML already."""
+"""Building blocks of the page, those of all pages. What takes text escapes it; `content` and cells are HTML already."""
 
 from __future__ import annotations
 
 import html
 from collections.abc import Sequence
 
+from markupsafe import Markup
+
+from rths import page
 from rths.diagnosis_report.values import as_float, known, percent
 
 
@@ -15,9 +18,13 @@ def esc(text: object) -> str:
 
 def section(name: str, title: str, *content: str) -> str:
     """A section with its anchor."""
-    return (
-        f'<section id="{esc(name)}"><h2>{esc(title)}</h2>\n{chr(10).join(filter(None, content))}</section>\n'
-    )
+    inside = ready("\n".join(filter(None, content)))
+    return str(page.block("section", name, title, caller=lambda: inside)) + "\n"
+
+
+def ready(content: str) -> Markup:
+    """What is HTML already, for blocks that escape text."""
+    return Markup(content)  # noqa: S704 - made here
 
 
 def heading(text: str) -> str:
@@ -27,9 +34,7 @@ def heading(text: str) -> str:
 
 def paragraph(text: str, style: str = "") -> str:
     """A paragraph of text."""
-    if not text:
-        return ""
-    return f'<p class="{esc(style)}">{esc(text)}</p>' if style else f"<p>{esc(text)}</p>"
+    return str(page.block("paragraph", text, style)) if text else ""
 
 
 def absent(text: str) -> str:
@@ -39,16 +44,12 @@ def absent(text: str) -> str:
 
 def bullets(texts: Sequence[str]) -> str:
     """A list of texts."""
-    return f"<ul>{''.join(f'<li>{esc(text)}</li>' for text in texts)}</ul>" if texts else ""
+    return str(page.block("bullets", texts)) if texts else ""
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """A table; cells are HTML already, heads are text."""
-    if not rows:
-        return ""
-    top = "".join(f"<th>{esc(text)}</th>" for text in head)
-    body = "".join(f"<tr>{''.join(f'<td>{cell}</td>' for cell in row)}</tr>" for row in rows)
-    return f'<div class="scroll"><table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>'
+    return str(page.table(head, [[ready(cell) for cell in row] for row in rows]))
 
 
 def bar(share: object, label: str = "", style: str = "") -> str:
@@ -63,13 +64,7 @@ def bar(share: object, label: str = "", style: str = "") -> str:
 
 def figure(picture: str, caption: str, note: str = "") -> str:
     """A picture with its caption; nothing where there is no picture."""
-    if not picture:
-        return ""
-    small = f"<small>{esc(note)}</small>" if note else ""
-    return (
-        f'<figure role="img" aria-label="{esc(caption)}">{picture}'
-        f"<figcaption>{esc(caption)}{small}</figcaption></figure>"
-    )
+    return str(page.block("drawing", ready(picture), caption, note)) if picture else ""
 
 
 def gallery(figures: Sequence[str]) -> str:

@@ -18,10 +18,10 @@ from rths.figure import COLOURS, STAMPS, figure
 Piece = Mapping[str, Any]
 Values = NDArray[np.float64]
 
-WIDTH = 4.6  # inches: one column of the page, or the width of a phone
+WIDTH = 3.6  # inches: one column of the page, or the width of a phone, where text is read at its size
 BLUE, ORANGE, GREEN = COLOURS[:3]
-INK = "black"  # becomes the page's own text colour, light or dark
-GREY = "#808080"  # readable on both
+INK = "black"  # becomes the page's own text colour
+GREY = "#808080"
 RECORDED, BEFORE, AFTER = INK, ORANGE, BLUE
 MOST_PARTS = len(COLOURS)
 LEVEL = "noise"  # a step of the waterfall that is a level of its own

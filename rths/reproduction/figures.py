@@ -7,9 +7,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from common.recording.reader import Run
-from rths.figure import figure
+from rths.figure import SINGLE, TEXT, figure, save
 from rths.identification import identify, segments, step_ticks
+from rths.pictures.layout import legend_above
 from rths.reproduction.experiments import DELAYS, Evidence
+
+HEIGHT = 2.6  # inches
 
 
 class Figure(NamedTuple):
@@ -23,9 +26,9 @@ class Figure(NamedTuple):
 def draw_all(evidence: Evidence, folder: Path) -> list[Figure]:
     """Draw every figure into a folder."""
     for item in FIGURES:
-        canvas = figure(7.0, 3.4)
+        canvas = figure(SINGLE, HEIGHT)
         item.draw(evidence, canvas)
-        canvas.savefig(folder / item.file)
+        save(canvas, folder / item.file)
     return list(FIGURES)
 
 
@@ -40,12 +43,11 @@ def window(run: Run, word: str, begin: float, end: float, interval: float) -> tu
 def hysteresis(evidence: Evidence, canvas: Any) -> None:
     """Fig. 4: force against drift angle."""
     axes = canvas.subplots(1, 2, sharey=True)
-    for axis, name, title in zip(
-        axes, ("column", "rc-column"), ("nominal: linear", "realistic: Clough with cracking"), strict=True
-    ):
+    for axis, name, title in zip(axes, ("column", "rc-column"), ("linear", "Clough, cracking"), strict=True):
         columns = evidence.benches[name].columns["master"]
         axis.plot(columns["column_displacement"] / 0.75 * 1e3, columns["column_force"] * 1e-3, linewidth=0.6)
-        axis.set(xlabel="drift angle, 10⁻³ rad", title=title)
+        axis.set(xlabel="drift angle, 10⁻³ rad")
+        axis.set_title(title, fontsize=TEXT)
     axes[0].set_ylabel("force, kN")
 
 
@@ -56,7 +58,7 @@ def delay(evidence: Evidence, canvas: Any) -> None:
     axis.plot(t, columns["column_target"] * 1e3, label="commanded")
     axis.plot(t, columns["column_displacement"] * 1e3, "--", label="measured")
     axis.set(xlabel="time, s", ylabel="displacement, mm")
-    axis.legend(loc="upper right")
+    legend_above(axis)
 
 
 def step_response(evidence: Evidence, canvas: Any) -> None:
@@ -73,7 +75,7 @@ def step_response(evidence: Evidence, canvas: Any) -> None:
     axis = canvas.subplots()
     axis.plot(t + 1e3 * interval, columns["actuator_command"][part] * 1e3, color="0.5", label="commanded")
     axis.plot(t, columns["column_displacement"][part] * 1e3, ".", markersize=3, label="measured")
-    axis.plot([dead, dead + constant], [0.0, height], "k-", label="tangent (mean of all steps)")
+    axis.plot([dead, dead + constant], [0.0, height], "k-", label="tangent, mean of all steps")
     axis.annotate(f"L {dead:.1f} ms", (dead, 0.0), (dead + 8, 0.35), arrowprops={"arrowstyle": "-"})
     axis.annotate(
         f"T {constant:.1f} ms",
@@ -82,7 +84,7 @@ def step_response(evidence: Evidence, canvas: Any) -> None:
         arrowprops={"arrowstyle": "-"},
     )
     axis.set(xlabel="time after the step, ms", ylabel="displacement, mm")
-    axis.legend(loc="lower right")
+    legend_above(axis)
 
 
 def sine(evidence: Evidence, canvas: Any) -> None:
@@ -92,10 +94,10 @@ def sine(evidence: Evidence, canvas: Any) -> None:
     _, better = window(evidence.benches["actuator-paper"], "sine 1 Hz", 2.0, 4.0, interval)
     axis = canvas.subplots()
     axis.plot(t, raw["column_target"] * 1e3, "k-", label="target")
-    axis.plot(t, better["column_displacement"] * 1e3, "--", label="measured, PID + Taylor")
-    axis.plot(t, raw["column_displacement"] * 1e3, ":", label="measured, uncompensated")
+    axis.plot(t, better["column_displacement"] * 1e3, "--", label="PID + Taylor")
+    axis.plot(t, raw["column_displacement"] * 1e3, ":", label="uncompensated")
     axis.set(xlabel="time, s", ylabel="displacement, mm")
-    axis.legend(loc="upper right")
+    legend_above(axis)
 
 
 def random_wave(evidence: Evidence, canvas: Any) -> None:
@@ -105,7 +107,7 @@ def random_wave(evidence: Evidence, canvas: Any) -> None:
     axis.plot(t, columns["column_target"] * 1e3, label="target")
     axis.plot(t, columns["column_displacement"] * 1e3, "--", label="measured, PID")
     axis.set(xlabel="time, s", ylabel="displacement, mm")
-    axis.legend(loc="upper right")
+    legend_above(axis)
 
 
 def two_histories(canvas: Any, curves: list[tuple[str, Any, Any, Any]], end: float) -> None:
@@ -116,7 +118,7 @@ def two_histories(canvas: Any, curves: list[tuple[str, Any, Any, Any]], end: flo
         lower.plot(t, drift * 1e3, style, label=label, linewidth=0.8)
     upper.set(ylabel="floor acceleration\nm/s²", xlim=(0.0, end))
     lower.set(xlabel="time, s", ylabel="storey drift\nmm")
-    upper.legend(loc="upper right", ncols=2)
+    legend_above(upper)
 
 
 def test_and_simulation(evidence: Evidence, canvas: Any) -> None:
@@ -156,7 +158,7 @@ def damping(evidence: Evidence, canvas: Any) -> None:
     axis.plot(DELAYS * 1e3, evidence.damping_by_delay * 100.0, "o-", label="closed loop, free vibration")
     axis.plot(DELAYS * 1e3, 5.0 - 0.156 * DELAYS * 1e3, "k:", label="5.0 − 0.156 points per ms")
     axis.set(xlabel="delay of the actuator, ms", ylabel="apparent damping, %")
-    axis.legend(loc="upper right")
+    legend_above(axis, columns=1)
 
 
 FIGURES = (

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import json
 import struct
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +13,12 @@ import pytest
 
 from common.recording.reader import read
 from rths.__main__ import main
-from rths.reproduction import experiments
+from rths.reproduction import experiments, figures
 from rths.reproduction.experiments import Evidence
 from rths.reproduction.figures import FIGURES
+from rths.reproduction.page import page
 from rths.reproduction.rows import apparent_damping, beyond, building, critical_delay, instability, rows
+from tests.rths.report.pages import check_alone, check_in_browser
 
 
 @pytest.fixture(scope="module")
@@ -68,6 +71,16 @@ def test_the_command_leaves_recordings_pictures_and_one_page(
         assert figure.caption in text
     for path in tmp_path.glob("*.mcap"):
         assert read(path).finished, path
+
+
+def test_the_page_stands_alone_and_in_a_browser(evidence: Evidence, tmp_path: Path) -> None:
+    table, drawn = rows(evidence), figures.draw_all(evidence, tmp_path)
+    table[0] = replace(table[0], name="<b>period</b>", note="<script>")
+    text = page(table, drawn, tmp_path)
+    assert "<b>period</b>" in check_alone(text).text
+    assert page(table, figures.draw_all(evidence, tmp_path), tmp_path) == text
+    (tmp_path / "index.html").write_text(text, encoding="utf-8")
+    check_in_browser(tmp_path / "index.html", tmp_path)
 
 
 def test_a_folder_that_cannot_be_written_is_said(tmp_path: Path, monkeypatch: Any, capsys: Any) -> None:

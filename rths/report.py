@@ -1,0 +1,86 @@
+"""`rths report`: a run as one HTML page."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from pathlib import Path
+
+from common import cli
+from common.errors import InputError
+
+PATIENCE_S = 2.0  # of drawing, before there is a word, and between two
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of `report`."""
+    parser.add_argument("file", type=Path, metavar="FILE", help="a recording (MCAP), damaged or cut off too")
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="OUT.html",
+        help="the page (default: beside the recording, with .html)",
+    )
+    cli.json_argument(parser, "name the page, its sentences and its pictures as JSON on standard output")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the page."""
+    from common.recording.reader import read
+    from rths.run_report import drawing, page, verdict
+    from rths.summary import summarize
+
+    recording = read(args.file)
+    output = place(args.output or args.file.with_suffix(".html"), args.file)
+    summary = summarize(recording)
+    drawn, left_out = drawing.draw_all(recording, Progress())
+    write(output, page.page(recording, summary, drawn, left_out))
+    names = list(dict.fromkeys(picture.name for several in drawn.values() for picture in several))
+    sentences = verdict.sentences(recording, summary)
+    if args.json:
+        result = {"page": str(output), "verdict": sentences, "pictures": names, "left_out": left_out}
+        sys.stdout.write(json.dumps(result) + "\n")
+    else:
+        sys.stdout.write(
+            "\n".join([*filter(None, [verdict.lost(summary)]), *sentences, f"page: {output}"]) + "\n"
+        )
+    return 0
+
+
+def place(path: Path, recording: Path) -> Path:
+    """Where the page goes; raises InputError where there is no place, or one that the recording takes."""
+    if path.exists() and path.samefile(recording):
+        raise InputError(f"{path} is the recording itself; give another file with -o.")
+    if path.is_dir():
+        raise InputError(f"Cannot write {path}: it is a folder; give the name of a file with -o.")
+    if not path.parent.is_dir():
+        raise InputError(
+            f"There is no folder {path.parent} for the page: make it, or give another file with -o."
+        )
+    return path
+
+
+def write(path: Path, text: str) -> None:
+    """Write the page; raises InputError where that cannot be."""
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"Cannot write {path}: {error.strerror}; give another file with -o.") from None
+
+
+class Progress:
+    """A line on standard error now and then, where drawing takes long."""
+
+    def __init__(self) -> None:
+        self._next = time.monotonic() + PATIENCE_S
+
+    def __call__(self, done: int, total: int, name: str) -> None:
+        """So many pictures are drawn, and the next is this."""
+        now = time.monotonic()
+        if now >= self._next:
+            self._next = now + PATIENCE_S
+            sys.stderr.write(f"{done} of {total} pictures drawn, next {name}\n")
+            sys.stderr.flush()

@@ -1,0 +1,179 @@
+"""A run in sentences with their figures, and what of it is lost."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from common.limits import UNITS
+from common.recording.reader import Run
+from common.roles import LATENCY, MASTER, SLAVE, kind_of, name_of, title
+from rths.summary import plan_of
+from rths.terminal import quantity
+
+Summary = Mapping[str, Any]
+ENDS = {
+    "completed": "The test ran to its end.",
+    "imported": "The data were imported, not recorded by a test.",
+}
+NO_END = "The recording does not say how the test ended."
+
+
+class Margin(NamedTuple):
+    """How near a recorded signal came to its limit in the plan."""
+
+    signal: str
+    peak: float
+    limit: float
+
+    @property
+    def share(self) -> float:
+        """The peak over the limit."""
+        return self.peak / self.limit
+
+    @property
+    def words(self) -> str:
+        """The signal's name in words, and whose it is."""
+        topic, _, name = self.signal.partition("/")
+        return name.replace("_", " ") + (f" of the {title(topic)}" if name_of(topic) else "")
+
+
+def lost(summary: Summary) -> str:
+    """What is lost of a recording, and what to do, in a sentence; empty for a whole one."""
+    file = Path(summary["file"]).name
+    if summary["damage"]:
+        return (
+            f"This recording is damaged {summary['damage']}, so the page shows what was read before; "
+            f"rths recover {file} saves what is whole behind it. {amount(summary)}"
+        )
+    if not summary["finished"]:
+        return (
+            "This recording was cut off before its end, so the page shows what had reached the file; "
+            f"rths recover {file} makes a finished one of it. {amount(summary)}"
+        )
+    return ""
+
+
+def amount(summary: Summary) -> str:
+    """How many ticks of how many are there."""
+    expected, topics = summary["ticks_expected"], summary["topics"]
+    if not expected or not topics:
+        return "It does not say how many ticks there should be."
+    counts = ", ".join(f"{facts['recorded']} of the {topic}" for topic, facts in topics.items())
+    return f"Of {expected} ticks there are {counts}."
+
+
+def sentences(run: Run, summary: Summary) -> list[str]:
+    """The verdict, one sentence for each thing that a test is judged by, of those that the recording knows."""
+    found = [
+        outcome(summary),
+        completeness(summary),
+        *exchange(summary),
+        rejected(summary),
+        lateness(run, summary),
+        *tracking(summary),
+        energy(summary),
+        nearest(run, summary),
+    ]
+    return [text for text in found if text]
+
+
+def outcome(summary: Summary) -> str:
+    """How the test ended."""
+    ended = summary["recorder"]
+    cause = ended.get("cause") or ended.get("outcome")
+    if not cause:
+        return NO_END
+    return ENDS.get(cause, f"The test ended: {cause.rstrip('.')}.")
+
+
+def completeness(summary: Summary) -> str:
+    """Ticks recorded and missing."""
+    expected, topics = summary["ticks_expected"], summary["topics"]
+    if not expected or not topics:
+        return ""
+    gaps = {topic: facts["missing"] for topic, facts in topics.items() if facts["missing"]}
+    names = ", ".join(topics)
+    if not gaps:
+        return f"All {expected} ticks are recorded ({names})."
+    counts = ", ".join(f"{count} of the {topic}" for topic, count in gaps.items())
+    return f"Of {expected} ticks are missing: {counts}."
+
+
+def exchange(summary: Summary) -> list[str]:
+    """What became of the messages, by direction."""
+    return [
+        f"{name.replace('/', ', ').capitalize()}: {counts['sent']} sent, of which {counts['used']} used, "
+        f"{counts['rejected']} rejected as late or out of order, {counts['lost']} lost."
+        for name, counts in summary["exchange"].items()
+    ]
+
+
+def rejected(summary: Summary) -> str:
+    """Frames that were none of the test's, or damaged."""
+    counts = {lab: sum(reasons.values()) for lab, reasons in summary["rejected"].items()}
+    if not counts:
+        return ""
+    return "Frames rejected: " + ", ".join(f"{count} by the {lab}" for lab, count in counts.items()) + "."
+
+
+def lateness(run: Run, summary: Summary) -> str:
+    """Ticks in which a deadline was missed."""
+    late, missed = summary["late_ticks"], summary["missed_ticks"]
+    if late is None:
+        return ""
+    ticks = max(run.ticks(topic) for topic in run.columns if kind_of(topic) == LATENCY)
+    return f"{late} of {ticks} ticks were late, {missed} of them missed altogether."
+
+
+def tracking(summary: Summary) -> list[str]:
+    """How the transfer systems followed their targets."""
+    return [
+        f"The {name.replace('.', ' of slave ')} followed its target with a delay of {facts['delay'] * 1e3:.2f} ms and "
+        f"{facts['amplitude']:.4f} of its amplitude at {facts['frequency']:.2f} Hz; rms error "
+        f"{100.0 * facts['nrmse']:.2f} % of the target's rms."
+        for name, facts in summary["tracking"].items()
+    ]
+
+
+def energy(summary: Summary) -> str:
+    """What the errors of the column's transfer system did to the energy."""
+    share = summary["error_energy"]
+    if share is None:
+        return ""
+    did = "put in" if share > 0.0 else "took out"
+    return (
+        f"Tracking errors at the column {did} up to {abs(share) * 100.0:.2f} % of the energy that the "
+        "ground motion gave."
+    )
+
+
+def margins(run: Run, summary: Summary) -> list[Margin]:
+    """Recorded signals with a limit of their own, the nearest to it first."""
+    peaks = summary["peaks"]
+    of_slaves = {name.partition("/")[2] for name in peaks if name.startswith(SLAVE)}
+    found = []
+    for name, facts in peaks.items():
+        topic, _, signal = name.partition("/")
+        if signal not in UNITS or (
+            topic == MASTER and signal in of_slaves
+        ):  # the master's are all slaves' at once
+            continue
+        plan = plan_of(run.of(topic) if name_of(topic) else run)
+        if plan:
+            found.append(Margin(name, facts["peak"], getattr(plan.limits, signal)))
+    return sorted(found, key=lambda item: -item.share)
+
+
+def nearest(run: Run, summary: Summary) -> str:
+    """The signal that came nearest to its limit."""
+    found = margins(run, summary)
+    if not found:
+        return ""
+    first = found[0]
+    unit = UNITS[first.signal.partition("/")[2]]
+    return (
+        f"Nearest to its limit came the {first.words}: {quantity(first.peak, unit)} of {quantity(first.limit, unit)} "
+        f"({100.0 * first.share:.0f} %)."
+    )
