@@ -45,8 +45,7 @@ def facts(run: Run, summary: Summary) -> list[tuple[str, str]]:
         ("storeys", str(plan.storeys) if plan else ""),
         ("slaves", ", ".join(summary["slaves"])),
         ("part tested", run.metadata.get("bench", {}).get("part", "")),
-        ("outcome", ended.get("outcome", "")),
-        ("cause", ended.get("cause", "")),
+        ("outcome", ended.get("cause") or ended.get("outcome", "")),
     ]
     return [(name, text) for name, text in found if text]
 
