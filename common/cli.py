@@ -9,7 +9,7 @@ import os
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from common import plan as plans
 from common import preflight, realtime
@@ -21,6 +21,14 @@ from common.reality import Reality
 
 SHIPPED = ("default", "paper", "rc_column", "two_dampers")
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser that puts a wrong command line into one sentence."""
+
+    def error(self, message: str) -> NoReturn:
+        """Say what is wrong and where help is; exit code 2."""
+        self.exit(2, f"rths: {message}; see {self.prog} --help.\n")
 
 
 def plan_arguments(parser: argparse.ArgumentParser, *, optional: bool = False) -> None:
@@ -144,13 +152,21 @@ def reporter(as_json: bool) -> Report:
 def guarded(main: Callable[[], int]) -> int:
     """Run a command; a user's mistake becomes one sentence on standard error and an exit code."""
     try:
-        return main()
-    except RthsError as error:
-        sys.stderr.write(f"rths: {error}\n")
-        return error.exit_code
+        return answered(main)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # the reader of a pipe has gone
         return 0
     except KeyboardInterrupt:
         sys.stderr.write("rths: stopped by the user.\n")
         return 3
+
+
+def answered(main: Callable[[], int]) -> int:
+    """Run a command until its last word is out, so that a pipe that nobody reads is noticed here and not at exit."""
+    try:
+        return main()
+    except RthsError as error:
+        sys.stderr.write(f"rths: {error}\n")
+        return error.exit_code
+    finally:
+        sys.stdout.flush()

@@ -2,6 +2,14 @@
 
 from __future__ import annotations
 
+EXIT_CODES = {
+    0: "done",
+    1: "a check of yours failed",
+    2: "bad usage or input",
+    3: "stopped by an interlock or by you, or refused before it began",
+    4: "the other laboratory or the network was lost",
+}
+
 
 class RthsError(Exception):
     """Base of all errors shown to the user as one sentence; `exit_code` is the process's (0 is success)."""

@@ -128,7 +128,7 @@ def enter(
     run: Callable[[argparse.Namespace], int],
 ) -> int:
     """Entry of `python -m name`: parse its options and run it."""
-    parser = argparse.ArgumentParser(prog=f"python -m {name}", description=text)
+    parser = cli.Parser(prog=f"python -m {name}", description=text)
     add_arguments(parser)
     args = parser.parse_args()
     return cli.guarded(lambda: run(args))

@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from common.errors import InputError
 from common.plan import Plan
+from common.telling import Tell, untold
 from diagnosis import fitting, link, readings, report
 from diagnosis.fitting import Data, Values
 from diagnosis.ground import Ground
@@ -79,7 +80,7 @@ def laid(system: System, verdict: Verdict, values: Values) -> System:
     return system
 
 
-def diagnose(record: Record, validation: Sequence[Record] = ()) -> dict[str, Any]:
+def diagnose(record: Record, validation: Sequence[Record] = (), tell: Tell = untold) -> dict[str, Any]:
     """The report on a recording (contract, section 8), as plain values.
 
     Raises:
@@ -88,11 +89,11 @@ def diagnose(record: Record, validation: Sequence[Record] = ()) -> dict[str, Any
     with threadpool_limits(
         limits=1, user_api="blas"
     ):  # small matrices: more threads only wait for each other
-        found = examine(record)
-        return report.build(found, validation)
+        found = examine(record, tell)
+        return report.build(found, validation, tell)
 
 
-def examine(record: Record) -> Diagnosis:
+def examine(record: Record, tell: Tell = untold) -> Diagnosis:
     """Judge every part of a recording."""
     found = Diagnosis(record)
     if record.ticks < LEAST_TICKS or record.ticks * record.plan.test.interval < SHORTEST:
@@ -111,7 +112,8 @@ def examine(record: Record) -> Diagnosis:
             "or table_command or damper_command with a reading of that laboratory."
         )
     datas: list[Data] = []
-    for part in parts:
+    for number, part in enumerate(parts, 1):
+        tell(part.name, number, len(parts))
         data = fitting.prepare(part, record, rounded)
         datas.append(data)
         found.warnings += reversed_signs(data)

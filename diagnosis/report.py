@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from common.telling import Tell, untold
 from diagnosis import details, exercise, how_far, next_test, where
 from diagnosis.which import which
 
@@ -18,12 +19,14 @@ VERSION = 1
 STILL = 5.0  # rms of a signal over its noise below which it hardly moved
 
 
-def build(found: Diagnosis, validation: Sequence[Record]) -> dict[str, Any]:
+def build(found: Diagnosis, validation: Sequence[Record], tell: Tell = untold) -> dict[str, Any]:
     """The whole report."""
+    tell("how far the gap closes", 0, 0)
     far = how_far.judge(found, validation)
     status = status_of(found)
     sites = sites_of(found, far)
     entries = which(found)
+    tell("the next test", 0, 0)
     tests = next_test.choices(found)
     evidence = details.details(found, far, entries)
     evidence["next"] = [

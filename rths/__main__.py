@@ -5,10 +5,12 @@ from __future__ import annotations
 import argparse
 import importlib
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import common
 from common import cli
+from common.errors import EXIT_CODES, InputError
 
 VERBS = {
     "run": "run the whole test on this machine",
@@ -37,6 +39,7 @@ VERBS = {
     "doctor": "check whether this machine will keep the interval",
     "import": "make a recording of data of your own",
     "export": "write a recording as CSV, Parquet or MAT",
+    "completion": "write a script with which the shell completes all this",
 }
 
 MODULES = {
@@ -52,22 +55,26 @@ def check_home() -> str:
     here, found = Path(__file__).resolve().parent.parent, Path(common.__file__).resolve().parent.parent
     if here == found:
         return ""
-    return f"rths: another package named 'common' in {found} hides this program's; start rths from elsewhere."
+    return f"another package named 'common' in {found} hides this program's; start rths from elsewhere."
 
 
 def parser_for(verb: str) -> argparse.ArgumentParser:
     """The parser of one command."""
-    module = importlib.import_module(MODULES.get(verb, f"rths.{verb}"))
-    example = EXAMPLES[verb]
-    parser = argparse.ArgumentParser(
+    parser = cli.Parser(
         prog=f"rths {verb}",
         description=f"{VERBS[verb][0].upper()}{VERBS[verb][1:]}.",
-        epilog=f"example: {example}",
+        epilog=f"example: {EXAMPLES[verb]}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    fill(parser, verb)
+    return parser
+
+
+def fill(parser: argparse.ArgumentParser, verb: str) -> None:
+    """Give a parser the arguments of a command, and what runs it as the default `run`."""
+    module = importlib.import_module(MODULES.get(verb, f"rths.{verb}"))
     module.add_arguments(parser)
     parser.set_defaults(run=module.run)
-    return parser
 
 
 EXAMPLES = {
@@ -97,6 +104,7 @@ EXAMPLES = {
     "doctor": "rths doctor --seconds 20 -o runs",
     "import": "rths import drive.csv --map drive.toml -o drive.mcap",
     "export": "rths export runs/default-20260101-120000.mcap -o test.csv",
+    "completion": "rths completion bash > ~/.rths.bash && echo '. ~/.rths.bash' >> ~/.bashrc",
 }
 
 
@@ -104,29 +112,36 @@ def overview() -> str:
     """What `rths --help` shows."""
     width = max(map(len, VERBS))
     rows = "\n".join(f"  {verb:<{width}}  {text}" for verb, text in VERBS.items())
+    codes = "\n".join(f"  {code}  {meaning}" for code, meaning in EXIT_CODES.items())
     return (
         "usage: rths VERB [options]\n\nDistributed real-time hybrid testing: two laboratories, one structure, 2 ms.\n\n"
-        f"{rows}\n\n'rths VERB --help' explains each with an example.\n"
+        f"{rows}\n\nexit codes:\n{codes}\n\n'rths VERB --help' explains each with an example.\n"
     )
 
 
 def main() -> int:
     """Entry of the console script."""
-    words = sys.argv[1:]
+    return cli.guarded(lambda: command(sys.argv[1:]))
+
+
+def command(words: Sequence[str]) -> int:
+    """Run what the command line says; its exit code.
+
+    Raises:
+        RthsError: it cannot be run, or failed.
+    """
     if not words or words[0] in ("-h", "--help"):
         sys.stdout.write(overview())
         return 0 if words else 2
     if complaint := check_home():
-        sys.stderr.write(complaint + "\n")
-        return 2
+        raise InputError(complaint)
     verb = words[0]
     if verb not in VERBS:
         from common.schema import nearest
 
-        sys.stderr.write(f"rths: unknown command '{verb}': {nearest(verb, VERBS)}\n")
-        return 2
+        raise InputError(f"unknown command '{verb}': {nearest(verb, VERBS)}")
     args = parser_for(verb).parse_intermixed_args(words[1:])
-    return cli.guarded(lambda: int(args.run(args)))
+    return int(args.run(args))
 
 
 if __name__ == "__main__":

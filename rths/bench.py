@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from common import cli
+from rths.progress import Progress
 
 if TYPE_CHECKING:
     from rths.benches import Result
@@ -55,15 +56,17 @@ def run(args: argparse.Namespace) -> int:
     """Play the bench test of a part; its exit code."""
     from common import plan as plans
     from common.drive import Stopper
-    from rths import benches
 
     plan = plans.load(cli.plan_path(args.plan)).with_test(seed=args.seed)
-    order = benches.Order(args.part, args.compensated, tuple(args.only), args.real_time)
-    reality = cli.load_reality(args.reality, plan)
-    if args.part in OF_SLAVE:
-        role = plan.slave_role(args.name or "")
-        plan, reality = plan.of(role), reality.of(role)
-    result = benches.play(plan, reality, order, args.output, Stopper())
+    with Progress("bench test") as progress:
+        from rths import benches
+
+        order = benches.Order(args.part, args.compensated, tuple(args.only), args.real_time)
+        reality = cli.load_reality(args.reality, plan)
+        if args.part in OF_SLAVE:
+            role = plan.slave_role(args.name or "")
+            plan, reality = plan.of(role), reality.of(role)
+        result = benches.play(plan, reality, order, args.output, Stopper(), progress.tell)
     if args.json:
         sys.stdout.write(json.dumps(summary(result)) + "\n")
     else:

@@ -18,6 +18,7 @@ from common.reality import Reality
 from common.recording.writer import Recording
 from common.rig import ColumnCommand, ColumnMeasurement, GuardedRig, TableCommand, TableMeasurement
 from common.tables import TableCompensator
+from common.telling import Tell, untold
 from master import assembly as master
 from models import excitation
 from models.excitation import POSITION, Programme, Segment
@@ -65,7 +66,12 @@ class Result(NamedTuple):
 
 
 def play(
-    plan: Plan, reality: Reality, order: Order, output: Path | None, stopping: Callable[[], str]
+    plan: Plan,
+    reality: Reality,
+    order: Order,
+    output: Path | None,
+    stopping: Callable[[], str],
+    tell: Tell = untold,
 ) -> Result:
     """Play a bench test on the plan's rig, or on the reality's, and record it.
 
@@ -87,7 +93,7 @@ def play(
     done, late, error = 0, 0, None
     try:
         with armed(bench.rig, sink, epoch_ns):
-            done, late = loop(bench, clock, sink, epoch_ns, stopping)
+            done, late = loop(bench, clock, sink, epoch_ns, stopping, tell)
     except StoppedError as stop:
         done, late, error = stop.ticks, stop.late, stop.error
     except RthsError as failure:
@@ -198,7 +204,12 @@ def begin(
 
 
 def loop(
-    bench: ColumnBench | TableBench, clock: Clock, sink: Sink, epoch_ns: int, stopping: Callable[[], str]
+    bench: ColumnBench | TableBench,
+    clock: Clock,
+    sink: Sink,
+    epoch_ns: int,
+    stopping: Callable[[], str],
+    tell: Tell,
 ) -> tuple[int, int]:
     """All ticks; how many, and how many began a whole interval late.
 
@@ -209,6 +220,7 @@ def loop(
     interval_ns = round(plan.test.interval * 1e9)
     start_ns, late = clock.now() + LEAD_NS, 0
     for tick in range(plan.ticks):
+        tell("ticks", tick, plan.ticks)
         nominal = start_ns + tick * interval_ns
         clock.sleep_until(nominal)
         late += clock.now() >= nominal + interval_ns

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import sys
 import tempfile
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from common import cli
 from common.errors import InputError
+from common.telling import Tell
+from rths.progress import Progress
 from rths.trial.worker import DIAGNOSIS
 
 if TYPE_CHECKING:
@@ -79,9 +81,9 @@ def run(args: argparse.Namespace) -> int:
         args.cases, args.seed, args.set, duration=args.duration, only=args.only, effects=args.effects
     )
     folder = prepared(args.output)
-    with tempfile.TemporaryDirectory(prefix="rths-recordings-") as place:
-        recorded = record_cases(cases, Path(place), args.jobs)
-        answers = diagnose_cases(Path(place), len(cases), args)
+    with tempfile.TemporaryDirectory(prefix="rths-recordings-") as place, Progress("blind trial") as progress:
+        recorded = record_cases(cases, Path(place), args.jobs, progress.tell)
+        answers = diagnose_cases(Path(place), len(cases), args, progress.tell)
         outcomes = judge_all(cases, recorded, answers)
         if args.keep:
             keep(cases, recorded, Path(place), folder)
@@ -99,7 +101,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def check(args: argparse.Namespace) -> None:
-    """Raise InputError for numbers that make no trial, and for a missing package before any work is done."""
+    """Raise InputError for numbers that make no trial, and for what is missing, before any work is done."""
+    from rths.trial.judge import diagnose_all
     from rths.trial.spread import needed
 
     for name, value, fits, wanted in (
@@ -115,6 +118,9 @@ def check(args: argparse.Namespace) -> None:
     if args.dask:
         needed("joblib", "--dask")
         needed("dask.distributed", "--dask")
+    if args.diagnosis != DIAGNOSIS:
+        with tempfile.TemporaryDirectory(prefix="rths-nothing-") as folder:
+            diagnose_all(Path(folder), diagnosis=args.diagnosis)
 
 
 def prepared(folder: Path) -> Path:
@@ -129,40 +135,29 @@ def prepared(folder: Path) -> Path:
     return folder
 
 
-class Counter:
-    """Progress on standard error, a line now and then."""
-
-    def __init__(self, what: str, total: int) -> None:
-        self._what, self._total = what, total
-        self._done, self._started, self._next = 0, time.monotonic(), 0.0
-
-    def __call__(self, _name: str = "") -> None:
-        """One more is done."""
-        self._done += 1
-        spent = time.monotonic() - self._started
-        if spent >= self._next or self._done == self._total:
-            self._next = spent + 5.0
-            sys.stderr.write(f"{self._what} {self._done} of {self._total}, {spent:.0f} s\n")
-            sys.stderr.flush()
-
-
-def record_cases(cases: Sequence[Case], folder: Path, jobs: int) -> dict[int, Recorded]:
+def record_cases(cases: Sequence[Case], folder: Path, jobs: int, tell: Tell) -> dict[int, Recorded]:
     """Recordings by the number of the case."""
     from rths.trial.record import record_all
 
-    recorded, count = {}, Counter("recorded", len(cases))
+    recorded: dict[int, Recorded] = {}
+    tell("recorded", 0, len(cases))
     for item in record_all(cases, folder, jobs):
         recorded[item.index] = item
-        count()
+        tell("recorded", len(recorded), len(cases))
     return recorded
 
 
-def diagnose_cases(folder: Path, total: int, args: argparse.Namespace) -> dict[str, Any]:
+def diagnose_cases(folder: Path, total: int, args: argparse.Namespace, tell: Tell) -> dict[str, Any]:
     """Answers by the name of the recording."""
     from rths.trial.judge import diagnose_all
 
-    count = Counter("diagnosed", total)
-    return dict(diagnose_all(folder, jobs=args.jobs, dask=args.dask, diagnosis=args.diagnosis, done=count))
+    count = itertools.count(1)
+    tell("diagnosed", 0, total)
+
+    def done(_name: str) -> None:
+        tell("diagnosed", next(count), total)
+
+    return dict(diagnose_all(folder, jobs=args.jobs, dask=args.dask, diagnosis=args.diagnosis, done=done))
 
 
 def keep(cases: Iterable[Case], recorded: dict[int, Recorded], place: Path, folder: Path) -> None:

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 from common import cli
+from rths.progress import Progress
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -25,9 +26,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Judge a recording; 1 where it is over its budget, 0 where it is within or the machine allows no verdict."""
-    from rths.latency_budget import assess
+    with Progress("reading"):
+        from rths.latency_budget import assess
 
-    report = assess(args.file, args.budget)
+        report = assess(args.file, args.budget)
     text = json.dumps(report.plain(), allow_nan=False) + "\n" if args.json else str(report)
     try:
         sys.stdout.write(text)

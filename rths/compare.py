@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from common import cli
 from common.errors import InputError
+from rths.progress import Progress
 
 if TYPE_CHECKING:
     from rths.source import Source
@@ -26,10 +27,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Compare; 1 where a signal differs by more than the tolerance."""
-    from rths.source import columns
+    if args.tolerance is not None and not args.tolerance >= 0.0:
+        raise InputError(f"--tolerance is {args.tolerance}, but must be at least 0.")
+    with Progress("comparing") as progress:
+        from rths.source import columns
 
-    a, b = columns(args.a), columns(args.b)
-    result = compare(a, b) | {"motion_a": a.motion, "motion_b": b.motion}
+        a, b = columns(args.a, progress.tell), columns(args.b, progress.tell)
+        result = compare(a, b)
+    result |= {"motion_a": a.motion, "motion_b": b.motion}
     if not result["signals"]:
         raise InputError(f"{args.a} and {args.b} have no tick and signal in common.")
     beyond = [

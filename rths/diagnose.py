@@ -11,6 +11,8 @@ from typing import Any
 
 from common import cli
 from common.errors import InputError
+from common.telling import Tell, untold
+from rths.progress import Progress
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -43,11 +45,15 @@ def run(args: argparse.Namespace) -> int:
     for path in (args.html, args.json):
         if path and str(path) != "-":
             writable(path)
-    report = diagnose_file(args.file, plan=args.plan, validate=args.validate, against_ideal=args.ideal)
-    if args.html:
-        from rths.diagnosis_report import page
+    with Progress("diagnosing") as progress:
+        report = diagnose_file(
+            args.file, plan=args.plan, validate=args.validate, against_ideal=args.ideal, tell=progress.tell
+        )
+        if args.html:
+            from rths.diagnosis_report import page
 
-        page.write(report, args.html)
+            progress.tell("page")
+            page.write(report, args.html)
     if args.json:
         text = json.dumps(report, allow_nan=False) + "\n"
         if str(args.json) == "-":
@@ -72,7 +78,12 @@ def writable(path: Path) -> Path:
 
 
 def diagnose_file(
-    path: Path, *, plan: str | None = None, validate: Sequence[Path] = (), against_ideal: bool = False
+    path: Path,
+    *,
+    plan: str | None = None,
+    validate: Sequence[Path] = (),
+    against_ideal: bool = False,
+    tell: Tell = untold,
 ) -> dict[str, Any]:
     """The report on a recording, as plain values that JSON can hold.
 
@@ -87,7 +98,7 @@ def diagnose_file(
     chosen = plans.load(cli.plan_path(plan)) if plan else None
     own = record.build(read(path), chosen, against_ideal=against_ideal)
     others = [record.build(read(other), chosen, against_ideal=against_ideal) for other in validate]
-    report = diagnose(own, others)
+    report = diagnose(own, others, tell)
     from rths.diagnosis_report import wording
 
     report["details"]["test"]["file"] = path.name

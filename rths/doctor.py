@@ -10,8 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from common import cli, realtime
+from common.telling import Tell
+from rths.progress import Progress
 
 SHORTEST = 3.0  # s; below, the processes are not up before they have to end
+PARTS = 3
 EXCHANGE, WAKE_UP = 0.45, 0.85  # ends of the parts as shares of the time; the rest is the disk's
 
 
@@ -39,7 +42,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Check this machine; 1 where a check failed."""
     check_bounds(args)
-    report = examine(args)
+    with Progress("doctor") as progress:
+        report = examine(args, progress.tell)
     if args.json:
         sys.stdout.write(json.dumps(report) + "\n")
     else:
@@ -57,7 +61,7 @@ def check_bounds(args: argparse.Namespace) -> None:
         raise InputError(f"--interval {args.interval:g} s cannot be used: give 0.0001 to 0.1.")
 
 
-def examine(args: argparse.Namespace) -> dict[str, Any]:
+def examine(args: argparse.Namespace, tell: Tell) -> dict[str, Any]:
     """Measure part after part, so that none disturbs another, and judge; times in s."""
     from common.machine import Watch, facts
     from rths.checkup import children, disk
@@ -75,12 +79,12 @@ def examine(args: argparse.Namespace) -> dict[str, Any]:
 
     # 'on' is judged rather than obeyed: the check goes on with what can be had
     mode = "off" if args.rt == "off" else "auto"
-    progress(f"round trip over zenoh, {EXCHANGE * args.seconds:.0f} s")
+    tell("round trip over zenoh", 1, PARTS)
     granted, round_trip = children.exchange(interval_ns, round(until(EXCHANGE) * 1e9), mode)
-    progress(f"wake-up lateness, {(WAKE_UP - EXCHANGE) * args.seconds:.0f} s")
+    tell("wake-up lateness", 2, PARTS)
     place = granted.get("priority", 0), granted.get("processor", -1)
     wake_up = children.wake_ups(interval_ns, until(WAKE_UP), *place)
-    progress(f"disk, {(1.0 - WAKE_UP) * args.seconds:.0f} s")
+    tell("disk", 3, PARTS)
     report: dict[str, Any] = {
         "seconds": args.seconds,
         "interval": args.interval,
@@ -99,12 +103,6 @@ def examine(args: argparse.Namespace) -> dict[str, Any]:
     report["notes"] = notes(report)
     report["verdict"] = verdict(report, found)._asdict()
     return report
-
-
-def progress(text: str) -> None:
-    """What is going on, on standard error."""
-    sys.stderr.write(f"doctor: {text}\n")
-    sys.stderr.flush()
 
 
 def write_report(report: dict[str, Any]) -> None:

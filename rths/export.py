@@ -38,13 +38,15 @@ def run(args: argparse.Namespace) -> int:
     """Export."""
     from common.recording.reader import read
     from rths import tabular
+    from rths.progress import Progress
 
-    recording = read(args.file)
-    columns, units, happened = flat(recording), flat_units(recording), events(recording)
-    tabular.write(args.output, columns, units, events=structs(happened))
     apart = args.output.with_stem(f"{args.output.stem}-events") if beside(args) else None
-    if apart:
-        tabular.write(apart, happened, {"t": "s"})
+    with Progress("exporting"):
+        recording = read(args.file)
+        columns, units, happened = flat(recording), flat_units(recording), events(recording)
+        tabular.write(args.output, columns, units, events=structs(happened))
+        if apart:
+            tabular.write(apart, happened, {"t": "s"})
     ticks, count = len(columns["seq"]), len(happened["t"])
     if args.json:
         said: dict[str, Any] = {

@@ -11,7 +11,9 @@ from typing import Any
 from common import cli
 from common.errors import InputError
 from common.roles import name_of
+from common.telling import Tell
 from rths.bench import OF_SLAVE
+from rths.progress import Progress
 
 PARTS = ("column", "actuator", "table", "damper")
 
@@ -32,10 +34,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Identify, and report."""
+    with Progress("identifying") as progress:
+        reports = identified(args, progress.tell)
+    if args.json:
+        sys.stdout.write(json.dumps({"file": str(args.file), "parts": reports}) + "\n")
+    else:
+        for report in reports:
+            show(report)
+    return 0
+
+
+def identified(args: argparse.Namespace, tell: Tell) -> list[dict[str, Any]]:
+    """The reports on all parts that are asked for; raises InputError where there is none."""
     from common.recording.reader import read
     from rths.identification import identify, part_of, possible
 
     recording = read(args.file)
+    tell(f"column, model {args.fit}" if args.fit else "", 0, 0)
+    models = [fitted(recording, args.fit)] if args.fit else []
     reports = []
     for role in recording.roles:
         view = recording.of(role)
@@ -43,17 +59,12 @@ def run(args: argparse.Namespace) -> int:
         if not parts[0]:
             parts = possible(view)
         own = [part for part in parts if role == recording.roles[0] or part in OF_SLAVE]
-        reports += [identify(view, part) | named(part, role) for part in own]
+        for part in own:
+            tell(part, 0, 0)
+            reports.append(identify(view, part) | named(part, role))
     if not reports:
         raise InputError(f"{args.file} holds no part's in- and outputs: see rths inspect {args.file}.")
-    if args.fit:
-        reports.append(fitted(recording, args.fit))
-    if args.json:
-        sys.stdout.write(json.dumps({"file": str(args.file), "parts": reports}) + "\n")
-    else:
-        for report in reports:
-            show(report)
-    return 0
+    return reports + models
 
 
 def named(part: str, role: str) -> dict[str, str]:

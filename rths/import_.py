@@ -17,6 +17,7 @@ from common.plan import Plan
 from common.roles import MASTER, kind_of, name_of
 from common.schema import fill, key, nearest
 from common.signals import Kind, Signal
+from rths.progress import Progress
 
 
 def lab_signals(plan: Plan) -> dict[str, str]:
@@ -73,12 +74,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Import."""
-    from rths import tabular
+    with Progress("importing"):
+        from rths import tabular
 
-    mapping = load_map(args.map)
-    columns = tabular.read(args.data)
-    t, values = resampled(mapping, columns, args.data)
-    write(args.output, mapping, t, values, args.data.name)
+        mapping = load_map(args.map)
+        columns = tabular.read(args.data)
+        t, values = resampled(mapping, columns, args.data)
+        write(args.output, mapping, t, values, args.data.name)
     show(args, mapping, t.size, list(values))
     return 0
 

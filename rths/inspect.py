@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from common import cli
+from rths.progress import Progress
 from rths.terminal import quantity, table
 
 
@@ -20,10 +21,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Report on a recording."""
-    from common.recording.reader import read
-    from rths.summary import summarize
+    with Progress("reading"):
+        from common.recording.reader import read
+        from rths.summary import summarize
 
-    summary = summarize(read(args.file))
+        summary = summarize(read(args.file))
     if args.json:
         sys.stdout.write(json.dumps(summary) + "\n")
     else:

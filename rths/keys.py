@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import argparse
 import ipaddress
+import json
 import os
 import re
 import sys
 from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from common import cli
 from common.errors import InputError
@@ -52,6 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help=f"name or address by which the master is dialled, beside {', '.join(HERE)}",
     )
+    cli.json_argument(parser, "say what was written as JSON on standard output")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -62,7 +64,11 @@ def run(args: argparse.Namespace) -> int:
     roles = (MASTER, *slave_roles(args), RECORDER, OPERATOR, OBSERVER)
     owners = certificates(roles, args.host, now - EARLIER, now + timedelta(days=args.days))
     write(args.folder, owners)
-    sys.stdout.write(told(args.folder, roles, now + timedelta(days=args.days)))
+    end = now + timedelta(days=args.days)
+    if args.json:
+        sys.stdout.write(json.dumps(plain(args.folder, roles, end)) + "\n")
+    else:
+        sys.stdout.write(told(args.folder, roles, end))
     return 0
 
 
@@ -217,6 +223,17 @@ PLACES = {
     OPERATOR: "who may give a test orders",
     OBSERVER: "who may watch",
 }
+
+
+def plain(folder: Path, roles: Sequence[str], end: datetime) -> dict[str, Any]:
+    """The files, and until when they are valid, as plain values."""
+    return {
+        "folder": str(folder),
+        "valid_until": end.isoformat(timespec="seconds"),
+        "authority": f"{AUTHORITY}.pem",
+        "authority_key": f"{AUTHORITY}.key",
+        "roles": {role: {"certificate": f"{role}.pem", "key": f"{role}.key"} for role in roles},
+    }
 
 
 def told(folder: Path, roles: Sequence[str], end: datetime) -> str:

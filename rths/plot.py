@@ -70,22 +70,34 @@ def run(args: argparse.Namespace) -> int:
     chosen = choose(args.names)
     place = place_of(args)
     recording = read(args.file)
-    made: list[str] = []
-    left_out: dict[str, str] = {}
-    for picture in chosen:
-        drawn = {
-            str(path)
-            for role in recording.roles
-            if save(recording, role, picture, path := place.path(picture.name, role), args.width)
-        }
-        made += sorted(drawn)
-        if not drawn:
-            left_out[picture.name] = picture.needs
+    made, left_out = draw_all(recording, chosen, place, args.width)
     complain(args, made, left_out)
     result = {"pictures": made, "left_out": left_out}
     sys.stdout.write(json.dumps(result) if args.json else "\n".join(made))
     sys.stdout.write("\n")
     return 0
+
+
+def draw_all(
+    recording: Run, chosen: list[Picture], place: Place, width: str
+) -> tuple[list[str], dict[str, str]]:
+    """Files of the pictures that were drawn, and what the others lack."""
+    from rths.progress import Progress
+
+    made: list[str] = []
+    left_out: dict[str, str] = {}
+    with Progress("drawing") as progress:
+        for number, picture in enumerate(chosen):
+            progress.tell(picture.name, number, len(chosen))
+            drawn = {
+                str(path)
+                for role in recording.roles
+                if save(recording, role, picture, path := place.path(picture.name, role), width)
+            }
+            made += sorted(drawn)
+            if not drawn:
+                left_out[picture.name] = picture.needs
+    return made, left_out
 
 
 def choose(names: list[str]) -> list[Picture]:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from common import cli
+from rths.progress import Progress
 from rths.terminal import table
 
 if TYPE_CHECKING:
@@ -32,10 +33,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Recover a recording; 1 where something of it is lost."""
-    from common.recording.recovery import recover
-
     output = args.output or args.file.with_name(f"{args.file.stem}-recovered.mcap")
-    found = recover(args.file, output)
+    with Progress("recovering"):
+        from common.recording.recovery import recover
+
+        found = recover(args.file, output)
     if args.json:
         sys.stdout.write(json.dumps(found.plain(), allow_nan=False) + "\n")
     else:

@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 from common import cli
 from common.errors import InputError
-from common.roles import MASTER, SLAVE, latency_topic
+from common.roles import MASTER, SLAVE, latency_topic, title
+from common.telling import Tell, untold
+from rths.progress import Progress
 
 if TYPE_CHECKING:
     from common.recording.reader import Run
@@ -54,10 +56,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Replay; 1 where a computed signal differs from the recorded one."""
-    from common.recording.reader import read
+    with Progress("replaying") as progress:
+        from common.recording.reader import read
 
-    recording = read(args.file)
-    matches = {**replay_master(recording), **replay_slave(recording)}
+        recording = read(args.file)
+        matches = {**replay_master(recording, progress.tell), **replay_slave(recording, progress.tell)}
     result = {name: vars(match) for name, match in matches.items()}
     same = all(match.differing == 0 for match in matches.values())
     if args.json:
@@ -69,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
     return 0 if same else 1
 
 
-def replay_master(recording: Run) -> dict[str, Match]:
+def replay_master(recording: Run, tell: Tell = untold) -> dict[str, Match]:
     """The building, the compensator and the damper's control again, from the first tick to the first hole."""
     from master.step import MasterStep, Outputs
     from rths.summary import plan_of
@@ -85,6 +88,7 @@ def replay_master(recording: Run) -> dict[str, Match]:
     for tick, seq in enumerate(columns["seq"]):
         if seq != tick:
             break
+        tell("the master's ticks", tick, len(columns["seq"]))
         outputs = step(
             tick,
             columns["column_displacement"][tick],
@@ -126,11 +130,12 @@ def ground_of(recording: Run) -> Any:
     return np.frombuffer(recording.attachments[GROUND], dtype="<f8").reshape(2, -1).copy()
 
 
-def replay_slave(recording: Run) -> dict[str, Match]:
+def replay_slave(recording: Run, tell: Tell = untold) -> dict[str, Match]:
     """What each slave did with the commands it had, and the master with the feedbacks it had."""
     matches: dict[str, Match] = {}
     for role in recording.roles:
         if recording.has(role):
+            tell(f"what the {title(role)} did", 0, 0)
             suffix = role.removeprefix(SLAVE)
             for name, match in replay_exchange(recording, role).items():
                 place = f"{MASTER}/{name}{suffix}" if name == "damper_force_used" else f"{role}/{name}"

@@ -5,13 +5,10 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-import time
 from pathlib import Path
 
 from common import cli
 from common.errors import InputError
-
-PATIENCE_S = 2.0  # of drawing, before there is a word, and between two
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,14 +27,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the page."""
     from common.recording.reader import read
+    from rths.progress import Progress
     from rths.run_report import drawing, page, verdict
     from rths.summary import summarize
 
-    recording = read(args.file)
-    output = place(args.output or args.file.with_suffix(".html"), args.file)
-    summary = summarize(recording)
-    drawn, left_out = drawing.draw_all(recording, Progress())
-    write(output, page.page(recording, summary, drawn, left_out))
+    with Progress("reporting") as progress:
+        recording = read(args.file)
+        output = place(args.output or args.file.with_suffix(".html"), args.file)
+        summary = summarize(recording)
+        drawn, left_out = drawing.draw_all(recording, progress.tell)
+        write(output, page.page(recording, summary, drawn, left_out))
     names = list(dict.fromkeys(picture.name for several in drawn.values() for picture in several))
     sentences = verdict.sentences(recording, summary)
     if args.json:
@@ -69,18 +68,3 @@ def write(path: Path, text: str) -> None:
         path.write_text(text, encoding="utf-8")
     except OSError as error:
         raise InputError(f"Cannot write {path}: {error.strerror}; give another file with -o.") from None
-
-
-class Progress:
-    """A line on standard error now and then, where drawing takes long."""
-
-    def __init__(self) -> None:
-        self._next = time.monotonic() + PATIENCE_S
-
-    def __call__(self, done: int, total: int, name: str) -> None:
-        """So many pictures are drawn, and the next is this."""
-        now = time.monotonic()
-        if now >= self._next:
-            self._next = now + PATIENCE_S
-            sys.stderr.write(f"{done} of {total} pictures drawn, next {name}\n")
-            sys.stderr.flush()

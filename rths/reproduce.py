@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from common import cli
 from common.errors import InputError
+from rths.progress import Progress
 
 if TYPE_CHECKING:
     from rths.reproduction.rows import Row
@@ -32,8 +33,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run every experiment; 1 where a row is outside its tolerance."""
     from recorder.files import checked
-    from rths.reproduction import experiments, figures, page
-    from rths.reproduction.rows import rows
 
     folder: Path = args.output
     try:
@@ -43,9 +42,14 @@ def run(args: argparse.Namespace) -> int:
             f"Cannot write into {folder}: {error.strerror}; give another folder with -o."
         ) from None
     target = checked(folder / "index.html")
-    evidence = experiments.gather(folder, say)
-    table = rows(evidence)
-    pictures = figures.draw_all(evidence, folder)
+    with Progress("reproducing") as progress:
+        from rths.reproduction import experiments, figures, page
+        from rths.reproduction.rows import rows
+
+        evidence = experiments.gather(folder, progress.tell)
+        progress.tell("figures")
+        table = rows(evidence)
+        pictures = figures.draw_all(evidence, folder)
     target.write_text(page.page(table, pictures, folder), encoding="utf-8")
     if args.json:
         sys.stdout.write(json.dumps({"rows": [asdict(row) for row in table], "page": str(target)}))
@@ -54,11 +58,6 @@ def run(args: argparse.Namespace) -> int:
         show(table)
         sys.stdout.write(f"page: {target}\n")
     return 0 if all(row.passed for row in table) else 1
-
-
-def say(text: str) -> None:
-    """Progress, on standard error."""
-    sys.stderr.write(f"{text}\n")
 
 
 def show(table: list[Row]) -> None:

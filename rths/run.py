@@ -7,6 +7,7 @@ import json
 import sys
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +20,7 @@ from common.preflight import PASSED, Check, Gate
 from common.reality import Reality
 from common.realtime import assign, freeze
 from common.roles import MASTER, RECORDER
+from rths.progress import Progress as Working
 from rths.running import announced
 from rths.terminal import Progress
 
@@ -91,11 +93,12 @@ def in_virtual_time(
     from rths import virtual
 
     said = before_the_start(plan, output, gate)
-    bench = virtual.assemble(plan, reality, output, virtual_report, gate=gate)
-    sys.stderr.write(f"{said}\n")
-    freeze()
-    started = time.monotonic()
-    error = virtual.run(bench, stopping)
+    with Working("running") as working:
+        bench = virtual.assemble(plan, reality, output, partial(virtual_report, working), gate=gate)
+        sys.stderr.write(f"{said}\n")
+        freeze()
+        started = time.monotonic()
+        error = virtual.run(bench, stopping, working.tell)
     seconds = time.monotonic() - started
     sys.stderr.write(f"{plan.test.duration:g} s of test in {seconds:.1f} s of computing\n")
     return error
@@ -123,9 +126,10 @@ def checks(plan: Plan, output: Path) -> list[Check]:
     return [*preflight.checks(plan), space.check(plan, output.parent)]
 
 
-def virtual_report(kind: str, data: Any) -> None:
+def virtual_report(working: Working, kind: str, data: Any) -> None:
     """Events of a test in virtual time, on standard error."""
     if kind == "event" and data["code"] not in UNSAID:
+        working.leave(wipe=True)
         cli.text_report(kind, data)
 
 

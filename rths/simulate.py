@@ -13,6 +13,8 @@ from common import cli
 from common.errors import InterlockError
 from common.plan import Plan, ideal
 from common.tables import Compensator, Control
+from common.telling import Tell
+from rths.progress import Progress
 
 if TYPE_CHECKING:
     from models.closed_loop import Rollout
@@ -35,12 +37,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Simulate; 1 where the loop left the plan's limits."""
-    from models import substructure
-
     plan = adapted(cli.load_plan(args), args)
-    motion = substructure.motion(plan)
-    computed = played if plan.slaves else rolled_out
-    columns, beyond_limit = computed(plan, motion, args)
+    with Progress("simulating") as progress:
+        from models import substructure
+
+        motion = substructure.motion(plan)
+        columns, beyond_limit = (
+            played(plan, args, progress.tell) if plan.slaves else rolled_out(plan, motion, args)
+        )
     summary = summarize(plan, columns, beyond_limit) | {"ground_motion": motion.describe()}
     if args.output:
         summary["file"] = str(args.output)
@@ -64,13 +68,13 @@ def rolled_out(plan: Plan, motion: Any, args: argparse.Namespace) -> tuple[dict[
     return columns, beyond(plan, columns, rollout.ticks)
 
 
-def played(plan: Plan, motion: Any, args: argparse.Namespace) -> tuple[dict[str, Any], str]:
+def played(plan: Plan, args: argparse.Namespace, tell: Tell) -> tuple[dict[str, Any], str]:
     """The same of several slaves: the loops themselves in virtual time, which a limit stops."""
     from recorder.files import checked
     from rths.source import recorded
     from rths.virtual import simulated
 
-    found, error = simulated(plan, args.output and checked(args.output), noise=args.noise)
+    found, error = simulated(plan, args.output and checked(args.output), noise=args.noise, tell=tell)
     if error is not None and not isinstance(error, InterlockError):
         raise error
     return recorded(found).signals, str(error or "")

@@ -9,8 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from common import cli, plan
+from common.errors import InputError
 from common.recording.reader import Run, Values, read
 from common.roles import MASTER, name_of
+from common.telling import Tell, untold
 
 OF_THE_TICK = ("seq", "t")
 
@@ -26,18 +28,19 @@ class Source(NamedTuple):
     motion: str
 
 
-def columns(name: str) -> Source:
+def columns(name: str, tell: Tell = untold) -> Source:
     """What there is in a recording, or of the simulation of a plan (.toml, or the name of one that ships).
 
     Raises:
         InputError: it can be neither read nor simulated.
     """
     if name in cli.SHIPPED or name.endswith(".toml"):
-        return simulated(cli.plan_path(name))
+        return simulated(cli.plan_path(name), tell)
+    tell(f"reading {name}", 0, 0)
     return recorded(read(Path(name)))
 
 
-def simulated(path: Path) -> Source:
+def simulated(path: Path, tell: Tell = untold) -> Source:
     """The simulation of a plan."""
     from models import substructure
     from models.closed_loop import signals, simulate
@@ -46,7 +49,7 @@ def simulated(path: Path) -> Source:
     if test.slaves:
         from rths.virtual import simulated as played
 
-        return recorded(played(test)[0])
+        return recorded(played(test, tell=tell)[0])
     record = substructure.motion(test)
     values = signals(test, simulate(test, substructure.ground_rows(test, record)))
     ticks = (values["t"] / test.test.interval).round().astype(int)
@@ -54,8 +57,14 @@ def simulated(path: Path) -> Source:
 
 
 def recorded(run: Run) -> Source:
-    """The signals of a recording on the ticks that master and slaves have in common."""
+    """The signals of a recording on the ticks that master and slaves have in common.
+
+    Raises:
+        InputError: it has neither a master's nor a slave's.
+    """
     topics = [topic for topic in (MASTER, *run.roles) if run.has(topic)]
+    if not topics:
+        raise InputError(f"{run.path} holds no ticks of a master or a slave to compare.")
     ticks = reduce(np.intersect1d, (run.sequences[topic] for topic in topics))
     values: dict[str, Values] = {}
     for topic in topics:

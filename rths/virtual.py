@@ -20,6 +20,7 @@ from common.recording.reader import Run, read
 from common.roles import MASTER, RECORDER
 from common.safety.modes import Mode
 from common.tables import Rig, Sensors
+from common.telling import Tell, untold
 from master.assembly import build_loop as build_master
 from master.loop import MasterLoop
 from models import substructure
@@ -96,7 +97,7 @@ def assemble(
     return Bench(clock, master, slaves, recorder, endpoints, gates)
 
 
-def run(bench: Bench, stopping: Callable[[], str]) -> RthsError | None:
+def run(bench: Bench, stopping: Callable[[], str], tell: Tell = untold) -> RthsError | None:
     """Play a test to its end; the error that ended it, None where it was completed.
 
     Where several laboratories end with one, that which follows another's is not the one: the cause counts, and of
@@ -113,6 +114,7 @@ def run(bench: Bench, stopping: Callable[[], str]) -> RthsError | None:
             gate.note(bench.loops[role].lab)
     ticks = bench.master.lab.plan.ticks
     for tick in range(ticks):
+        tell("ticks", tick, ticks)
         if reason := stopping():
             bench.master.stop(reason)
         if not bench.master.lab.running:
@@ -146,7 +148,9 @@ def _listening(bench: Bench) -> dict[str, str]:
     return codes
 
 
-def simulated(plan: Plan, output: Path | None = None, *, noise: bool = False) -> tuple[Run, RthsError | None]:
+def simulated(
+    plan: Plan, output: Path | None = None, *, noise: bool = False, tell: Tell = untold
+) -> tuple[Run, RthsError | None]:
     """The nominal models of a plan with several slaves, played as a test: its recording, and what ended it early.
 
     The loop objects stand in for the compiled rollout, which knows one slave. Without `noise` sensors are free of
@@ -157,7 +161,7 @@ def simulated(plan: Plan, output: Path | None = None, *, noise: bool = False) ->
     nominal = replace(nominal, slaves=dict.fromkeys(nominal.slaves, Rig()))
     with tempfile.TemporaryDirectory() as folder:
         path = output or Path(folder) / "simulation.mcap"
-        error = run(assemble(plan, nominal, path), str)
+        error = run(assemble(plan, nominal, path), str, tell)
         return read(path), error
 
 

@@ -177,7 +177,7 @@ def _records(path: Path, run: Run) -> Iterator[Any]:
         raise InputError(f"Cannot read the recording {path}: {error.strerror}.") from None
     except DAMAGE as error:
         raise InputError(
-            f"{path} is not a readable MCAP recording: {error or type(error).__name__}; "
+            f"{path} is not a readable MCAP recording: {str(error) or type(error).__name__}; "
             "if it was one, rths recover saves what is whole."
         ) from None
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from common import cli
 from common.errors import InputError
+from rths.progress import Progress
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -47,9 +48,11 @@ def run(args: argparse.Namespace) -> int:
 
     chosen = schedules(args)
     started, results = time.monotonic(), []
-    for result in spread(play, chosen, args.jobs):
-        results.append(result)
-        tell(len(results), len(chosen), started)
+    with Progress("faults") as progress:
+        progress.tell("played", 0, len(chosen))
+        for result in spread(play, chosen, args.jobs):
+            results.append(result)
+            progress.tell("played", len(results), len(chosen))
     results.sort(key=lambda result: result.schedule.seed)
     found = summary(results, time.monotonic() - started, reproduction(args))
     if args.json:
@@ -77,23 +80,17 @@ def schedules(args: argparse.Namespace) -> list[Schedule]:
             raise InputError(f"{name} is {value}, but must be {wanted}.")
     if args.jobs != 1:
         needed("joblib", "--jobs")
-    if args.schedule:
+    if args.schedule is not None:
         return [parse(args.schedule)]
     return [draw(one, args.duration, recorded=args.recorded) for one in range(seed, seed + count)]
 
 
 def reproduction(args: argparse.Namespace) -> str:
     """How one schedule of these is played again; its seed or its line comes behind."""
-    if args.schedule:
+    if args.schedule is not None:
         return f"rths faults --schedule '{args.schedule}'"
     length = "" if args.duration is None else f" --duration {args.duration:g}"
     return "rths faults" + length + (" --recorded" if args.recorded else "") + " --seed {seed}"
-
-
-def tell(done: int, total: int, started: float) -> None:
-    """Progress on standard error, a line now and then."""
-    if done % 50 == 0 and done < total:
-        sys.stderr.write(f"played {done} of {total}, {time.monotonic() - started:.0f} s\n")
 
 
 def summary(results: Sequence[Result], spent: float, again: str) -> dict[str, Any]:

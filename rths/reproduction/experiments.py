@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ from common.preflight import Gate
 from common.reality import as_planned
 from common.recording.reader import Run, read
 from common.tables import Actuator, Compensator, Control, GroundMotion, TableCompensator
+from common.telling import Tell
 from models import indicators, preflight, substructure
 from models.closed_loop import signals, simulate
 from models.registry import Array
@@ -48,15 +48,13 @@ class Evidence:
     critical_delay: tuple[float, float] = (0.0, 0.0)  # bracket, s
 
 
-def gather(folder: Path, say: Callable[[str], None]) -> Evidence:
+def gather(folder: Path, tell: Tell) -> Evidence:
     """Run everything; recordings go into `folder`."""
     default, paper = (plans.load(cli.plan_path(name)) for name in ("default", "paper"))
     evidence = Evidence(default, paper)
-    say("bench tests of the column, the actuator, the table and the damper")
-    run_benches(evidence, folder)
-    say("closed-loop tests at 10 % and 20 %")
-    run_tests(evidence, folder)
-    say("pure simulations and free vibrations")
+    run_benches(evidence, folder, tell)
+    run_tests(evidence, folder, tell)
+    tell("pure simulations and free vibrations", 0, 0)
     run_simulations(evidence)
     free_vibrations(evidence)
     evidence.critical_delay = bisect(evidence.default)
@@ -88,7 +86,7 @@ def beyond(plan: Plan) -> Plan:
     return replace(plan, compensator=BEYOND, table=replace(plan.table, compensator=TABLE_LEAD))
 
 
-def run_benches(evidence: Evidence, folder: Path) -> None:
+def run_benches(evidence: Evidence, folder: Path, tell: Tell) -> None:
     """Characterisation tests; noise on."""
     default, paper = evidence.default, evidence.paper
     realistic = plans.load(cli.plan_path("rc_column"))
@@ -101,7 +99,8 @@ def run_benches(evidence: Evidence, folder: Path) -> None:
         "table": (default, Order("table")),
         "damper": (default, Order("damper")),
     }
-    for name, (plan, order) in orders.items():
+    for number, (name, (plan, order)) in enumerate(orders.items(), 1):
+        tell(f"bench test {name}", number, len(orders))
         path = folder / f"bench-{name}.mcap"
         result = benches.play(plan, as_planned(plan), order, path, never)
         if result.error is not None:
@@ -109,7 +108,7 @@ def run_benches(evidence: Evidence, folder: Path) -> None:
         evidence.benches[name] = read(path)
 
 
-def run_tests(evidence: Evidence, folder: Path) -> None:
+def run_tests(evidence: Evidence, folder: Path, tell: Tell) -> None:
     """Closed-loop tests of both laboratories through the real loops; an unstable one is stopped by its limits."""
     default, paper = evidence.default, evidence.paper
     cases = {
@@ -120,7 +119,8 @@ def run_tests(evidence: Evidence, folder: Path) -> None:
         "with-amd-20": at_scale(paper, 0.2),
         "without-amd-20": without_amd(at_scale(paper, 0.2)),
     }
-    for name, plan in cases.items():
+    for number, (name, plan) in enumerate(cases.items(), 1):
+        tell(f"closed-loop test {name}", number, len(cases))
         path = folder / f"test-{name}.mcap"
         bench = virtual.assemble(plan, as_planned(plan), path, gate=gate_of(name, plan))
         error = virtual.run(bench, never)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
 from typing import NamedTuple
 
 from common.recording.reader import Run
 from common.roles import name_of, title
+from common.telling import Tell
 from rths import figure
 from rths.page import data_uri
 from rths.pictures import PICTURES, Picture
@@ -28,15 +28,14 @@ class Drawn(NamedTuple):
 
 
 Pictures = dict[str, list[Drawn]]  # by the role of the slave that they concern
-Told = Callable[[int, int, str], None]  # how many are done of how many, and what comes next
 
 
-def draw_all(run: Run, told: Told) -> tuple[Pictures, dict[str, str]]:
+def draw_all(run: Run, tell: Tell) -> tuple[Pictures, dict[str, str]]:
     """Every picture that a recording has signals for, by slave; and those left out, with the signals they need."""
     asked = [(role, picture) for role in run.roles for picture in PICTURES.values()]
     found: Pictures = {role: [] for role in run.roles}
     for place, (role, picture) in enumerate(asked):
-        told(place, len(asked), picture.name)
+        tell(picture.name, place, len(asked))
         if drawn := draw(run, role, picture):
             found[role].append(drawn)
     names = {drawn.name for several in found.values() for drawn in several}

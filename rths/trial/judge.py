@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -26,6 +28,7 @@ class Answer(NamedTuple):
     seconds: float
 
 
+GRACE = 3.0  # s, in which an interrupted process may end those that it started
 NONE = Answer({"status": "error", "error": "the diagnosis gave no answer"}, float("nan"))
 
 
@@ -68,11 +71,21 @@ def _work(words: list[str], place: Path, jobs: int, done: Callable[[str], None])
                 for line in process.stdout:
                     done(line.strip())
             except BaseException:
-                process.kill()
+                _end(process)
                 raise
     if process.returncode:
         said = complaints.read_text(encoding="utf-8").strip().splitlines() or ["it ended without a word"]
         raise InputError(f"The process that diagnoses failed: {said[-1].removeprefix('rths: ')}")
+
+
+def _end(process: subprocess.Popen[str]) -> None:
+    """End the process with those that it started; Ctrl-C on a terminal has told it already."""
+    for word in (None, signal.SIGINT, signal.SIGKILL):
+        if word is not None:
+            process.send_signal(word)
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(GRACE)
+            return
 
 
 def environment(jobs: int) -> dict[str, str]:

@@ -64,7 +64,7 @@ def test_report_page_and_summary(call: Any, capsys: Any, cases: Cases, tmp_path:
     path = cases.file(FRICTION, duration=8.0)
     assert call("diagnose", path, "--json", out, "--html", html) == 0
     text, error = capsys.readouterr()
-    assert error == ""
+    assert all(line.startswith("diagnosing: ") for line in error.splitlines())
     assert "damper friction" in text
     report = checked(out)
     assert report["which"][0]["effects"] == ["damper.friction"]

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from common.recording.reader import read
+from common.telling import untold
 from rths.__main__ import main
 from rths.reproduction import experiments, figures
 from rths.reproduction.experiments import Evidence
@@ -23,7 +24,7 @@ from tests.rths.report.pages import check_alone, check_in_browser
 
 @pytest.fixture(scope="module")
 def evidence(tmp_path_factory: pytest.TempPathFactory) -> Evidence:
-    return experiments.gather(tmp_path_factory.mktemp("experiments"), lambda _text: None)
+    return experiments.gather(tmp_path_factory.mktemp("experiments"), untold)
 
 
 def test_every_row_is_within_its_tolerance(evidence: Evidence) -> None:

@@ -16,12 +16,12 @@ import pytest
 from common import reality
 from common.plan import from_tables
 from common.recording.reader import Run, read
+from common.telling import untold
 from rths import virtual
 from rths.__main__ import main
 from rths.diagnosis_report.page import page as diagnosis_page
 from rths.page import numeric
 from rths.pictures import PICTURES
-from rths.report import Progress
 from rths.run_report import drawing, verdict
 from rths.run_report.page import page
 from rths.summary import summarize
@@ -46,12 +46,8 @@ def reported(virtual_recording: Path, tmp_path_factory: pytest.TempPathFactory) 
     """The page of the short test."""
     path = tmp_path_factory.mktemp("reports") / "short.html"
     run = read(virtual_recording)
-    path.write_text(page(run, summarize(run), *drawing.draw_all(run, silent)), encoding="utf-8")
+    path.write_text(page(run, summarize(run), *drawing.draw_all(run, untold)), encoding="utf-8")
     return path
-
-
-def silent(_done: int, _total: int, _name: str) -> None:
-    """Progress that nobody sees."""
 
 
 def undrawn(run: Run) -> str:
@@ -197,7 +193,7 @@ def test_slaves_have_pictures_and_tables_of_their_own(tmp_path: Path, monkeypatc
     plan = from_tables({"test": {"duration": 2.0, "name": "two"}, "slave": slaves}, tmp_path)
     assert virtual.run(virtual.assemble(plan, reality.as_planned(plan), tmp_path / "two.mcap"), str) is None
     run = read(tmp_path / "two.mcap")
-    made = page(run, summarize(run), *drawing.draw_all(run, silent))
+    made = page(run, summarize(run), *drawing.draw_all(run, untold))
     text = check_alone(made).text
     assert made.count("<h3>Slave roof</h3>") == made.count("<h3>Slave cellar</h3>") == 2
     assert 'alt="Tracking of the slave &#39;roof&#39;"' in made
@@ -273,19 +269,6 @@ def test_a_file_that_must_not_be_read_or_written_is_said(
     monkeypatch.setattr(Path, "open", refuse)
     assert call("report", virtual_recording, "-o", tmp_path / "a.html") == 2
     assert "Permission denied" in capsys.readouterr().err
-
-
-def test_progress_is_silent_until_it_takes_long(capsys: Any, monkeypatch: Any) -> None:
-    now = [0.0]
-    monkeypatch.setattr("rths.report.time.monotonic", lambda: now[0])
-    progress = Progress()
-    for done, at in enumerate((0.1, 1.9, 2.1, 2.2, 4.2)):
-        now[0] = at
-        progress(done, 6, "spectra")
-    assert (
-        capsys.readouterr().err
-        == "2 of 6 pictures drawn, next spectra\n4 of 6 pictures drawn, next spectra\n"
-    )
 
 
 @pytest.mark.parametrize(

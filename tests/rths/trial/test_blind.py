@@ -122,8 +122,6 @@ def test_the_command_scores_and_keeps(tmp_path: Path, capsys: pytest.CaptureFixt
     )  # fmt: skip
     captured = capsys.readouterr()
     found = json.loads(captured.out)
-    assert "recorded 4 of 4" in captured.err
-    assert "diagnosed 4 of 4" in captured.err
     assert code == 1
     assert json.loads((tmp_path / "out" / "results.json").read_text()) == found
     assert (tmp_path / "out" / "index.html").stat().st_size > 10_000

@@ -1,0 +1,207 @@
+"""Manners of the command line: one sentence for a mistake, one JSON document for a report, quiet ends, exit codes."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from common import errors, signals
+from common.errors import EXIT_CODES, RthsError
+from common.recording.writer import Recording
+from rths import progress
+from rths.__main__ import EXAMPLES, VERBS, main, parser_for
+from tests.helpers import ROOT
+
+Call = Callable[..., int]
+SILENT = ("completion",)  # verbs that report nothing: what they write is for a shell
+OF_A_RECORDING = (
+    "inspect",
+    "replay",
+    "budget",
+    "diagnose",
+    "identify",
+    "plot",
+    "export",
+    "layout",
+    "compare",
+)
+ENDS = {
+    "plot": ["-o", "{tmp}/out"],
+    "export": ["-o", "{tmp}/out.csv"],
+    "layout": ["-o", "{tmp}/out.json"],
+    "compare": ["default"],
+}
+RECORDINGS = ("missing.mcap", "folder", "empty.mcap", "text.mcap", "torn.mcap", "file/x.mcap")
+OF_A_PLAN = (
+    "run --virtual",
+    "simulate",
+    "bench column",
+    "master",
+    "slave",
+    "record",
+    "keys {tmp}/keys --plan",
+    "diagnose {recording} --plan",
+    "simulate default -o {tmp}/out.mcap --duration",
+    "run --virtual --reality",
+)
+PLANS = ("missing.toml", "folder", "binary.toml", "open.toml", "other.toml", "file/x.toml")
+MISTAKES = [
+    *(f"{verb} {{tmp}}/{name} {' '.join(ENDS.get(verb, ()))}" for verb in OF_A_RECORDING for name in RECORDINGS),
+    *(f"{verb} {{tmp}}/tickless.mcap {' '.join(ENDS.get(verb, ()))}" for verb in ("replay", "budget", "compare")),
+    *(f"recover {{tmp}}/{name} -o {{tmp}}/out.mcap" for name in RECORDINGS if name != "torn.mcap"),
+    *(f"{words} {{tmp}}/{name}" for words in OF_A_PLAN for name in PLANS),
+    *(f"simulate default --duration {value}" for value in ("nan", "inf", "-1", "0", "ten")),
+    *(f"simulate default --scale {value}" for value in ("nan", "inf")),
+    *(f"simulate default --seed {value}" for value in ("-1", "1.5")),
+    *(f"compare {{recording}} {{recording}} --tolerance {value}" for value in ("nan", "-1")),
+    *(f"blind --{words}" for words in ("cases 0", "jobs -7", "seed -1", "duration nan", "only x")),
+    *(f"faults --{words}" for words in ("schedules 0", "jobs 0", "seed -1", "duration nan", "schedule x")),
+    *(f"doctor --{words}" for words in ("seconds nan", "interval 0")),
+    *(f"keys {{tmp}}/keys --days {value}" for value in ("0", "-1", "nan")),
+    *(f"{words} {place}" for words in ("simulate default -o", "bench column default -o", "run --virtual -o")
+      for place in ("/proc/x.mcap", "{tmp}/folder", "{tmp}/file/x.mcap")),
+    *(f"{words} {place}" for words in ("blind --cases 1 -o", "reproduce -o", "keys", "diagnose {recording} --html")
+      for place in ("/proc/x/y", "{tmp}/file", "{tmp}/file/x") if not words.startswith("diagnose") or "x" in place),
+    *(f"export {{recording}} -o {place}" for place in ("/proc/x.csv", "{tmp}/file/x.mat", "{tmp}/out.pdf")),
+    *(f"import {{tmp}}/{name} --map {{tmp}}/map.toml -o {{tmp}}/out.mcap"
+      for name in ("missing.csv", "folder", "text.mcap", "empty.csv", "file/x.csv")),
+    "identify {recording} --fit x",
+    "bench colum default",
+    "budget {recording} --budget {tmp}/other.toml",
+    "completion csh",
+    "slave default --connect nonsense",
+]  # fmt: skip
+REPORTS = {
+    "inspect": "{recording}",
+    "simulate": "default --duration 1",
+    "bench": "column default --only static -o {tmp}/bench.mcap",
+    "identify": "{recording} --part column",
+    "recover": "{recording} -o {tmp}/recovered.mcap",
+    "replay": "{recording}",
+    "compare": "{recording} {recording}",
+    "keys": "{tmp}/keys",
+    "faults": "--seed 1 --duration 1",
+    "layout": "{recording} -o {tmp}/layout.json",
+    "export": "{recording} -o {tmp}/table.csv",
+    "run": "--virtual --duration 1 -o {tmp}/run.mcap",
+}
+
+
+@pytest.fixture
+def call(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, virtual_recording: Path) -> Call:
+    """The exit code of a command line with places filled in; progress is silent, whatever the machine does."""
+    monkeypatch.setattr(progress, "UNSAID", float("inf"))
+
+    def called(line: str) -> int:
+        filled = line.replace("{tmp}", str(tmp_path)).replace("{recording}", str(virtual_recording))
+        monkeypatch.setattr(sys, "argv", ["rths", *filled.split()])
+        try:
+            return main()
+        except SystemExit as end:
+            return int(end.code or 0)
+
+    return called
+
+
+@pytest.fixture
+def litter(tmp_path: Path, virtual_recording: Path) -> None:
+    """Files and folders that nobody should give to a command."""
+    (tmp_path / "folder").mkdir()
+    for name in ("file", "empty.mcap", "empty.csv"):
+        (tmp_path / name).touch()
+    (tmp_path / "text.mcap").write_text("hello\n")
+    (tmp_path / "torn.mcap").write_bytes(virtual_recording.read_bytes()[:500])
+    (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
+    (tmp_path / "open.toml").write_text("[test\n")
+    (tmp_path / "other.toml").write_text("x = 1\n")
+    (tmp_path / "map.toml").write_text(
+        f"plan = '{ROOT}/rths/plans/default.toml'\nrate = 1.0\n[signals]\ndamper_stroke = {{ column = 'y' }}\n"
+    )
+    recording = Recording(tmp_path / "tickless.mcap", "test", 1, {"event": signals.EVENT})
+    recording.add("event", 0, 0, (0.0, "recorder", "info", "begin", "recording begun", {}))
+    recording.close({"outcome": "completed"})
+
+
+@pytest.mark.usefixtures("litter")
+@pytest.mark.parametrize("line", MISTAKES)
+def test_a_mistake_is_one_sentence_and_exit_code_2(line: str, call: Call, capsys: Any) -> None:
+    assert call(line) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert re.fullmatch(r"rths: \S.*\n", said.err), said.err
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_a_wrong_option_is_one_sentence_that_says_where_help_is(verb: str, call: Call, capsys: Any) -> None:
+    assert call(f"{EXAMPLES[verb].partition(' >')[0].removeprefix('rths ')} --nonsense") == 2
+    assert capsys.readouterr().err == f"rths: unrecognized arguments: --nonsense; see rths {verb} --help.\n"
+
+
+@pytest.mark.parametrize("verb", [verb for verb in VERBS if verb not in SILENT])
+def test_every_verb_that_reports_takes_json(verb: str) -> None:
+    assert "--json" in parser_for(verb).format_help()
+
+
+@pytest.mark.parametrize("verb", REPORTS)
+def test_json_is_one_document_and_nothing_else_on_standard_output(verb: str, call: Call, capsys: Any) -> None:
+    assert call(f"{verb} {REPORTS[verb]} --json") in (0, 1)
+    said = capsys.readouterr()
+    assert said.out.count("\n") == 1
+    assert isinstance(json.loads(said.out), dict)
+    assert "\x1b" not in said.out + said.err
+
+
+def test_no_command_writes_colours() -> None:
+    for folder in ("common", "models", "master", "slave", "recorder", "diagnosis", "rths"):
+        for path in (ROOT / folder).rglob("*.py"):
+            assert not re.search(r"\\x1b|\\033|\\e\[|\x1b", path.read_text(encoding="utf-8")), path
+
+
+def test_exit_codes_stand_in_one_table() -> None:
+    classes = [one for one in vars(errors).values() if isinstance(one, type) and issubclass(one, RthsError)]
+    assert {one.exit_code for one in classes} <= set(EXIT_CODES)
+    readme = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
+    assert f"Exit codes: {', '.join(f'{code} {text}' for code, text in EXIT_CODES.items())}." in readme
+
+
+def started(*words: str | Path) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-m", "rths", *map(str, words)],
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+
+
+@pytest.mark.parametrize("words", [["inspect", "{recording}"], ["--help"], ["inspect", "--help"]])
+def test_a_reader_that_has_gone_is_no_error(words: list[str], virtual_recording: Path) -> None:
+    with started(*(word.replace("{recording}", str(virtual_recording)) for word in words)) as process:
+        assert process.stdout
+        assert process.stderr
+        process.stdout.close()
+        assert process.stderr.read() == ""
+    assert process.returncode == 0
+
+
+@pytest.mark.parametrize("line", ["simulate two_dampers", "faults --jobs 2 --schedules 400"])
+def test_ctrl_c_is_one_sentence_and_exit_code_3(line: str) -> None:
+    with started(*line.split()) as process:
+        assert process.stderr
+        begun = process.stderr.readline()  # of progress, after two seconds
+        os.killpg(process.pid, signal.SIGINT)
+        rest = process.stderr.read()
+    assert re.match(r"simulating: |faults: ", begun), begun + rest
+    assert rest.endswith("rths: stopped by the user.\n")
+    assert "Traceback" not in rest
+    assert process.returncode == 3
