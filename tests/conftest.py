@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -26,6 +27,12 @@ def no_leaked_thread() -> Iterator[None]:
     for thread in left:
         thread.join(timeout=5.0)
     assert [thread.name for thread in left if thread.is_alive()] == []
+
+
+@pytest.fixture(autouse=True)
+def unhurried(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No command says how far it is because this machine is slow today."""
+    monkeypatch.setattr("rths.progress.UNSAID", math.inf)
 
 
 @pytest.fixture(scope="session")

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import json
 import os
 import sys
 import time
 import webbrowser
 from pathlib import Path
 
+from common import cli
 from common.errors import InputError
 
 RATE, RATES = 10.0, (1.0, 30.0)  # Hz
@@ -36,6 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--wait", action="store_true", help="for a file that is written from now on")
     parser.add_argument("--leave", action="store_true", help="when the test has ended (default: at Ctrl-C)")
+    cli.json_argument(parser, "say the page's address as JSON on standard output")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -75,7 +78,8 @@ def serve(args: argparse.Namespace, since_ns: int) -> None:
         if feed.failure:
             raise InputError(feed.failure)
         server = Server(feed, args.port, args.rate)
-        sys.stdout.write(f"live view: {server.url}\n")
+        sys.stdout.write(json.dumps({"url": server.url}) if args.json else f"live view: {server.url}")
+        sys.stdout.write("\n")
         sys.stdout.flush()
         if not args.no_browser and shown_somewhere():
             webbrowser.open(server.url)

@@ -13,7 +13,7 @@ from rths.__main__ import VERBS, parser_for
 from rths.completion import SHELLS, script
 from tests.helpers import ROOT
 
-SLOW = ("numba", "numpy", "scipy", "matplotlib", "zenoh")
+SLOW = ("numba", "scipy", "matplotlib", "zenoh")
 ASKED = {
     "in": ["inspect"],
     "simulate d": ["default"],

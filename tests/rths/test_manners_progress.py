@@ -9,6 +9,11 @@ import pytest
 from rths.progress import Progress
 
 
+@pytest.fixture(autouse=True)
+def unhurried() -> None:
+    """Here progress is what is tested."""
+
+
 class Terminal(io.StringIO):
     def isatty(self) -> bool:
         return True
