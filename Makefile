@@ -26,8 +26,8 @@ check: setup
 	$(BIN)/mypy
 
 test: check
-	$(BIN)/pytest -n 2 --ignore=tests/system
-	$(BIN)/pytest tests/system
+	$(BIN)/pytest -n 2 --ignore=tests/system --ignore=tests/docs
+	$(BIN)/pytest tests/docs tests/system
 
 FAULT_TESTS := tests/system/faults tests/system/test_recording_faults.py tests/system/test_security.py
 

@@ -30,6 +30,7 @@ DIRECTIVE = re.compile(r"<!-- (file|terminal): (\S+) -->\s*")
 ANYTHING = "…"
 MARK = "-- exit of the command"
 TIMEOUT_S = 180.0
+PROGRESS = re.compile(r"[a-z]+: (?:.+, )?\d+ s")  # of rths/progress.py: how often depends on the machine
 
 
 class Block(NamedTuple):
@@ -82,12 +83,13 @@ def commands(text: str) -> list[Command]:
 
 
 def matches(expected: str, printed: str) -> bool:
-    """Whether a command printed what the page shows; blanks at the ends of lines do not count."""
+    """Whether a command printed what the page shows; blanks at the ends of lines and lines of progress do not count."""
     pattern = "".join(
         r"(?:.*\n)*?" if line == ANYTHING else ".*".join(map(re.escape, line.split(ANYTHING))) + r"\n"
         for line in bare(expected)
     )
-    return re.fullmatch(pattern, "".join(f"{line}\n" for line in bare(printed))) is not None
+    lines = [line for line in bare(printed) if not PROGRESS.fullmatch(line)]
+    return re.fullmatch(pattern, "".join(f"{line}\n" for line in lines)) is not None
 
 
 def bare(text: str) -> list[str]:

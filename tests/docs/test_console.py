@@ -40,6 +40,11 @@ def test_standard_error_counts_as_printed(tmp_path: Path) -> None:
     assert page(tmp_path, shown("$ echo trouble >&2", "trouble")) == []
 
 
+def test_lines_of_progress_are_those_of_a_slow_machine(tmp_path: Path) -> None:
+    lines = "running: ticks, 12 of 20, 5 s\\ndiagnosing: 9 s\\none\\nbroken: 3 m\\n"
+    assert page(tmp_path, shown(f"$ printf '{lines}' >&2", "one", "broken: 3 m")) == []
+
+
 def test_a_command_that_fails_needs_its_exit_code_shown(tmp_path: Path) -> None:
     (complaint,) = page(tmp_path, shown("$ false"))
     assert "failed with 1" in complaint
