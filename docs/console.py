@@ -30,7 +30,7 @@ DIRECTIVE = re.compile(r"<!-- (file|terminal): (\S+) -->\s*")
 ANYTHING = "…"
 MARK = "-- exit of the command"
 TIMEOUT_S = 180.0
-PROGRESS = re.compile(r"[a-z]+: (?:.+, )?\d+ s")  # of rths/progress.py: how often depends on the machine
+PROGRESS = re.compile(r"[a-z ]+: (?:.+, )?\d+ s")  # of rths/progress.py: how often depends on the machine
 
 
 class Block(NamedTuple):
