@@ -162,11 +162,16 @@ def guarded(main: Callable[[], int]) -> int:
 
 
 def answered(main: Callable[[], int]) -> int:
-    """Run a command until its last word is out, so that a pipe that nobody reads is noticed here and not at exit."""
+    """Run a command until its last word is out, so that a pipe that nobody reads is noticed here and not at exit.
+
+    An error is the last word, and its exit code stays where nobody reads what came before.
+    """
     try:
-        return main()
+        code = main()
     except RthsError as error:
+        with contextlib.suppress(BrokenPipeError):
+            sys.stdout.flush()
         sys.stderr.write(f"rths: {error}\n")
         return error.exit_code
-    finally:
-        sys.stdout.flush()
+    sys.stdout.flush()
+    return code
