@@ -154,7 +154,7 @@ def guarded(main: Callable[[], int]) -> int:
     try:
         return answered(main)
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # the reader of a pipe has gone
+        unread()
         return 0
     except KeyboardInterrupt:
         sys.stderr.write("rths: stopped by the user.\n")
@@ -167,11 +167,18 @@ def answered(main: Callable[[], int]) -> int:
     An error is the last word, and its exit code stays where nobody reads what came before.
     """
     try:
-        code = main()
+        return main()
     except RthsError as error:
-        with contextlib.suppress(BrokenPipeError):
+        try:
             sys.stdout.flush()
+        except BrokenPipeError:
+            unread()
         sys.stderr.write(f"rths: {error}\n")
         return error.exit_code
-    sys.stdout.flush()
-    return code
+    finally:
+        sys.stdout.flush()
+
+
+def unread() -> None:
+    """The reader of standard output has gone: what is still to be written goes nowhere."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
