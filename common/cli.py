@@ -14,12 +14,13 @@ from typing import Any, NoReturn
 from common import plan as plans
 from common import preflight, realtime
 from common import reality as realities
-from common.errors import RthsError
+from common.errors import InputError, RthsError
 from common.laboratory import Report
 from common.plan import Plan
 from common.reality import Reality
 
 SHIPPED = ("default", "paper", "rc_column", "two_dampers")
+MAGIC = b"\x89MCAP0\r\n"  # with which every recording begins
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 
 
@@ -169,16 +170,40 @@ def answered(main: Callable[[], int]) -> int:
     try:
         return main()
     except RthsError as error:
-        try:
-            sys.stdout.flush()
-        except BrokenPipeError:
-            unread()
-        sys.stderr.write(f"rths: {error}\n")
-        return error.exit_code
+        return complained(str(error), error.exit_code)
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        if error.filename is None:
+            raise
+        return complained(f"Cannot use {error.filename}: {error.strerror}.", InputError.exit_code)
     finally:
+        drain()
+
+
+def complained(text: str, code: int) -> int:
+    """Say an error after all that was printed before it; its exit code."""
+    drain()
+    sys.stderr.write(f"rths: {text}\n")
+    return code
+
+
+def drain() -> None:
+    """Write what standard output still holds; nowhere, where its reader has gone."""
+    try:
         sys.stdout.flush()
+    except BrokenPipeError:
+        unread()
 
 
 def unread() -> None:
     """The reader of standard output has gone: what is still to be written goes nowhere."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def spared(path: Path) -> Path:
+    """A path to write to; raises InputError where a recording stands there, which no other output may replace."""
+    with contextlib.suppress(OSError), path.open("rb") as stream:
+        if stream.read(len(MAGIC)) == MAGIC:
+            raise InputError(f"{path} is a recording; give another file for the output.")
+    return path

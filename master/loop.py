@@ -338,13 +338,14 @@ class MasterLoop:
     def progress(self) -> dict[str, float]:
         """What a user watches: drift of the specimen's storey (m), forces (N), round trip (s), missed deadlines.
 
-        Of several slaves the largest damper force, the longest round trip and the most deadlines missed.
+        Of several slaves the largest damper force without its sign, the longest round trip, the most deadlines missed.
         """
         accounts = [partner.account for partner in self._partners]
+        forces = [partner.used.damper_force for partner in self._partners]
         return {
             "drift": self._drift,
             "column_force": self._column_force,
-            "damper_force": max((partner.used.damper_force for partner in self._partners), key=abs),
+            "damper_force": forces[0] if self._alone else max(map(abs, forces)),
             "round_trip": max(account.round_trip for account in accounts),
             "missed": float(max(account.missed for account in accounts)),
         }

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from common import cli
+from common.telling import untold
 from rths.progress import Progress
 
 if TYPE_CHECKING:
@@ -58,7 +60,8 @@ def run(args: argparse.Namespace) -> int:
     from common.drive import Stopper
 
     plan = plans.load(cli.plan_path(args.plan)).with_test(seed=args.seed)
-    with Progress("bench test") as progress:
+    # in real time nothing may run beside the loop
+    with contextlib.nullcontext() if args.real_time else Progress("bench test") as progress:
         from rths import benches
 
         order = benches.Order(args.part, args.compensated, tuple(args.only), args.real_time)
@@ -66,7 +69,9 @@ def run(args: argparse.Namespace) -> int:
         if args.part in OF_SLAVE:
             role = plan.slave_role(args.name or "")
             plan, reality = plan.of(role), reality.of(role)
-        result = benches.play(plan, reality, order, args.output, Stopper(), progress.tell)
+        result = benches.play(
+            plan, reality, order, args.output, Stopper(), progress.tell if progress else untold
+        )
     if args.json:
         sys.stdout.write(json.dumps(summary(result)) + "\n")
     else:

@@ -68,6 +68,7 @@ def run(args: argparse.Namespace) -> int:
 
 def writable(path: Path) -> Path:
     """The path, if a file can be written there; raises InputError."""
+    cli.spared(path)
     if path.is_dir():
         raise InputError(f"Cannot write {path}: it is a folder; give the name of a file.")
     try:

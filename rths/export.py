@@ -40,12 +40,13 @@ def run(args: argparse.Namespace) -> int:
     from rths import tabular
     from rths.progress import Progress
 
-    apart = args.output.with_stem(f"{args.output.stem}-events") if beside(args) else None
+    apart = None
     with Progress("exporting"):
         recording = read(args.file)
         columns, units, happened = flat(recording), flat_units(recording), events(recording)
         tabular.write(args.output, columns, units, events=structs(happened))
-        if apart:
+        if beside(args):
+            apart = args.output.with_stem(f"{args.output.stem}-events")
             tabular.write(apart, happened, {"t": "s"})
     ticks, count = len(columns["seq"]), len(happened["t"])
     if args.json:

@@ -58,6 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write a layout."""
+    cli.spared(args.output)
     subject = of_default_test() if args.file is None else of_recording(args.file)
     made = layout(subject)
     try:

@@ -68,8 +68,8 @@ def run(args: argparse.Namespace) -> int:
     from common.recording.reader import read
 
     chosen = choose(args.names)
-    place = place_of(args)
     recording = read(args.file)
+    place = place_of(args)
     made, left_out = draw_all(recording, chosen, place, args.width)
     complain(args, made, left_out)
     result = {"pictures": made, "left_out": left_out}
@@ -174,7 +174,7 @@ def draw(recording: Run, role: str, picture: Picture, width: str = "single") -> 
     from rths.pictures import layout
 
     canvas = figure.figure(*(picture.double if width == "double" else picture.size))
-    if not picture.draw(recording.of(role), canvas):
+    if not picture.on(recording.of(role), canvas):
         return None
     layout.caption(canvas, caption(recording, role))
     return canvas

@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Recover a recording; 1 where something of it is lost."""
-    output = args.output or args.file.with_name(f"{args.file.stem}-recovered.mcap")
+    output = args.output or args.file.parent / f"{args.file.stem}-recovered.mcap"
     with Progress("recovering"):
         from common.recording.recovery import recover
 

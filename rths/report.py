@@ -33,7 +33,7 @@ def run(args: argparse.Namespace) -> int:
 
     with Progress("reporting") as progress:
         recording = read(args.file)
-        output = place(args.output or args.file.with_suffix(".html"), args.file)
+        output = place(args.output or args.file.with_suffix(".html"))
         summary = summarize(recording)
         drawn, left_out = drawing.draw_all(recording, progress.tell)
         write(output, page.page(recording, summary, drawn, left_out))
@@ -49,10 +49,9 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def place(path: Path, recording: Path) -> Path:
-    """Where the page goes; raises InputError where there is no place, or one that the recording takes."""
-    if path.exists() and path.samefile(recording):
-        raise InputError(f"{path} is the recording itself; give another file with -o.")
+def place(path: Path) -> Path:
+    """Where the page goes; raises InputError where there is no place, or one that a recording takes."""
+    cli.spared(path)
     if path.is_dir():
         raise InputError(f"Cannot write {path}: it is a folder; give the name of a file with -o.")
     if not path.parent.is_dir():

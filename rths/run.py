@@ -66,6 +66,8 @@ def run(args: argparse.Namespace) -> int:
     from recorder.files import choose_path
 
     gate = Gate(cli.accepted_risks(args))
+    if not 0 <= args.live_port <= 65535:
+        raise InputError(f"--live-port {args.live_port} must be from 1 to 65535, or 0 for a free one.")
     if args.live and args.virtual:
         raise InputError(
             "--live shows a test in real time: leave out --virtual, or give its recording to rths live."
@@ -159,7 +161,8 @@ def in_real_time(
         progress.end()
         if view is not None:
             view.close()
-            progress.say(f"live view: {view.again} shows it again")
+            if output.is_file():
+                progress.say(f"live view: {view.again} shows it again")
     return verdict(processes, stopping())
 
 

@@ -236,7 +236,7 @@ def _take(run: Run, channel: Channel, schemas: dict[int, Schema], messages: list
 
 def _decode(run: Run, channel: Channel, schema: Schema, messages: list[Message]) -> None:
     _, run.test, topic = channel.topic.split("/", 2)
-    run.roles = tuple(channel.metadata.get("slaves", SLAVE).split())
+    run.roles = tuple(channel.metadata.get("slaves", SLAVE).split()) or (SLAVE,)
     kind = _described(schema.data, schema.name)
     decoded = [kind.FromString(message.data) for message in messages]
     if topic == "event":

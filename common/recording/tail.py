@@ -73,7 +73,8 @@ class Tail:
             self._contents.decode(run)
         except InputError as error:
             self._end(str(error))
-        run.finished, run.damage = self.finished, self.damage or run.damage
+        self.damage = self.damage or run.damage
+        run.finished, run.damage = self.finished, self.damage
         self._metadata = dict(run.metadata)
         return run
 

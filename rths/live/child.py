@@ -27,6 +27,7 @@ class View:
         self._last: deque[str] = deque(maxlen=1)
         self._leash = Leash()
         self._process: subprocess.Popen[str] | None = None
+        self._reader: threading.Thread | None = None
         self._over = False
         words = [str(recording), "--wait", "--leave", "--no-browser", "--port", str(port)]
         try:
@@ -88,5 +89,6 @@ class View:
             if not self._recording.is_file():  # there is no end to show
                 self._process.terminate()
             self._await(self._process)
-            self._reader.join(LEAVE_S)
+            if self._reader is not None:
+                self._reader.join(LEAVE_S)
         self._leash.close()

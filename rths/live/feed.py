@@ -103,7 +103,10 @@ class Feed:
             return
         self._grown_ns = self._clock.now()
         self.changes += 1
-        self._take(run)
+        try:
+            self._take(run)
+        except (LookupError, TypeError, ValueError) as error:
+            self.failure = f"{self.path} does not hold what a test records ({type(error).__name__}: {error})."
 
     def _old(self) -> bool:
         """Whether the file is still that of a test before, or not there."""

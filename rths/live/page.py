@@ -88,8 +88,10 @@ class Page:
     def update(self) -> None:
         """Bring everything up to date, in one message to the browser."""
         self._document.hold("collect")
-        self._update(self._feed)
-        self._document.unhold()
+        try:
+            self._update(self._feed)
+        finally:
+            self._document.unhold()
 
     def _update(self, feed: Feed) -> None:
         self._head(feed)

@@ -24,6 +24,13 @@ class Picture(NamedTuple):
     double: tuple[float, float]  # inches, across two columns
     draw: Callable[[Run, Any], bool]
 
+    def on(self, recording: Run, canvas: Any) -> bool:
+        """Draw; False where the recording lacks the signals, or holds numbers of which no picture can be made."""
+        try:
+            return self.draw(recording, canvas)
+        except (ValueError, ArithmeticError, MemoryError):
+            return False
+
 
 _ALL = (
     Picture(

@@ -100,7 +100,7 @@ def bound(axis: Any, label: str, *, x: float | None = None, y: float | None = No
 def caption(canvas: Any, text: str) -> Any:
     """Small text over a figure, which grows by it; broken into lines that fit whatever the words are."""
     limit = canvas.bbox.width * 0.98
-    longest = max(map(len, text.splitlines()))
+    longest = max(map(len, text.splitlines()), default=1)
     label = canvas.suptitle("", fontsize=SMALL, x=0.01, ha="left", parse_math=False)
     while True:
         label.set_text("\n".join(line for part in text.splitlines() for line in textwrap.wrap(part, longest)))

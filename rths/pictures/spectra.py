@@ -18,6 +18,7 @@ from rths.pictures.layout import bound, decades, legend_above, shrink
 
 SEGMENT = 10.0  # s: lines 0.1 Hz apart, half the width of a peak at 2 Hz with 5 % of damping
 LEAST = 64  # ticks
+HOLES = 4  # ticks that may be missing for one that is there
 RANGE = 1e6  # of the ordinate: below lies rounding
 MODES = 3
 DASHED = (0, (4, 2))
@@ -116,13 +117,15 @@ def densities(axis: Any, lines: list[Line]) -> None:
 def amplitude_density(item: Curve) -> tuple[Values, Values]:
     """Frequency (m,) Hz and amplitude density (m,) in the signal's unit per √Hz, without the mean.
 
-    Unknown ticks are bridged by straight lines.
+    Unknown ticks are bridged by straight lines. Raises ValueError where times leap or stand still.
     """
     from scipy import signal
 
     known = np.isfinite(item.values)
     step = interval(item.t[known])
     begin, end = item.t[known][[0, -1]]
+    if not 0.0 < end - begin <= HOLES * step * known.sum():
+        raise ValueError("the times of a signal are none of regular ticks")
     even = np.interp(
         begin + step * np.arange(round((end - begin) / step) + 1), item.t[known], item.values[known]
     )

@@ -64,7 +64,7 @@ def png(
 ) -> tuple[bytes, tuple[int, int]] | None:
     """A picture's file and its CSS pixels; a grid of dots, because it stays small however long the test was."""
     canvas = figure.figure(*size)
-    if not picture.draw(run.of(role), canvas):
+    if not picture.on(run.of(role), canvas):
         return None
     stream = io.BytesIO()
     canvas.savefig(stream, format="png", dpi=figure.DOTS, metadata=figure.STAMPS[".png"])

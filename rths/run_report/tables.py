@@ -55,7 +55,10 @@ def date(run: Run) -> str:
     stamp = run.metadata.get("host", {}).get("recorded_unix_ns", "")
     if not stamp.isdecimal():
         return ""
-    at = datetime.datetime(1970, 1, 1) + datetime.timedelta(microseconds=int(stamp) // 1000)
+    try:
+        at = datetime.datetime(1970, 1, 1) + datetime.timedelta(microseconds=int(stamp) // 1000)
+    except (ValueError, OverflowError):
+        return ""
     return f"{at:%Y-%m-%d %H:%M:%S} UTC"
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -156,9 +157,8 @@ def margins(run: Run, summary: Summary) -> list[Margin]:
     found = []
     for name, facts in peaks.items():
         topic, _, signal = name.partition("/")
-        if signal not in UNITS or (
-            topic == MASTER and signal in of_slaves
-        ):  # the master's are all slaves' at once
+        of_all_slaves = topic == MASTER and signal in of_slaves  # the master's are all slaves' at once
+        if signal not in UNITS or of_all_slaves or not math.isfinite(facts["peak"]):
             continue
         plan = plan_of(run.of(topic) if name_of(topic) else run)
         if plan:

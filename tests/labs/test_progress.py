@@ -20,7 +20,7 @@ def test_progress_has_the_newest_drift_forces_and_late_ticks(name: str, tmp_path
     assert virtual.run(bench, lambda: "") is None
     progress, master = bench.master.progress, read(tmp_path / "a.mcap").columns["master"]
     used = master["damper_force_used"][-1].ravel().tolist()
-    assert progress["damper_force"] == max(used, key=abs) != 0.0
+    assert progress["damper_force"] == (used[0] if len(used) == 1 else max(map(abs, used))) != 0.0
     assert progress["column_force"] == master["column_force"][-1]
     assert progress["drift"] == master["column_target"][-1] / test.column.deformation_ratio
     assert progress["missed"] == 0.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -207,3 +208,53 @@ def test_ctrl_c_is_one_sentence_and_exit_code_3(line: str) -> None:
     assert rest.endswith("rths: stopped by the user.\n")
     assert "Traceback" not in rest
     assert process.returncode == 3
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["layout {recording} -o {other}", "report {recording} -o {other}", "diagnose {recording} --html {other}"],
+)
+def test_no_output_replaces_a_recording(
+    line: str, call: Call, virtual_recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other = Path(shutil.copy(virtual_recording, tmp_path / "other.mcap"))
+    before = other.read_bytes()
+    assert call(line.replace("{other}", str(other))) == 2
+    assert f"{other} is a recording" in capsys.readouterr().err
+    assert other.read_bytes() == before
+
+
+def test_a_file_that_is_not_there_leaves_no_folder_behind(call: Call, tmp_path: Path) -> None:
+    assert call("plot {tmp}/nosuch.mcap") == 2
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("line", ["plot .", "export . -o . --events", "recover .", f"live {'x' * 300}"])
+def test_a_path_that_is_none_is_one_sentence(
+    line: str, call: Call, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert call(line) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("rths: ")
+    assert said.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("line", "code"), [("compare {recording} nosuch.mcap", 2), ("inspect {recording}", 0)]
+)
+def test_an_exit_code_stays_where_nobody_reads(line: str, code: int, virtual_recording: Path) -> None:
+    words = line.replace("{recording}", str(virtual_recording)).split()
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    with subprocess.Popen(
+        [sys.executable, "-m", "rths", *words],
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment,
+    ) as process:
+        assert process.stdout
+        process.stdout.close()
+        assert process.stderr
+        assert "Exception" not in process.stderr.read()
+    assert process.returncode == code

@@ -185,3 +185,29 @@ def test_the_parts_of_a_tick_are_rows_with_their_percentiles() -> None:
     assert {line.get_label(): line for line in lower.lines}["longest"].get_ydata().max() == pytest.approx(
         1e6 * run.columns["latency"]["round_trip"].max()
     )
+
+
+def still(run: Run) -> None:
+    run.columns["master"]["t"][:] = run.columns["slave"]["t"][:] = 1.0
+
+
+def leaping(run: Run) -> None:
+    run.columns["master"]["t"][-1] = run.columns["slave"]["t"][-1] = 1e9
+
+
+def huge(run: Run) -> None:
+    for topic in ("master", "slave"):
+        for name, values in run.columns[topic].items():
+            if name not in ("seq", "t") and values.dtype.kind == "f":
+                values[:] = values * 1e100
+
+
+@pytest.mark.parametrize("name", PICTURES)
+@pytest.mark.parametrize("spoil", [still, leaping, huge])
+def test_a_recording_of_nonsense_ends_no_command(spoil: Any, name: str) -> None:
+    run = sinusoid(1.0, 1e-3)
+    spoil(run)
+    with np.errstate(all="ignore"):
+        canvas = plot.draw(run, SLAVE, PICTURES[name])
+        if canvas is not None:
+            canvas.draw_without_rendering()

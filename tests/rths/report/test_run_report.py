@@ -239,7 +239,7 @@ def test_a_test_that_was_stopped_says_why(virtual_recording: Path) -> None:
         (["{tmp}/text.mcap"], "is not a readable MCAP recording"),
         (["{file}", "-o", "{tmp}"], "Cannot write {tmp}: it is a folder"),
         (["{file}", "-o", "{tmp}/no/a.html"], "There is no folder {tmp}/no for the page"),
-        (["{file}", "-o", "{file}"], "is the recording itself"),
+        (["{file}", "-o", "{file}"], "is a recording; give another file"),
     ],
 )
 def test_mistakes_get_one_sentence(
