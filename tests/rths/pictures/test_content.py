@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from typing import Any
 
 import numpy as np
@@ -207,7 +208,8 @@ def huge(run: Run) -> None:
 def test_a_recording_of_nonsense_ends_no_command(spoil: Any, name: str) -> None:
     run = sinusoid(1.0, 1e-3)
     spoil(run)
-    with np.errstate(all="ignore"):
+    with np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of a layout that long numbers leave no room
         canvas = plot.draw(run, SLAVE, PICTURES[name])
         if canvas is not None:
             canvas.draw_without_rendering()
