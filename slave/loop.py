@@ -127,6 +127,8 @@ class SlaveLoop:
         if self.lab.exchange.allows(Event.STOP):
             self.lab.exchange.happen(Event.STOP, remote=True, cause=request.reason)
             self._master_ticks = request.ticks
+            if not self.completed:
+                self.lab.note("stop", request.reason, tick=self.ticks)
             self.lab.safety.follow(Turn.END)
 
     # -- ticks ------------------------------------------------------------------------------------

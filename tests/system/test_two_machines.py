@@ -71,7 +71,9 @@ def test_two_slaves_one_beside_the_master_and_one_across_the_cable(
 ) -> None:
     first, second = machines
     path = tmp_path / "slaves.mcap"
-    words = ("two_dampers", "--duration", "3")
+    plan = tmp_path / "plan.toml"
+    plan.write_text((ROOT / "rths/plans/two_dampers.toml").read_text() + PATIENT)
+    words = (plan, "--duration", "3")
     here, there = "tcp/127.0.0.1:7447", f"tcp/{ADDRESS_A}:7447"
     processes = {
         "roof": start(first, "slave", *words, "--name", "roof", "--connect", here),

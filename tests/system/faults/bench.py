@@ -166,7 +166,10 @@ class Process:
 
     def finish(self, seconds: float = 20.0) -> int:
         """Its exit code, waited for."""
-        code = self._popen.wait(seconds)
+        try:
+            code = self._popen.wait(seconds)
+        except subprocess.TimeoutExpired:
+            raise DisturbedError(f"{self.module} has not ended after {seconds:g} s") from None
         for reader in self._readers:
             reader.join(2.0)
         return code
