@@ -13,7 +13,7 @@ from tests.system.faults.hostile import Stranger
 from tests.system.faults.impostor import FAR
 
 QUIET = 2.0  # s without strangers
-DOUBLES = 9.0  # s for a second slave and a second master
+DOUBLES = 6.0  # s for a second slave and a second master
 
 
 def test_f47_f51_neither_a_slow_disk_nor_strangers_hold_up_the_loop(tmp_path: Path) -> None:
