@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,6 @@ import pytest
 
 from common.errors import InterlockError
 from common.recording.reader import read
-from rths.__main__ import main
 from rths.diagnosis_report.schema import schema
 from tests.diagnosis.cases import Cases, play, short
 from tests.helpers import with_table
@@ -25,20 +23,6 @@ FRICTION = {"damper.friction": {"force": 3.0}}
 def cases(tmp_path_factory: pytest.TempPathFactory) -> Cases:
     """Recordings with known secrets, made on demand."""
     return Cases(tmp_path_factory.mktemp("cases"))
-
-
-@pytest.fixture
-def call(monkeypatch: Any) -> Any:
-    """A command in this process; its exit code."""
-
-    def rths(*words: str | Path) -> int:
-        monkeypatch.setattr(sys, "argv", ["rths", *map(str, words)])
-        try:
-            return main()
-        except SystemExit as error:
-            return int(error.code or 0)
-
-    return rths
 
 
 def checked(path: Path) -> dict[str, Any]:

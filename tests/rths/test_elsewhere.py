@@ -8,7 +8,6 @@ import os
 import shutil
 import struct
 import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -27,7 +26,6 @@ from common.recording.writer import Recording
 from common.roles import latency_topic, ramp_topic
 from common.signals import Kind
 from rths import layout, virtual
-from rths.__main__ import main
 from tests.helpers import ROOT
 from tests.rths import extremes
 
@@ -230,18 +228,6 @@ def test_the_recordings_have_what_the_comparison_is_about(recordings: dict[str, 
     for topic, rows in cut.items():
         assert rows == whole[topic][: len(rows)]
     assert 100 < len(cut["rths/two/master"]) < len(whole["rths/two/master"])
-
-
-@pytest.fixture
-def call(monkeypatch: Any) -> Any:
-    def rths(*words: str | Path) -> int:
-        monkeypatch.setattr(sys, "argv", ["rths", *map(str, words)])
-        try:
-            return main()
-        except SystemExit as error:
-            return int(error.code or 0)
-
-    return rths
 
 
 @pytest.fixture

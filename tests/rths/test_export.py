@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -18,20 +17,7 @@ from common import signals
 from common.recording.reader import Run, read
 from common.recording.writer import Recording
 from rths import export
-from rths.__main__ import main
 from tests.rths import extremes
-
-
-@pytest.fixture
-def call(monkeypatch: Any) -> Any:
-    def rths(*words: str | Path) -> int:
-        monkeypatch.setattr(sys, "argv", ["rths", *map(str, words)])
-        try:
-            return main()
-        except SystemExit as error:
-            return int(error.code or 0)
-
-    return rths
 
 
 @pytest.fixture(scope="module")

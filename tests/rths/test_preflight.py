@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -15,22 +14,13 @@ from common.preflight import Gate, RefusedError
 from common.recording.reader import Run, read
 from common.tables import Compensator
 from rths import virtual
-from rths.__main__ import main, parser_for
+from rths.__main__ import parser_for
 from rths.reproduction import experiments
 from rths.run import start_all
 from tests.helpers import ROOT
 
 UNSTABLE = "[test]\nduration = 1.0\n[compensator]\nkind = 'none'\n[control]\namd = false\n"
 NEAR = "[test]\nduration = 4.0\n[limits]\ndamper_stroke = 0.01\n"
-
-
-@pytest.fixture
-def call(monkeypatch: Any) -> Any:
-    def rths(*words: str | Path) -> int:
-        monkeypatch.setattr(sys, "argv", ["rths", *map(str, words)])
-        return main()
-
-    return rths
 
 
 def noted(run: Run, code: str) -> list[tuple[str, str, str]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -14,19 +13,6 @@ from common import reality
 from common.plan import Plan, from_tables
 from common.recording.reader import read
 from rths import tabular, virtual
-from rths.__main__ import main
-
-
-@pytest.fixture
-def call(monkeypatch: Any) -> Any:
-    def rths(*words: str | Path) -> int:
-        monkeypatch.setattr(sys, "argv", ["rths", *map(str, words)])
-        try:
-            return main()
-        except SystemExit as error:
-            return int(error.code or 0)
-
-    return rths
 
 
 @pytest.fixture(scope="module")

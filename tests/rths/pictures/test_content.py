@@ -213,3 +213,4 @@ def test_a_recording_of_nonsense_ends_no_command(spoil: Any, name: str) -> None:
         canvas = plot.draw(run, SLAVE, PICTURES[name])
         if canvas is not None:
             canvas.draw_without_rendering()
+            assert canvas.axes

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 import shutil
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,6 @@ from common.plan import from_tables
 from common.recording.reader import Run, read
 from common.telling import untold
 from rths import virtual
-from rths.__main__ import main
 from rths.diagnosis_report.page import page as diagnosis_page
 from rths.page import numeric
 from rths.pictures import PICTURES
@@ -30,15 +28,6 @@ from tests.rths.diagnosis_report.reports import REPORTS, fresh
 from tests.rths.report.pages import check_alone, check_in_browser
 
 HOSTILE = "<script>alert(1)</script>\"'><img src=x onerror=alert(2)> & {{ 7 * 7 }}"
-
-
-@pytest.fixture
-def call(monkeypatch: Any) -> Any:
-    def rths(*words: str | Path) -> int:
-        monkeypatch.setattr(sys, "argv", ["rths", *map(str, words)])
-        return main()
-
-    return rths
 
 
 @pytest.fixture(scope="module")
