@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -77,7 +78,11 @@ class Laboratory:
 
     def tick_ns(self, tick: int) -> int:
         """Nominal time of a tick on this laboratory's clock."""
-        return self.start_ns + tick * self.interval_ns
+        return self.start_ns + self.plan.tick_ns(tick)
+
+    def tick_at(self, elapsed_ns: int) -> int:
+        """The tick whose interval a time after the first tick falls into."""
+        return math.floor((elapsed_ns + 0.5) / (self.plan.test.interval * 1e9))
 
     def note(
         self,
@@ -90,7 +95,7 @@ class Laboratory:
     ) -> None:
         """Record and report an event."""
         t = tick * self.plan.test.interval
-        at = self.epoch_ns + tick * self.interval_ns
+        at = self.epoch_ns + self.plan.tick_ns(tick)
         self.outlet.add("event", at, at, (t, self.name, level, code, text, dict(values)))
         self.report(
             "event", {"t": t, "lab": self.name, "level": level, "code": code, "text": text} | dict(values)
@@ -116,7 +121,7 @@ class Laboratory:
     def sample_ramp(self, topic: str, tick: int, *values: float) -> None:
         """Record one interval of the way to rest: commands written, then readings."""
         if self.recorded:
-            at = self.epoch_ns + tick * self.interval_ns
+            at = self.epoch_ns + self.plan.tick_ns(tick)
             t = tick * self.plan.test.interval
             self.outlet.add(topic, at, at, (tick, t, self.safety.mode.value, *values))
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import tomli_w
 
+from common import building
 from common.errors import InputError, PlanError
 from common.roles import name_of, slave_role
 from common.schema import fill, nearest, plain
@@ -79,6 +80,10 @@ class Plan:
     def ticks(self) -> int:
         """Number of control intervals of the whole test."""
         return round(self.test.duration / self.test.interval)
+
+    def tick_ns(self, tick: int) -> int:
+        """Nominal time of a tick after the first, ns; rounded for each tick, so that nothing adds up."""
+        return round(tick * (self.test.interval * 1e9))
 
     @property
     def window(self) -> int:
@@ -202,10 +207,13 @@ def from_tables(tables: dict[str, Any], base: Path) -> Plan:
     types = {name: type(getattr(Plan, name)) for name in TABLES}
     slaves = named_slaves(tables.get("slave", {}))
     given = {name: fill(types[name], tables[name], name) for name in tables if name != "slave" or not slaves}
+    if "structure" in given:
+        given["structure"] = building.with_modal_damping(given["structure"], tables["structure"])
     plan = Plan(base=base, **given)
     plan = replace(plan, slaves={name: slave_laboratory(plan, name, slaves[name]) for name in slaves})
-    check_storeys(plan)
-    check_columns(plan)
+    building.check(plan)
+    if plan.ticks < 1:
+        raise PlanError(f"duration in [test] is {plan.test.duration} s, shorter than one interval.")
     check_tolerances(plan)
     check_safety(plan)
     return plan
@@ -254,43 +262,27 @@ def slave_laboratory(plan: Plan, name: str, given: dict[str, Any]) -> SlaveLabor
     return SlaveLaboratory(rig=fill(Rig, given.get("rig", {}), f"{where}.rig"), **parts)
 
 
-def check_storeys(plan: Plan) -> None:
-    """Masses, stiffnesses, dashpots, the specimen's storey and the dampers' floors must fit together."""
-    structure, storeys = plan.structure, plan.storeys
-    for name, values in (("stiffness", structure.stiffness), ("damping", structure.damping)):
-        if len(values) != storeys:
-            raise PlanError(
-                f"[structure] has {storeys} masses but {len(values)} values of {name}: give one per storey."
-            )
-    if plan.column.storey > storeys:
-        raise PlanError(f"storey in [column] is {plan.column.storey}, but the structure has {storeys}.")
-    dampers = {f"slave.{name}.damper": lab.damper for name, lab in plan.slaves.items()}
-    for where, damper in (dampers or {"damper": plan.damper}).items():
-        if damper.floor > storeys:
-            raise PlanError(f"floor in [{where}] is {damper.floor}, but the structure has {storeys}.")
-
-
-def check_columns(plan: Plan) -> None:
-    """The specimen cannot stand for more columns than its storey has, nor a test last less than one interval."""
-    column = plan.column
-    if column.represents > column.columns_per_storey:
-        raise PlanError(
-            f"represents in [column] is {column.represents}, but the storey has {column.columns_per_storey} columns."
-        )
-    if plan.ticks < 1:
-        raise PlanError(f"duration in [test] is {plan.test.duration} s, shorter than one interval.")
-
-
 def check_tolerances(plan: Plan) -> None:
     """Every tolerance must name a nominal parameter and be a share between 0 and 1."""
+    tables = plan.tables()
+    tables["actuator"] = building.parameters(plan.actuator)
+    known = [name for table in NOMINAL for name in uncertain(table, tables[table])]
     for name, value in plan.tolerances.parameters.items():
-        part, _, parameter = name.partition(".")
-        tables = plan.tables()
-        known = [f"{table}.{item}" for table in NOMINAL for item in tables[table]]
-        if f"{part}.{parameter}" not in known:
+        if name not in known:
             raise PlanError(f"Unknown parameter '{name}' in [tolerances]: {nearest(name, known)}")
         if not 0.0 <= value <= 1.0:
             raise PlanError(f"'{name}' in [tolerances] is {value}, but must be at least 0 and at most 1.")
+
+
+def uncertain(where: str, table: dict[str, Any]) -> list[str]:
+    """The parameters of a table that nobody knows exactly; what the specimen takes over is a choice, none of them."""
+    names = []
+    for name, value in table.items():
+        if isinstance(value, dict) and name != "experimental":
+            names += uncertain(f"{where}.{name}", value)
+        elif isinstance(value, int | float | list):
+            names.append(f"{where}.{name}")
+    return names
 
 
 def check_safety(plan: Plan) -> None:

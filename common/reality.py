@@ -21,6 +21,7 @@ from common.tables import Rig
 Entry = tuple[str, Mapping[str, float]]  # name of an effect of the catalogue, and its parameters
 
 TRUE_TABLES = ("ground_motion", "structure", "column", "actuator", "table", "damper", "sensors")
+MERGED = ("experimental", "servo")
 KNOWN = ("seed", "master", "slave", "link", "effect", *TRUE_TABLES)
 
 
@@ -174,13 +175,23 @@ def true_plan(tables: dict[str, Any], plan: Plan) -> Plan:
     """The plan with the reality's parameters in place of its own; what holds for all slaves before a slave's own."""
     merged = plan.tables()
     for name in TRUE_TABLES:
-        merged[name] |= table_of(tables, name, name)
+        merged[name] |= within(merged[name], table_of(tables, name, name))
     for slave in plan.slaves:
         own = tables.get("slave", {}).get(slave, {})
         for name in ("table", "damper"):
             merged["slave"][slave][name] |= table_of(tables, name, name)
             merged["slave"][slave][name] |= table_of(own, name, f"slave.{slave}.{name}")
     return from_tables(merged, plan.base)
+
+
+def within(planned: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    """What a reality gives of one table; a table within it whose keys are fixed keeps what is not given."""
+    return {
+        name: planned[name] | value
+        if name in MERGED and isinstance(value, dict) and name in planned
+        else value
+        for name, value in given.items()
+    }
 
 
 def table_of(tables: Mapping[str, Any], name: str, where: str) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from common.errors import PlanError
 Table = TypeVar("Table")
 
 Storeys = tuple[float, ...]
+StoreysOrMatrix = tuple[Any, ...]  # one number per storey, or one row of a matrix
 
 
 @dataclasses.dataclass(frozen=True)
@@ -123,10 +124,25 @@ def convert(field: dataclasses.Field[Any], value: object, where: str) -> object:
         return fill(field.metadata["table"], value, f"{where}.{field.name}")
     rule: Rule = field.metadata["rule"]
     name = f"{field.name.rstrip('_')} in [{where}]"
-    if field.type == "Storeys":
+    if (
+        field.type == "StoreysOrMatrix"
+        and isinstance(value, list)
+        and any(isinstance(row, list) for row in value)
+    ):
+        return tuple(matrix_row(row, name) for row in value)
+    if field.type in ("Storeys", "StoreysOrMatrix"):
         items = value if isinstance(value, list) else [value]
         return tuple(in_range(as_type("float", item, name), rule, name) for item in items)
     return in_range(as_type(str(field.type), value, name), rule, name)
+
+
+def matrix_row(row: object, name: str) -> Storeys:
+    """One row of a matrix; its range is that of the whole matrix, which the plan checks."""
+    if not isinstance(row, list):
+        raise PlanError(
+            f"{name} mixes rows and numbers: give one value per storey, or a matrix as a list of rows."
+        )
+    return tuple(in_range(as_type("float", item, name), Rule(""), name) for item in row)
 
 
 def as_type(kind: str, value: object, name: str) -> Any:
@@ -158,8 +174,12 @@ def plain(table: Any) -> dict[str, Any]:
         if field.metadata.get("more"):
             result |= value
             continue
+        if value is None:  # a table that was not given
+            continue
         if dataclasses.is_dataclass(value):
             value = plain(value)
+        elif isinstance(value, tuple) and any(isinstance(row, tuple) for row in value):
+            value = [list(row) for row in value]
         elif isinstance(value, tuple):
             value = value[0] if len(value) == 1 else list(value)
         result[field.name.rstrip("_")] = value

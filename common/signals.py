@@ -52,7 +52,12 @@ MASTER = (
     Signal("actuator_command", "m", "command written, to be reached at the end of the interval"),
     Signal("column_displacement", "m", "specimen deformation measured"),
     Signal("column_force", "N", "restoring force of the specimen measured"),
-    Signal("numerical_force", "N", "restoring force of the numerical columns of the storey", Kind.STOREYS),
+    Signal(
+        "numerical_force",
+        "N",
+        "restoring force of the numerical columns of the storey; of a matrix the sum of the floors' from above",
+        Kind.STOREYS,
+    ),
     Signal("damper_force_used", "N", "damper force used, at the damper's own scale", per_slave=True),
     Signal(
         "damper_force_seq",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from common.schema import Storeys, key
+from common.schema import Storeys, StoreysOrMatrix, key
 
 
 @dataclass(frozen=True)
@@ -41,17 +41,42 @@ class NumericalColumns:
 
 
 @dataclass(frozen=True)
+class Experimental:
+    """What the specimen takes over of the whole building, left out of the numerical part.
+
+    Stiffness and damping act on the drift of the specimen's storey, the mass on the floor above it. Without this table
+    the specimen takes over its share of the storey's columns, `represents` of `columns_per_storey`.
+    """
+
+    mass: float = key("of the floor above the specimen's storey", default=0.0, unit="kg", least=0.0)
+    stiffness: float = key("of the specimen's storey", default=0.0, unit="N/m", least=0.0)
+    damping: float = key("of the specimen's storey", default=0.0, unit="N·s/m", least=0.0)
+
+
+@dataclass(frozen=True)
 class Structure:
     """The building: one value per storey, or one for a single storey."""
 
     mass: Storeys = key("floor masses, from the bottom", default=(160_000.0,), unit="kg", above=0.0)
-    stiffness: Storeys = key("storey stiffnesses, all columns", default=(25e6,), unit="N/m", least=0.0)
+    stiffness: StoreysOrMatrix = key(
+        "storey stiffnesses, all columns; or the whole building's symmetric matrix as a list of rows",
+        default=(25e6,),
+        unit="N/m",
+        least=0.0,
+    )
     damping: Storeys = key("storey dashpots", default=(200_000.0,), unit="N·s/m", least=0.0)
+    damping_ratio: float = key(
+        "damping ratio of every mode of the whole building in place of the dashpots, 0 for the dashpots",
+        default=0.0,
+        least=0.0,
+        most=1.0,
+    )
     integrator: str = key("integration method", default="newmark_explicit")
     rho_infinity: float = key("KR-α: spectral radius at infinity", default=0.5, least=0.0, most=1.0)
     columns: NumericalColumns = field(
         default_factory=NumericalColumns, metadata={"table": NumericalColumns, "more": False}
     )
+    experimental: Experimental | None = field(default=None, metadata={"table": Experimental, "more": False})
 
 
 @dataclass(frozen=True)
@@ -64,16 +89,54 @@ class Column:
     columns_per_storey: int = key("columns of that storey", default=4, least=1)
     represents: int = key("columns of the storey that the specimen stands for", default=1, least=1)
     deformation_ratio: float = key("specimen deformation over storey drift", default=0.5, above=0.0)
+    mass: float = key("moving mass of the specimen, felt by the load cell", default=0.0, unit="kg", least=0.0)
+    damping: float = key(
+        "dashpot of the specimen, felt by the load cell", default=0.0, unit="N·s/m", least=0.0
+    )
     parameters: dict[str, float] = key("parameters of the model beside the stiffness", default={}, more=True)
 
 
 @dataclass(frozen=True)
-class Actuator:
-    """Nominal first-order lag with dead time of the hydraulic actuator."""
+class ServoHydraulics:
+    """Nominal servo-hydraulic actuator in interaction with its specimen: `model = "servo_hydraulic"`.
 
-    gain: float = key("static gain", default=1.0, above=0.0)
-    delay: float = key("dead time L", default=0.014, unit="s", least=0.0, most=1.0)
-    time_constant: float = key("time constant T, 0 for none", default=0.030, unit="s", least=0.0)
+    `q̈ + β1·q̇ + β2·q = a1β0·(g·u − x)`, `ḟ = −a3·f + q − a2·ẋ`, `m·ẍ + c·ẋ + f_model(x) = f`, with the specimen's
+    mass, dashpot and model of `[column]`.
+    """
+
+    gain: float = key("g: factor on the command", default=1.0261, above=0.0)
+    valve: float = key(
+        "a1β0: gain of controller and servo valve", default=2.1283e13, unit="N/(m·s³)", above=0.0
+    )
+    valve_damping: float = key("β1 of the valve's dynamics", default=425.0, unit="1/s", above=0.0)
+    valve_stiffness: float = key("β2 of the valve's dynamics", default=9.9976e4, unit="1/s²", above=0.0)
+    leakage: float = key("a3: loss of force by leakage", default=3.3, unit="1/s", least=0.0)
+    piston: float = key(
+        "a2: force that a motion of the piston takes from the oil", default=4.2297e6, unit="N/m", above=0.0
+    )
+    delay: float = key("dead time of the command", default=0.0, unit="s", least=0.0, most=1.0)
+
+
+@dataclass(frozen=True)
+class Actuator:
+    """Nominal hydraulic actuator: a first-order lag with dead time, `T·ẏ + y = K·u(t − L)`, or servo-hydraulics."""
+
+    model: str = key(
+        "fopdt for the first-order lag with dead time, servo_hydraulic for `[actuator.servo]`",
+        default="fopdt",
+        choices=("fopdt", "servo_hydraulic"),
+    )
+    gain: float = key("fopdt: static gain", default=1.0, above=0.0)
+    delay: float = key("fopdt: dead time L", default=0.014, unit="s", least=0.0, most=1.0)
+    time_constant: float = key("fopdt: time constant T, 0 for none", default=0.030, unit="s", least=0.0)
+    command: str = key(
+        "ramp: the command of a tick is reached at the interval's end; held: it acts as a step from the tick on",
+        default="ramp",
+        choices=("ramp", "held"),
+    )
+    servo: ServoHydraulics = field(
+        default_factory=ServoHydraulics, metadata={"table": ServoHydraulics, "more": False}
+    )
 
 
 PAPER_COMPENSATOR = {"lead": 0.044, "proportional": 1.93, "integral": 0.047, "derivative": 0.0}
@@ -87,6 +150,9 @@ class ForceCorrection:
         "corner frequency of the high-pass filter, 0 for none", default=0.0, unit="Hz", least=0.0
     )
     unity: float = key("frequency at which the filter's gain is one", default=2.0, unit="Hz", above=0.0)
+    unit_delay: bool = key(
+        "whether the force enters the equation of motion one interval after it was measured", default=False
+    )
 
 
 @dataclass(frozen=True)

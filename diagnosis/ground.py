@@ -25,7 +25,7 @@ class Ground:
         self.measured = record.signals["ground_acceleration"][:, None]
         self.present = record.present["ground_acceleration"][:, None]
         self.nuisances: tuple[Nuisance, ...] = ()
-        self.candidates = of_sites(("ground",))
+        self.candidates = of_sites(("ground",), record.plan)
 
     def predict(self, system: System) -> Array:
         """Ground acceleration."""

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import copy
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
+from common.plan import Plan
 from diagnosis.record import Mask, Record
 from models import effects
 from models.closed_loop import MEASURED_A, MEASURED_B
@@ -67,7 +69,7 @@ def nuisances(record: Record, fields: tuple[tuple[str, str], ...]) -> tuple[Nuis
     """Those of the parameters that can move: finite and not zero."""
     known, result = record.plan.tolerances, []
     for table, field in fields:
-        value = np.asarray(getattr(getattr(record.plan, table), field))
+        value = np.asarray(attrgetter(f"{table}.{field}")(record.plan))
         tolerance = known.parameters.get(f"{table}.{field}", known.default)
         if tolerance > 0.0 and np.all(np.isfinite(value)) and np.all(value != 0.0):
             result.append(Nuisance(table, field, tolerance))
@@ -97,10 +99,28 @@ def outputs(record: Record, names: tuple[str, ...]) -> tuple[Array, Mask]:
     return np.stack(values, axis=1), np.stack(there, axis=1)
 
 
-def of_sites(sites: tuple[str, ...]) -> tuple[Effect, ...]:
-    """The catalogue's effects on these sites that change a waveform; noise and rounding are seen directly."""
-    found = [effect for effect in effects.CATALOGUE.values() if effect.site in sites]
+def of_sites(sites: tuple[str, ...], plan: Plan) -> tuple[Effect, ...]:
+    """The catalogue's effects on these sites that change a waveform and that the plan's models can have.
+
+    Noise and rounding are seen directly.
+    """
+    found = [effect for effect in effects.CATALOGUE.values() if effect.site in sites and effect.fits(plan)]
     return tuple(effect for effect in found if not effect.name.endswith((".noise", ".quantization")))
+
+
+ACTUATOR = {
+    "fopdt": ("gain", "delay", "time_constant"),
+    "servo_hydraulic": (
+        "servo.gain",
+        "servo.valve",
+        "servo.valve_damping",
+        "servo.valve_stiffness",
+        "servo.leakage",
+        "servo.piston",
+        "servo.delay",
+    ),
+}
+COLUMN = (("column", "stiffness"), ("column", "mass"), ("column", "damping"))
 
 
 class LaboratoryA:
@@ -120,15 +140,11 @@ class LaboratoryA:
         self.measured, self.present = outputs(record, MEASURED_A)
         self.nuisances = nuisances(
             record,
-            (
-                ("actuator", "gain"),
-                ("actuator", "delay"),
-                ("actuator", "time_constant"),
-                ("column", "stiffness"),
-            ),
+            tuple(("actuator", name) for name in ACTUATOR[record.plan.actuator.model]) + COLUMN,
         )
         sites = ["actuator", *(f"sensor.{name}" for name in MEASURED_A if record.has(name))]
-        self.candidates = of_sites((*sites, "column") if record.has("column_force") else tuple(sites))
+        with_column = (*sites, "column") if record.has("column_force") else tuple(sites)
+        self.candidates = of_sites(with_column, record.plan)
 
     def predict(self, system: System) -> Array:
         """Readings of the laboratory."""
@@ -154,8 +170,8 @@ class ColumnAlone:
     def __init__(self, record: Record, deformation: Array) -> None:
         self.inputs = deformation
         self.measured, self.present = outputs(record, self.signals)
-        self.nuisances = nuisances(record, (("column", "stiffness"),))
-        self.candidates = of_sites(("column", "sensor.column_force"))
+        self.nuisances = nuisances(record, COLUMN)
+        self.candidates = of_sites(("column", "sensor.column_force"), record.plan)
 
     def predict(self, system: System) -> Array:
         """Force readings."""
@@ -188,7 +204,7 @@ class LaboratoryB:
         sites = [f"sensor.{name}" for name in moving if record.has(name)] + (["table"] if driven else [])
         self.anew = self.beginnings(record)
         with_damper = record.has("damper_stroke") or record.has("damper_force")
-        self.candidates = of_sites((*sites, "damper") if with_damper else tuple(sites))
+        self.candidates = of_sites((*sites, "damper") if with_damper else tuple(sites), record.plan)
 
     def predict(self, system: System) -> Array:
         """Readings of the laboratory."""
@@ -265,9 +281,9 @@ class Building:
         self.measured = np.stack(columns, axis=1)
         self.present = np.repeat(record.present["displacement"][:, None], self.measured.shape[1], axis=1)
         self.nuisances = nuisances(
-            record, (("structure", "mass"), ("structure", "stiffness"), ("structure", "damping"))
+            record, tuple(("structure", name) for name in ("mass", "stiffness", "damping", "damping_ratio"))
         )
-        self.candidates = of_sites(("structure",))
+        self.candidates = of_sites(("structure",), record.plan)
 
     def predict(self, system: System) -> Array:
         """Displacement, velocity and acceleration of every storey."""

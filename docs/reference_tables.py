@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import inspect
 import sys
 from collections.abc import Iterable, Mapping
 from typing import Any, get_type_hints
@@ -23,7 +24,14 @@ from rths.__main__ import EXAMPLES, VERBS, parser_for
 
 KEY_HEAD = ("key", "default", "unit", "allowed", "meaning")
 SITES = ("ground", "structure", "actuator", "column", "link", "table", "damper")
-TYPES = {"float": "number", "int": "whole number", "str": "text", "bool": "true or false"}
+TYPES = {
+    "float": "number",
+    "int": "whole number",
+    "str": "text",
+    "bool": "true or false",
+    "Storeys": "number, or one per storey",
+    "StoreysOrMatrix": "matrix; or number, or one per storey",
+}
 
 
 def plan() -> str:
@@ -37,10 +45,15 @@ def plan_table(name: str, values: Any) -> list[str]:
     """A table of the plan and the tables within it."""
     fields = table_fields(values)
     rows = [key_row(field, getattr(values, field.name)) for field in fields if "rule" in field.metadata]
-    text = f"## `[{name}]`\n\n{type(values).__doc__}\n\n{table(KEY_HEAD, rows)}"
-    inner = [field.name for field in fields if "table" in field.metadata]
+    text = f"## `[{name}]`\n\n{inspect.getdoc(type(values))}\n\n{table(KEY_HEAD, rows)}"
+    inner = {
+        field.name: getattr(values, field.name)
+        or field.metadata["table"]()  # one that is absent unless it is given
+        for field in fields
+        if "table" in field.metadata
+    }
     own = [text] if rows else []
-    return own + [part for field in inner for part in plan_table(f"{name}.{field}", getattr(values, field))]
+    return own + [part for field, within in inner.items() for part in plan_table(f"{name}.{field}", within)]
 
 
 def key_row(field: dataclasses.Field[Any], default: Any) -> tuple[str, ...]:
@@ -49,7 +62,7 @@ def key_row(field: dataclasses.Field[Any], default: Any) -> tuple[str, ...]:
     if field.metadata["more"]:
         given = ", ".join(f"`{name} = {value:g}`" for name, value in default.items())
         return ("further numbers", given, "", "", rule.text)
-    kind = "a table" if isinstance(default, dict) else TYPES.get(str(field.type), "number, or one per storey")
+    kind = "a table" if isinstance(default, dict) else TYPES[str(field.type)]
     kind = "" if rule.pattern else kind
     return (
         f"`{field.name.rstrip('_')}`",
@@ -132,7 +145,8 @@ def effect_table(found: Iterable[Effect], *, sized: bool = True) -> str:
     rows = []
     for effect in found:
         for place, parameter in enumerate(effect.parameters):
-            first = (f"`{effect.name}`", effect.says) if place == 0 else ("", parameter.says)
+            of = f", of the actuator `{'` or `'.join(effect.actuators)}`" if effect.actuators else ""
+            first = (f"`{effect.name}`", effect.says + of) if place == 0 else ("", parameter.says)
             rows.append((*first, f"`{parameter.name}`", parameter.unit, *numbers(parameter, sized)))
     head = ("effect", "says", "parameter", "unit", "none at", "allowed")
     return table((*head, "from barely visible to strong") if sized else head, rows)

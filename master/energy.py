@@ -12,7 +12,7 @@ from common.rig import ColumnMeasurement
 from master.step import Outputs
 from models import energy_balance
 from models.energy_balance import ACCELERATION, DISPLACEMENT, DRIFT_SHARE, ERROR_SHARE, VELOCITY
-from models.structures.partition import experimental_stiffness
+from models.structures.partition import felt, storey_stiffness
 
 FLOOR_SHARE = 0.01  # of the largest displacement allowed
 
@@ -64,5 +64,5 @@ def floor(plan: Plan) -> float:
 
     Infinite for a storey without stiffness, of which no share can be taken.
     """
-    stiffness = max(plan.structure.stiffness[plan.column.storey - 1], experimental_stiffness(plan))
+    stiffness = max(storey_stiffness(plan), felt(plan).stiffness)
     return 0.5 * stiffness * (FLOOR_SHARE * plan.limits.displacement) ** 2 or math.inf

@@ -136,7 +136,7 @@ class Account:
             *answered.stamps,
             row.used_ns,
         )
-        log_ns = lab.epoch_ns + row.tick * lab.interval_ns
+        log_ns = lab.epoch_ns + lab.plan.tick_ns(row.tick)
         lab.outlet.add(self._topic, log_ns, lab.epoch_ns + now - lab.start_ns, values)
 
 

@@ -206,7 +206,7 @@ class MasterLoop:
 
     def _sample(self, tick: int, measured: tuple[float, float], outputs: Outputs) -> None:
         lab = self.lab
-        log_ns = lab.epoch_ns + tick * lab.interval_ns
+        log_ns = lab.epoch_ns + lab.plan.tick_ns(tick)
         publish_ns = lab.epoch_ns + (self._sent_ns or lab.clock.now()) - lab.start_ns
         values = (
             tick,

@@ -133,7 +133,7 @@ class Partner:
 
     def take(self, feedback: Feedback, received_ns: int, decoded_ns: int) -> None:
         """Take in a feedback, unless it is not fresh."""
-        expected = (received_ns - self._lab.start_ns) // self._lab.interval_ns
+        expected = self._lab.tick_at(received_ns - self._lab.start_ns)
         if not self.tally.admit(feedback.seq, expected):
             return
         self.heard_ns = received_ns

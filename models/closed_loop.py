@@ -117,13 +117,18 @@ def noises(system: System, seed: int | None) -> tuple[Array, Array]:
     """Noise of both laboratories' readings, (ticks, 2) and (ticks, 4); zero without a seed."""
     ticks, sensors, more = system.plan.ticks, system.plan.sensors, system.effects.sensors
     if seed is None:
-        return np.zeros((ticks, len(MEASURED_A))), np.zeros((ticks, len(MEASURED_B)))
-    a = readings.levels(MEASURED_A, noise.levels_a(sensors), more)
+        return noise_a(system, seed), np.zeros((ticks, len(MEASURED_B)))
     b = readings.levels(MEASURED_B, noise.levels_b(sensors), more)
-    return (
-        noise.Noise(noise.lab_seed(seed, noise.LAB_A), a).rows(ticks),
-        noise.Noise(noise.lab_seed(seed, noise.LAB_B), b).rows(ticks),
-    )
+    return noise_a(system, seed), noise.Noise(noise.lab_seed(seed, noise.LAB_B), b).rows(ticks)
+
+
+def noise_a(system: System, seed: int | None) -> Array:
+    """Noise of laboratory A's readings, (ticks, 2); zero without a seed."""
+    ticks, sensors, more = system.plan.ticks, system.plan.sensors, system.effects.sensors
+    if seed is None:
+        return np.zeros((ticks, len(MEASURED_A)))
+    levels = readings.levels(MEASURED_A, noise.levels_a(sensors), more)
+    return noise.Noise(noise.lab_seed(seed, noise.LAB_A), levels).rows(ticks)
 
 
 @jit

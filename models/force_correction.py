@@ -32,7 +32,7 @@ def coefficients(correction: ForceCorrection, interval: float) -> tuple[float, f
 
 @jit
 def step(memory: float, gain: float, s: Array, force: float) -> float:
-    """Corrected force (N) of a tick; `s` (2,) holds what was measured and corrected at the tick before."""
+    """Corrected force (N) of a tick; `s` begins with what was measured and corrected at the tick before."""
     if gain == 0.0:
         return force
     corrected = memory * s[CORRECTED] + gain * (force - s[MEASURED])

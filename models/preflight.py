@@ -12,8 +12,8 @@ from common.preflight import Check, Risk
 from common.tables import Limits
 from models import limited, several_slaves, substructure
 from models.closed_loop import signals, simulate
-from models.partition import Partition, assess
 from models.registry import Array
+from models.structures.partition import Partition, assess
 
 MOST_TICKS = 1_000_000  # of the simulation, which is kept in memory
 MOST_SLAVE_TICKS = 60_000  # of all slaves where there are several, which are stepped one by one: about 4 s

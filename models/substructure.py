@@ -1,10 +1,11 @@
 """The master's computation of one control interval: building, compensator, damper control.
 
-    M·ẍ + C·ẋ + f_numerical(x) + specimen = −M·1·z̈ + Σ λ·damper_force
+    M_N·ẍ + C_N·ẋ + f_numerical(x) + specimen = −M·1·z̈ + Σ λ·damper_force
 
-with one damper for each slave's laboratory. At tick k the forces measured at the displacement x_k complete the
-equation of motion; the integrator then gives x_{k+1}, from which the targets of the interval's end follow (contract,
-sections 2 and 3).
+with the whole building's mass M under the ground, the numerical part's M_N and C_N, and one damper for each slave's
+laboratory. At tick k the forces measured at the displacement x_k, the specimen's corrected and with `unit_delay` that
+of the tick before, complete the equation of motion; the integrator then gives x_{k+1}, from which the targets of the
+interval's end follow (contract, sections 2 and 3).
 """
 
 from __future__ import annotations
@@ -14,20 +15,23 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from common.building import is_matrix
 from common.plan import Plan, resolve
 from models import compensators, force_correction, integrators, specimens, trend
 from models.compiled import jit
 from models.ground_motion import GroundMotion, ground, load
 from models.integrators.state import ACCELERATION, DISPLACEMENT, NEXT_DISPLACEMENT, NEXT_VELOCITY, VELOCITY
 from models.registry import Array
-from models.structures import shear_building
+from models.structures import partition, shear_building
 
 Codes = NDArray[np.int64]
 
 # places in `codes`, with one floor per damper from FLOORS on, in `scalars`, and of the rows of `dampers`
 INTEGRATOR, SPECIMEN, COMPENSATOR, STOREY, FLOORS = range(5)
-INTERVAL, RATIO, REPRESENTS, HIGH_PASS, HIGH_PASS_GAIN, P_DELTA = range(6)
+INTERVAL, RATIO, REPRESENTS, HIGH_PASS, HIGH_PASS_GAIN, P_DELTA, UNIT_DELAY = range(7)
 FORCE_SCALE, MOTOR_GAIN, FORCE_USED = range(3)
+MATRIX = -1  # in place of a specimen's code: the numerical part is linear and coupled by a stiffness matrix
+DELAYED = force_correction.CORRECTED + 1  # place in `filtered`
 
 # places in the output row: a slave's SENT values, those of further slaves after them, then one per storey each
 GROUND_ACCELERATION, COLUMN_TARGET, ACTUATOR_COMMAND = range(3)
@@ -46,64 +50,90 @@ class Substructure(NamedTuple):
     dampers: Array  # (3, slaves): λ, motor force over floor velocity N·s/m, and the force that a tick uses, N
     mass: Array  # (n,) kg
     coefficients: Array  # of the integrator
-    column_params: Array  # (n, parameters) of the numerical columns
+    column_params: Array  # (n, parameters) of the numerical columns, or (n, n) their stiffness matrix N/m
     compensator_params: Array
     ground: Array  # (2, ticks + 1): acceleration m/s², displacement m
     state: Array  # (rows, n) of the integrator
     column_memory: Array  # (n, memory)
     compensator_memory: Array
     recent: Array  # (1 + slaves, RECENT): accelerations of specimen and floors, newest first, m/s²
-    filtered: Array  # (2,): the column force of the tick before, measured and corrected, N
+    filtered: Array  # (3,): the column force of the tick before, measured, corrected and to be used next, N
     target: Array  # (1,): the specimen's target of the present tick, m
     balance: Array  # (n,): external minus restoring force, N
     output: Array
 
 
-def build(plan: Plan, rows: Array, p_delta: float = 0.0) -> Substructure:
+def build(plan: Plan, rows: Array, p_delta: float = 0.0, *, slaves: bool = True) -> Substructure:
     """The numerical side of a plan at rest; `rows` of the ground as `ground_rows` gives them.
 
-    `p_delta` is the stiffness (N/m, negative) that gravity adds to every storey.
+    `p_delta` is the stiffness (N/m, negative) that gravity adds to every storey. Without `slaves` nothing is computed
+    for them: a building without dampers.
 
     Raises:
         InputError: a model, method or parameter that the registries do not know.
     """
-    structure, column = plan.structure, plan.column
-    mass, stiffness = np.array(structure.mass), np.array(structure.stiffness)
-    own = stiffness.copy()
-    own[column.storey - 1] *= 1.0 - column.represents / column.columns_per_storey
-    model = structure.columns
-    packed = [specimens.pack(model.model, stiffness=float(k), **model.parameters) for k in own]
-    M, C, K = shear_building.matrices(mass, stiffness, np.array(structure.damping))
-    method = integrators.build(structure.integrator, M, C, K, plan.test.interval, structure.rho_infinity)
-    chosen = plan.compensator
+    column, chosen = plan.column, plan.compensator
+    mass = np.array(plan.structure.mass)
+    columns = numerical_columns(plan)
+    method = integration(plan)
     compensator = compensators.build(chosen.kind, chosen.parameters, plan.test.interval)
-    slaves = [plan.of(role) for role in plan.roles]
+    labs = [plan.of(role) for role in plan.roles] if slaves else []
     scalars = [
         plan.test.interval,
         column.deformation_ratio,
         float(column.represents),
-        *force_correction.coefficients(plan.compensator.force, plan.test.interval),
+        *force_correction.coefficients(chosen.force, plan.test.interval),
         p_delta,
+        float(chosen.force.unit_delay),
     ]
     n = plan.storeys
-    floors = [slave.damper.floor - 1 for slave in slaves]
+    floors = [lab.damper.floor - 1 for lab in labs]
     return Substructure(
-        np.array([method.code, packed[0][0], compensator.code, column.storey - 1, *floors]),
+        np.array([method.code, columns.code, compensator.code, column.storey - 1, *floors]),
         np.array(scalars),
-        np.array([damper(slave) for slave in slaves]).T.copy(),
+        np.array([damper(lab) for lab in labs]).reshape(-1, FORCE_USED + 1).T.copy(),
         mass,
         method.coefficients,
-        np.stack([params for _, params, _ in packed]),
+        columns.params,
         compensator.params,
         rows,
         method.start(np.zeros(n), np.zeros(n), -mass * rows[0, 0]),
-        np.stack([memory for _, _, memory in packed]),
+        columns.memory,
         compensator.state,
-        np.zeros((1 + len(slaves), trend.RECENT)),
-        np.zeros(2),
+        np.zeros((1 + len(labs), trend.RECENT)),
+        np.zeros(DELAYED + 1),
         np.zeros(1),
         np.zeros(n),
-        np.zeros(TABLE_TARGET + SENT * len(slaves) + STOREY_VALUES * n),
+        np.zeros(TABLE_TARGET + SENT * len(labs) + STOREY_VALUES * n),
+    )
+
+
+class NumericalColumns(NamedTuple):
+    """The numerical columns of every storey at rest."""
+
+    code: int  # of their model, or MATRIX
+    params: Array  # (n, parameters), or (n, n) N/m
+    memory: Array  # (n, memory)
+
+
+def numerical_columns(plan: Plan) -> NumericalColumns:
+    """The numerical columns of a plan; raises InputError where their model or a parameter is unknown."""
+    if is_matrix(plan.structure.stiffness):
+        K = np.ascontiguousarray(partition.numerical(plan).K)
+        return NumericalColumns(MATRIX, K, np.zeros((plan.storeys, specimens.STATE_SIZE)))
+    model, own = plan.structure.columns, partition.storey_stiffnesses(plan)
+    packed = [specimens.pack(model.model, stiffness=float(k), **model.parameters) for k in own]
+    params, memory = (np.stack([parts[place] for parts in packed]) for place in (1, 2))
+    return NumericalColumns(packed[0][0], params, memory)
+
+
+def integration(plan: Plan) -> integrators.Method:
+    """The plan's method for the numerical part; raises InputError where it is unknown or would diverge."""
+    structure, numerical = plan.structure, partition.numerical(plan)
+    chosen = integrators.INTEGRATORS.get(structure.integrator)
+    K = numerical.K if chosen and chosen.of_numerical else partition.matrices(plan).K
+    return integrators.build(
+        structure.integrator, numerical.M, numerical.C, K, plan.test.interval, structure.rho_infinity
     )
 
 
@@ -132,6 +162,48 @@ def shifted(rows: Array, ticks: float) -> Array:
     """Rows of the ground that come `ticks` later, by linear interpolation; the ends stay at their value."""
     places = np.arange(rows.shape[1], dtype=np.float64)
     return np.stack([np.interp(places - ticks, places, row) for row in rows])
+
+
+@jit
+def couple(K: Array, state: Array, first: int, output: Array) -> None:
+    """Storey forces (N) of the stiffness matrix K (n, n) N/m at x_k into `output` from place `first` on.
+
+    A storey carries the sum of the restoring forces on the floors above it.
+    """
+    n = K.shape[0]
+    shear = 0.0
+    for i in range(n - 1, -1, -1):
+        for j in range(n):
+            shear += K[i, j] * state[NEXT_DISPLACEMENT, j]
+        output[first + i] = shear
+
+
+@jit
+def control(
+    scalars: Array,
+    dampers: Array,
+    codes: Codes,
+    ground: Array,
+    state: Array,
+    recent: Array,
+    output: Array,
+    tick: int,
+) -> None:
+    """Targets of the tables and forces of the dampers' motors for the interval's end, into `output`."""
+    interval = scalars[INTERVAL]
+    here, ahead = ground[1, tick], ground[1, tick + 1]
+    for slave in range(dampers.shape[1]):
+        floor, more, past = codes[FLOORS + slave], SENT * slave, recent[1 + slave]
+        trend.remember(past, state[ACCELERATION, floor])
+        output[TABLE_TARGET + more] = state[NEXT_DISPLACEMENT, floor] + ahead
+        output[TABLE_VELOCITY + more] = (
+            state[NEXT_VELOCITY, floor] + (ahead - here) / interval + 0.5 * interval * ground[0, tick + 1]
+        )
+        output[TABLE_ACCELERATION + more] = trend.ahead(past) + ground[0, tick + 1]
+        output[TABLE_JERK + more] = (
+            trend.slope(past, interval) + (ground[0, tick + 1] - ground[0, tick]) / interval
+        )
+        output[DAMPER_COMMAND + more] = dampers[MOTOR_GAIN, slave] * state[NEXT_VELOCITY, floor]
 
 
 @jit
@@ -164,18 +236,26 @@ def advance(
     n, slaves = mass.size, dampers.shape[1]
     storeys = TABLE_TARGET + SENT * slaves
     corrected = force_correction.step(scalars[HIGH_PASS], scalars[HIGH_PASS_GAIN], filtered, column_force)
+    if scalars[UNIT_DELAY] != 0.0:
+        corrected, filtered[DELAYED] = filtered[DELAYED], corrected
     storey = codes[STOREY]
     interval, ratio = scalars[INTERVAL], scalars[RATIO]
     for i in range(n):
         balance[i] = -mass[i] * ground[0, tick]
     for slave in range(slaves):
         balance[codes[FLOORS + slave]] += dampers[FORCE_SCALE, slave] * dampers[FORCE_USED, slave]
+    forces = storeys + 4 * n
+    if codes[SPECIMEN] == MATRIX:
+        couple(column_params, state, forces, output)
     for i in range(n):
         drift = shear_building.storey_drift(state[NEXT_DISPLACEMENT], i)
-        force = specimens.step(codes[SPECIMEN], column_params[i], column_memory[i], drift)
+        if codes[SPECIMEN] == MATRIX:
+            force = output[forces + i]
+        else:
+            force = specimens.step(codes[SPECIMEN], column_params[i], column_memory[i], drift)
         if scalars[P_DELTA] != 0.0:
             force += scalars[P_DELTA] * drift
-        output[storeys + 4 * n + i] = force
+        output[forces + i] = force
         if i == storey:
             force += scalars[REPRESENTS] * corrected
         shear_building.add_nodal(-force, i, balance)
@@ -199,19 +279,7 @@ def advance(
         column_displacement,
         interval,
     )
-    here, ahead = ground[1, tick], ground[1, tick + 1]
-    for slave in range(slaves):
-        floor, more, past = codes[FLOORS + slave], SENT * slave, recent[1 + slave]
-        trend.remember(past, state[ACCELERATION, floor])
-        output[TABLE_TARGET + more] = state[NEXT_DISPLACEMENT, floor] + ahead
-        output[TABLE_VELOCITY + more] = (
-            state[NEXT_VELOCITY, floor] + (ahead - here) / interval + 0.5 * interval * ground[0, tick + 1]
-        )
-        output[TABLE_ACCELERATION + more] = trend.ahead(past) + ground[0, tick + 1]
-        output[TABLE_JERK + more] = (
-            trend.slope(past, interval) + (ground[0, tick + 1] - ground[0, tick]) / interval
-        )
-        output[DAMPER_COMMAND + more] = dampers[MOTOR_GAIN, slave] * state[NEXT_VELOCITY, floor]
+    control(scalars, dampers, codes, ground, state, recent, output, tick)
     for i in range(n):
         output[storeys + i] = state[DISPLACEMENT, i]
         output[storeys + n + i] = state[VELOCITY, i]

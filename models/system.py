@@ -14,7 +14,7 @@ from common.plan import Plan
 
 @dataclass(frozen=True)
 class ActuatorEffects:
-    """Laboratory A's transfer system, beyond a first-order lag with dead time."""
+    """Laboratory A's transfer system, beyond its plan's model."""
 
     velocity_limit: float = math.inf  # m/s
     backlash: float = 0.0  # m, whole play
@@ -105,6 +105,11 @@ class Effects:
     sensors: dict[str, SensorEffects] = field(default_factory=dict)
 
 
+def times(factor: float, value: Any) -> Any:
+    """A number multiplied, or every one of nested tuples."""
+    return tuple(times(factor, item) for item in value) if isinstance(value, tuple) else factor * value
+
+
 @dataclass(frozen=True)
 class System:
     """A plan whose parameters may have moved, with effects."""
@@ -113,11 +118,22 @@ class System:
     effects: Effects = field(default_factory=Effects)
 
     def scaled(self, table: str, name: str, factor: float) -> System:
-        """The system with one parameter of the plan, or each of its storeys, multiplied."""
+        """The system with one parameter of the plan, or each of its storeys or a matrix's entries, multiplied.
+
+        `name` may be that of a parameter in a table within it, `servo.gain`. What the specimen takes over of the
+        structure is a part of it and goes along, so that the numerical part has the same factor.
+        """
         part = getattr(self.plan, table)
-        value = getattr(part, name)
-        moved = tuple(factor * item for item in value) if isinstance(value, tuple) else factor * value
-        return self.moved(table, **{name: moved})
+        inner, _, key = name.rpartition(".")
+        if inner:
+            within = getattr(part, inner)
+            return self.moved(table, **{inner: replace(within, **{key: factor * getattr(within, key)})})
+        values = {name: times(factor, getattr(part, name))}
+        if table == "structure" and part.experimental is not None:
+            own = name.removesuffix("_ratio")
+            left_out = {own: factor * getattr(part.experimental, own)}
+            values["experimental"] = replace(part.experimental, **left_out)
+        return self.moved(table, **values)
 
     def moved(self, table: str, **values: Any) -> System:
         """The system with parameters of one of the plan's tables replaced."""

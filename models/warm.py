@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 
 import numpy as np
 
 from common.plan import Plan
-from models import cache, compensators, energy_balance, substructure
+from models import cache, column_loop, compensators, energy_balance, substructure
 from models.closed_loop import simulate
 from models.labs import column_lab, readings, replay, table_lab
+from models.structures.response import response
 from models.system import System
 
 
@@ -18,6 +20,9 @@ def compile_all() -> None:
     plan = Plan().with_test(duration=0.01)
     ground = np.zeros((2, plan.ticks + 1))
     simulate(plan, ground)
+    alone = replace(plan, control=replace(plan.control, amd=False))
+    column_loop.simulate(alone, ground)
+    response(alone, ground)
     still = np.zeros(plan.ticks)
     replay.laboratory_a(System(plan), still)
     replay.laboratory_b(System(plan), still, still)

@@ -217,13 +217,12 @@ def loop(
         StoppedError: a limit, the rig or the user ended it.
     """
     plan = bench.plan
-    interval_ns = round(plan.test.interval * 1e9)
     start_ns, late = clock.now() + LEAD_NS, 0
     for tick in range(plan.ticks):
         tell("ticks", tick, plan.ticks)
-        nominal = start_ns + tick * interval_ns
+        nominal = start_ns + plan.tick_ns(tick)
         clock.sleep_until(nominal)
-        late += clock.now() >= nominal + interval_ns
+        late += clock.now() >= start_ns + plan.tick_ns(tick + 1)
         try:
             if reason := stopping():
                 raise InterlockError(f"The bench test was {reason}")
@@ -232,7 +231,7 @@ def loop(
             values, violation = bench.tick(tick)
         except (RigError, InterlockError) as error:
             raise StoppedError(error, tick, late) from None
-        at_ns = epoch_ns + tick * interval_ns
+        at_ns = epoch_ns + plan.tick_ns(tick)
         row: Item = [
             bench.topic,
             at_ns,

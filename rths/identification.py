@@ -95,13 +95,16 @@ def of_actuator(run: Run, interval: float) -> dict[str, Any]:
     """L, T, K by least squares on everything, and by the tangent where there are steps."""
     columns = run.columns["master"]
     command, measured = columns["actuator_command"], columns["column_displacement"]
-    fit = actuator.least_squares(command, measured, interval)
+    plan = plan_of(run)
+    held = plan is not None and plan.actuator.command == "held"
+    fit = actuator.least_squares(command, measured, interval, held=held)
     result: dict[str, Any] = {"parameters": plain(fit.parameters), "nrmse": fit.nrmse}
     begins = [
         tick for segment in segments(run) if segment.name == "step" for tick in step_ticks(command, segment)
     ]
     if begins:
-        found = step_response.tangents(columns["t"], command, measured, begins, round(TAIL / interval))
+        length = round(TAIL / interval)
+        found = step_response.tangents(columns["t"], command, measured, begins, length, held=held)
         result["tangent"] = plain(found._asdict())
     return result
 

@@ -207,9 +207,9 @@ def write(path: Path, mapping: Mapping, t: Any, values: dict[str, Any], data: st
     recording = Recording(path, plan.test.name, plan.storeys, topics, plan.roles)
     recording.metadata("plan", {"toml": plan.toml(), "digest": plan.digest()})
     recording.metadata("import", {"data": data})
-    interval_ns = round(plan.test.interval * 1e9)
     for topic, names in given.items():
         table = zip(*(values[name].tolist() for name in names), strict=True)
         for tick, row in enumerate(table):
-            recording.add(topic, tick * interval_ns, tick * interval_ns, (tick, float(t[tick]), *row))
+            at = plan.tick_ns(tick)
+            recording.add(topic, at, at, (tick, float(t[tick]), *row))
     recording.close({"ticks_expected": str(t.size), "outcome": "import", "cause": "imported"})

@@ -158,8 +158,7 @@ def write(path: Path, plan: Plan, rollout: Rollout, motion: Any, ground: Any) ->
     from recorder import files
 
     recording = files.begin(path, plan, motion, ground)
-    interval_ns = round(plan.test.interval * 1e9)
     for topic, values in rows(plan, rollout):
-        at = values[0] * interval_ns
+        at = plan.tick_ns(values[0])
         recording.add(topic, at, at, values)
     recording.close({"outcome": "simulation", "cause": "simulation of the nominal models"})

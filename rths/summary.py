@@ -14,6 +14,7 @@ from common.recording.reader import Run, Values
 from common.roles import LATENCY, MASTER, SLAVE, kind_of, latency_topic, name_of
 from common.signals import Kind
 from models import indicators
+from models.structures.partition import storey_stiffness
 from rths.accounts import accounts
 
 PERCENTILES = (50, 90, 99, 99.9)
@@ -147,7 +148,7 @@ def error_energy(run: Run, plan: Plan) -> float | None:
     target, measured = (
         columns[name] / column.deformation_ratio for name in ("column_target", "column_displacement")
     )
-    strain = 0.5 * structure.stiffness[column.storey - 1] * float(np.max(np.abs(target))) ** 2
+    strain = 0.5 * storey_stiffness(plan) * float(np.max(np.abs(target))) ** 2
     if strain == 0.0 or not all(np.all(np.isfinite(columns[name])) for name in needed):
         return None
     momentum = columns["velocity"].reshape(columns["t"].size, -1) @ np.array(structure.mass)

@@ -186,7 +186,7 @@ def _tick(bench: Bench, tick: int) -> None:
 def _come_to_rest(bench: Bench) -> None:
     """The ramps of all laboratories, an interval at a time."""
     lab = bench.master.lab
-    tick = (bench.clock.now() - lab.start_ns) // lab.interval_ns + 1  # after the one that has been
+    tick = lab.tick_at(bench.clock.now() - lab.start_ns) + 1  # after the one that has been
     while True:
         bench.clock.sleep_until(bench.master.lab.tick_ns(tick))
         _exchange(bench, poll=False)

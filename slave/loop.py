@@ -106,7 +106,7 @@ class SlaveLoop:
                 self._handshake.follow(message, received_ns)
 
     def _take_command(self, command: Command, received_ns: int) -> None:
-        expected = (received_ns - self.tick_ns(0)) // self.lab.interval_ns
+        expected = self.lab.tick_at(received_ns - self.tick_ns(0))
         if not self._tally.admit(command.seq, expected):
             return
         self.lab.heard_ns = received_ns
@@ -239,7 +239,7 @@ class SlaveLoop:
 
     def _sample(self, tick: int, measured: TableMeasurement, wanted: TableCommand, sent_ns: int) -> None:
         lab, command = self.lab, self._command
-        log_ns = lab.epoch_ns + tick * lab.interval_ns
+        log_ns = lab.epoch_ns + lab.plan.tick_ns(tick)
         publish_ns = log_ns + sent_ns - self.tick_ns(tick)
         values = (
             tick,

@@ -58,6 +58,55 @@ stiffness = 63e6
 """
 )
 
+# a structure whose stiffness is a full matrix, with a specimen that has a mass, on servo-hydraulics
+SERVO_PLAN = """
+[test]
+name = "servo"
+duration = 2.5
+interval = 0.000244140625
+[ground_motion]
+scale = 0.4
+[structure]
+mass = [1000.0, 1000.0, 1000.0]
+stiffness = [
+    [26.0549e6, -23.1339e6, 5.9370e6],
+    [-23.1339e6, 32.5608e6, -14.4200e6],
+    [5.9370e6, -14.4200e6, 9.2673e6],
+]
+damping_ratio = 0.05
+integrator = "rk4"
+[structure.experimental]
+mass = 29.13
+stiffness = 1.19e6
+damping = 114.6
+[column]
+stiffness = 1.19e6
+mass = 29.13
+damping = 114.6
+columns_per_storey = 1
+deformation_ratio = 1.0
+[actuator]
+model = "servo_hydraulic"
+command = "held"
+[compensator]
+kind = "pid"
+proportional = 2.0
+integral = 95.0
+derivative = 0.0
+[compensator.force]
+unit_delay = true
+[control]
+amd = false
+[sensors]
+column_displacement = 1.6e-5
+column_force = 2.2
+[limits]
+actuator_velocity = 5.0
+actuator_acceleration = inf
+[recording]
+required = false
+"""
+
 
 def with_table(base: Plan, table: str, **values: object) -> Plan:
     """A plan with some keys of one table changed."""

@@ -132,12 +132,18 @@ def lay(system: System, entries: Sequence[Entry]) -> System:
     with fields of their own the last one given holds.
 
     Raises:
-        InputError: an effect or a parameter is unknown, a parameter is missing or out of its bounds.
+        InputError: an effect or a parameter is unknown, a parameter is missing or out of its bounds, or the plan's
+            actuator is of a model that cannot have the effect.
     """
     for name, given in entries:
         if name not in CATALOGUE:
             raise InputError(f"Unknown effect '{name}': {nearest(name, CATALOGUE)}")
         effect = CATALOGUE[name]
+        if not effect.fits(system.plan):
+            raise InputError(
+                f"The effect '{name}' is one of the actuator '{' or '.join(effect.actuators)}', but the plan's is "
+                f"'{system.plan.actuator.model}', which has none such: leave it out."
+            )
         system = effect.apply(system, **checked(effect, given))
     return system
 

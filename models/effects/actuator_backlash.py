@@ -35,4 +35,5 @@ EFFECT = Effect(
     ),
     reference="Nordin, Gutman, Controlling mechanical systems with backlash: a survey, Automatica 38 (2002) 1633-1649",
     apply=apply,
+    actuators=("fopdt",),
 )

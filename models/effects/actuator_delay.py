@@ -2,11 +2,14 @@
 
     T·ẏ + y = K·u(t − L − delay)
 
-The total is at least 0. Not to be confused with `actuator.time_constant`, which delays slow motion alike
-but also flattens fast motion, or with negative damping of the specimen: c = −k·delay in the loop.
+or the same dead time on the command of servo-hydraulics. The total is at least 0. Not to be confused with
+`actuator.time_constant`, which delays slow motion alike but also flattens fast motion, or with negative
+damping of the specimen: c = −k·delay in the loop.
 """
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 from models.effects.effect import Effect, Parameter
 from models.system import System
@@ -14,7 +17,11 @@ from models.system import System
 
 def apply(system: System, delay: float) -> System:
     """Dead time longer by `delay` s, in total not below 0."""
-    return system.moved("actuator", delay=max(system.plan.actuator.delay + delay, 0.0))
+    actuator = system.plan.actuator
+    if actuator.model == "servo_hydraulic":
+        servo = replace(actuator.servo, delay=max(actuator.servo.delay + delay, 0.0))
+        return system.moved("actuator", servo=servo)
+    return system.moved("actuator", delay=max(actuator.delay + delay, 0.0))
 
 
 EFFECT = Effect(

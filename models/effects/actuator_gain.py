@@ -2,8 +2,9 @@
 
     T·ẏ + y = factor·K·u(t − L)
 
-Not to be confused with a wrong displacement reading (`sensor.column_displacement.gain`), under which the
-force per true displacement stays right but the force per reading does not.
+or the same factor on the command of servo-hydraulics. Not to be confused with a wrong displacement reading
+(`sensor.column_displacement.gain`), under which the force per true displacement stays right but the force
+per reading does not.
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ from models.system import System
 
 def apply(system: System, factor: float) -> System:
     """Static gain multiplied by `factor`."""
-    return system.scaled("actuator", "gain", factor)
+    servo = system.plan.actuator.model == "servo_hydraulic"
+    return system.scaled("actuator", "servo.gain" if servo else "gain", factor)
 
 
 EFFECT = Effect(

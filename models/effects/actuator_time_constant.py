@@ -32,4 +32,5 @@ EFFECT = Effect(
     ),
     reference="factor·T·ẏ + y = K·u(t − L)",
     apply=apply,
+    actuators=("fopdt",),
 )

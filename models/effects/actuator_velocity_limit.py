@@ -2,6 +2,7 @@
 
     |ẏ| ≤ velocity
 
+Of servo-hydraulics it is the flow that ends, at what moves the piston as fast without a load: `|q| ≤ a2·velocity`.
 Not to be confused with a slower servo loop, which smooths every motion; this one leaves slow motion as it
 is and cuts fast flanks to straight lines.
 """

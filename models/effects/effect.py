@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from common.plan import Plan
 from models.system import System
 
 Kind = Literal["physics", "measurement"]
@@ -37,6 +38,11 @@ class Effect:
     parameters: tuple[Parameter, ...]
     reference: str
     apply: Callable[..., System]  # lays it over a system; takes the parameters by name
+    actuators: tuple[str, ...] = ()  # models of [actuator] that can have it, empty for any
+
+    def fits(self, plan: Plan) -> bool:
+        """Whether what the plan describes can have it."""
+        return not self.actuators or plan.actuator.model in self.actuators
 
     def values(self, given: Mapping[str, float]) -> dict[str, float]:
         """All parameters by name, those not given at their default."""

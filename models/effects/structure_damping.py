@@ -13,8 +13,9 @@ from models.system import System
 
 
 def apply(system: System, factor: float) -> System:
-    """Storey dashpots multiplied by `factor`."""
-    return system.scaled("structure", "damping", factor)
+    """Storey dashpots, or the damping ratio in their place, multiplied by `factor`."""
+    name = "damping_ratio" if system.plan.structure.damping_ratio > 0.0 else "damping"
+    return system.scaled("structure", name, factor)
 
 
 EFFECT = Effect(

@@ -14,7 +14,7 @@ from models.system import System
 
 
 def apply(system: System, factor: float) -> System:
-    """Storey stiffnesses multiplied by `factor`."""
+    """Storey stiffnesses, or the stiffness matrix, multiplied by `factor`."""
     return system.scaled("structure", "stiffness", factor)
 
 

@@ -34,7 +34,9 @@ class ActuatorFit:
 
 
 @jit
-def respond(taps: Array, rows: Array, history: Array, command: Array, start: float, result: Array) -> None:
+def respond(
+    taps: Array, rows: Array, history: Array, command: Array, start: float, result: Array, held: bool
+) -> None:
     """Displacement at each tick, from `start` at tick 0; the command written at tick k acts from there on."""
     displacement = start
     result[0] = start
@@ -43,37 +45,49 @@ def respond(taps: Array, rows: Array, history: Array, command: Array, start: flo
         before = delay.delayed(history, taps, 0)
         for i in range(rows.shape[0]):
             after = delay.delayed(history, taps, i + 1)
+            if held:
+                before = after
             displacement = first_order.step(rows[i], displacement, before, after)
             before = after
         result[k + 1] = displacement
 
 
 def response(
-    command: Array, interval: float, dead_time: float, time_constant: float, start: float = 0.0
+    command: Array,
+    interval: float,
+    dead_time: float,
+    time_constant: float,
+    start: float = 0.0,
+    *,
+    held: bool = False,
 ) -> Array:
-    """Exact response (n,) of `T·ẏ + y = u(t − L)` to a ramped command that was zero before."""
-    segments = delay.split(interval, dead_time)
+    """Exact response (n,) of `T·ẏ + y = u(t − L)` to a ramped or `held` command that was zero before."""
+    segments = delay.split(interval, dead_time, held=held)
     rows = first_order.propagators(1.0, time_constant, segments.lengths)
     result = np.empty(command.size)
-    respond(segments.taps, rows, np.zeros(segments.memory), command, start, result)
+    respond(segments.taps, rows, np.zeros(segments.memory), command, start, result, held)
     return result
 
 
-def columns(command: Array, interval: float, dead_time: float, time_constant: float) -> Array:
+def columns(
+    command: Array, interval: float, dead_time: float, time_constant: float, *, held: bool = False
+) -> Array:
     """What the displacement is a sum of: response, level, fading of the state at the beginning; (n, 3)."""
-    moved = response(command, interval, dead_time, time_constant)
+    moved = response(command, interval, dead_time, time_constant, held=held)
     fading = np.exp(-interval * np.arange(command.size) / time_constant)
     return np.column_stack([moved, np.ones(command.size), fading])
 
 
-def first_guess(command: Array, measured: Array, interval: float) -> tuple[float, float, Array]:
+def first_guess(
+    command: Array, measured: Array, interval: float, *, held: bool = False
+) -> tuple[float, float, Array]:
     """Best dead time and time constant of a coarse grid, with the sum's weights (3,)."""
     horizon = min(LONGEST, 0.3 * interval * command.size)
     least, place = np.inf, (0.0, 0.0)
     best: Array = np.zeros(3)
     for dead_time in np.concatenate([[0.0], np.geomspace(interval, horizon, 14)]):
         for time_constant in np.geomspace(interval / 2.0, horizon, 10):
-            base = columns(command, interval, float(dead_time), float(time_constant))
+            base = columns(command, interval, float(dead_time), float(time_constant), held=held)
             weights = np.asarray(np.linalg.lstsq(base, measured, rcond=None)[0], dtype=np.float64)
             cost = float(np.sum((base @ weights - measured) ** 2))
             if cost < least and weights[0] > 0.0:
@@ -85,14 +99,14 @@ def first_guess(command: Array, measured: Array, interval: float) -> tuple[float
     return *place, best
 
 
-def least_squares(command: Array, measured: Array, interval: float) -> ActuatorFit:
+def least_squares(command: Array, measured: Array, interval: float, *, held: bool = False) -> ActuatorFit:
     """Dead time L (s), time constant T (s) and gain K of `T·ẏ + y = K·u(t − L)` from a record of any motion.
 
     `command` (m) and `measured` (m) have one value per tick of `interval` (s): the command written at tick k
-    is ramped and reached at tick k + 1. The sensor's level and the state at the beginning are fitted beside,
-    so the record may begin at any level, best at rest. Prediction by the exact kernels of the emulated
-    actuator; intervals from Jacobian and residual, corrected for autocorrelation (`estimate.of_fit`). A
-    steady sine alone does not separate the three parameters, which the intervals show.
+    is ramped and reached at tick k + 1, or where `held` acts as a step. The sensor's level and the state at the
+    beginning are fitted beside, so the record may begin at any level, best at rest. Prediction by the exact
+    kernels of the emulated actuator; intervals from Jacobian and residual, corrected for autocorrelation
+    (`estimate.of_fit`). A steady sine alone does not separate the three parameters, which the intervals show.
 
     Raises:
         InputError: too short, unequal lengths, not finite, constant, or a measurement that does not follow.
@@ -106,14 +120,14 @@ def least_squares(command: Array, measured: Array, interval: float) -> ActuatorF
     checks.moves("command", command)
     checks.moves("measured_displacement", measured)
     moved = np.ascontiguousarray(command - command[0])
-    dead_time, time_constant, weights = first_guess(moved, measured, interval)
+    dead_time, time_constant, weights = first_guess(moved, measured, interval, held=held)
     spread = float(np.std(measured))
     scales = np.array([interval, interval, 1.0, spread, spread])
     start = np.array([dead_time, time_constant, *weights]) / scales
 
     def model(x: Array) -> Array:
         values = x * scales
-        return columns(moved, interval, float(values[0]), float(values[1])) @ values[2:]
+        return columns(moved, interval, float(values[0]), float(values[1]), held=held) @ values[2:]
 
     low = np.array([0.0, SHORTEST, -np.inf, -np.inf, -np.inf]) / scales
     high = np.array([2.0 * LONGEST, 2.0 * LONGEST, np.inf, np.inf, np.inf]) / scales

@@ -1,7 +1,8 @@
 """Dead time, time constant and gain from a step by the tangent at the inflection, as in the paper.
 
 The tangent meets the start level at L and the steady level T later; K is the final over the commanded
-step. The step as the actuator sees it is a ramp of one interval, so times count from the ramp's middle.
+step. The step as the actuator sees it is a ramp of one interval, so times count from the ramp's middle; of a
+held command they count from the step's tick.
 Smoothing: behind the onset the response is fitted by a polynomial of second order in `e^(−t/T₀)`, T₀ being
 a first guess from the times at 28 % and 63 % (Smith 1957). That is free of bias for a first-order lag and
 bends with responses of higher order. Source: section 3.2 of Yokoyama et al. (17WCEE, 2020).
@@ -49,7 +50,7 @@ class Curve(NamedTuple):
     covariance: Array  # of the weights
 
 
-def tangent(t: Array, command: Array, measured: Array, begin: int) -> StepResponse:
+def tangent(t: Array, command: Array, measured: Array, begin: int, *, held: bool = False) -> StepResponse:
     """L (s), T (s) and K from one step by the tangent at the inflection.
 
     `t` (s), `command` (m) and `measured` (m) have one value per tick; `command` stands still but for its
@@ -84,7 +85,7 @@ def tangent(t: Array, command: Array, measured: Array, begin: int) -> StepRespon
         raise InputError(
             f"The displacement is not steady at the end of the step at tick {begin}: record longer."
         )
-    times = t[begin:] - t[begin] - interval / 2.0
+    times = t[begin:] - t[begin] - (0.0 if held else interval / 2.0)
     share = (after - start) / rise
     relative = noise / abs(rise)
     near, far = (smooth(times, share, relative, interval, guard) for guard in (1, 2))
@@ -103,7 +104,9 @@ def tangent(t: Array, command: Array, measured: Array, begin: int) -> StepRespon
     )
 
 
-def tangents(t: Array, command: Array, measured: Array, steps: Sequence[int], length: int) -> StepResponse:
+def tangents(
+    t: Array, command: Array, measured: Array, steps: Sequence[int], length: int, *, held: bool = False
+) -> StepResponse:
     """Mean L (s), T (s) and K of several steps in one record, with intervals from their scatter.
 
     Arrays as for `tangent`; `steps` are the ticks at which a step begins, `length` the ticks (behind the
@@ -127,7 +130,7 @@ def tangents(t: Array, command: Array, measured: Array, steps: Sequence[int], le
         while still > 0 and begin - still < MOST_BEFORE // 4 and command[still - 1] == command[begin - 1]:
             still -= 1
         part = slice(still, begin + length)
-        found.append(tangent(t[part], command[part], measured[part], begin - still))
+        found.append(tangent(t[part], command[part], measured[part], begin - still, held=held))
     if len(found) == 1:
         return found[0]
     return StepResponse(*(mean([step[i] for step in found]) for i in range(len(found[0]))))

@@ -25,12 +25,7 @@ def laboratory_a(system: System, command: Array, start: float = 0.0) -> Array:
     sensors = readings.build(interval, MEASURED_A, system.effects.sensors)
     lab = build_a(system)
     if start != 0.0:
-        lab.history[:] = start
-        there = system.plan.actuator.gain * start
-        lab.state[: column_lab.FORCE] = there
-        parts = (lab.code, lab.params, lab.memory, lab.effects, lab.yielding, lab.yielded, lab.cell)
-        lab.state[column_lab.FORCE] = specimen.force(*parts, there, interval)
-        lab.cell[specimen.RATE] = lab.cell[specimen.LAST_STEP] = 0.0
+        column_lab.begin(lab, start, interval)
     play_a(*lab, *sensors, command, interval, result)
     return result
 

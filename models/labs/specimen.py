@@ -2,12 +2,13 @@
 
     f = g(δ_max)·p(δ')·f_column(δ') + friction + c·δ̇ + m·δ̈,    δ' = δ outside the grip's gap
 
-with `f_column` the plan's model or, once it yields, that of Bouc and Wen in its place. Without effects
-the force is that of the plan's model to the last bit.
+with `f_column` the plan's model or, once it yields, that of Bouc and Wen in its place, and with the plan's mass and
+dashpot in m and c. Without them and without effects the force is that of the plan's model to the last bit.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -41,8 +42,9 @@ class Specimen(NamedTuple):
 
 
 def build(column: Column, effects: ColumnEffects | None = None) -> Specimen:
-    """Specimen at rest."""
+    """Specimen at rest, with the plan's mass and dashpot beside those of the effects."""
     more = effects or ColumnEffects()
+    more = replace(more, viscous=more.viscous + column.damping, inertia=more.inertia + column.mass)
     code, params, memory = specimens.pack(column.model, stiffness=column.stiffness, **column.parameters)
     yields = np.isfinite(more.yield_displacement)
     values = [

@@ -49,6 +49,17 @@ def tridiagonal(storeys: Array) -> Array:
     return np.diag(storeys + above) - np.diag(storeys[1:], 1) - np.diag(storeys[1:], -1)
 
 
+def modal_damping(M: Array, K: Array, ratio: float) -> Array:
+    """Damping matrix (n, n) N·s/m that gives every mode of M (kg) and K (N/m) the same damping ratio.
+
+    `C = M·Φ·diag(2ζω)·Φᵀ·M` with Φ of modal mass 1 (Chopra, section 11.4.2).
+    """
+    found = modes(M, np.zeros_like(M), K)
+    weighted = M @ found.shapes
+    C: Array = (weighted * (4.0 * math.pi * ratio / found.periods)) @ weighted.T
+    return C
+
+
 @jit
 def storey_drift(x: Array, i: int) -> float:
     """Drift (m) of storey i from the floors' displacements `x` (n,); velocities give its rate."""

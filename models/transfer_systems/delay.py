@@ -1,14 +1,17 @@
-"""Dead time on a command that is ramped from sample to sample.
+"""Dead time on a command that is ramped from sample to sample, or held from one to the next.
 
 The command reaches the value written at tick k−1 at t_k and moves linearly in between, so a command
 delayed by any L is piecewise linear too, with one kink per interval where L is no multiple of it.
 Splitting each interval at that kink (and, if wanted, into equal substeps) gives segments over which the
 delayed command is a straight line: models that are linear propagate over them without any error.
+
+A command that is held acts as a step at the tick it is written; delayed, it steps at the same borders.
 """
 
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -25,11 +28,12 @@ class Segments(NamedTuple):
     memory: int  # length of that history
 
 
-def split(interval: float, delay: float, substeps: int = 1) -> Segments:
+def split(interval: float, delay: float, substeps: int = 1, *, held: bool = False) -> Segments:
     """Segments of one interval (s) for a dead time (s), with the borders of equal substeps among them.
 
     History index 0 is the command written at the present tick, reached at the interval's end. At the
-    share θ of the interval the delayed command stands between history entries.
+    share θ of the interval the delayed command stands between history entries. Of a command that is `held`, the tap
+    of a segment's end is that of the whole segment.
     """
     lag = delay / interval
     whole = math.floor(lag + 1e-9)
@@ -38,6 +42,12 @@ def split(interval: float, delay: float, substeps: int = 1) -> Segments:
     if rest > 1e-9:
         borders.add(rest)
     shares = sorted(borders)
+    if held:
+        middles = [0.5 * (early + late) for early, late in pairwise(shares)]
+        steps = [max(math.ceil(whole + (rest if rest > 1e-9 else 0.0) - share), 0) for share in middles]
+        return Segments(
+            np.diff(shares) * interval, np.array([(index, 0.0) for index in (steps[0], *steps)]), whole + 3
+        )
     places = [1.0 + lag - share for share in shares]
     if rest <= 1e-9:
         places = [1.0 + whole - share for share in shares]

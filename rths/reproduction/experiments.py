@@ -20,7 +20,7 @@ from common.telling import Tell
 from models import indicators, preflight, substructure
 from models.closed_loop import signals, simulate
 from models.registry import Array
-from models.structures.partition import experimental_stiffness
+from models.structures.partition import felt, storey_stiffness
 from rths import benches, virtual
 from rths.benches import Order
 
@@ -162,8 +162,8 @@ def simulated(plan: Plan, ground: Array) -> dict[str, Array]:
 def with_path(plan: Plan, path: Any) -> Plan:
     """The building that an amplitude and a delay in the column's path make of it (damping equivalent)."""
     column, structure = plan.column, plan.structure
-    omega = float(np.sqrt(structure.stiffness[0] / structure.mass[0]))
-    lost, _ = indicators.damping_equivalent(experimental_stiffness(plan), path.amplitude, path.delay, omega)
+    omega = float(np.sqrt(storey_stiffness(plan) / structure.mass[0]))
+    lost, _ = indicators.damping_equivalent(felt(plan).stiffness, path.amplitude, path.delay, omega)
     softer = column.stiffness * path.amplitude * float(np.cos(omega * path.delay))
     return replace(
         plan,

@@ -15,9 +15,9 @@ from common.plan import Plan
 from common.tables import Compensator, Control
 from models import limited, preflight, several_slaves, substructure
 from models.closed_loop import signals, simulate
-from models.partition import assess, critical_delay_of
 from models.preflight import expected_delay, partition_check, peaks, peaks_check, peaks_risk
 from models.registry import Array
+from models.structures.partition import assess, critical_delay_of
 from rths import virtual
 from tests.helpers import with_table
 

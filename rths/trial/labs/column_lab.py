@@ -84,6 +84,15 @@ def true_values(actuator: Actuator, column: Column) -> laying.Values:
         raise InputError(
             f"the column of this laboratory is linear, not '{column.model}': lay an effect over it."
         )
+    if column.mass or column.damping:
+        raise InputError(
+            "the column of this laboratory has no mass or damping of its own: lay an effect over it."
+        )
+    if actuator.model != "fopdt" or actuator.command != "ramp":
+        raise InputError(
+            f"this laboratory has the actuator 'fopdt' on a ramped command, not '{actuator.model}' on one that is "
+            f"'{actuator.command}': give those in [actuator]."
+        )
     if actuator.time_constant <= 0.0:
         raise InputError("time_constant in [actuator] must be above 0 s in this laboratory.")
     return {

@@ -34,6 +34,22 @@ def emulated(command: Array, device: Actuator | None = None) -> Array:
     return result
 
 
+@pytest.mark.parametrize("held", [False, True])
+def test_a_held_command_is_told_from_a_ramped_one(held: bool) -> None:
+    device = Actuator(gain=0.97, delay=0.0133, time_constant=0.02, command="held" if held else "ramp")
+    t = times(1500)
+    command = 2e-3 * np.sin(2.0 * np.pi * (0.5 + 1.5 * t) * t)
+    fit = actuator.least_squares(command, emulated(command, device), DT, held=held)
+    other = actuator.least_squares(command, emulated(command, device), DT, held=not held)
+    assert fit["delay"].value == pytest.approx(0.0133, abs=1e-7)
+    assert other["delay"].value - fit["delay"].value == pytest.approx(
+        DT / 2 * (1 if held else -1) * -1, rel=0.1
+    )
+    step = np.where(t < 0.2, 0.0, 2e-3)
+    found = step_response.tangent(t[:600], step[:600], emulated(step, device)[:600], 100, held=held)
+    assert found.delay.value == pytest.approx(0.0133, abs=1e-4)
+
+
 def noise(seed: int, size: int) -> Array:
     return NOISE * np.random.default_rng(seed).standard_normal(size)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -51,6 +52,38 @@ def test_the_delayed_command_is_the_ramp_delayed(lag: float, share: float, subst
         for border, place in enumerate(borders):
             got = delay.delayed(history, segments.taps, border)
             assert got == pytest.approx(exact(tick * DT + place), abs=1e-12 + 1e-9 * abs(value))
+
+
+@settings(max_examples=30, deadline=None)
+@given(lag=st.floats(0.0, 0.02), substeps=st.integers(1, 8))
+def test_a_held_command_is_delayed_as_steps(lag: float, substeps: int) -> None:
+    values = commands(60)
+    segments = delay.split(DT, lag, substeps, held=True)
+    history = np.zeros(segments.memory)
+    borders = np.concatenate([[0.0], np.cumsum(segments.lengths)])
+    assert borders[-1] == pytest.approx(DT)
+    for tick, value in enumerate(values):
+        delay.remember(history, value)
+        for place, (begin, end) in enumerate(pairwise(borders)):
+            for share in (0.01, 0.99):
+                source = math.floor(tick + (begin + share * (end - begin) - lag) / DT)
+                expected = values[source] if source >= 0 else 0.0
+                assert delay.delayed(history, segments.taps, place + 1) == expected
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.014, 0.0133])
+def test_a_held_command_acts_as_steps_on_the_lag(lag: float) -> None:
+    values, constant = commands(200), 0.010
+    lab = column_lab.build(
+        DT, Actuator(gain=0.98, delay=lag, time_constant=constant, command="held"), Column()
+    )
+    got = [column_lab.advance(*lab, value)[0] for value in values]
+    t = DT * np.arange(1, values.size + 1)
+    exact = np.zeros(values.size)
+    for tick, jump in enumerate(np.diff(values, prepend=0.0)):
+        since = np.clip(t - tick * DT - lag, 0.0, None)
+        exact -= 0.98 * jump * np.expm1(-since / constant)
+    assert np.max(np.abs(got - exact)) < 1e-12
 
 
 @pytest.mark.parametrize("lag", [0.0, 0.014, 0.0133, 0.0147])

@@ -1,0 +1,119 @@
+"""Commands on a plan with a stiffness matrix, a specimen with a mass and servo-hydraulics on a held command."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from common import reality
+from common.plan import parse
+from common.recording.reader import Run, read
+from diagnosis import record
+from diagnosis.parts import Building, LaboratoryA
+from models import closed_loop, substructure
+from models.system import System
+from rths import virtual
+from tests.helpers import SERVO_PLAN
+
+Call = Callable[..., int]
+BRIEF = SERVO_PLAN.replace("duration = 2.5", "duration = 1.0")
+
+
+@pytest.fixture
+def plan_file(tmp_path: Path) -> Path:
+    path = tmp_path / "servo.toml"
+    path.write_text(BRIEF)
+    return path
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path, plan = tmp_path_factory.mktemp("servo") / "run.mcap", parse(BRIEF, Path())
+    assert virtual.run(virtual.assemble(plan, reality.as_planned(plan), path), lambda: "") is None
+    return path
+
+
+def of_master(run: Run) -> dict[str, Any]:
+    return run.columns["master"]
+
+
+def test_a_test_in_virtual_time_is_the_closed_loop_and_replays(call: Call, recording: Path) -> None:
+    run, plan = read(recording), parse(BRIEF, Path())
+    ground = substructure.ground_rows(plan, substructure.motion(plan))
+    expected = closed_loop.signals(plan, closed_loop.simulate(plan, ground, seed=plan.test.seed))
+    for name in ("displacement", "numerical_force", "column_force", "actuator_command"):
+        assert np.array_equal(of_master(run)[name], expected[name]), name
+    assert call("replay", recording) == 0
+
+
+def test_times_of_ticks_are_rounded_each_for_itself(recording: Path) -> None:
+    run = read(recording)
+    stamps = np.asarray(run.log_ns["master"]) - run.log_ns["master"][0]
+    assert np.abs(stamps - np.arange(stamps.size) * 1e9 / 4096.0).max() <= 0.5
+    assert set(np.diff(stamps).tolist()) == {244_140, 244_141}
+
+
+def test_the_report_and_the_summary_take_it(call: Call, recording: Path, capsys: Any, tmp_path: Path) -> None:
+    assert call("inspect", recording) == 0
+    assert "hybrid simulation error energy" in capsys.readouterr().out
+    assert call("report", recording, "-o", tmp_path / "page.html") == 0
+    assert "servo_hydraulic" in (tmp_path / "page.html").read_text(encoding="utf-8")
+
+
+def test_the_pieces_of_a_diagnosis_are_replayed_to_the_noise(recording: Path) -> None:
+    run, plan = read(recording), parse(BRIEF, Path())
+    built = record.build(run)
+    lab, building = LaboratoryA(built), Building(built)
+    error = lab.measured - lab.predict(System(plan))
+    assert np.abs(np.std(error, axis=0) / [1.6e-5, 2.2] - 1.0).max() < 0.05
+    assert np.array_equal(building.predict(System(plan)), building.measured)
+    names = {item.name for item in lab.nuisances}
+    assert {"actuator.servo.valve", "actuator.servo.gain", "column.mass", "column.damping"} <= names
+    assert not names & {"actuator.gain", "actuator.time_constant", "actuator.servo.delay"}
+    assert {item.name for item in building.nuisances} == {
+        "structure.mass",
+        "structure.stiffness",
+        "structure.damping_ratio",
+    }
+    for nuisance in (*lab.nuisances, *building.nuisances):
+        assert nuisance.moved(System(plan), 1.0) != System(plan)
+    offered = {effect.name for effect in lab.candidates}
+    assert {"actuator.delay", "actuator.compliance", "column.yielding"} <= offered
+    assert not offered & {"actuator.time_constant", "actuator.backlash"}
+
+
+def test_an_effect_that_it_cannot_have_is_refused_with_a_sentence(
+    call: Call, plan_file: Path, capsys: Any, tmp_path: Path
+) -> None:
+    secret = tmp_path / "secret.toml"
+    secret.write_text("[[effect]]\nname = 'actuator.backlash'\nwidth = 1e-4\n")
+    assert call("run", plan_file, "--virtual", "--reality", secret, "-o", tmp_path / "a.mcap") == 2
+    error = capsys.readouterr().err
+    assert "'actuator.backlash' is one of the actuator 'fopdt', but the plan's is 'servo_hydraulic'" in error
+
+
+def test_it_simulates_with_ideal_transfer_systems(call: Call, plan_file: Path, tmp_path: Path) -> None:
+    path = tmp_path / "ideal.mcap"
+    assert call("simulate", plan_file, "--ideal", "-o", path) == 0
+    columns = of_master(read(path))
+    assert np.array_equal(columns["column_displacement"], columns["column_target"])
+    stiff = 1.19e6 * columns["column_displacement"]
+    assert np.std(columns["column_force"] - stiff) > 0.001 * np.std(stiff)  # mass and dashpot are felt
+
+
+def test_the_bench_finds_the_lag_that_comes_nearest(
+    call: Call, plan_file: Path, capsys: Any, tmp_path: Path
+) -> None:
+    path = tmp_path / "bench.mcap"
+    assert call("bench", "actuator", plan_file, "--only", "step", "--only", "sine 1", "-o", path) == 0
+    capsys.readouterr()
+    assert call("identify", path, "--json") == 0
+    (report,) = json.loads(capsys.readouterr().out)["parts"]
+    found = {name: item["value"] for name, item in report["parameters"].items()}
+    assert found["delay"] + found["time_constant"] == pytest.approx(0.0251, rel=0.03)
+    assert found["gain"] == pytest.approx(1.0 / 0.99254, rel=2e-3)
