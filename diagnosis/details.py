@@ -8,7 +8,7 @@ import numpy as np
 
 from diagnosis import fitting, where
 from diagnosis.ceilings import ceilings, unknown
-from diagnosis.paths import paths
+from diagnosis.paths import force_path, paths
 from diagnosis.search import remaining
 from diagnosis.signals import windows
 from models import closed_loop
@@ -61,6 +61,7 @@ def details(found: Diagnosis, far: HowFar, which: list[dict[str, Any]]) -> dict[
         },
         "parts": [part(found, trace) for trace in far.traces if trace.series.size],
         "paths": paths(record, nominal_signals(found)),
+        "force_path": force_path(record),
         "loop_shares": far.loop_shares,
         "candidates": [candidate(found, entry) for entry in which if entry["effects"]],
         "ceiling": ceilings(found),

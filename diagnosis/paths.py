@@ -10,6 +10,7 @@ from common.errors import InputError
 from diagnosis.record import Record
 from models import indicators
 from models.indicators import FrequencyEvaluation
+from models.labs import force_path as force
 from models.registry import Array
 from models.structures.partition import damping_lost
 
@@ -55,3 +56,13 @@ def measured(record: Record, signals: dict[str, Array], start: str, end: str) ->
         )
     except InputError:
         return None
+
+
+def force_path(record: Record) -> dict[str, Any] | None:
+    """Delay (s) with its interval of 95 % and gain of the column force beside the plan's specimen, if known."""
+    if not record.has("column_displacement", "column_force"):
+        return None
+    found = force.force_path(
+        record.plan, record.signals["column_displacement"], record.signals["column_force"]
+    )
+    return None if found is None else {**found._asdict(), "interval": list(found.interval)}

@@ -71,7 +71,7 @@ class DamperEffects:
 
 @dataclass(frozen=True)
 class SensorEffects:
-    """One reading: `gain·lagged(value) + bias + drift·t`, noise added, then rounded to the step."""
+    """One reading: `gain·delayed(lagged(value)) + bias + drift·t`, noise added, then rounded to the step."""
 
     gain: float = 1.0
     bias: float = 0.0
@@ -79,6 +79,7 @@ class SensorEffects:
     lag: float = 0.0  # s
     quantization: float = 0.0
     noise: float = 0.0  # rms, beside the plan's
+    delay: float = 0.0  # s
 
 
 @dataclass(frozen=True)

@@ -43,6 +43,7 @@ def write_report(summary: dict[str, Any]) -> None:
     write_completeness(summary)
     write_peaks(summary["peaks"])
     write_tracking(summary["tracking"])
+    write_force_path(summary["force_path"])
     if summary["error_energy"] is not None:
         say(
             f"hybrid simulation error energy at the column: {summary['error_energy'] * 100.0:+.2f} % of the energy in\n"
@@ -121,6 +122,17 @@ def write_tracking(tracking: dict[str, dict[str, Any]]) -> None:
     ]
     sys.stdout.write("\n")
     table(rows)
+
+
+def write_force_path(found: dict[str, Any] | None) -> None:
+    """How late the column force is, and its gain, beside the plan's specimen at the measured displacement."""
+    if found is None:
+        return
+    low, high = found["interval"]
+    sys.stdout.write(
+        f"force path: delay {found['delay'] * 1e3:.2f} ± {(high - low) * 0.5e3:.2f} ms, gain {found['gain']:.4f} "
+        f"at {found['frequency']:.2f} Hz\n"
+    )
 
 
 def write_latency(summary: dict[str, Any]) -> None:

@@ -14,6 +14,7 @@ from common.recording.reader import Run, Values
 from common.roles import LATENCY, MASTER, SLAVE, kind_of, latency_topic, name_of
 from common.signals import Kind
 from models import indicators
+from models.labs.force_path import force_path as force_path_of
 from models.structures.partition import storey_stiffness
 from rths.accounts import accounts
 
@@ -64,6 +65,7 @@ def summarize(run: Run) -> dict[str, Any]:
         "recorder": dict(run.metadata.get("summary", {})),
         "peaks": peaks(run),
         "tracking": tracking(run),
+        "force_path": force_path(run, plan) if plan else None,
         "error_energy": error_energy(run, plan) if plan else None,
         "latency": latencies(run),
         "late_ticks": late_ticks(run),
@@ -136,6 +138,18 @@ def tracking(run: Run) -> dict[str, dict[str, float | None]]:
             "enclosed_area": float(indicators.tracking_indicator(wanted, got)[-1]),
         }
     return result
+
+
+def force_path(run: Run, plan: Plan) -> dict[str, Any] | None:
+    """Delay (s) with its interval and gain of the column force, which tracking does not show; None where unknown."""
+    columns = run.columns.get("master", {})
+    if not {"column_displacement", "column_force"} <= columns.keys():
+        return None
+    displacement, force = columns["column_displacement"], columns["column_force"]
+    if force.size <= LEAST_TICKS or not np.all(np.isfinite([displacement, force])):
+        return None
+    found = force_path_of(plan, displacement, force)
+    return None if found is None else {**found._asdict(), "interval": list(found.interval)}
 
 
 def error_energy(run: Run, plan: Plan) -> float | None:

@@ -2,7 +2,7 @@
 
 A method is a file with `Params`, `RULES` and `step`; one with a memory adds `state`, the array at rest, and
 one with derived numbers adds `pack`, which appends them to the parameters. It is added by its line in
-`COMPENSATORS` and one in `step`.
+`COMPENSATORS` and one in `fed_forward`, or in `fed_back` where it takes the measurement.
 """
 
 from __future__ import annotations
@@ -16,10 +16,23 @@ import numpy as np
 from common.errors import InputError
 from common.schema import Rule, nearest
 from models import registry
-from models.compensators import ats, horiuchi, inverse, none, pid, pid_inverse, pid_taylor, taylor
+from models.compensators import (
+    amb,
+    ats,
+    horiuchi,
+    inverse,
+    none,
+    pi_lead,
+    pid,
+    pid_inverse,
+    pid_taylor,
+    series,
+    taylor,
+)
 from models.compiled import jit
 from models.registry import Array
 
+FEEDBACK = (1, 3, 6, 7, 8, 10)  # codes of methods that take the measurement
 WHOLE = ("order",)  # parameters that count something
 
 
@@ -53,6 +66,9 @@ COMPENSATORS = {
     "inverse": Compensator(5, inverse.Params, inverse.RULES, pack=inverse.pack),
     "pid_inverse": Compensator(6, pid_inverse.Params, pid_inverse.RULES, pid.state, pid_inverse.pack),
     "ats": Compensator(7, ats.Params, ats.RULES, ats.state, ats.pack),
+    "pi_lead": Compensator(8, pi_lead.Params, pi_lead.RULES, pi_lead.state, pi_lead.pack),
+    "series": Compensator(9, series.Params, series.RULES),
+    "amb": Compensator(10, amb.Params, amb.RULES, amb.state, amb.pack),
 }
 
 
@@ -86,6 +102,60 @@ def build(kind: str, parameters: Mapping[str, float], interval: float, table: st
 
 
 @jit
+def fed_forward(
+    code: int,
+    p: Array,
+    s: Array,
+    target: float,
+    rate: float,
+    acceleration: float,
+    jerk: float,
+    present: float,
+) -> float:
+    """Command (m) of a method that does without the measurement; the target where the code is of none."""
+    command = target
+    if code == 2:
+        command = taylor.step(p, target, rate, acceleration, jerk)
+    elif code == 4:
+        command = horiuchi.step(p, s, target, present)
+    elif code == 5:
+        command = inverse.step(p, target, rate, acceleration, jerk)
+    elif code == 9:
+        command = series.step(p, target, rate, acceleration, jerk)
+    return command
+
+
+@jit
+def fed_back(
+    code: int,
+    p: Array,
+    s: Array,
+    target: float,
+    rate: float,
+    acceleration: float,
+    jerk: float,
+    present: float,
+    measured: float,
+    interval: float,
+) -> float:
+    """Command (m) of a method that takes the measurement."""
+    command = target
+    if code == 1:
+        command = pid.step(p, s, target, present - measured, interval)
+    elif code == 3:
+        command = pid_taylor.step(p, s, target, rate, acceleration, jerk, present - measured, interval)
+    elif code == 6:
+        command = pid_inverse.step(p, s, target, rate, acceleration, jerk, present - measured, interval)
+    elif code == 7:
+        command = ats.step(p, s, target, rate, acceleration, present, measured, interval)
+    elif code == 8:
+        command = pi_lead.step(p, s, present, measured, interval)
+    elif code == 10:
+        command = amb.step(p, s, target, present, measured, interval)
+    return command
+
+
+@jit
 def step(
     code: int,
     p: Array,
@@ -103,19 +173,6 @@ def step(
     `target` (m), `rate` (m/s), `acceleration` (m/s²) and `jerk` (m/s³) are the target's at t_{k+1};
     `present` (m) is the target and `measured` (m) the displacement at t_k.
     """
-    command = target
-    if code == 1:
-        command = pid.step(p, s, target, present - measured, interval)
-    elif code == 2:
-        command = taylor.step(p, target, rate, acceleration, jerk)
-    elif code == 3:
-        command = pid_taylor.step(p, s, target, rate, acceleration, jerk, present - measured, interval)
-    elif code == 4:
-        command = horiuchi.step(p, s, target, present)
-    elif code == 5:
-        command = inverse.step(p, target, rate, acceleration, jerk)
-    elif code == 6:
-        command = pid_inverse.step(p, s, target, rate, acceleration, jerk, present - measured, interval)
-    elif code == 7:
-        command = ats.step(p, s, target, rate, acceleration, present, measured, interval)
-    return command
+    if code in FEEDBACK:
+        return fed_back(code, p, s, target, rate, acceleration, jerk, present, measured, interval)
+    return fed_forward(code, p, s, target, rate, acceleration, jerk, present)

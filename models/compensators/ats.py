@@ -31,6 +31,7 @@ import numpy as np
 
 from common.errors import InputError
 from common.schema import Rule
+from models.compensators import low_pass
 from models.compiled import jit
 from models.registry import Array
 
@@ -38,7 +39,7 @@ from models.registry import Array
 class Params(NamedTuple):
     """Start of the coefficients, what they learn from, and the bounds they keep."""
 
-    lead: float = 0.044  # s; a₁ starts there, a₂ at lead²/2
+    lead: float = 0.044  # s; without a lag a₁ starts there, a₂ at lead²/2
     window: float = 1.0  # s
     trigger: float = 0.0005  # m
     cutoff: float = 20.0  # Hz
@@ -49,6 +50,7 @@ class Params(NamedTuple):
     a0_rate: float = 2.0  # 1/s
     a1_rate: float = 0.05  # s/s
     a2_rate: float = 0.001  # s²/s
+    time_constant: float = 0.0  # s; of a lag behind that lead: a₁ and a₂ start as its series inverse
 
 
 RULES = {
@@ -63,11 +65,11 @@ RULES = {
     "a0_rate": Rule("fastest change of a0", "1/s", least=0.0),
     "a1_rate": Rule("fastest change of a1", "s/s", least=0.0),
     "a2_rate": Rule("fastest change of a2", "s²/s", least=0.0),
+    "time_constant": Rule("lag of the actuator to start from, beside that delay", "s", least=0.0, most=1.0),
 }
-LEAD, WINDOW, TRIGGER, CUTOFF, A0_LEAST, A0_MOST, A1_MOST, A2_MOST, A0_RATE, A1_RATE, A2_RATE = range(11)
-LENGTH = 11  # window in ticks
-SOS = 12  # three sections of b0 b1 b2 a1 a2
-REST = 27  # three pairs: the filter's memory at a constant input of 1
+LEAD, WINDOW, TRIGGER, CUTOFF, A0_LEAST, A0_MOST, A1_MOST, A2_MOST, A0_RATE, A1_RATE, A2_RATE, LAG = range(12)
+LENGTH = 12  # window in ticks
+SOS = 13  # the low-pass
 
 ORDER = 6
 SECTIONS = ORDER // 2
@@ -89,47 +91,23 @@ def pack(params: Array, interval: float) -> Array:
     Raises:
         InputError: the filter's corner is above what the interval resolves, or the start outside its box.
     """
-    most = 0.5 / interval
-    if params[CUTOFF] >= most:
-        raise InputError(f"cutoff of compensator 'ats' is {params[CUTOFF]:g}, but must be below {most:g} Hz.")
-    if params[LEAD] > params[A1_MOST]:
+    sections = low_pass.coefficients("ats", ORDER, float(params[CUTOFF]), interval)
+    start = params[LEAD] + params[LAG]
+    if start > params[A1_MOST]:
+        name = "lead and time_constant" if params[LAG] else "lead"
         raise InputError(
-            f"lead of compensator 'ats' is {params[LEAD]:g}, but must be at most a1_most = {params[A1_MOST]:g}."
+            f"{name} of compensator 'ats' is {start:g}, but must be at most a1_most = {params[A1_MOST]:g}."
         )
     length = max(round(float(params[WINDOW]) / interval), 4)
-    from scipy import signal  # half a second and 50 MB that only this compensator needs
-
-    sections = signal.butter(ORDER, float(params[CUTOFF]), fs=1.0 / interval, output="sos")
-    rest = signal.sosfilt_zi(sections)
-    return np.concatenate([params, [float(length)], sections[:, [0, 1, 2, 4, 5]].ravel(), rest.ravel()])
+    return np.concatenate([params, [float(length)], sections])
 
 
 def state(params: Array, _interval: float) -> Array:
     """Start coefficients, and everything else empty."""
     s = np.zeros(RING + 4 * int(params[LENGTH]))
-    lead = float(params[LEAD])
-    s[:3] = 1.0, lead, min(lead * lead / 2.0, float(params[A2_MOST]))
+    lead, lag = float(params[LEAD]), float(params[LAG])
+    s[:3] = 1.0, lead + lag, min(lead * lead / 2.0 + lead * lag, float(params[A2_MOST]))
     return s
-
-
-@jit
-def settle(p: Array, s: Array, at: int, value: float) -> None:
-    """Put the filter that stands at `at` to rest at a constant input."""
-    for i in range(2 * SECTIONS):
-        s[at + i] = p[REST + i] * value
-
-
-@jit
-def low_pass(p: Array, s: Array, at: int, value: float) -> float:
-    """One tick of the filter whose memory stands at `at`; direct form II transposed."""
-    for i in range(SECTIONS):
-        b = SOS + 5 * i
-        z = at + 2 * i
-        out = p[b] * value + s[z]
-        s[z] = p[b + 1] * value - p[b + 3] * out + s[z + 1]
-        s[z + 1] = p[b + 2] * value - p[b + 4] * out
-        value = out
-    return value
 
 
 @jit
@@ -150,8 +128,8 @@ def gather(s: Array, at: int, sign: float, x: float, v: float, a: float, u: floa
 @jit
 def observe(p: Array, s: Array, measured: float, interval: float) -> None:
     """Filter the pair of t_k, and move the window on by the row of t_{k−1}."""
-    command = low_pass(p, s, COMMAND_FILTER, s[COMMAND])
-    now = low_pass(p, s, MEASURED_FILTER, measured)
+    command = low_pass.step(p, SOS, SECTIONS, s, COMMAND_FILTER, s[COMMAND])
+    now = low_pass.step(p, SOS, SECTIONS, s, MEASURED_FILTER, measured)
     pace = TIME / interval
     x = s[BEFORE]
     v = 0.5 * pace * (now - s[EARLIER])
@@ -253,8 +231,8 @@ def step(
     """Command (m); before the first tick, command and measurement count as still."""
     if s[TICKS] == 0.0:
         s[COMMAND] = present
-        settle(p, s, COMMAND_FILTER, present)
-        settle(p, s, MEASURED_FILTER, measured)
+        low_pass.settle(p, SOS, SECTIONS, s, COMMAND_FILTER, present)
+        low_pass.settle(p, SOS, SECTIONS, s, MEASURED_FILTER, measured)
         s[BEFORE] = measured
         s[EARLIER] = measured
         s[ANCHOR] = measured

@@ -41,6 +41,7 @@ from models.effects import (
     link_jitter,
     link_loss,
     sensor_bias,
+    sensor_delay,
     sensor_drift,
     sensor_gain,
     sensor_lag,
@@ -112,6 +113,7 @@ READINGS = (
     sensor_bias.effect,
     sensor_drift.effect,
     sensor_lag.effect,
+    sensor_delay.effect,
     sensor_quantization.effect,
     sensor_noise.effect,
 )

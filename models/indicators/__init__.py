@@ -9,10 +9,12 @@ from models.indicators.damping import (
     free_vibration_damping,
 )
 from models.indicators.energy import hybrid_simulation_error_energy
+from models.indicators.force_path import ForcePath, force_path
 from models.indicators.stability import critical_delay, predictive_stability_indicator, sensitivity
 from models.indicators.tracking import (
     FrequencyEvaluation,
     correlation_delay,
+    correlation_lag,
     frequency_evaluation_index,
     nrmse,
     peak_error,
@@ -20,12 +22,15 @@ from models.indicators.tracking import (
 )
 
 __all__ = [
+    "ForcePath",
     "FrequencyEvaluation",
     "apparent_damping",
     "correlation_delay",
+    "correlation_lag",
     "critical_delay",
     "damping_equivalent",
     "damping_points",
+    "force_path",
     "free_vibration_damping",
     "frequency_evaluation_index",
     "hybrid_simulation_error_energy",

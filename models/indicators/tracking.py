@@ -73,6 +73,24 @@ def correlation_delay(target: Array, measured: Array, interval: float, most: flo
     return float((best - reach + 0.5 * (before - after) / (before - 2.0 * at + after)) * interval)
 
 
+def correlation_lag(target: Array, measured: Array, interval: float, ticks: int = 50) -> float:
+    """Delay (s) of the first `ticks` whole ones at which target and measurement (n,) correlate best.
+
+    Criterion J1 of the benchmark control problem. It knows no lead, which comes out as 0, and no part of a tick:
+    `correlation_delay` does.
+
+    Raises:
+        InputError: signals empty, unequal, not finite, constant or not longer than the delays asked for.
+
+    Source: Silva, Gomez, Maghareh, Dyke and Spencer, Mechanical Systems and Signal Processing 135 (2020) 106381.
+    """
+    checked(target=target, measured=measured)
+    moving(target=target, measured=measured)
+    if target.size <= ticks:
+        raise InputError(f"{target.size} ticks are too few for {ticks} delays: give at least {ticks + 1}.")
+    return interval * int(np.argmax([overlap(target, measured, lag) for lag in range(ticks)]))
+
+
 def overlap(target: Array, measured: Array, lag: int) -> float:
     """Correlation coefficient of the target with a measurement that is `lag` ticks late."""
     n = target.size

@@ -1,6 +1,7 @@
-"""What a sensor makes of a value: `gain·lagged(value) + bias + drift·t + noise`, rounded to its step.
+"""What a sensor makes of a value: `gain·delayed(lagged(value)) + bias + drift·t + noise`, rounded to its step.
 
-The lag is of first order, `τ·ẏ + y = x`, for a value that moves on a straight line from tick to tick.
+The lag is of first order, `τ·ẏ + y = x`, for a value that moves on a straight line from tick to tick; so does what is
+delayed, by any part of an interval. Before its first tick a value counts as zero.
 Without effects a reading is value plus noise to the last bit.
 """
 
@@ -16,32 +17,50 @@ from models.registry import Array
 from models.system import SensorEffects
 from models.transfer_systems import first_order
 
-PRESENT, GAIN, BIAS, DRIFT, QUANTUM, FADE, EARLY, LATE = range(8)
-LAGGED, PREVIOUS = range(2)
+PRESENT, GAIN, BIAS, DRIFT, QUANTUM, FADE, EARLY, LATE, DELAY = range(9)
+LAGGED, PREVIOUS, NEWEST, KEPT = range(4)  # the newest of the values kept for a delay, which stand in a ring
 
 
 class Readings(NamedTuple):
     """Arrays of one laboratory's sensors, in the order `step` takes them."""
 
-    params: Array  # (signals, 8)
-    state: Array  # (signals, 2)
+    params: Array  # (signals, 9)
+    state: Array  # (signals, 3 and as many as the longest delay needs)
 
 
 def build(interval: float, names: Sequence[str], sensors: Mapping[str, SensorEffects]) -> Readings:
     """Sensors at rest, one row per name."""
-    params = np.zeros((len(names), 8))
+    params = np.zeros((len(names), 9))
     for place, name in enumerate(names):
         more = sensors.get(name, SensorEffects())
         row = first_order.propagators(1.0, more.lag, np.array([interval]))[0]
         steady = (more.gain, more.bias, more.drift, more.quantization)
-        params[place] = (float(more != SensorEffects()), *steady, *row)
-    return Readings(params, np.zeros((len(names), 2)))
+        params[place] = (float(more != SensorEffects()), *steady, *row, more.delay / interval)
+    longest = float(np.max(params[:, DELAY], initial=0.0))
+    return Readings(params, np.zeros((len(names), KEPT + (int(longest) + 2 if longest > 0.0 else 0))))
 
 
 def levels(names: Sequence[str], nominal: Array, sensors: Mapping[str, SensorEffects]) -> Array:
     """Rms noise of each reading: the plan's, and what an effect adds to it."""
     more = np.array([sensors.get(name, SensorEffects()).noise for name in names])
     return np.where(more > 0.0, np.hypot(nominal, more), nominal)
+
+
+@jit
+def delayed(params: Array, state: Array, place: int, value: float) -> float:
+    """The value of signal `place` by its delay ago; the ring moves on by one tick."""
+    ticks = params[place, DELAY]
+    if ticks == 0.0:
+        return value
+    size = state.shape[1] - KEPT
+    newest = (int(state[place, NEWEST]) + 1) % size
+    state[place, NEWEST] = newest
+    state[place, KEPT + newest] = value
+    whole = int(ticks)
+    rest = ticks - whole
+    late = state[place, KEPT + (newest - whole) % size]
+    later = state[place, KEPT + (newest - whole - 1) % size]
+    return (1.0 - rest) * late + rest * later
 
 
 @jit
@@ -56,7 +75,12 @@ def step(params: Array, state: Array, place: int, value: float, noise: float, t:
     )
     state[place, LAGGED] = lagged
     state[place, PREVIOUS] = value
-    result = params[place, GAIN] * lagged + params[place, BIAS] + params[place, DRIFT] * t + noise
+    result = (
+        params[place, GAIN] * delayed(params, state, place, lagged)
+        + params[place, BIAS]
+        + params[place, DRIFT] * t
+        + noise
+    )
     quantum = params[place, QUANTUM]
     if quantum > 0.0:
         result = quantum * np.floor(result / quantum + 0.5)

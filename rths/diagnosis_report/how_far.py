@@ -91,7 +91,12 @@ def paths(report: Report) -> str:
     content = (
         paragraph(text) + table(head, rows) if rows else absent("The paths' delays are not in this report.")
     )
-    return section("paths", "Paths of the loop", content)
+    force = wording.force_path(report)
+    beside = (
+        "The measured column force against that of the plan's specimen at the measured displacement, which no index of "
+        f"tracking shows: {force}."
+    )
+    return section("paths", "Paths of the loop", content, paragraph(beside) if force else "")
 
 
 def gain(value: object) -> str:

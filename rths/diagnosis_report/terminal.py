@@ -21,6 +21,7 @@ def summary(report: Report) -> str:
         *verdict(report),
         *gap(report),
         *where(report),
+        *row("force path", wording.force_path(report)),
         *which(report),
         *how_far(report),
         *tolerances(report),

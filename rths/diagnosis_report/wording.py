@@ -23,6 +23,7 @@ READINGS = {
     "bias": "bias",
     "drift": "drift",
     "lag": "lag",
+    "delay": "delay",
     "quantization": "quantization",
     "noise": "added noise",
 }
@@ -148,6 +149,15 @@ def cause(report: Report) -> str:
     closes = f" closes {percent(share)} of it" if known(share) else " explains it"
     partly = " (only a part)" if report.get("status") == "partly_explained" else ""
     return effects(report["which"][0].get("effects") or []) + closes + partly
+
+
+def force_path(report: Report) -> str:
+    """How late the column force is and its gain, in words; empty where the report does not say."""
+    found = (report.get("details") or {}).get("force_path")
+    if not found:
+        return ""
+    delay = quantity(found.get("delay"), "s", found.get("interval"))
+    return f"delay {delay}, gain {as_float(found.get('gain')):.4f}"
 
 
 def above_floor(item: Mapping[str, Any]) -> float:

@@ -26,6 +26,7 @@ def page(run: Run, summary: Summary, drawn: Pictures, left_out: dict[str, str]) 
         peaks=tables.peaks(summary),
         limits=tables.limits(verdict.margins(run, summary)),
         tracking=tables.tracking(summary),
+        force_path=tables.force_path(summary),
         latency=tables.latency(summary),
         exchange=tables.exchange(summary),
         rejected=tables.rejected(summary),

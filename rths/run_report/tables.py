@@ -138,6 +138,21 @@ def tracking(summary: Summary) -> Table:
     return Table("", head, rows)
 
 
+def force_path(summary: Summary) -> Table:
+    """The column force against the plan's specimen at the measured displacement."""
+    found = summary["force_path"]
+    if found is None:
+        return Table("", (), [])
+    low, high = (milliseconds(end) for end in found["interval"])
+    row = [
+        milliseconds(found["delay"]),
+        f"{low} to {high}",
+        f"{found['gain']:.4f}",
+        f"{found['frequency']:.2f} Hz",
+    ]
+    return Table("Force path", ("delay", "95 %", "gain", "at"), [row])
+
+
 def milliseconds(value: float | None) -> str:
     """A delay."""
     return "none" if value is None else f"{value * 1e3:.2f} ms"

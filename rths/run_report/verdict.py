@@ -74,6 +74,7 @@ def sentences(run: Run, summary: Summary) -> list[str]:
         rejected(summary),
         lateness(run, summary),
         *tracking(summary),
+        force_path(summary),
         energy(summary),
         nearest(run, summary),
     ]
@@ -136,6 +137,18 @@ def tracking(summary: Summary) -> list[str]:
         f"{100.0 * facts['nrmse']:.2f} % of the target's rms."
         for name, facts in summary["tracking"].items()
     ]
+
+
+def force_path(summary: Summary) -> str:
+    """How late the column force was, which tracking does not show."""
+    found = summary["force_path"]
+    if found is None:
+        return ""
+    low, high = found["interval"]
+    return (
+        f"The column force came {found['delay'] * 1e3:.2f} ms (95 %: {low * 1e3:.2f} to {high * 1e3:.2f} ms) after "
+        f"what the plan's specimen gives at the measured displacement, with {found['gain']:.4f} of its size."
+    )
 
 
 def energy(summary: Summary) -> str:

@@ -56,6 +56,24 @@ def test_a_clean_laboratory_is_left_in_peace(cases: Cases, seed: int) -> None:
     assert report["next_test"] == ""
 
 
+LATE = "sensor.column_force.delay"
+
+
+def test_a_late_force_is_found_with_its_delay_and_shown_by_its_path(cases: Cases) -> None:
+    report = cases.report({LATE: {"delay": 0.002}})
+    assert named(report) == [LATE]
+    assert [entry["site"] for entry in report["where"]] == ["sensor.column_force"]
+    assert estimate(report, LATE, "delay") == pytest.approx(0.002, abs=2e-4)
+    path = report["details"]["force_path"]
+    assert path["delay"] == pytest.approx(0.002, abs=1e-4)
+    assert path["interval"][0] <= 0.002 <= path["interval"][1]
+
+
+def test_a_short_delay_and_a_lag_of_that_size_stand_together(cases: Cases) -> None:
+    report = cases.report({LATE: {"delay": 0.0006}})
+    assert [LATE, "sensor.column_force.lag"] in [sorted(names) for names in report["equivalent"]]
+
+
 def test_two_effects_in_two_laboratories_are_both_found(cases: Cases) -> None:
     report = cases.report({"column.friction": {"force": 900.0}, "damper.friction": {"force": 3.0}})
     assert named(report) == ["column.friction", "damper.friction"]

@@ -65,6 +65,11 @@ def test_inspect_says_what_is_in_a_recording(call: Any, capsys: Any, virtual_rec
     assert summary["tracking"]["table"]["enclosed_area"] > 0.0
     assert 0.0 < summary["error_energy"] < 0.02
     assert "outcome: completed" in out
+    low, high = summary["force_path"]["interval"]
+    assert low <= 0.0 <= high
+    assert summary["force_path"]["delay"] == pytest.approx(0.0, abs=1e-4)
+    assert summary["force_path"]["gain"] == pytest.approx(1.0, abs=2e-3)
+    assert f"gain {summary['force_path']['gain']:.4f} at" in out
 
 
 def test_inspect_as_json(call: Any, capsys: Any, virtual_recording: Path) -> None:

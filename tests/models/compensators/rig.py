@@ -17,13 +17,14 @@ from models.registry import Array
 
 DT = 0.002
 L, T = 0.014, 0.030  # s; dead time and time constant of the nominal actuator
+ADAPTIVE = {"ats": 3, "amb": 4}  # coefficients, which stand first in the memory
 GAINS = {"proportional": 1.93, "integral": 0.047, "derivative": 0.0}
 
 Motion = Callable[[Array], tuple[Array, Array, Array, Array]]
 
 
 class Run(NamedTuple):
-    """Target and measurement at every tick, commands reached one tick later, coefficients of `ats`."""
+    """Target and measurement at every tick, commands reached one tick later, coefficients of those that adapt."""
 
     target: Array
     measured: Array
@@ -66,14 +67,14 @@ def drive(
     built = compensators.build(kind, parameters, DT)
     lab = column_lab.build(DT, actuator or Actuator(), Column())
     r, rate, bend, jerk = motion(clock(ticks + 1))
-    run = Run(r[:-1], np.zeros(ticks), np.zeros(ticks), np.zeros((ticks, 3)))
+    adaptive = ADAPTIVE.get(kind, 0)
+    run = Run(r[:-1], np.zeros(ticks), np.zeros(ticks), np.zeros((ticks, adaptive)))
     measured = 0.0
     for k in range(ticks):
         run.measured[k] = measured
         told = measured + (0.0 if noise is None else float(noise[k]))
         run.command[k] = ask(built, r[k + 1], rate[k + 1], bend[k + 1], jerk[k + 1], r[k], told)
-        if kind == "ats":
-            run.coefficients[k] = built.state[:3]
+        run.coefficients[k] = built.state[:adaptive]
         measured, _ = column_lab.advance(*lab, run.command[k])
     return run
 

@@ -192,8 +192,15 @@ def test_the_same_input_gives_the_same_bits() -> None:
     assert (runs[0].coefficients == runs[1].coefficients).all()
 
 
+def test_it_starts_from_the_series_inverse_of_a_lag_behind_its_lead() -> None:
+    start = compensators.build("ats", {"lead": L, "time_constant": T}, DT).state[:3]
+    assert start == pytest.approx(TRUE, rel=1e-12)
+
+
 def test_starts_and_filters_that_cannot_be_are_refused() -> None:
     with pytest.raises(InputError, match="lead of compensator 'ats' is 0.05, but must be at most a1_most"):
         compensators.build("ats", {"lead": 0.05, "a1_most": 0.04}, DT)
+    with pytest.raises(InputError, match="lead and time_constant of compensator 'ats' is 0.05, but"):
+        compensators.build("ats", {"lead": 0.02, "time_constant": 0.03, "a1_most": 0.04}, DT)
     with pytest.raises(InputError, match="cutoff of compensator 'ats' is 250, but must be below 250 Hz"):
         compensators.build("ats", {"cutoff": 250.0}, DT)

@@ -20,7 +20,11 @@ TYPICAL: dict[str, dict[str, float]] = {
     "inverse": PLANT,
     "pid_inverse": {**GAINS, **PLANT},
     "ats": {},
+    "pi_lead": {},
+    "series": {"a0": 1.0},
+    "amb": {"a0": 1.0},
 }
+FEEDFORWARD = [kind for kind in COMPENSATORS if kind != "pi_lead"]  # which commands nothing without an error
 
 
 @pytest.mark.parametrize("frequency", [0.5, 1.0, 2.0, 3.0])
@@ -56,7 +60,7 @@ def test_the_residuals_of_the_seed_paper() -> None:
         assert delay(got, 1.0) == pytest.approx(expected, abs=0.0015)
 
 
-@pytest.mark.parametrize("kind", COMPENSATORS)
+@pytest.mark.parametrize("kind", FEEDFORWARD)
 @pytest.mark.parametrize("target", [0.5, -0.003, 0.0])
 def test_a_still_target_is_left_alone(kind: str, target: float) -> None:
     built = compensators.build(kind, TYPICAL[kind], DT)

@@ -76,6 +76,7 @@ for signal, unit in SIGNALS.items():
         f"sensor.{signal}.bias": {"offset": unit},
         f"sensor.{signal}.drift": {"rate": f"{unit}/s"},
         f"sensor.{signal}.lag": {"time_constant": "s"},
+        f"sensor.{signal}.delay": {"delay": "s"},
         f"sensor.{signal}.quantization": {"step": unit},
         f"sensor.{signal}.noise": {"rms": unit},
     }

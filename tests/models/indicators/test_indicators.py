@@ -63,6 +63,16 @@ class TestTracking:
         measured += 1e-3 * np.random.default_rng(2).standard_normal(t.size)
         assert indicators.correlation_delay(target, measured, DT) == pytest.approx(delay, abs=2e-4)
 
+    @pytest.mark.parametrize("delay", [0.0, 0.004, 0.04, 0.098])
+    def test_the_benchmarks_delay_is_that_of_the_best_whole_tick(self, delay: float) -> None:
+        assert indicators.correlation_lag(chirp(), chirp(delay), DT) == pytest.approx(delay, abs=1e-12)
+
+    def test_the_benchmarks_delay_knows_no_lead_and_an_end(self) -> None:
+        assert indicators.correlation_lag(chirp(), chirp(-0.01), DT) == 0.0
+        assert indicators.correlation_lag(chirp(), chirp(0.03), DT, ticks=10) == pytest.approx(9 * DT)
+        with pytest.raises(InputError, match="50 ticks are too few for 50 delays: give at least 51"):
+            indicators.correlation_lag(chirp()[:50], chirp()[:50], DT)
+
     def test_a_delay_beyond_the_search_is_said(self) -> None:
         with pytest.raises(InputError, match="not within ±0.02 s"):
             indicators.correlation_delay(chirp(), chirp(0.15), DT, most=0.02)

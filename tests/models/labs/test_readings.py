@@ -95,6 +95,38 @@ def test_the_lag_solves_its_equation_and_gain_and_bias_come_after_it() -> None:
     assert np.allclose(got, 1.1 * exact + 0.3, atol=1e-7)
 
 
+@given(delay=st.floats(1e-5, 0.2), start=st.floats(-5.0, 5.0), interval=st.sampled_from([DT, 1.0 / 4096.0]))
+@settings(max_examples=60)
+def test_a_delayed_reading_is_the_straight_line_between_two_values_before(
+    delay: float, start: float, interval: float
+) -> None:
+    values = start + np.random.default_rng(8).normal(size=round(0.25 / interval))
+    t = interval * np.arange(values.size)
+    got = read(values, SensorEffects(delay=delay), interval=interval)
+    known = t >= delay
+    assert np.allclose(got[known], np.interp(t[known] - delay, t, values), atol=1e-9)
+    assert (got[t < delay - interval] == 0.0).all()
+
+
+def test_gain_bias_drift_and_noise_come_after_the_delay_and_the_lag_before() -> None:
+    values, noises = np.sin(0.1 * np.arange(80.0)), np.cos(3.0 * np.arange(80.0))
+    lagged = read(values, SensorEffects(lag=0.008))
+    more = SensorEffects(gain=1.1, bias=0.3, drift=2.0, lag=0.008, delay=3 * DT)
+    expected = 1.1 * np.concatenate([np.zeros(3), lagged[:-3]]) + 0.3 + 2.0 * DT * np.arange(80) + noises
+    assert np.allclose(read(values, more, noises), expected, atol=1e-12)
+
+
+def test_each_reading_has_its_own_delay() -> None:
+    names = ("column_displacement", "column_force")
+    delays = {"column_displacement": SensorEffects(delay=2 * DT), "column_force": SensorEffects(delay=5 * DT)}
+    sensors = readings.build(DT, names, delays)
+    rows = np.array(
+        [[readings.step(*sensors, i, float(k + 1), 0.0, k * DT) for i in range(2)] for k in range(12)]
+    )
+    ramp = np.arange(12.0)
+    assert np.allclose(rows.T, [np.maximum(ramp - 1.0, 0.0), np.maximum(ramp - 4.0, 0.0)])
+
+
 def test_noise_is_not_lagged() -> None:
     values, noises = np.sin(np.arange(50.0)), np.cos(3.0 * np.arange(50.0))
     more = SensorEffects(gain=0.9, lag=0.02)
@@ -141,7 +173,7 @@ def test_the_noise_of_a_reading_has_the_level_of_both() -> None:
     assert rows[:, 3].std() == pytest.approx(0.2, rel=0.03)
 
 
-SIZES = {"gain": 1.1, "bias": 0.02, "drift": 0.01, "lag": 0.005}
+SIZES = {"gain": 1.1, "bias": 0.02, "drift": 0.01, "lag": 0.005, "delay": 0.0071}
 
 
 @pytest.mark.parametrize("kind", SIZES)
@@ -149,7 +181,7 @@ SIZES = {"gain": 1.1, "bias": 0.02, "drift": 0.01, "lag": 0.005}
 def test_the_rigs_falsify_the_reading_named_and_the_truth_stays(name: str, kind: str) -> None:
     """From one laboratory's readings without the effect, those with it by the formula."""
     effect = CATALOGUE[f"sensor.{name}.{kind}"]
-    size = SIZES[kind] * (1.0 if kind in ("gain", "lag") else min(effect.parameters[0].most, 1.0))
+    size = SIZES[kind] * (1.0 if kind in ("gain", "lag", "delay") else min(effect.parameters[0].most, 1.0))
     system = lay(System(Plan()), [(effect.name, {effect.parameters[0].name: size})])
     quiet = dict.fromkeys((*MEASURED_A, *MEASURED_B), 0.0)
     rows: list[list[tuple[float, ...]]] = []
@@ -169,6 +201,7 @@ def test_the_rigs_falsify_the_reading_named_and_the_truth_stays(name: str, kind:
         "bias": value + size,
         "drift": value + size * t,
         "lag": read(value, SensorEffects(lag=size)),
+        "delay": np.interp(t - size, t, value, left=0.0),
     }[kind]
     assert np.allclose(falsified[:, place], expected, rtol=1e-12, atol=1e-12)
     others = np.delete(np.arange(6), place)

@@ -112,6 +112,22 @@ def test_the_terminal_says_what_matters() -> None:
     assert "column.stiffness" not in text
 
 
+def test_the_force_path_stands_on_the_terminal_and_the_page() -> None:
+    report = fresh("explained")
+    assert "force path" not in summary(report)
+    report["details"]["force_path"] = {
+        "delay": 0.002013,
+        "interval": [0.00198, 0.002046],
+        "gain": 1.00033,
+        "frequency": 1.96,
+    }
+    jsonschema = pytest.importorskip("jsonschema")
+    jsonschema.Draft202012Validator(schema()).validate(report)
+    words = "delay 2.013 ms (1.980 … 2.046), gain 1.0003"
+    assert f"force path  {words}" in summary(report)
+    assert words in page(report)
+
+
 @pytest.mark.parametrize("name", REPORTS)
 def test_the_page_stands_alone(name: str, tmp_path: Path) -> None:
     path = tmp_path / "report.html"

@@ -71,6 +71,9 @@ def test_the_page_has_the_figures_of_inspect(
     for part, facts in summary["tracking"].items():
         assert f"{part}{facts['delay'] * 1e3:.2f}ms{facts['correlation_delay'] * 1e3:.2f}ms" in text
         assert f"{facts['nrmse']:.4f}{facts['peak_error']:.4f}" in text
+    force = summary["force_path"]
+    assert f"{force['gain']:.4f}{force['frequency']:.2f}Hz" in text
+    assert f"Thecolumnforcecame{force['delay'] * 1e3:.2f}ms" in text
     for segment, facts in summary["latency"].items():
         assert segment + "".join(f"{value * 1e6:.0f}" for value in facts.values()) in text
     for name, counts in summary["exchange"].items():

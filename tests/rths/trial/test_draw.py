@@ -26,7 +26,7 @@ from rths.trial.draw import (
     draw_parameter,
     peak_drift,
 )
-from rths.trial.library import Library, Stranger, family, laboratory, site_of
+from rths.trial.library import UNDRAWN, Library, Stranger, family, laboratory, shipped, site_of
 
 
 def softer(system: System, factor: float) -> System:
@@ -153,6 +153,12 @@ def test_the_drift_is_sensible() -> None:
         motion = case.plan["ground_motion"]
         drift = motion["scale"] * peak_drift(motion["record"], case.plan["control"]["amd"])
         assert 2.9e-3 < drift < 10.1e-3
+
+
+def test_an_effect_that_came_later_leaves_the_draws_as_they_were() -> None:
+    assert not any(family(name) in UNDRAWN for name in shipped().names)
+    with pytest.raises(InputError, match="Unknown 'sensor.column_force.delay'"):
+        draw(1, 1, "judge", effects=["sensor.column_force.delay"])
 
 
 def test_names_say_where_an_effect_is() -> None:

@@ -1,0 +1,39 @@
+"""The power series with given coefficients."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from models import compensators
+from models.compensators import inverse
+from tests.models.compensators.benchmark import DT, Plant
+from tests.models.compensators.rig import ask
+
+
+def test_the_command_is_the_sum_of_its_terms() -> None:
+    given = {"a0": 1.25, "a1": 0.5, "a2": 0.125, "a3": 0.0625}
+    built = compensators.build("series", given, DT)
+    assert ask(built, 1.0, 2.0, -4.0, 8.0) == 1.25 + 1.0 - 0.5 + 0.5
+
+
+def test_with_the_series_of_a_lag_it_is_the_inverse_of_that_lag() -> None:
+    c = inverse.coefficients(0.014, 0.03, 0.8, 3.0)
+    fixed = compensators.build("series", {f"a{i}": float(c[i]) for i in range(4)}, DT)
+    other = compensators.build(
+        "inverse", {"delay": 0.014, "time_constant": 0.03, "gain": 0.8, "order": 3}, DT
+    )
+    numbers = (0.1, -2.0, 30.0, 400.0)
+    assert ask(fixed, *numbers) == ask(other, *numbers)
+
+
+@pytest.mark.parametrize("frequency", [0.5, 2.0, 5.0, 10.0])
+def test_the_defaults_invert_the_plant_of_the_benchmark(frequency: float) -> None:
+    """Against the plant's own response to a command held from tick to tick, which adds half a tick."""
+    transition, held = Plant().discrete()
+    s = 2j * np.pi * frequency
+    states = np.linalg.solve(np.exp(s * DT) * np.eye(5) - transition, held)
+    built = compensators.build("series", {}, DT)
+    series = sum(built.params[i] * s**i for i in range(4))
+    left = states[3] * series * np.exp(s * DT / 2.0)
+    assert abs(left - 1.0) < 6e-3

@@ -1,0 +1,97 @@
+"""Delay and gain of a force against forces shifted on purpose."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from common.errors import InputError
+from common.plan import Plan
+from models import indicators
+from models.labs.force_path import force_path
+from models.registry import Array
+from tests.models.compensators import benchmark
+
+DT = 0.002
+
+
+def times(ticks: int) -> Array:
+    return np.arange(ticks, dtype=np.float64) * np.float64(DT)
+
+
+def motion(t: Array) -> Array:
+    """An earthquake's worth of sines around 2 Hz that swell and fade, written out for any time."""
+    draws = np.random.default_rng(5)
+    f, phase = draws.normal(2.0, 0.5, 40), draws.uniform(0.0, 6.28, 40)
+    envelope = np.exp(-(((t - 12.0) / 8.0) ** 2))
+    return np.asarray(1e3 * envelope * np.sin(2.0 * np.pi * np.outer(t, f) + phase).sum(axis=1))
+
+
+def noisy(values: Array, level: float, seed: int) -> Array:
+    return values + level * np.random.default_rng(seed).standard_normal(values.size)
+
+
+@pytest.mark.parametrize("seconds", [8.0, 40.0])
+@pytest.mark.parametrize("delay", [-0.0313, -0.0011, 0.0, 0.0007, 0.002, 0.0123, 0.08])
+def test_a_known_delay_and_gain_are_found(delay: float, seconds: float) -> None:
+    t = times(round(seconds / DT))
+    found = indicators.force_path(motion(t), 1.07 * motion(t - delay), DT)
+    assert found.delay == pytest.approx(delay, abs=2e-6 + 2e-3 * abs(delay))
+    assert found.gain == pytest.approx(1.07, rel=2e-3)
+    assert found.frequency == pytest.approx(2.0, abs=0.5)
+    assert found.interval[0] <= found.delay <= found.interval[1]
+
+
+def test_the_interval_holds_the_truth_as_often_as_it_says() -> None:
+    """Of 200 draws of noise 95 % within three standard errors of such a count."""
+    t = times(20_000)
+    expected, measured = motion(t), motion(t - 0.002)
+    within = 0
+    for seed in range(200):
+        found = indicators.force_path(
+            noisy(expected, 60.0, 2 * seed), noisy(measured, 90.0, 2 * seed + 1), DT
+        )
+        within += found.interval[0] <= 0.002 <= found.interval[1]
+        assert found.interval[1] - found.interval[0] < 2e-3
+    assert 0.90 <= within / 200 <= 0.995
+
+
+@pytest.mark.parametrize("ticks", [0, 8, -8, 40])
+@pytest.mark.parametrize("case", [1, 4])
+def test_it_bears_the_noise_of_a_specimen_with_mass(ticks: int, case: int) -> None:
+    """The benchmark's readings: twice differentiated, the displacement's noise is twenty times the force."""
+    run = benchmark.run("amb", {}, case)
+    x = run.measured
+    rate = np.gradient(x, benchmark.DT)
+    expected = benchmark.K_E * x + benchmark.C_E * rate + benchmark.M_E * np.gradient(rate, benchmark.DT)
+    found = indicators.force_path(expected, np.roll(run.force, ticks), benchmark.DT)
+    assert found.delay == pytest.approx(ticks * benchmark.DT, abs=1e-4)
+    assert found.interval[0] - 5e-5 <= ticks * benchmark.DT <= found.interval[1] + 5e-5
+    assert found.gain == pytest.approx(1.0, abs=5e-3)
+
+
+def test_a_dashpot_that_the_plan_lacks_is_a_lead() -> None:
+    t = times(20_000)
+    x = motion(t)
+    found = indicators.force_path(x, x + 0.003 * np.gradient(x, DT), DT)
+    assert found.delay == pytest.approx(-0.003, rel=0.01)
+
+
+def test_the_column_of_a_plan_is_played_over_the_measured_displacement() -> None:
+    plan = Plan()
+    x = motion(times(5000)) / 12.5e6
+    found = force_path(plan, x, np.roll(plan.column.stiffness * x, 3))
+    assert found is not None
+    assert found.delay == pytest.approx(3 * DT, rel=2e-3)
+    assert found.gain == pytest.approx(1.0, abs=2e-3)
+
+
+def test_what_says_nothing_is_refused() -> None:
+    t = times(5000)
+    with pytest.raises(InputError, match="nothing to do with"):
+        indicators.force_path(motion(t), noisy(0.0 * t, 1.0, 3), DT)
+    with pytest.raises(InputError, match="100 ticks are too few for a delay of the force: give at least 256"):
+        indicators.force_path(motion(t[:100]), motion(t[:100]), DT)
+    with pytest.raises(InputError, match="constant"):
+        indicators.force_path(motion(t), 0.0 * t, DT)
+    assert force_path(Plan(), 0.0 * t, 0.0 * t) is None
