@@ -19,7 +19,7 @@ from common.laboratory import Report
 from common.plan import Plan
 from common.reality import Reality
 
-SHIPPED = ("default", "paper", "rc_column", "two_dampers")
+SHIPPED = ("benchmark2020", "default", "paper", "rc_column", "two_dampers")
 MAGIC = b"\x89MCAP0\r\n"  # with which every recording begins
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 

@@ -1,6 +1,7 @@
-"""The pictures of the documents: `python -m docs.pictures` makes them again.
+"""The pictures of the documents: `python -m docs.pictures` makes them again, with names only those.
 
-Those of the tutorial are what its own commands draw; that of the safety machine comes from its table.
+Those of the tutorial are what its own commands draw, those of the benchmark what its command draws; that of the safety
+machine comes from its table.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from docs import console
 
 FOLDER = Path(__file__).resolve().parent
 TUTORIAL = ("hysteresis.png", "histories.png")
+BENCHMARK = ("compensators.png", "late_force.png")
 PLACES = {
     Mode.IDLE: (0, 2),
     Mode.CONFIGURED: (1, 2),
@@ -45,7 +47,18 @@ def tutorial() -> list[str]:
     return complaints
 
 
-def modes() -> None:
+def benchmark2020() -> list[str]:
+    """Play the whole benchmark and keep two of its pictures; what it misses of its goals."""
+    from rths.__main__ import command
+
+    with tempfile.TemporaryDirectory() as folder:
+        code = command(["benchmark2020", "-o", folder])
+        for name in BENCHMARK:
+            shutil.copy(Path(folder) / name, FOLDER / "pictures" / name)
+    return ["the benchmark misses a goal"] if code else []
+
+
+def modes() -> list[str]:
     """Draw the safety machine; the emergency stop, to which every mode leads, without its arrows."""
     import matplotlib as mpl
 
@@ -69,6 +82,7 @@ def modes() -> None:
     axes.set(xlim=(-0.9, 3 * ACROSS + 1.1), ylim=(-0.5, 2 * UP + 1.1), aspect="equal")
     with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": "rths"}):
         canvas.savefig(FOLDER / "pictures" / "modes.svg", metadata={"Date": None})
+    return []
 
 
 def place(mode: Mode) -> tuple[float, float]:
@@ -88,11 +102,13 @@ def arrow(axes: Any, start: Mode, end: Mode, label: str) -> None:
     axes.text(*middle, label, ha="center", va="center", fontsize=7.5, bbox=white)
 
 
+MAKERS = {"modes": modes, "tutorial": tutorial, "benchmark2020": benchmark2020}
+
+
 def main() -> int:
-    """Make all; 1 where the tutorial is not what its commands print."""
+    """Make those named, or all; 1 where a page or a goal is not as it should be."""
     (FOLDER / "pictures").mkdir(exist_ok=True)
-    modes()
-    complaints = tutorial()
+    complaints = [text for name in sys.argv[1:] or MAKERS for text in MAKERS[name]()]
     sys.stdout.write("\n".join(complaints))
     return 1 if complaints else 0
 

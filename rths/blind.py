@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from common import cli
 from common.errors import InputError
 from common.telling import Tell
+from rths.folder import prepared
 from rths.progress import Progress
 from rths.trial.worker import DIAGNOSIS
 
@@ -121,18 +122,6 @@ def check(args: argparse.Namespace) -> None:
     if args.diagnosis != DIAGNOSIS:
         with tempfile.TemporaryDirectory(prefix="rths-nothing-") as folder:
             diagnose_all(Path(folder), diagnosis=args.diagnosis)
-
-
-def prepared(folder: Path) -> Path:
-    """The folder, made; raises InputError where nothing can be written."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / "index.html").write_text("", encoding="utf-8")
-    except OSError as error:
-        raise InputError(
-            f"Cannot write into {folder}: {error.strerror}; give another folder with -o."
-        ) from None
-    return folder
 
 
 def record_cases(cases: Sequence[Case], folder: Path, jobs: int, tell: Tell) -> dict[int, Recorded]:

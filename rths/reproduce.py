@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from common import cli
-from common.errors import InputError
+from rths.folder import prepared
 from rths.progress import Progress
 
 if TYPE_CHECKING:
@@ -32,16 +32,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run every experiment; 1 where a row is outside its tolerance."""
-    from recorder.files import checked
-
-    folder: Path = args.output
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(
-            f"Cannot write into {folder}: {error.strerror}; give another folder with -o."
-        ) from None
-    target = checked(folder / "index.html")
+    folder = prepared(args.output)
+    target = folder / "index.html"
     with Progress("reproducing") as progress:
         from rths.reproduction import experiments, figures, page
         from rths.reproduction.rows import rows

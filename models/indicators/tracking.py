@@ -6,11 +6,15 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from common.errors import InputError
 from models.indicators.checks import checked, moving
 from models.registry import Array
 
+Index = NDArray[np.int64]
+
+STILL = 1e-12  # of the whole signals' size: what rounding leaves of a part that does not move
 TIE = 1e-3  # correlation by which a peak may stand below the best and still be as good
 
 
@@ -63,7 +67,7 @@ def correlation_delay(target: Array, measured: Array, interval: float, most: flo
     reach, n = math.ceil(most / interval), target.size
     if n < 4 * reach:
         raise InputError(f"{n} ticks are too few for delays up to {most:g} s: give at least {4 * reach}.")
-    values = np.array([overlap(target, measured, lag) for lag in range(-reach, reach + 1)])
+    values = correlations(target, measured, -reach, reach)
     inner = (values[1:-1] >= values[:-2]) & (values[1:-1] >= values[2:])
     peaks = np.flatnonzero(inner & (values[1:-1] >= values.max() - TIE)) + 1
     if not peaks.size:
@@ -88,17 +92,36 @@ def correlation_lag(target: Array, measured: Array, interval: float, ticks: int 
     moving(target=target, measured=measured)
     if target.size <= ticks:
         raise InputError(f"{target.size} ticks are too few for {ticks} delays: give at least {ticks + 1}.")
-    return interval * int(np.argmax([overlap(target, measured, lag) for lag in range(ticks)]))
+    return interval * int(np.argmax(correlations(target, measured, 0, ticks - 1)))
 
 
-def overlap(target: Array, measured: Array, lag: int) -> float:
-    """Correlation coefficient of the target with a measurement that is `lag` ticks late."""
+def correlations(target: Array, measured: Array, first: int, last: int) -> Array:
+    """Correlation coefficients of the target with a measurement `first` to `last` ticks late, negative for early.
+
+    Each is that of the part of both signals (n,) that overlaps at its lag, the means there taken away. Products of all
+    lags come from one transform, what they are normalised by from running sums; 0 where a part does not move.
+    """
     n = target.size
-    a = target[max(0, -lag) : n - max(0, lag)]
-    b = measured[max(0, lag) : n - max(0, -lag)]
-    a, b = a - a.mean(), b - b.mean()
-    size = math.sqrt(float(a @ a) * float(b @ b))
-    return float(a @ b) / size if size > 0.0 else 0.0
+    a, b = target - target.mean(), measured - measured.mean()
+    size = 1 << (2 * n - 1).bit_length()
+    whole = np.fft.irfft(np.conj(np.fft.rfft(a, size)) * np.fft.rfft(b, size), size)
+    lags = np.arange(first, last + 1)
+    kept = n - np.abs(lags)
+    begin_a, begin_b = np.maximum(-lags, 0), np.maximum(lags, 0)
+    mean_a, square_a = moments(a, begin_a, kept)
+    mean_b, square_b = moments(b, begin_b, kept)
+    products = whole[lags] - kept * mean_a * mean_b
+    scale = np.sqrt(np.maximum(square_a, 0.0) * np.maximum(square_b, 0.0))
+    moves = scale > STILL * math.sqrt(float(a @ a) * float(b @ b))
+    return np.divide(products, scale, out=np.zeros(lags.size), where=moves)
+
+
+def moments(values: Array, begin: Index, count: Index) -> tuple[Array, Array]:
+    """Mean, and sum of squares about it, of several stretches of `values` (n,)."""
+    sums = np.concatenate([[0.0], np.cumsum(values)])
+    squares = np.concatenate([[0.0], np.cumsum(values * values)])
+    mean = (sums[begin + count] - sums[begin]) / count
+    return mean, squares[begin + count] - squares[begin] - count * mean * mean
 
 
 def tracking_indicator(target: Array, measured: Array) -> Array:

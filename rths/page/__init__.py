@@ -19,7 +19,7 @@ from markupsafe import Markup, escape
 FOLDER = Path(__file__).parent
 HEADING = re.compile(r'<section id="([^"]*)"><h2>(.*?)</h2>', re.DOTALL)
 NUMBER = re.compile(r"[<>≤≥±×+−-]?\s?[\d∞][\d.,]*(e[+-]?\d+)?(\s?[^\s\d]{1,6})?( \(.*\))?")
-NOTHING = ("", "–", "?")  # cells that say that there is no number
+NOTHING = ("", "–", "?", "unstable")  # cells that say that there is no number
 
 
 @functools.cache

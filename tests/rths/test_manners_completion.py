@@ -17,7 +17,7 @@ SLOW = ("numba", "scipy", "matplotlib", "zenoh")
 ASKED = {
     "in": ["inspect"],
     "simulate d": ["default"],
-    "simulate ": ["default", "other", "paper", "plan.toml", "rc_column", "two_dampers"],
+    "simulate ": ["benchmark2020", "default", "other", "paper", "plan.toml", "rc_column", "two_dampers"],
     "simulate --dur": ["--duration"],
     "inspect ": ["a.mcap", "other"],
     "inspect other/": ["other/b.mcap"],

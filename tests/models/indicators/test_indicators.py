@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from common.errors import InputError
 from models import indicators
+from models.indicators import tracking
 from models.registry import Array
 from models.structures import shear_building
 
@@ -66,6 +67,23 @@ class TestTracking:
     @pytest.mark.parametrize("delay", [0.0, 0.004, 0.04, 0.098])
     def test_the_benchmarks_delay_is_that_of_the_best_whole_tick(self, delay: float) -> None:
         assert indicators.correlation_lag(chirp(), chirp(delay), DT) == pytest.approx(delay, abs=1e-12)
+
+    @pytest.mark.parametrize("seed", [1, 2, 3])
+    def test_correlations_of_all_lags_are_the_coefficients_of_what_overlaps(self, seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        target = rng.normal(size=300).cumsum() + 40.0
+        measured = 3.0 * np.roll(target, 11) + rng.normal(size=300)
+        found = tracking.correlations(target, measured, -60, 60)
+        wanted = [
+            np.corrcoef(target[max(-k, 0) : 300 - max(k, 0)], measured[max(k, 0) : 300 - max(-k, 0)])[0, 1]
+            for k in range(-60, 61)
+        ]
+        assert found == pytest.approx(wanted, abs=1e-9)
+
+    def test_what_does_not_move_correlates_with_nothing(self) -> None:
+        target = np.concatenate([np.full(100, 2.0), np.sin(np.arange(20.0))])
+        measured = np.concatenate([np.cos(np.arange(20.0)), np.full(100, 1.0)])
+        assert np.all(tracking.correlations(target, measured, -110, -100) == 0.0)
 
     def test_the_benchmarks_delay_knows_no_lead_and_an_end(self) -> None:
         assert indicators.correlation_lag(chirp(), chirp(-0.01), DT) == 0.0

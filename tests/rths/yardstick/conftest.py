@@ -1,0 +1,35 @@
+"""The benchmark played once for all tests that look at its results."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+
+from common.telling import untold
+from rths.yardstick import evidence, figures, page, text
+from rths.yardstick.evidence import Evidence
+from rths.yardstick.problem import SETTINGS
+
+
+class Played(NamedTuple):
+    """What the command makes of a few settings and plants."""
+
+    evidence: Evidence
+    checks: list[evidence.Check]
+    json: dict[str, Any]
+    page: Path
+
+
+@pytest.fixture(scope="session")
+def played(tmp_path_factory: pytest.TempPathFactory) -> Played:
+    folder = tmp_path_factory.mktemp("benchmark2020")
+    settings = {name: SETTINGS[name] for name in ("sample", "amb", "none")}
+    found = evidence.gather(settings, 2, 2020, 2, untold)
+    checks = evidence.checks(found)
+    pictures = figures.draw_all(found, folder)
+    place = folder / "index.html"
+    place.write_text(page.page(found, checks, pictures, folder), encoding="utf-8")
+    return Played(found, checks, json.loads(json.dumps(text.as_json(found, checks), allow_nan=False)), place)
