@@ -49,7 +49,11 @@ MASTER = (
     Signal("acceleration", "m/s²", "acceleration relative to the ground", Kind.STOREYS),
     Signal("absolute_acceleration", "m/s²", "absolute acceleration", Kind.STOREYS),
     Signal("column_target", "m", "specimen deformation wanted at this tick"),
-    Signal("actuator_command", "m", "command written, to be reached at the end of the interval"),
+    Signal(
+        "actuator_command",
+        "m",
+        "command written, to be reached at the end of the interval, or held from the tick on",
+    ),
     Signal("column_displacement", "m", "specimen deformation measured"),
     Signal("column_force", "N", "restoring force of the specimen measured"),
     Signal(

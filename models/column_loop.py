@@ -42,12 +42,13 @@ def simulate(
     effects: Effects | None = None,
     seed: int | None = None,
     noise: Array | None = None,
+    farthest: float = FARTHEST,
 ) -> ColumnRollout:
     """Closed loop of a plan whose building carries no damper, with effects laid over its models where given.
 
     `ground` (2, ticks + 1) as `substructure.ground_rows` gives it. With a `seed` the sensors read what the emulated
     laboratory reads under that seed, with `noise` (ticks, 2) those rows in m and N are what errs in them; without
-    either they are free of noise. A command that is not finite or beyond 1e6 m ends the loop.
+    either they are free of noise. A command that is not finite or beyond `farthest` (m) ends the loop.
 
     Raises:
         InputError: the plan has a damper or names its slaves, both a seed and noise are given, the noise has another
@@ -65,6 +66,7 @@ def simulate(
         *build_a(system),
         *readings.build(plan.test.interval, MEASURED_A, system.effects.sensors),
         errors,
+        farthest,
         motion,
         floors,
     )
@@ -120,6 +122,7 @@ def roll(
     sensors: Array,
     sensed: Array,
     noise: Array,
+    farthest: float,
     motion: Array,
     floors: Array,
 ) -> int:
@@ -152,7 +155,7 @@ def roll(
             felt,
         )
         command = output[ACTUATOR_COMMAND]
-        if not abs(command) <= FARTHEST:
+        if not abs(command) <= farthest:
             return tick
         motion[tick, 0] = output[COLUMN_TARGET]
         motion[tick, 1] = command

@@ -67,7 +67,7 @@ SOS = 15  # the low-pass
 
 ORDER = 4
 SECTIONS = ORDER // 2
-COEFFICIENTS = 0  # a₀ … a₃
+# the coefficients stand first in the memory
 TICKS, QUIET, ANCHOR, COMMAND = 4, 5, 6, 7  # calls; s since motion; where it was, m; last command, m
 COMMAND_FILTER, MEASURED_FILTER = 8, 12
 FILTERED = 16  # filtered command, m

@@ -86,10 +86,14 @@ def gather(settings: Mapping[str, Compensator], plants: int, seed: int, jobs: in
 
 def summary(name: str, kind: str, results: list[Result], stages: Iterable[Stage]) -> Summary:
     """The worst of a setting's tests."""
-    needed = {(on.case.number, on.motion.title): on.needed for on in stages}
+    needed = {
+        (on.case.number, on.motion.title, plant): force
+        for on in stages
+        for plant, force in enumerate(on.needed)
+    }
     nominal = [item for item in results if item.plant == NOMINAL]
     drawn = [item for item in results if item.plant != NOMINAL]
-    within = [item for item in results if needed[item.case, item.motion] <= FORCE]
+    within = [item for item in results if needed[item.case, item.motion, item.plant] <= FORCE]
     stable = all(item.stable for item in nominal)
     return Summary(
         name,

@@ -21,7 +21,7 @@ from models.system import Effects
 from rths.yardstick.criteria import Criteria, criteria, peak, rms
 from rths.yardstick.problem import EL_CENTRO, Case, Motion, draw, planned, with_compensator, with_plant
 
-RUNAWAY = 10.0  # times the reference's peak: a loop beyond is unstable, finite or not
+RUNAWAY, ASTRAY = 10.0, 100.0  # times the reference's peak: targets and commands beyond are of unstable loops
 NOMINAL = 0  # the plant of the plan; 1, 2, … are drawn about it
 LEAD_MOST = 0.05  # s, of the two-sided delay
 
@@ -35,7 +35,7 @@ class Stage(NamedTuple):
     ground: Array
     reference: Array  # (ticks, floors) m: the whole building computed
     noise: Array  # (ticks, 2) of the readings
-    needed: float  # N, largest force that the reference's motion asks of the nominal specimen
+    needed: Sequence[float]  # N, largest force that the reference's motion asks of each plant's specimen
 
 
 class Result(NamedTuple):
@@ -63,8 +63,10 @@ def stage(case: Case, motion: Motion, plants: int, seed: int) -> Stage:
     rows = noise.Noise(noise.lab_seed(plan.test.seed, noise.LAB_A), levels).rows(plan.ticks)
     others = [with_plant(plan, plant) for plant in draw(plan, plants, seed)]
     reference = response.response(plan, ground)
-    needed = peak(specimen_force(plan, reference[:, plan.column.storey - 1]))
-    return Stage(case, motion, [plan, *others], ground, reference, rows, needed)
+    first = reference[:, plan.column.storey - 1]
+    all_plants = [plan, *others]
+    needed = [peak(specimen_force(one, first)) for one in all_plants]
+    return Stage(case, motion, all_plants, ground, reference, rows, needed)
 
 
 def specimen_force(plan: Plan, displacement: Array) -> Array:
@@ -80,10 +82,11 @@ def play(
     on: Stage, setting: str, chosen: Plan, plant: int = NOMINAL, effects: Effects | None = None
 ) -> tuple[Result, column_loop.ColumnRollout]:
     """One test on a stage, with the plan that has its plant and compensator."""
-    rollout = column_loop.simulate(chosen, on.ground, effects=effects, noise=on.noise)
-    ticks = rollout.ticks
-    target, measured = rollout.target[:ticks], rollout.displacement[:ticks]
     first = on.reference[:, chosen.column.storey - 1]
+    rollout = column_loop.simulate(
+        chosen, on.ground, effects=effects, noise=on.noise, farthest=ASTRAY * peak(first)
+    )
+    target, measured = rollout.target, rollout.displacement
     if not rollout.finite or peak(target) > RUNAWAY * peak(first):
         return unstable(on, setting, plant), rollout
     nominal, interval = plant == NOMINAL, chosen.test.interval
