@@ -4,7 +4,7 @@ READY := .venv/.ready
 
 FAULT_ROWS := runs/faults.jsonl
 
-.PHONY: setup run test check faults docs site benchmark blind clean
+.PHONY: setup run test check unit alone again faults docs site benchmark blind clean
 
 setup: $(READY)
 
@@ -25,9 +25,28 @@ check: setup
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
-test: check
-	$(BIN)/pytest -n 2 --ignore=tests/system --ignore=tests/docs
-	$(BIN)/pytest tests/docs tests/system
+test: check unit alone
+
+UNIT := -n 2 -m "not alone"
+UNIT_CACHE := .pytest_cache/unit
+
+unit: setup
+	@rm -f $(UNIT_CACHE)/passed
+	$(BIN)/pytest -o cache_dir=$(UNIT_CACHE) $(UNIT)
+	@touch $(UNIT_CACHE)/passed
+
+# one worker: nothing else is measured meanwhile, and where a test hangs beyond reach the others get another
+ALONE := -n 1 -m alone tests/docs tests/system
+ALONE_CACHE := .pytest_cache/alone
+
+alone: setup
+	@rm -f $(ALONE_CACHE)/passed
+	$(BIN)/pytest -o cache_dir=$(ALONE_CACHE) $(ALONE)
+	@touch $(ALONE_CACHE)/passed
+
+again: check
+	test -f $(UNIT_CACHE)/passed || $(BIN)/python -m tests.again $(UNIT_CACHE) $(UNIT)
+	test -f $(ALONE_CACHE)/passed || $(BIN)/python -m tests.again $(ALONE_CACHE) $(ALONE)
 
 FAULT_TESTS := tests/system/faults tests/system/test_recording_faults.py tests/system/test_security.py
 

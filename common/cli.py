@@ -6,8 +6,10 @@ import argparse
 import contextlib
 import json
 import os
+import signal
 import sys
-from collections.abc import Callable, Mapping
+import threading
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -153,13 +155,37 @@ def reporter(as_json: bool) -> Report:
 def guarded(main: Callable[[], int]) -> int:
     """Run a command; a user's mistake becomes one sentence on standard error and an exit code."""
     try:
-        return answered(main)
+        with interruptible():
+            return answered(main)
     except BrokenPipeError:
         unread()
         return 0
     except KeyboardInterrupt:
         sys.stderr.write("rths: stopped by the user.\n")
         return 3
+
+
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C. Python itself ends by the signal, whatever the exit code, once a plain one has passed through `exec`."""
+
+
+def interrupt(*_: object) -> NoReturn:
+    """Handle a SIGINT."""
+    raise Interrupted
+
+
+@contextlib.contextmanager
+def interruptible() -> Iterator[None]:
+    """Within it Ctrl-C raises Interrupted, where nobody has taken the signal for something else."""
+    ours = threading.current_thread() is threading.main_thread()
+    ours = ours and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    if ours:
+        signal.signal(signal.SIGINT, interrupt)
+    try:
+        yield
+    finally:
+        if ours and signal.getsignal(signal.SIGINT) is interrupt:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def answered(main: Callable[[], int]) -> int:

@@ -40,6 +40,7 @@ from common.tables import (
 
 PROTOCOL_VERSION = 4
 MOST_SLAVES = 16
+FOLLOWS_IN = "table.compensator"
 SLAVE_NAME = re.compile(r"[a-z][a-z0-9_]*")
 
 
@@ -48,6 +49,7 @@ class Plan:
     """A test, fully described; `base` is the folder that its relative paths start from.
 
     `slaves` holds the slaves by name in the order of the file; it is empty where there is one without a name.
+    `follows_in` is the table of the file that the table's compensator comes from, for sentences about it.
     """
 
     test: Test = Test()
@@ -70,6 +72,7 @@ class Plan:
     recording: Recording = Recording()
     slaves: dict[str, SlaveLaboratory] = field(default_factory=dict)
     base: Path = Path()
+    follows_in: str = field(default=FOLLOWS_IN, compare=False)
 
     @property
     def storeys(self) -> int:
@@ -106,7 +109,9 @@ class Plan:
             return self
         lab = self.slaves[name_of(role)]
         parts = {name: getattr(lab, name) for name in INTERFACE}
-        return replace(self, slave=Laboratory(lab.rig), slaves={}, **parts)
+        own = lab.table.compensator != self.table.compensator
+        follows_in = f"{role}.{FOLLOWS_IN}" if own else FOLLOWS_IN
+        return replace(self, slave=Laboratory(lab.rig), slaves={}, follows_in=follows_in, **parts)
 
     def slave_role(self, name: str) -> str:
         """The role of the slave of that name, empty for the one without.
@@ -164,10 +169,11 @@ class Plan:
         ):
             if value is not None:
                 tables[table][name] = value
-        return from_tables(tables, self.base)
+        return replace(from_tables(tables, self.base), follows_in=self.follows_in)
 
 
-TABLES = tuple(name for name in Plan.__dataclass_fields__ if name not in ("slaves", "base"))
+BESIDE = ("slaves", "base", "follows_in")  # no tables of a file
+TABLES = tuple(name for name in Plan.__dataclass_fields__ if name not in BESIDE)
 INTERFACE = ("table", "damper", "control")  # what a named slave may have of its own
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 MASTER, SLAVE, RECORDER, LATENCY = "master", "slave", "recorder", "latency"
 OPERATOR, OBSERVER = "operator", "observer"
+RAMP = "_ramp"
 
 
 def slave_role(name: str) -> str:
@@ -40,4 +41,10 @@ def latency_topic(role: str) -> str:
 def ramp_topic(role: str) -> str:
     """The topic of a laboratory's way to rest: `master_ramp`, `slave_ramp.roof`."""
     kind, point, name = role.partition(".")
-    return f"{kind}_ramp{point}{name}"
+    return f"{kind}{RAMP}{point}{name}"
+
+
+def ramps_of(topic: str) -> str:
+    """The laboratory whose way to rest a topic holds, empty for any other topic."""
+    kind, point, name = topic.partition(".")
+    return f"{kind.removesuffix(RAMP)}{point}{name}" if kind.endswith(RAMP) else ""

@@ -12,6 +12,7 @@ All blocks of a page run in order in one fresh folder, in which `examples` are t
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import signal
@@ -30,6 +31,7 @@ DIRECTIVE = re.compile(r"<!-- (file|terminal): (\S+) -->\s*")
 ANYTHING = "…"
 MARK = "-- exit of the command"
 TIMEOUT_S = 180.0
+LAST_WORDS_S = 5.0  # of a block that was killed
 PROGRESS = re.compile(r"[a-z ]+: (?:.+, )?\d+ s")  # of rths/progress.py: how often depends on the machine
 
 
@@ -88,8 +90,8 @@ def matches(expected: str, printed: str) -> bool:
         r"(?:.*\n)*?" if line == ANYTHING else ".*".join(map(re.escape, line.split(ANYTHING))) + r"\n"
         for line in bare(expected)
     )
-    lines = [line for line in bare(printed) if not PROGRESS.fullmatch(line)]
-    return re.fullmatch(pattern, "".join(f"{line}\n" for line in lines)) is not None
+    said = (line for line in printed.splitlines() if not PROGRESS.fullmatch(line))
+    return re.fullmatch(pattern, "".join(f"{line}\n" for line in bare("\n".join(said)))) is not None
 
 
 def bare(text: str) -> list[str]:
@@ -131,7 +133,8 @@ def complaints(block: Block, process: subprocess.Popen[str]) -> list[str]:
         printed, _ = process.communicate(timeout=TIMEOUT_S)
     except subprocess.TimeoutExpired:
         os.killpg(process.pid, signal.SIGKILL)
-        process.communicate()
+        with contextlib.suppress(subprocess.TimeoutExpired):  # a process in another session may hold the pipe
+            process.communicate(timeout=LAST_WORDS_S)
         return [f"line {block.line}: not done after {TIMEOUT_S:g} s"]
     pieces = re.split(rf"\n?{MARK}: (\d+)\n", printed)
     wanted = commands(block.text)

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any, get_type_hints
 
 from common import errors
-from common.plan import Plan
+from common.plan import TABLES, Plan
 from common.schema import Rule, table_fields
 from docs.markdown import quantity, table
 from models.compensators import COMPENSATORS
@@ -37,7 +37,7 @@ TYPES = {
 def plan() -> str:
     """Every table of a plan with its keys."""
     shared = Plan()
-    names = [field.name for field in dataclasses.fields(Plan) if field.name not in ("slaves", "base")]
+    names = list(TABLES)
     return "\n".join(text for name in names for text in plan_table(name, getattr(shared, name)))
 
 

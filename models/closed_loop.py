@@ -78,9 +78,7 @@ def simulate(
     outputs = np.zeros((ticks, master.output.size))
     measured_a, measured_b, used = np.zeros((ticks, 2)), np.zeros((ticks, 4)), np.zeros(ticks)
     follow = plan.table.compensator
-    compensator_b = compensators.build(
-        follow.kind, follow.parameters, plan.test.interval, "table.compensator"
-    )
+    compensator_b = compensators.build(follow.kind, follow.parameters, plan.test.interval, plan.follows_in)
     written = np.zeros(ticks)
     filled = roll(
         *master,

@@ -8,12 +8,20 @@ from models.excitation import ACCELERATION, JERK, POSITION, RATE, Programme
 
 
 class Follower:
-    """A programme behind a compensator."""
+    """A programme behind a compensator; `table` of the plan is where that stands, for errors."""
 
-    def __init__(self, chosen: Compensator | TableCompensator, programme: Programme, interval: float) -> None:
+    def __init__(
+        self,
+        chosen: Compensator | TableCompensator,
+        programme: Programme,
+        interval: float,
+        table: str = "compensator",
+    ) -> None:
         self._motion = programme.motion
         self._interval = interval
-        still, self._built = (compensators.build(chosen.kind, chosen.parameters, interval) for _ in range(2))
+        still, self._built = (
+            compensators.build(chosen.kind, chosen.parameters, interval, table) for _ in range(2)
+        )
         compensators.step(*still, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, interval)  # compiled before a rig is armed
 
     def wanted(self, tick: int) -> float:

@@ -32,7 +32,7 @@ class Slave:
 
     def __init__(self, plan: Plan, place: int, seed: int) -> None:
         chosen, self._interval = plan.table.compensator, plan.test.interval
-        self._follow = compensators.build(chosen.kind, chosen.parameters, self._interval, "table.compensator")
+        self._follow = compensators.build(chosen.kind, chosen.parameters, self._interval, plan.follows_in)
         self._lab = build_b(System(plan))
         levels = noise.levels_b(plan.sensors)
         self._noise = noise.Noise(noise.lab_seed(seed, noise.LAB_B + place), levels)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from common import cli
+from common.errors import InputError
 from common.telling import untold
 from rths.progress import Progress
 
@@ -66,6 +67,8 @@ def run(args: argparse.Namespace) -> int:
 
         order = benches.Order(args.part, args.compensated, tuple(args.only), args.real_time)
         reality = cli.load_reality(args.reality, plan)
+        if args.part not in OF_SLAVE and args.name:
+            raise InputError(f"The {args.part} is the master's: leave out --name {args.name}.")
         if args.part in OF_SLAVE:
             role = plan.slave_role(args.name or "")
             plan, reality = plan.of(role), reality.of(role)

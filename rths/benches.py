@@ -168,7 +168,7 @@ class TableBench:
         self._commands = Guard(plan.limits, ("table_target", *TableCommand._fields))
         self._force = programme.motion[POSITION] if order.part == "damper" else None
         chosen = plan.table.compensator if order.compensated else UNCOMPENSATED
-        self._follow = Follower(chosen, programme, plan.test.interval)
+        self._follow = Follower(chosen, programme, plan.test.interval, plan.follows_in)
 
     def tick(self, tick: int) -> tuple[tuple[float, ...], Violation | None]:
         """Read, compute, write; the recorded values behind seq and t, and the violation of a limit."""

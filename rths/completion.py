@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from common import cli
+from common.errors import InputError
 
 SHELLS = ("bash", "zsh", "fish")
 RECORDINGS, TABLES = "*.mcap", "*.toml"
 PATTERNS = {"reality": TABLES, "budget": TABLES, "map": TABLES}  # by destination, otherwise by placeholder:
 PLACEHOLDERS = {"FILE": RECORDINGS, "OTHER": RECORDINGS, "OUT.mcap": RECORDINGS}
 ANY_FILE = ("DATA", "OUT", "OUT.json", "MAP", "B.toml")
+EVALUATED = "$zsh_eval_context[-1] == eval"
+SOURCED = "$zsh_eval_context[-1] == (eval|file)"
 EITHER = ("A", "B")  # of `compare`: a recording, or a plan
 
 
@@ -32,7 +35,21 @@ def script(shell: str) -> str:
     """The script of a shell: static, so that a completion starts no program."""
     import shtab
 
-    return str(shtab.complete(whole(), shell))
+    found = str(shtab.complete(whole(), shell))
+    return registering(found) if shell == "zsh" else found
+
+
+def registering(text: str) -> str:
+    """Shtab's script for zsh, made to register where it is sourced from a file too, not by `eval` alone.
+
+    Raises:
+        InputError: the script does not ask how it is read in the way that is known.
+    """
+    if text.count(EVALUATED) != 1:
+        raise InputError(
+            "The completions for zsh need another version of shtab: install that of requirements.lock."
+        )
+    return text.replace(EVALUATED, SOURCED)
 
 
 def whole() -> argparse.ArgumentParser:
@@ -62,23 +79,33 @@ def completer(action: argparse.Action) -> Mapping[str, Any] | None:
     if name == "FOLDER":
         return dict(shtab.DIRECTORY)
     if pattern := PATTERNS.get(action.dest) or PLACEHOLDERS.get(name):
-        return dict(shtab.glob(pattern))
+        return files(pattern)
     return dict(shtab.FILE) if name in ANY_FILE else None
+
+
+def files(*patterns: str) -> Mapping[str, Any]:
+    """Files of some patterns; zsh takes one that stands alone in brackets for qualifiers of a file."""
+    import shtab
+
+    return dict(shtab.glob(*patterns)) | {"zsh": f"_files -g '{either(patterns)}'"}
+
+
+def either(patterns: Sequence[str]) -> str:
+    """Patterns as one of zsh's."""
+    return patterns[0] if len(patterns) == 1 else f"({'|'.join(patterns)})"
 
 
 def with_plans(name: str, *patterns: str) -> Mapping[str, Any]:
     """Files of some patterns and the plans that ship; `name` becomes part of the shells' functions."""
-    import shtab
-
-    files: dict[str, Any] = dict(shtab.glob(*patterns))
+    found = files(*patterns)
     plans = " ".join(cli.SHIPPED)
     own = f"_rths_glob_{name}"  # by _glob_ shtab's bash script knows that these are files
-    groups = f"'plans:plan that ships:({plans})' 'files:file:_files -g \"({'|'.join(patterns)})\"'"
+    groups = f"'plans:plan that ships:({plans})' 'files:file:_files -g \"{either(patterns)}\"'"
     preamble = {
-        "bash": f"{files['preamble']['bash']}\n"
-        f'{own}() {{\n  {files["bash"]} "$1"\n  compgen -W "{plans}" -- "$1"\n}}\n',
+        "bash": f"{found['preamble']['bash']}\n"
+        f'{own}() {{\n  {found["bash"]} "$1"\n  compgen -W "{plans}" -- "$1"\n}}\n',
         "zsh": f"{own}() {{\n  _alternative {groups}\n}}\n",
-        "fish": f"{files['preamble']['fish']}\n"
-        f"function {own}\n  {files['fish'].strip('()')}\n  printf '%s\\n' {plans}\nend\n",
+        "fish": f"{found['preamble']['fish']}\n"
+        f"function {own}\n  {found['fish'].strip('()')}\n  printf '%s\\n' {plans}\nend\n",
     }
     return {"bash": own, "zsh": own, "fish": f"({own})", "preamble": preamble}

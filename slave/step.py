@@ -13,9 +13,7 @@ class SlaveStep:
 
     def __init__(self, plan: Plan) -> None:
         chosen = plan.table.compensator
-        self._built = compensators.build(
-            chosen.kind, chosen.parameters, plan.test.interval, "table.compensator"
-        )
+        self._built = compensators.build(chosen.kind, chosen.parameters, plan.test.interval, plan.follows_in)
         self._interval = plan.test.interval
         self._target = 0.0  # of t_k
 

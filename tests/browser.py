@@ -13,6 +13,7 @@ from playwright.sync_api import sync_playwright
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 # a container's root needs the first two; the last makes pictures the same on every machine
 OPTIONS = ("--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu", "--font-render-hinting=none")
+LIMIT_S = 60.0  # for a browser to start, a page to load, a picture to be made
 
 
 def chromium() -> str | None:
@@ -59,9 +60,12 @@ class Page:
 def open_page(url: str, width: int = 1280, height: int = 900) -> Iterator[Page]:
     """A page (http or file) in a window of `width` by `height` CSS pixels, until the end of the block."""
     with sync_playwright() as library:
-        browser = library.chromium.launch(executable_path=chromium(), args=list(OPTIONS))
+        browser = library.chromium.launch(
+            executable_path=chromium(), args=list(OPTIONS), timeout=LIMIT_S * 1e3
+        )
         try:
             page = Page(browser.new_page(viewport={"width": width, "height": height}))
+            page._page.set_default_timeout(LIMIT_S * 1e3)
             page._page.goto(url, wait_until="load")
             yield page
         finally:

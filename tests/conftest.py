@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import faulthandler
 import math
+import os
 import threading
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from pathlib import Path
 
 import pytest
@@ -13,6 +15,12 @@ from hypothesis import settings
 from common import cli, plan, reality
 from common.plan import Plan
 from rths import virtual
+from tests.limited import Left, adopt, children, descendants, end, look
+
+# of libraries, which end them with the interpreter: joblib's idle workers, the counters of shared memory
+KEPT = ("joblib.externals.loky", "resource_tracker")
+OUT_OF_REACH_S = 60.0  # after its limit a test that no signal has ended takes its interpreter with it
+STDERR = pytest.StashKey[int]()
 
 settings.register_profile("rths", deadline=None, derandomize=True)  # the same cases on every machine
 settings.load_profile("rths")
@@ -27,6 +35,53 @@ def no_leaked_thread() -> Iterator[None]:
     for thread in left:
         thread.join(timeout=5.0)
     assert [thread.name for thread in left if thread.is_alive()] == []
+
+
+@pytest.fixture(autouse=True)
+def no_leaked_process() -> Iterator[None]:
+    """A test that leaves a process behind fails, and the process is killed: one in real time starves the others."""
+    before = set(children(os.getpid()))
+    yield
+    left = end(lambda: below(before))
+    assert [str(process) for process in left] == []
+
+
+def below(before: set[int]) -> list[Left]:
+    """Processes that run below this one, apart from those before and those of libraries."""
+    started = [child for child in children(os.getpid()) if child not in before]
+    found = [process for child in started if (process := look(child)) is not None]
+    return [one for process in found if not kept(process) for one in (process, *descendants(process.pid))]
+
+
+def kept(process: Left) -> bool:
+    """Whether a process belongs to a library."""
+    return any(name in process.words for name in KEPT)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Orphans of a test come to this process; the standard error stays in reach while a test's is caught."""
+    adopt()
+    config.stash[STDERR] = os.dup(2)
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
+    """A test that hangs where Python hears no signal writes the stacks of all threads and ends its interpreter."""
+    marker = item.get_closest_marker("timeout")
+    limit = float(marker.args[0] if marker else item.config.getini("timeout"))
+    faulthandler.dump_traceback_later(limit + OUT_OF_REACH_S, exit=True, file=item.config.stash[STDERR])
+    try:
+        return (yield)
+    finally:
+        faulthandler.cancel_dump_traceback_later()
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Nothing outlives the tests: what a fixture has left is named and killed."""
+    left = end(lambda: [one for one in descendants(os.getpid()) if not kept(one)])
+    for process in left:
+        os.write(session.config.stash[STDERR], f"killed what was left: {process}\n".encode())
 
 
 @pytest.fixture(autouse=True)

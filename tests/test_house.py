@@ -73,6 +73,7 @@ def test_another_common_in_the_way_is_said_in_one_sentence(tmp_path: Path) -> No
         env={"PYTHONPATH": f"{tmp_path}:{ROOT}", "PATH": "/usr/bin:/bin"},
         capture_output=True,
         text=True,
+        timeout=60,
     )
     assert found.returncode == 2
     assert found.stderr.startswith("rths: another package named 'common'")

@@ -23,7 +23,7 @@ from common.errors import InputError
 from common.recording.checksums import CHECKSUMS, fits, opened
 from common.recording.salvage import DAMAGE, HEAD, RECORD_LIMIT
 from common.recording.schema import message_class
-from common.roles import LATENCY, MASTER, SLAVE, latency_topic, ramp_topic, title
+from common.roles import LATENCY, MASTER, SLAVE, latency_topic, ramps_of, title
 
 Values = NDArray[Any]
 
@@ -244,8 +244,8 @@ def _decode(run: Run, channel: Channel, schema: Schema, messages: list[Message])
         return
     names = [item.name for item in kind.DESCRIPTOR.fields]
     columns = {name: np.array([getattr(item, name) for item in decoded]) for name in names}
-    if topic in map(ramp_topic, (MASTER, *run.roles)):
-        run.ramps[topic.replace(ramp_topic(""), "")] = columns
+    if ramps_of(topic) in (MASTER, *run.roles):
+        run.ramps[ramps_of(topic)] = columns
         return
     run.units[topic] = json.loads(channel.metadata.get("units", "{}"))
     run.columns[topic] = columns

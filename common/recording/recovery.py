@@ -31,6 +31,7 @@ from common.recording.salvage import (
     written,
 )
 from common.recording.writer import CHUNK_SIZE
+from common.roles import ramps_of
 
 RECOVERY = "recovery"  # metadata of a recovered recording
 DAMAGED = " (damaged)"  # after the name of what is there, but not as it was written
@@ -50,8 +51,12 @@ class Missing(NamedTuple):
 
 @dataclass
 class Topic:
-    """What is left of a topic; `unrecorded` counts messages that were not in the file before the damage either."""
+    """What is left of a topic; `unrecorded` counts messages that were not in the file before the damage either.
 
+    The numbers of the way to rest of a laboratory, `ramp_of`, go on behind those of its ticks; all others begin at 0.
+    """
+
+    ramp_of: str = ""
     kept: int = 0
     first: tuple[int, int] | None = None  # sequence and log time, ns
     last: tuple[int, int] | None = None
@@ -61,7 +66,7 @@ class Topic:
 
     def take(self, sequence: int, log_ns: int, holes: int) -> None:
         """Take note of a message behind so many holes of the file."""
-        expected = self.last[0] + 1 if self.last else 0
+        expected = self.last[0] + 1 if self.last else sequence if self.ramp_of else 0
         if sequence > expected and holes > self.holes:
             after = self.last[1] if self.last else None
             self.missing.append(Missing(expected, sequence - 1, after, log_ns))
@@ -72,14 +77,28 @@ class Topic:
         self.last = (sequence, log_ns)
         self.holes = holes
 
-    def end(self, written_count: int) -> None:
-        """Take note of how many messages of the topic the file held when it was finished."""
+    def end(self, written_count: int, begin: int = 0) -> None:
+        """Take note of how many messages the file held when it was finished, and of where those of a ramp may begin."""
         lacking = written_count - self.kept - self.lost
+        if (
+            self.ramp_of
+            and self.first
+            and lacking > 0
+            and (before := min(lacking, self.first[0] - begin)) > 0
+        ):
+            self.missing.insert(0, Missing(self.first[0] - before, self.first[0] - 1, None, self.first[1]))
+            lacking -= before
         if lacking > 0:
-            first = self.last[0] + 1 if self.last else 0
+            first = self.last[0] + 1 if self.last else begin
             self.missing.append(
                 Missing(first, first + lacking - 1, self.last[1] if self.last else None, None)
             )
+
+    @property
+    def until(self) -> int:
+        """The sequence number behind the last that was written, as far as it is known."""
+        last = self.last[0] if self.last else -1
+        return max([last, *(hole.last for hole in self.missing)]) + 1
 
     @property
     def lost(self) -> int:
@@ -319,7 +338,7 @@ class Salvage:
                     channel.topic, channel.message_encoding, numbers[channel.schema_id], channel.metadata
                 )
                 name = channel.topic.split("/", 2)[-1]
-                self._channels[number] = new, self._topics.setdefault(name, Topic())
+                self._channels[number] = new, self._topics.setdefault(name, Topic(ramps_of(name)))
 
     def _copy(self, opcode: int, offset: int, end: int) -> None:
         piece = judge(self._source, offset, end)
@@ -367,9 +386,12 @@ class Salvage:
         self._parts += [f"metadata '{name}'" for name in absent]
         self._parts += [f"attachment '{name}'" for (_, name), count in self._left.items() if count > 0]
         counts = self._survey.statistics.channel_message_counts if self._survey.statistics else {}
-        for number, (_, topic) in self._channels.items():
-            if number in counts:
-                topic.end(counts[number])
+        held = [(topic, counts[number]) for number, (_, topic) in self._channels.items() if number in counts]
+        for topic, count in sorted(
+            held, key=lambda each: each[0].ramp_of != ""
+        ):  # where ticks end comes first
+            laboratory = self._topics.get(topic.ramp_of)
+            topic.end(count, laboratory.until if laboratory else 0)
 
     def _account(self) -> Recovery:
         survey = self._survey

@@ -13,14 +13,30 @@ from types import TracebackType
 from typing import Any, Self
 
 from mcap.opcode import Opcode
+from mcap.records import Statistics
 from mcap.writer import MCAP0_MAGIC
 
 from common.errors import InputError
 from common.recording.reader import Contents, Run, unpacked
-from common.recording.salvage import DAMAGE, HEAD, RECORD_LIMIT, Source, parsed
+from common.recording.salvage import DAMAGE, HEAD, RECORD_LIMIT, Source, parsed, summary
 
 LOOK_BYTES = 1 << 20  # of the file per look: some seconds of a test, decoded in a few tens of milliseconds
 WANTED = frozenset({Opcode.CHUNK, Opcode.METADATA, Opcode.ATTACHMENT})  # of the rest the place alone matters
+
+
+def length(path: Path) -> float:
+    """Seconds from the first to the last message of a finished recording, by its summary; 0 where it has none."""
+    try:
+        with path.open("rb") as stream:
+            found = summary(Source(stream))
+    except (OSError, *DAMAGE):
+        return 0.0
+    times = [
+        (record.message_end_time - record.message_start_time) * 1e-9
+        for _, record in (found.records if found else ())
+        if isinstance(record, Statistics)
+    ]
+    return max(times, default=0.0)
 
 
 class Tail:

@@ -108,11 +108,7 @@ def which(report: Report) -> list[str]:
     for item in (report.get("which") or [])[:3]:
         found = wording.parameters(item)
         several = len(item.get("effects") or []) > 1
-        texts = [
-            f"{wording.plain(name.split('.', 1)[-1].replace('.', ' ')) + ' ' if several else ''}"
-            f"{wording.plain(parameter)} {value}"
-            for name, parameter, value in found
-        ]
+        texts = [setting(*each, several=several) for each in found]
         head = f"{probability(item.get('probability')):>6}  {wording.effects(item.get('effects') or [])}"
         text = head + (": " + ", ".join(texts) if texts else "")
         lines += textwrap.wrap(
@@ -125,6 +121,12 @@ def which(report: Report) -> list[str]:
             initial_indent="",
         )
     return rows("which", lines) if lines else row("which", "no effect of the catalogue is named")
+
+
+def setting(name: str, parameter: str, value: str, *, several: bool) -> str:
+    """A parameter's value behind the names of a candidate's effects, with its own effect where they are `several`."""
+    own = wording.effect(name) if several else ""
+    return " ".join(filter(None, (own, wording.called(own or wording.effect(name), parameter), value)))
 
 
 def how_far(report: Report) -> list[str]:

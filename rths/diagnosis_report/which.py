@@ -76,11 +76,18 @@ def worth(item: Candidate) -> str:
     return paragraph("; ".join(facts))
 
 
+def setting(name: str, parameter: str, *, several: bool) -> str:
+    """What a parameter is called, with its effect where they are `several`; no word twice."""
+    if not several:
+        return wording.plain(parameter)
+    return ": ".join(filter(None, (wording.effect(name), wording.called(wording.effect(name), parameter))))
+
+
 def parameters(item: Candidate) -> str:
     """A candidate's parameters with intervals."""
     several = len(item.get("effects") or []) > 1
     rows = [
-        [esc(f"{wording.effect(name)}: " if several else "") + esc(wording.plain(parameter)), esc(value)]
+        [esc(setting(name, parameter, several=several)), esc(value)]
         for name, parameter, value in wording.parameters(item)
     ]
     return table(("parameter", "value (interval)"), rows)

@@ -86,6 +86,11 @@ def parameters(candidate: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     ]
 
 
+def called(name: str, parameter: str) -> str:
+    """A parameter behind the words `name` of its effect; empty where these end with it: `table delay` has but one."""
+    return "" if f" {name}".endswith(f" {plain(parameter)}") else plain(parameter)
+
+
 def equivalent(names: Sequence[str]) -> str:
     """A set of effects that cannot be told apart, as a sentence."""
     first, *others = map(effect, names)

@@ -32,9 +32,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--window",
         type=float,
-        default=WINDOW,
         metavar="S",
-        help=f"that plots reach back (default: {WINDOW:g})",
+        help=f"that plots reach back (default: {WINDOW:g}, of a finished recording all of it)",
     )
     parser.add_argument("--wait", action="store_true", help="for a file that is written from now on")
     parser.add_argument("--leave", action="store_true", help="when the test has ended (default: at Ctrl-C)")
@@ -55,7 +54,7 @@ def check(args: argparse.Namespace) -> None:
     """Raise InputError for options that cannot be."""
     if not RATES[0] <= args.rate <= RATES[1]:
         raise InputError(f"--rate {args.rate:g} must be from {RATES[0]:g} to {RATES[1]:g} Hz.")
-    if not 1.0 <= args.window <= 3600.0:
+    if args.window is not None and not 1.0 <= args.window <= 3600.0:
         raise InputError(f"--window {args.window:g} must be from 1 to 3600 s.")
     if not 0 <= args.port <= 65535:
         raise InputError(f"--port {args.port} must be from 1 to 65535, or 0 for a free one.")
@@ -67,13 +66,15 @@ def serve(args: argparse.Namespace, since_ns: int) -> None:
     """Read the recording and serve its page."""
     from common.clock import MonotonicClock
     from common.drive import Stopper
-    from common.recording.tail import Tail
+    from common.recording.tail import Tail, length
     from rths.live.feed import Feed
     from rths.live.server import Server
 
     stopping = Stopper()
     with Tail(args.file) as tail:
-        feed = Feed(tail, args.window, MonotonicClock(), since_ns=since_ns)
+        whole = 0.0 if args.window or since_ns else length(args.file)
+        window = args.window or whole or WINDOW
+        feed = Feed(tail, window, MonotonicClock(), since_ns=since_ns, whole=whole > 0.0)
         feed.look()
         if feed.failure:
             raise InputError(feed.failure)

@@ -50,14 +50,15 @@ def history(
     up: str,
     stream: Stream,
     curves: tuple[Curve, ...],
-    window: float,
+    window: float | None,
     *,
     scale: Scale = "linear",
     **options: Any,
 ) -> Any:
-    """Curves over the last `window` s; `up` is the label of their axis, with the unit."""
-    latest = DataRange1d(follow="end", follow_interval=window, range_padding=0.0)
-    found = plot(title, "time, s", up, ("linear", scale), x_range=latest, **options)
+    """Curves over the last `window` s, or all; `up` is the label of their axis, with the unit."""
+    latest: dict[str, Any] = {} if window is None else {"follow": "end", "follow_interval": window}
+    across = DataRange1d(range_padding=0.0, **latest)
+    found = plot(title, "time, s", up, ("linear", scale), x_range=across, **options)
     draw(found, stream, "t", curves)
     return found
 

@@ -15,11 +15,12 @@ from common.errors import InputError
 from common.plan import Plan, parse
 from common.recording.reader import Run, Values
 from common.recording.tail import Tail
-from common.roles import LATENCY, MASTER, RECORDER, SLAVE, latency_topic
+from common.roles import LATENCY, MASTER, RECORDER, SLAVE, kind_of, latency_topic
 from common.safety.modes import Mode
-from rths.live.trace import Trace
+from rths.live.trace import Trace, extremes, largest
 
 POINTS = 1000  # of a line: as many as a wide screen has columns for it
+POINTS_WHOLE = 5000  # of a line of a finished recording, which is sent once
 SILENT_NS = 2_000_000_000  # without anything new; the recorder writes twenty times a second
 EVENTS = 100
 EDGES = np.geomspace(50.0, 50_000.0, 61)  # µs, of the histogram's classes
@@ -61,13 +62,16 @@ NOTHING, NO_TIMING = Trace(1, 1), Timing()
 class Feed:
     """What the views show; `window` (s) is how long its traces reach back.
 
-    Several pages read it, each at its own pace; `changes` counts the looks that brought something,
-    `happened` all events.
+    Where that is the `whole` of a finished recording, what is left of each group of ticks are its extremes. Several
+    pages read it, each at its own pace; `changes` counts the looks that brought something, `happened` all events.
     """
 
-    def __init__(self, tail: Tail, window: float, clock: Clock, *, since_ns: int = 0) -> None:
+    def __init__(
+        self, tail: Tail, window: float, clock: Clock, *, since_ns: int = 0, whole: bool = False
+    ) -> None:
         self.path = tail.path
         self.window = window
+        self.whole = whole
         self.plan: Plan | None = None
         self.test = ""
         self.roles: tuple[str, ...] = (SLAVE,)
@@ -96,6 +100,12 @@ class Feed:
         except InputError as error:
             self.failure = str(error)
             return
+        self._show(run)
+        if self.ended:
+            for trace in self._traces.values():
+                trace.close()
+
+    def _show(self, run: Run) -> None:
         if run.metadata and self.plan is None and "plan" in run.metadata:
             self._plan_of(run)
         if not (run.events or any(run.has(topic) for topic in run.columns) or self._ramp(run)):
@@ -165,8 +175,11 @@ class Feed:
         """The trace of a topic of which something has come: of the latency the worst of each group of ticks."""
         if topic not in self._traces:
             ticks = self.window / (self.interval or Plan().test.interval)
-            step = max(math.ceil(ticks / POINTS), 1)
-            self._traces[topic] = Trace(step, POINTS, worst=topic.startswith(LATENCY))
+            kind, room = kind_of(topic), POINTS_WHOLE if self.whole else POINTS
+            thin = largest if kind == LATENCY else extremes if self.whole else None
+            most = 2 * len(SIGNALS[kind][1:]) if thin is extremes else 1  # points of a group
+            step = max(math.ceil((ticks + 1 if self.whole else ticks) * most / room), 1)
+            self._traces[topic] = Trace(step, room, thin)
         return self._traces[topic]
 
     # -- what is there ----------------------------------------------------------------------------

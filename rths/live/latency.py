@@ -21,7 +21,7 @@ LABEL = "round trip, µs"
 class Latency:
     """A plot over time and a histogram, the control interval marked in both."""
 
-    def __init__(self, streams: Streams, window: float) -> None:
+    def __init__(self, streams: Streams, window: float | None) -> None:
         curve = Curve("round_trip", "round trip", COLOURS[0], width=1.0)
         trips = history(
             "longest round trips (dashed: interval)",

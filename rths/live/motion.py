@@ -9,11 +9,10 @@ from rths.live.chart import Curve, draw, history, plot
 from rths.live.stream import Streams
 
 
-def motions(streams: Streams, window: float) -> dict[str, Any]:
-    """The plots of both laboratories by name."""
-    loop = plot(
-        f"column: hysteresis of the last {window:g} s", "displacement, mm", "force, kN", ("linear", "linear")
-    )
+def motions(streams: Streams, window: float | None) -> dict[str, Any]:
+    """The plots of both laboratories by name, of the last `window` s, or of the whole test."""
+    part = "" if window is None else f" of the last {window:g} s"
+    loop = plot(f"column: hysteresis{part}", "displacement, mm", "force, kN", ("linear", "linear"))
     draw(
         loop,
         streams.master,

@@ -61,8 +61,9 @@ class Page:
         self._feed = feed
         self.streams = Streams()
         self.status = Status()
-        self.latency = Latency(self.streams, feed.window)
-        self.plots = motions(self.streams, feed.window) | self.latency.parts
+        window = None if feed.whole else feed.window
+        self.latency = Latency(self.streams, window)
+        self.plots = motions(self.streams, window) | self.latency.parts
         self._heading = Div(sizing_mode="stretch_width", name="heading")
         self._parting = parting(feed)
         self.slave = Select(title="slave", options=[], visible=False, width=200, name="slave")

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import base64
-import html
 import io
-from collections.abc import Iterable, Sequence
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 from rths.figure import COLOURS, figure
+from rths.page import data_uri, frame, render
 from rths.trial.measures import (
     Bin,
     Matrix,
-    Measure,
     by_size,
     confusion,
     confusion_by_site,
@@ -21,55 +19,40 @@ from rths.trial.measures import (
 )
 from rths.trial.scoring import VISIBLE, Outcome
 
-STYLE = """
-body { font: 15px/1.45 system-ui, sans-serif; max-width: 72rem; margin: 2rem auto; padding: 0 1rem; color: #222; }
-table { border-collapse: collapse; width: 100%; font-size: 13px; }
-th, td { text-align: left; vertical-align: top; padding: .35rem .5rem; border-bottom: 1px solid #ccc; }
-.pass { color: #00694b; font-weight: 600; } .fail { color: #b33000; font-weight: 600; }
-small { color: #555; } figure { margin: 2rem 0; break-inside: avoid; } img { max-width: 100%; }
-figcaption { font-size: 13px; color: #444; }
-"""
-WORDS = {True: '<span class="pass">pass</span>', False: '<span class="fail">fail</span>', None: ""}
+TITLE = "Blind trial of the diagnosis"
+CASE = ("case", "kind", "truth", "size", "verdict", "probability", "why")
+INCH = 96  # CSS pixels
+
+
+class Image(NamedTuple):
+    """A figure of the page: an address that holds it, CSS pixels, caption."""
+
+    source: str
+    size: tuple[int, int]
+    caption: str
 
 
 def page(outcomes: Sequence[Outcome], about: str) -> str:
     """The page's text; `about` says how the cases were made."""
     wrong = [item for item in outcomes if not item.right]
-    return f"""<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><title>Blind trial of the diagnosis</title><style>{STYLE}</style></head>
-<body><h1>Blind trial of the diagnosis</h1>
-<p>{html.escape(about)} The process that diagnosed was given the recordings only.
-{len(outcomes) - len(wrong)} of {len(outcomes)} cases right. Brackets: Wilson 95 % interval of a share, range of the
-middle 80 % of anything else.</p>
-{table(("measure", "value", "cases", "goal", ""), map(row, measures(outcomes)))}
-{pictures(outcomes)}
-<h2>Cases that are not right</h2>
-{table(("case", "kind", "truth", "size", "verdict", "probability", "why"), map(case_row, wrong))}
-</body></html>
-"""
-
-
-def table(heads: Iterable[str], rows: Iterable[str]) -> str:
-    """A table of ready rows."""
-    head = "".join(f"<th>{html.escape(text)}</th>" for text in heads)
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
-
-
-def cells(texts: Iterable[str]) -> str:
-    """Texts as the cells of a row."""
-    return "".join(f"<td>{html.escape(text)}</td>" for text in texts)
-
-
-def row(item: Measure) -> str:
-    """One measure."""
-    return (
-        f"<tr>{cells((item.name, item.text, str(item.count), item.goal))}<td>{WORDS[item.passed]}</td></tr>\n"
+    body = render(
+        "blind.html",
+        title=TITLE,
+        about=about,
+        right=len(outcomes) - len(wrong),
+        count=len(outcomes),
+        measures=measures(outcomes),
+        matrices=matrices(outcomes),
+        curves=curves(outcomes),
+        names=CASE,
+        wrong=[case(item) for item in wrong],
     )
+    return frame(TITLE, body)
 
 
-def case_row(item: Outcome) -> str:
-    """One case that is not right."""
-    texts = (
+def case(item: Outcome) -> tuple[str, ...]:
+    """The cells of a case that is not right."""
+    return (
         str(item.index),
         item.kind,
         hidden(item),
@@ -78,7 +61,6 @@ def case_row(item: Outcome) -> str:
         number(item.probability),
         item.why,
     )
-    return f"<tr>{cells(texts)}</tr>\n"
 
 
 def hidden(item: Outcome) -> str:
@@ -95,25 +77,34 @@ def number(value: float) -> str:
     return "–" if value != value else f"{value:.3g}"  # noqa: PLR0124 - NaN is not itself
 
 
-def pictures(outcomes: Sequence[Outcome]) -> str:
-    """All figures."""
-    drawn = (
-        (draw_matrix(confusion_by_site(outcomes)), "Sites: truth down, first site of the diagnosis across."),
-        (draw_matrix(confusion(outcomes)), "Effects: truth down, verdict across; single effects only."),
-        (draw_sizes(by_size(outcomes)), "Right verdicts on single effects against residual to noise."),
-        (draw_reliability(reliability(outcomes)), "Right verdicts against the probability that they state."),
-    )
-    return "\n".join(picture(data, caption) for data, caption in drawn)
+def matrices(outcomes: Sequence[Outcome]) -> list[Image]:
+    """What the diagnosis said against what was hidden."""
+    sites = draw_matrix(confusion_by_site(outcomes))
+    effects = draw_matrix(confusion(outcomes))
+    return [
+        image(sites, "Sites: truth down, first site of the diagnosis across."),
+        image(effects, "Effects: truth down, verdict across; single effects only."),
+    ]
 
 
-def picture(data: bytes, caption: str) -> str:
-    """One figure with its caption."""
-    text = html.escape(caption)
-    image = f'<img alt="{text}" src="data:image/png;base64,{base64.b64encode(data).decode()}">'
-    return f"<figure>{image}<figcaption>{text}</figcaption></figure>"
+def curves(outcomes: Sequence[Outcome]) -> list[Image]:
+    """How often the diagnosis is right."""
+    sizes, stated = draw_sizes(by_size(outcomes)), draw_reliability(reliability(outcomes))
+    return [
+        image(sizes, "Right verdicts on single effects against residual to noise."),
+        image(stated, "Right verdicts against the probability that they state."),
+    ]
 
 
-def draw_matrix(matrix: Matrix) -> bytes:
+def image(canvas: Any, caption: str) -> Image:
+    """A figure as it stands inside the page, in the size in which it was drawn."""
+    buffer = io.BytesIO()
+    canvas.savefig(buffer, format="png")
+    width, height = (round(INCH * inches) for inches in canvas.get_size_inches())
+    return Image(data_uri(buffer.getvalue()), (width, height), caption)
+
+
+def draw_matrix(matrix: Matrix) -> Any:
     """A confusion matrix: shares of each row as shades, counts as numbers."""
     import numpy as np
 
@@ -135,22 +126,22 @@ def draw_matrix(matrix: Matrix) -> bytes:
     axis.set_xticks(range(len(verdicts)), verdicts, rotation=90, fontsize=7)
     axis.set_yticks(range(len(truths)), truths, fontsize=7)
     axis.set(xlabel="diagnosis", ylabel="truth")
-    return as_png(canvas)
+    return canvas
 
 
-def draw_sizes(bins: Sequence[Bin]) -> bytes:
+def draw_sizes(bins: Sequence[Bin]) -> Any:
     """Accuracy against size."""
-    canvas = figure(6.0, 3.2)
+    canvas = figure(4.2, 3.6)
     axis = canvas.subplots()
     shares(axis, bins)
     axis.axvline(VISIBLE, color="0.4", linestyle=":", label="size from which an effect counts")
     axis.set(xscale="symlog", xlabel="residual to noise", ylabel="right effect first", ylim=(-0.06, 1.05))
     axis.set_xlim(left=-0.1)
     axis.legend(loc="center right")
-    return as_png(canvas)
+    return canvas
 
 
-def draw_reliability(bins: Sequence[Bin]) -> bytes:
+def draw_reliability(bins: Sequence[Bin]) -> Any:
     """Stated against observed probability."""
     canvas = figure(4.2, 4.0)
     axis = canvas.subplots()
@@ -158,7 +149,7 @@ def draw_reliability(bins: Sequence[Bin]) -> bytes:
     shares(axis, bins)
     axis.set(xlabel="probability stated", ylabel="share right", xlim=(0.0, 1.02), ylim=(-0.03, 1.05))
     axis.legend(loc="upper left")
-    return as_png(canvas)
+    return canvas
 
 
 def shares(axis: Any, bins: Sequence[Bin]) -> None:
@@ -171,10 +162,3 @@ def shares(axis: Any, bins: Sequence[Bin]) -> None:
     axis.plot(
         [item.middle for item in bins], [item.share for item in bins], "o", color=COLOURS[0], markersize=4
     )
-
-
-def as_png(canvas: Any) -> bytes:
-    """A figure as a picture."""
-    buffer = io.BytesIO()
-    canvas.savefig(buffer, format="png")
-    return buffer.getvalue()

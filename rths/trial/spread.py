@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+import signal
 from collections.abc import Callable, Iterator, Sequence
+from multiprocessing import resource_tracker
 from typing import Any, TypeVar
 
 from common.errors import InputError
@@ -28,7 +30,22 @@ def spread(
     with _backend(joblib, jobs, dask):
         tasks = (joblib.delayed(function)(item) for item in items)
         mode = "generator" if dask else "generator_unordered"
-        yield from joblib.Parallel(n_jobs=-1 if dask else jobs, return_as=mode)(tasks)
+        with uninterrupted():  # the workers start here
+            results = joblib.Parallel(n_jobs=-1 if dask else jobs, return_as=mode)(tasks)
+        yield from results
+
+
+@contextlib.contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Ctrl-C waits for the end of the block; a process that starts within never hears it: who started it ends it."""
+    if not hasattr(signal, "pthread_sigmask"):  # not POSIX
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def needed(package: str, option: str) -> Any:
@@ -44,11 +61,14 @@ def needed(package: str, option: str) -> Any:
 def _backend(joblib: Any, jobs: int, dask: str) -> Iterator[None]:
     if not dask:
         loky = importlib.import_module("joblib.externals.loky")
+        resource_tracker.ensure_running()  # before the workers, because its start lets signals through again
+        done = False
         try:
             with joblib.parallel_config(backend="loky", n_jobs=jobs, inner_max_num_threads=1):
                 yield
-        finally:
-            loky.get_reusable_executor().shutdown(wait=True)  # it would wait for more work
+            done = True
+        finally:  # it would wait for more work, and for the end of what nobody wants any more
+            loky.get_reusable_executor().shutdown(wait=True, kill_workers=not done)
         return
     distributed = needed("dask.distributed", "--dask")
     try:

@@ -160,7 +160,9 @@ def test_it_runs_as_a_module_and_imports_next_to_nothing() -> None:
     heavy = {"numpy", "typing", "subprocess", "asyncio"}
     text = f"import sys, common.bare_loop; print(sorted(set(sys.modules) & {heavy}))"
     environment = {"PYTHONPATH": str(ROOT)}
-    bare = subprocess.run([sys.executable, "-S", "-c", text], capture_output=True, text=True, env=environment)
+    bare = subprocess.run(
+        [sys.executable, "-S", "-c", text], capture_output=True, text=True, env=environment, timeout=60
+    )
     assert bare.stdout == "[]\n"
     done = subprocess.run(
         [sys.executable, "-m", "common.bare_loop", "1000000"],
@@ -168,12 +170,17 @@ def test_it_runs_as_a_module_and_imports_next_to_nothing() -> None:
         capture_output=True,
         text=True,
         env=environment,
+        timeout=60,
     )
     ready, line = done.stdout.splitlines()
     assert ready == "ready"
     assert json.loads(line)["interval"] == 0.001
     refused = subprocess.run(
-        [sys.executable, "-m", "common.bare_loop", "5"], capture_output=True, text=True, env=environment
+        [sys.executable, "-m", "common.bare_loop", "5"],
+        capture_output=True,
+        text=True,
+        env=environment,
+        timeout=60,
     )
     assert refused.returncode == 2
     assert "is too short" in refused.stderr

@@ -345,7 +345,8 @@ def test_no_rejection_is_lost_between_threads() -> None:
     for second in range(100):
         told += found.news(second * NEWS_NS) is not None
     for thread in threads:
-        thread.join()
+        thread.join(10.0)
+    assert not any(thread.is_alive() for thread in threads)
     found.news(1_000 * NEWS_NS)
     assert found.counts["check"] == 8_000
 

@@ -49,7 +49,8 @@ def test_nothing_is_lost_between_several_producers_and_a_consumer() -> None:
         got += inbox.get(0.01) is not None
     assert got == 3 * each
     for producer in producers:
-        producer.join()
+        producer.join(10.0)
+    assert not any(producer.is_alive() for producer in producers)
 
 
 def test_a_signal_does_not_make_it_wait_for_ever() -> None:

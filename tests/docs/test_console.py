@@ -45,6 +45,10 @@ def test_lines_of_progress_are_those_of_a_slow_machine(tmp_path: Path) -> None:
     assert page(tmp_path, shown(f"$ printf '{lines}' >&2", "one", "broken: 3 m")) == []
 
 
+def test_a_line_of_progress_takes_its_empty_line_along(tmp_path: Path) -> None:
+    assert page(tmp_path, shown("$ printf 'diagnosing: 9 s\\n\\nfound\\n'", "found")) == []
+
+
 def test_a_command_that_fails_needs_its_exit_code_shown(tmp_path: Path) -> None:
     (complaint,) = page(tmp_path, shown("$ false"))
     assert "failed with 1" in complaint

@@ -106,7 +106,7 @@ def test_a_slow_disk_costs_drops_never_time(tmp_path: Path) -> None:
     write = sink.put
 
     def slow(items: list[Any]) -> None:
-        gate.wait()
+        assert gate.wait(60.0)
         write(items)
 
     sink.put = slow  # type: ignore[method-assign]
@@ -168,13 +168,14 @@ def test_a_disk_that_hangs_does_not_keep_the_recorder_for_ever(tmp_path: Path, m
     monkeypatch.setattr("recorder.sink.CLOSE_S", 0.2)
     gate = threading.Event()
     sink = FileSink(recording(tmp_path), MonotonicClock())
-    monkeypatch.setattr(sink, "put", lambda _: gate.wait())
+    monkeypatch.setattr(sink, "put", lambda _: gate.wait(60.0))
     threaded = ThreadedSink(sink)
     threaded.put([ITEM])
     threaded.close({}, {})
     assert threaded.failure == "the disk has not taken the last 1 samples within 0.2 s."
     gate.set()
-    threaded._thread.join()
+    threaded._thread.join(10.0)
+    assert not threaded._thread.is_alive()
     sink._recording.abandon()
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -20,6 +19,7 @@ from common.plan import Plan
 from common.zenoh_link import listenable
 from rths import virtual
 from tests.helpers import PATIENT, ROOT
+from tests.processes import environment, tied
 
 SESSION = 0x1D3A_57C9_E2B4_6F81  # no run of its bytes comes about by chance
 
@@ -88,10 +88,10 @@ def test_the_processes_say_nothing_of_their_session(tmp_path: Path, as_json: boo
     }
     processes = [
         subprocess.Popen(
-            [sys.executable, str(tmp_path / "draw.py"), module, str(path), *more, *options],
+            tied(sys.executable, tmp_path / "draw.py", module, path, *more, *options),
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
-            env={**os.environ, "PYTHONPATH": str(ROOT)},
+            env=environment(),
             cwd=ROOT,
         )
         for module, more in words.items()

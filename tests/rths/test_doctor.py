@@ -173,7 +173,7 @@ def test_rivals_are_programs_with_a_priority(tmp_path: Path, monkeypatch: pytest
 
 @pytest.mark.parametrize("option", [("--seconds", "1"), ("--interval", "0"), ("--seconds", "nan")])
 def test_times_that_cannot_be_used_are_refused(option: tuple[str, str]) -> None:
-    done = subprocess.run([*RTHS, *option], capture_output=True, text=True, env=ENVIRONMENT)
+    done = subprocess.run([*RTHS, *option], capture_output=True, text=True, env=ENVIRONMENT, timeout=60)
     assert done.returncode == 2
     assert "cannot be used" in done.stderr
     assert "Traceback" not in done.stderr

@@ -27,9 +27,11 @@ from common.roles import latency_topic, ramp_topic
 from common.signals import Kind
 from rths import layout, virtual
 from tests.helpers import ROOT
+from tests.processes import finished
 from tests.rths import extremes
 
 SCRIPTS = ROOT / "tests/javascript"
+INSTALL_S = 240.0
 KINDS = ("one slave", "two slaves", "extremes", "killed and recovered")
 
 
@@ -110,9 +112,7 @@ def javascript(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., list[A
     (folder / "node_modules").symlink_to(installed(npm) / "node_modules")
 
     def run(script: str, *words: Path) -> list[Any]:
-        done = subprocess.run(
-            [node, folder / script, *words], capture_output=True, text=True, encoding="utf-8", timeout=300
-        )
+        done = finished(node, folder / script, *words, seconds=120.0)
         assert done.returncode == 0, done.stderr[-2000:]
         return [json.loads(line) for line in done.stdout.splitlines()]
 
@@ -129,7 +129,11 @@ def installed(npm: str) -> Path:
     growing.mkdir(parents=True, exist_ok=True)
     for name in ("package.json", "package-lock.json", ".npmrc"):
         shutil.copy(SCRIPTS / name, growing)
-    done = subprocess.run([npm, "ci"], cwd=growing, capture_output=True, text=True, timeout=300)
+    try:
+        done = finished(npm, "ci", seconds=INSTALL_S, cwd=growing)
+    except subprocess.TimeoutExpired:
+        shutil.rmtree(growing)
+        pytest.skip(f"npm has not got its packages within {INSTALL_S:g} s")
     assert "EUSAGE" not in done.stderr, done.stderr  # the lock does not fit the package file
     if done.returncode:
         shutil.rmtree(growing)

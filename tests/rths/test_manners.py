@@ -20,6 +20,7 @@ from common.errors import EXIT_CODES, RthsError
 from common.recording.writer import Recording
 from rths.__main__ import EXAMPLES, VERBS, main, parser_for
 from tests.helpers import ROOT
+from tests.processes import environment, finished
 
 Call = Callable[..., int]
 SILENT = ("completion",)  # verbs that report nothing: what they write is for a shell
@@ -208,6 +209,15 @@ def test_ctrl_c_is_one_sentence_and_exit_code_3(line: str) -> None:
     assert rest.endswith("rths: stopped by the user.\n")
     assert "Traceback" not in rest
     assert process.returncode == 3
+
+
+def test_ctrl_c_within_code_that_is_made_as_it_goes_keeps_its_exit_code(tmp_path: Path) -> None:
+    text = "import os, signal, time; os.kill(os.getpid(), signal.SIGINT); time.sleep(60)"
+    program = f"import sys; from common.cli import guarded; sys.exit(guarded(lambda: exec({text!r})))"
+    (tmp_path / "made.py").write_text(program)
+    own = environment(PYTHONPATH=f"{tmp_path}{os.pathsep}{ROOT}")
+    done = finished(sys.executable, "-m", "made", seconds=60.0, env=own)
+    assert (done.returncode, done.stdout, done.stderr) == (3, "", "rths: stopped by the user.\n")
 
 
 @pytest.mark.parametrize(

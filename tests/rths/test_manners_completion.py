@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
+import select
 import shutil
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
 
+from common.errors import InputError
 from rths.__main__ import VERBS, parser_for
 from rths.completion import SHELLS, script
 from tests.helpers import ROOT
+from tests.processes import finished
 
 SLOW = ("numba", "scipy", "matplotlib", "zenoh")
 ASKED = {
@@ -29,6 +35,7 @@ ASKED = {
     "diagnose a.mcap --validate ": ["a.mcap", "other"],
     "completion ": sorted(SHELLS),
     "keys ": ["other"],
+    "inspect --j": ["--json"],
 }
 
 
@@ -61,12 +68,97 @@ def test_bash_completes_verbs_options_choices_plans_and_files(folder: Path) -> N
     assert done.stderr == ""
 
 
-@pytest.mark.parametrize("shell", ["zsh", "fish"])
-def test_other_shells_take_their_script(shell: str, folder: Path) -> None:
+def need(shell: str) -> None:
     if shutil.which(shell) is None:
-        pytest.skip(f"{shell} is not installed here")
-    done = subprocess.run([shell, "-n", f".{shell}"], cwd=folder, capture_output=True, text=True, timeout=60)
-    assert (done.returncode, done.stderr) == (0, "")
+        pytest.skip(f"{shell} is not installed here (Debian: {shell})")
+
+
+# an interactive zsh that asks its own line editor, and writes down what that is given to choose from
+ZSHRC = """
+autoload -Uz compinit && compinit -u -D
+READ
+print -r -- $_comps[rths] > .answers
+compadd() {
+  if (( ! ${argv[(I)-[OAD]]} )); then
+    local -a fitting
+    builtin compadd -A fitting "$@"
+    print -rn -- "${(j: :)fitting} " >> .answers
+  fi
+  builtin compadd "$@"
+}
+zle-line-init() {
+  local words
+  for words in ${(f)"$(<.asked)"}; do
+    BUFFER="rths $words" CURSOR=$(( $#words + 5 ))
+    zle list-choices
+    print >> .answers
+  done
+  exit
+}
+zle -N zle-line-init
+"""
+
+
+@pytest.mark.parametrize(
+    "way", ["source ./.zsh", 'eval "$(<.zsh)"', "fpath=($PWD/.found $fpath) && compinit -u -D"]
+)
+def test_zsh_completes_verbs_options_choices_plans_and_files(way: str, folder: Path) -> None:
+    need("zsh")
+    (folder / ".asked").write_text("\n".join(ASKED) + "\n")
+    (folder / ".zshrc").write_text(ZSHRC.replace("READ", way))
+    (folder / ".found").mkdir()
+    shutil.copy(folder / ".zsh", folder / ".found/_rths")
+    said = on_a_terminal(["zsh", "-d", "-i"], folder)
+    registered, *answers = (folder / ".answers").read_text().splitlines()
+    assert registered.endswith("_rths"), said
+    found = [sorted(set(answer.split())) for answer in answers]
+    wanted = [sorted(word.removeprefix("other/") for word in words) for words in ASKED.values()]
+    assert dict(zip(ASKED, found, strict=True)) == dict(zip(ASKED, wanted, strict=True)), said
+
+
+def on_a_terminal(command: list[str], folder: Path) -> str:
+    """What an interactive shell prints on a terminal of its own, which is closed when the shell has had its time."""
+    ours, its = os.openpty()
+    own = {**os.environ, "ZDOTDIR": str(folder), "HOME": str(folder), "TERM": "dumb"}
+    try:
+        process = subprocess.Popen(
+            command, stdin=its, stdout=its, stderr=its, env=own, cwd=folder, start_new_session=True
+        )
+    finally:
+        os.close(its)
+    said, deadline = b"", time.monotonic() + 60.0
+    try:
+        while process.poll() is None:
+            assert time.monotonic() < deadline, said
+            if select.select([ours], [], [], 0.1)[0]:
+                with contextlib.suppress(OSError):  # the other end is closed
+                    said += os.read(ours, 65536)
+        return said.decode(errors="replace")
+    finally:
+        os.close(ours)
+        process.kill()
+        process.wait()
+
+
+def test_fish_completes_verbs_options_choices_plans_and_files(folder: Path) -> None:
+    need("fish")
+    lines = ["source .fish", *(f"complete -C 'rths {words}'; echo ==" for words in ASKED)]
+    homes = dict.fromkeys(("HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME"), str(folder / ".home"))
+    done = finished(
+        "fish", "--no-config", "-c", "\n".join(lines), seconds=60.0, cwd=folder, env={**os.environ, **homes}
+    )
+    answers = [
+        sorted(line.partition("\t")[0].rstrip("/") for line in answer.splitlines())
+        for answer in done.stdout.split("==\n")[:-1]
+    ]
+    assert dict(zip(ASKED, answers, strict=True)) == {words: sorted(found) for words, found in ASKED.items()}
+    assert done.stderr == ""
+
+
+def test_another_shtab_is_refused_in_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("shtab.complete", lambda *_: "compdef _rths rths")
+    with pytest.raises(InputError, match=r"install that of requirements\.lock"):
+        script("zsh")
 
 
 @pytest.mark.parametrize("shell", SHELLS)

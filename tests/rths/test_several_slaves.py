@@ -159,6 +159,32 @@ def test_a_simulation_beyond_a_limit_is_exit_code_1(call: Any, capsys: Any, plan
     assert "beyond its limit" in json.loads(capsys.readouterr().out)["beyond_limit"]
 
 
+@pytest.mark.parametrize("part", ["column", "actuator"])
+def test_bench_refuses_a_slaves_name_for_what_is_the_masters(
+    part: str, call: Any, capsys: Any, plan_file: Path, tmp_path: Path
+) -> None:
+    assert call("bench", part, plan_file, "--name", "cellar", "-o", tmp_path / "a.mcap") == 2
+    assert capsys.readouterr().err == f"rths: The {part} is the master's: leave out --name cellar.\n"
+    assert not (tmp_path / "a.mcap").exists()
+
+
+@pytest.mark.parametrize(
+    ("table", "place"),
+    [("slave.cellar.table.compensator", "slave.cellar.table.compensator"), ("table.compensator",) * 2],
+)
+@pytest.mark.parametrize("verb", ["run --virtual", "simulate", "bench table --name cellar --compensated"])
+def test_an_unknown_compensator_is_named_with_the_table_that_holds_it(
+    verb: str, table: str, place: str, call: Any, capsys: Any, tmp_path: Path
+) -> None:
+    wrong = tmp_path / "wrong.toml"
+    wrong.write_text(f"[slave.roof.rig]\n[slave.cellar.rig]\n[{table}]\nkind = 'taylr'\n")
+    name, *options = verb.split()
+    part = [options.pop(0)] if name == "bench" else []
+    assert call(name, *part, wrong, *options, "-o", tmp_path / "a.mcap") == 2
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert said == f"rths: Unknown compensator 'taylr' in [{place}]: did you mean taylor?"
+
+
 def test_bench_wants_a_slaves_name_for_its_parts_and_identify_finds_them_again(
     call: Any, capsys: Any, plan_file: Path, recording: Path, tmp_path: Path
 ) -> None:

@@ -8,19 +8,19 @@ import subprocess
 import pytest
 
 from tests.helpers import ROOT
+from tests.processes import finished
 
 SKIPPED = 77
 
 
+@pytest.mark.timeout(960)
 def test_the_services_leave_a_whole_recording() -> None:
     if (
         shutil.which("docker") is None
-        or subprocess.run(["docker", "info"], capture_output=True).returncode != 0
+        or subprocess.run(["docker", "info"], capture_output=True, timeout=60).returncode != 0
     ):
         pytest.skip("no container engine runs here: see tests/system/compose_check.sh --start-engine")
-    check = subprocess.run(
-        [ROOT / "tests" / "system" / "compose_check.sh"], capture_output=True, text=True, timeout=900
-    )
+    check = finished(ROOT / "tests" / "system" / "compose_check.sh", seconds=900.0)
     if check.returncode == SKIPPED:
         pytest.skip(check.stdout.strip().splitlines()[-1])
     assert check.returncode == 0, check.stdout + check.stderr

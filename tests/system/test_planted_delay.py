@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import shutil
 import socket
 import subprocess
@@ -19,12 +18,14 @@ import pytest
 
 from common.recording.reader import read
 from common.zenoh_link import listenable
-from tests.helpers import ROOT, patient
+from tests.helpers import patient
+from tests.processes import environment, tied
 
 PLANTED = 0.003
 SECONDS, SINCE = 8, 4.0  # s of test, and from when on the delay is there
 CLOSE = 0.2e-3  # s
 ATTEMPTS = 4
+REACH_S = 60.0
 APART = ["unshare", "--time", "--monotonic", "1"]
 
 
@@ -51,9 +52,13 @@ class DelayingRelay:
 
     def _reach(self) -> socket.socket:
         """The listener, which may not be there yet."""
+        deadline = time.monotonic() + REACH_S
         while True:
-            with contextlib.suppress(ConnectionRefusedError):
+            try:
                 return socket.create_connection(("127.0.0.1", self._to))
+            except ConnectionRefusedError:
+                if time.monotonic() > deadline:
+                    raise
             time.sleep(0.05)
 
     def _take(self, way: str, source: socket.socket, queue: SimpleQueue[tuple[float, bytes]]) -> None:
@@ -80,17 +85,20 @@ class DelayingRelay:
 
 def start(*words: str | Path, before: list[str] | None = None) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [*(before or []), sys.executable, "-m", "rths", *map(str, words)],
+        tied(*(before or []), sys.executable, "-m", "rths", *words),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        env=environment(),
     )
 
 
 @pytest.fixture
 def time_namespaces() -> None:
-    if shutil.which("unshare") is None or subprocess.run([*APART, "true"], capture_output=True).returncode:
+    if (
+        shutil.which("unshare") is None
+        or subprocess.run([*APART, "true"], capture_output=True, timeout=30).returncode
+    ):
         pytest.skip("time namespaces are not allowed here")
 
 
@@ -124,13 +132,19 @@ def medians(folder: Path, way: str, names: Sequence[str]) -> dict[str, tuple[flo
     relay = DelayingRelay(int(listen.rpartition(":")[2]), way)
     recorder = start("record", *words, "--connect", listen, "-o", path)
     slave = start("slave", *words, "--connect", f"tcp/127.0.0.1:{relay.port}", before=APART)
-    assert master.stdout is not None
-    for line in master.stdout:
-        if '"running"' in line or '"progress"' in line:
-            relay.slow_from = time.monotonic() + SINCE
-            break
-    errors = [process.communicate(timeout=60)[1] for process in (master, slave, recorder)]
-    assert [process.returncode for process in (master, slave, recorder)] == [0, 0, 0], errors
+    processes = (master, slave, recorder)
+    try:
+        assert master.stdout is not None
+        for line in master.stdout:
+            if '"running"' in line or '"progress"' in line:
+                relay.slow_from = time.monotonic() + SINCE
+                break
+        errors = [process.communicate(timeout=60)[1] for process in processes]
+    finally:
+        for process in processes:
+            process.kill()
+            process.communicate()
+    assert [process.returncode for process in processes] == [0, 0, 0], errors
     latency = read(path).columns["latency"]
     t = latency["seq"] * 0.002
     before, after = (t > 1.0) & (t < SINCE - 0.5), t > SINCE + 0.5

@@ -22,19 +22,16 @@ from common import reality
 from common.plan import Plan
 from common.recording.reader import Run, read
 from rths import virtual
-from tests.helpers import PATIENT, ROOT, SLOW, patient
+from tests.helpers import PATIENT, SLOW, patient
+from tests.processes import environment, tied
 
 RTHS = [sys.executable, "-m", "rths"]
 TIMES = ("wake_lateness", "compute_time", "clock_offset", "clock_offset_bound")
 
 
-def environment() -> dict[str, str]:
-    return {**os.environ, "PYTHONPATH": str(ROOT)}
-
-
 def start(*words: str | Path, module: str = "rths", **options: Any) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [sys.executable, "-m", module, *map(str, words)],
+        tied(sys.executable, "-m", module, *words),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

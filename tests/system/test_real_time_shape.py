@@ -14,14 +14,14 @@ import pytest
 from common.realtime import PRIORITY
 from common.recording.reader import MACHINES, read
 from common.zenoh_link import listenable
-from tests.helpers import ROOT
+from tests.processes import environment, tied
 
 RTHS = [sys.executable, "-m", "rths"]
-ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT)}
 ALLOWED = subprocess.run(
     [sys.executable, "-c", f"import os; os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param({PRIORITY}))"],
     capture_output=True,
     check=False,
+    timeout=30,
 )
 fifo = pytest.mark.skipif(
     ALLOWED.returncode != 0, reason="real-time priority is not allowed here: run as root"
@@ -31,7 +31,7 @@ fifo = pytest.mark.skipif(
 def machines(path: Path, *words: str) -> dict[str, str]:
     """What the recording of a short test says of its machines."""
     command = [*RTHS, "run", "--duration", "1", *words, "-o", str(path)]
-    subprocess.run(command, cwd=path.parent, env=ENVIRONMENT, check=True, capture_output=True, timeout=90)
+    subprocess.run(command, cwd=path.parent, env=environment(), check=True, capture_output=True, timeout=90)
     return read(path).metadata.get(MACHINES, {})
 
 
@@ -74,7 +74,9 @@ def test_the_threads_of_the_link_inherit_the_priority() -> None:
     listen = listenable()
     laboratories = [
         subprocess.Popen(
-            [*RTHS, role, "default", option, listen, "--rt", "on"], env=ENVIRONMENT, stderr=subprocess.DEVNULL
+            tied(*RTHS, role, "default", option, listen, "--rt", "on"),
+            env=environment(),
+            stderr=subprocess.DEVNULL,
         )
         for role, option in (("master", "--listen"), ("slave", "--connect"))
     ]  # they wait for a recorder

@@ -13,6 +13,7 @@ import pytest
 from benchmarks.cable import ADDRESSES, NoCableError, cable, ip
 from common.recording.reader import read
 from tests.helpers import PATIENT, ROOT, patient
+from tests.processes import environment, tied
 
 ADDRESS_A, ADDRESS_B = ADDRESSES
 
@@ -29,11 +30,11 @@ def machines() -> Iterator[tuple[str, str]]:
 
 def start(machine: str, *words: str | Path) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        ["ip", "netns", "exec", machine, sys.executable, "-m", "rths", *map(str, words)],
+        tied("ip", "netns", "exec", machine, sys.executable, "-m", "rths", *words),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        env=environment(),
     )
 
 

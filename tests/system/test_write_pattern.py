@@ -128,7 +128,7 @@ def write_write_read(count: int) -> list[float]:
 
     threading.Thread(target=serve, daemon=True).start()
     found = []
-    with socket.create_connection(server.getsockname()) as asking:
+    with socket.create_connection(server.getsockname(), timeout=10.0) as asking:
         for _ in range(count):
             began = time.monotonic()
             asking.sendall(b"a")

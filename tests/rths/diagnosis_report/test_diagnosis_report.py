@@ -9,7 +9,8 @@ from typing import Any
 
 import pytest
 
-from rths.diagnosis_report import pictures, wording
+from models.effects import CATALOGUE
+from rths.diagnosis_report import pictures, which, wording
 from rths.diagnosis_report.page import page, write
 from rths.diagnosis_report.schema import schema
 from rths.diagnosis_report.terminal import summary
@@ -268,6 +269,28 @@ def test_quantities_read_as_in_the_field() -> None:
     assert percent_interval([None, 0.95]) == ""
     assert [times(14.2), times(1.6), times(None)] == ["14×", "1.6×", "–"]
     assert span([2.1, 9.8], "s") == "2.1–9.8 s"
+
+
+def candidate(*names: str) -> dict[str, Any]:
+    values = {
+        name: {one.name: {"value": 1.0, "unit": one.unit} for one in CATALOGUE[name].parameters}
+        for name in names
+    }
+    return {"effects": list(names), "parameters": values, "probability": 0.5}
+
+
+@pytest.mark.parametrize("others", [(), ("damper.friction",)])
+def test_no_word_of_an_effect_is_said_twice(others: tuple[str, ...]) -> None:
+    for name in CATALOGUE:
+        report = fresh("explained") | {"which": [candidate(name, *others)]}
+        lines = summary(report).splitlines()
+        first = next(place for place, line in enumerate(lines) if line.startswith("which"))
+        last = next(place for place, line in enumerate(lines) if place > first and not line.startswith(" "))
+        said = " ".join(" ".join(lines[first:last]).split())
+        assert not re.search(r"\b([a-z]{2,})\W+\1\b", said), said
+        assert all(wording.effect(each) in said for each in (name, *others))
+        shown = re.sub(r"<[^>]*>", "|", which.parameters(report["which"][0]))
+        assert not re.search(r"\b([a-z]{2,})\W+\1\b", shown), shown
 
 
 def test_names_become_words() -> None:

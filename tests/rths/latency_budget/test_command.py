@@ -110,4 +110,4 @@ def test_a_closed_pipe_changes_no_exit_code(short_plan: Plan, tmp_path: Path) ->
     process.stdout.close()
     with process.stderr as stream:
         assert stream.read() == b""
-    assert process.wait() == 1
+    assert process.wait(60.0) == 1

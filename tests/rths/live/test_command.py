@@ -10,7 +10,9 @@ from typing import Any
 
 import pytest
 
+from common.recording.tail import length
 from rths.__main__ import main
+from rths.live.feed import Feed
 from tests.helpers import ROOT
 
 
@@ -45,6 +47,43 @@ def test_what_is_no_recording_is_said_before_anything_is_served(
     monkeypatch.setattr(signal, "signal", lambda *_: None)
     assert rths(monkeypatch, "live", path, "--no-browser") == 2
     assert "is no MCAP recording" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("options", "whole", "window"),
+    [((), True, 4.5), (("--window", "2"), False, 2.0), (("--wait",), False, 10.0)],
+)
+def test_a_finished_recording_is_shown_whole_unless_a_window_is_given(
+    options: tuple[str, ...], whole: bool, window: float, virtual_recording: Path, monkeypatch: Any
+) -> None:
+    shown: list[Feed] = []
+
+    class Server:
+        url = "nowhere"
+
+        def __init__(self, feed: Feed, _port: int, _rate: float) -> None:
+            shown.append(feed)
+
+        def run(self, _stopping: object, *, leave: bool) -> None:
+            assert not leave
+
+    monkeypatch.setattr("os.nice", lambda _more: 0)
+    monkeypatch.setattr(signal, "signal", lambda *_: None)
+    monkeypatch.setattr("rths.live.server.Server", Server)
+    assert rths(monkeypatch, "live", virtual_recording, "--no-browser", *options) == 0
+    assert [feed.whole for feed in shown] == [whole]
+    assert shown[0].window == pytest.approx(window, abs=0.5)
+
+
+def test_a_recording_that_is_not_finished_is_shown_as_far_as_it_is(
+    virtual_recording: Path, tmp_path: Path
+) -> None:
+    content = virtual_recording.read_bytes()
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(content[: len(content) // 2])
+    assert length(cut) == 0.0
+    assert length(tmp_path / "nothing.mcap") == 0.0
+    assert 4.0 <= length(virtual_recording) < 5.0
 
 
 def test_ctrl_c_ends_it_with_exit_code_0(virtual_recording: Path) -> None:

@@ -16,24 +16,25 @@ from common import reality
 from common.clock import VirtualClock
 from common.plan import Plan, load
 from common.recording.reader import Run, read
-from common.recording.tail import Tail
+from common.recording.tail import Tail, length
 from common.recording.writer import Recording
 from common.signals import TOPICS
 from rths import virtual
-from rths.live.feed import EDGES, POINTS, SILENT_NS, Feed
+from rths.live.feed import EDGES, POINTS, POINTS_WHOLE, SILENT_NS, Feed
 from rths.live.page import Page
 from rths.live.status import row
+from rths.live.stream import FACTORS
 from tests.helpers import ROOT
 
 
 class Growing:
     """A page on a file that grows."""
 
-    def __init__(self, folder: Path, content: bytes, window: float = 10.0) -> None:
+    def __init__(self, folder: Path, content: bytes, window: float = 10.0, *, whole: bool = False) -> None:
         self.path = folder / "growing.mcap"
         self.clock = VirtualClock()
         self.tail = Tail(self.path)
-        self.feed = Feed(self.tail, window, self.clock)
+        self.feed = Feed(self.tail, window, self.clock, whole=whole)
         self.document = Document()
         self.page = Page(self.document, self.feed)
         self._content = content
@@ -62,8 +63,8 @@ def grow(tmp_path: Path) -> Iterator[Grow]:
     """Makes pages whose files are closed in the end."""
     with contextlib.ExitStack() as stack:
 
-        def made(content: bytes, window: float = 10.0) -> Growing:
-            growing = Growing(tmp_path, content, window)
+        def made(content: bytes, window: float = 10.0, *, whole: bool = False) -> Growing:
+            growing = Growing(tmp_path, content, window, whole=whole)
             stack.enter_context(growing.tail)
             return growing
 
@@ -136,6 +137,34 @@ def test_a_window_bounds_what_a_page_holds(virtual_recording: Path, grow: Grow) 
         growing.to(share)
         assert growing.source("slave")["t"].size <= POINTS
     assert growing.source("slave")["t"][-1] == pytest.approx(4.1, abs=0.1)
+
+
+def test_the_whole_of_a_long_recording_is_shown_with_all_that_is_extreme(
+    default_plan: Plan, tmp_path: Path, grow: Grow
+) -> None:
+    path = tmp_path / "long.mcap"
+    assert virtual.run(virtual.assemble(default_plan, reality.as_planned(default_plan), path), str) is None
+    run = read(path)
+    growing = grow(path.read_bytes(), window=length(path), whole=True)
+    growing.to(1.0)
+    signals: dict[str, tuple[str, ...]] = {"master": ("column_target", "column_displacement", "column_force")}
+    signals["slave"] = ("table_target", "table_displacement", "damper_stroke", "damper_force")
+    for topic, names in signals.items():
+        source = growing.source(topic)
+        assert run.ticks(topic) > POINTS_WHOLE > source["t"].size > 0.3 * POINTS_WHOLE
+        assert source["t"][0] < 0.1
+        assert source["t"][-1] > run.ramps[topic]["t"][-1] - 0.1
+        for name in names:
+            every = FACTORS.get(name, 1.0) * np.concatenate(
+                [run.columns[topic][name], run.ramps[topic].get(name, [])]
+            )
+            assert np.nanmax(source[name]) == np.nanmax(every), name
+            assert np.nanmin(source[name]) == np.nanmin(every), name
+    trips = growing.source("latency")
+    assert POINTS_WHOLE > trips["t"].size > 0.5 * POINTS_WHOLE
+    assert trips["round_trip"].max() == 1e6 * np.nanmax(run.columns["latency"]["round_trip"])
+    assert growing.page.plots["hysteresis"].title.text == "column: hysteresis"
+    assert growing.page.plots["column"].x_range.follow is None
 
 
 def test_a_second_reader_gets_all_of_the_window_at_once(growing: Growing) -> None:

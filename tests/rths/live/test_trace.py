@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rths.live.trace import Trace
+from rths.live.trace import Trace, extremes, largest
 
 TICKS = np.arange(1000)
 
@@ -28,11 +28,35 @@ def test_every_so_many_ticks_have_one_point_however_they_come(cuts: list[int], s
 def test_the_worst_of_each_group_is_kept_however_it_comes(cuts: list[int], step: int, seed: int) -> None:
     values = np.random.default_rng(seed).normal(size=TICKS.size)
     values[::7] = np.nan
-    trace = Trace(step, 2000, worst=True)
+    trace = Trace(step, 2000, largest)
     in_pieces(trace, sorted(cuts), values)
     groups = [values[begin : begin + step] for begin in range(0, TICKS.size, step)][:-1]
     expected = [np.nan if np.isnan(group).all() else np.nanmax(group) for group in groups]
     assert np.array_equal(trace.since(0)["a"], expected, equal_nan=True)
+
+
+@given(cuts=st.lists(st.integers(0, 1000), max_size=20), step=st.integers(1, 30), seed=st.integers(0, 99))
+def test_the_extremes_of_each_group_are_kept_with_their_times(cuts: list[int], step: int, seed: int) -> None:
+    values = np.random.default_rng(seed).normal(size=(2, TICKS.size))
+    values[1, ::7] = np.nan
+    trace = Trace(step, 5000, extremes)
+    for begin, end in zip([0, *sorted(cuts)], [*sorted(cuts), TICKS.size], strict=True):
+        some = slice(begin, end)
+        trace.add(TICKS[some], {"t": TICKS[some] * 0.5, "a": values[0, some], "b": values[1, some]})
+    trace.close()
+    kept = trace.since(0)
+    places = np.rint(kept["t"] / 0.5).astype(int)
+    assert np.all(np.diff(places) > 0)
+    for row, name in enumerate(("a", "b")):
+        assert np.array_equal(kept[name], values[row, places], equal_nan=True)
+    for begin in range(0, TICKS.size, step):
+        here = (places >= begin) & (places < begin + step)
+        assert np.count_nonzero(here) <= 4
+        for row, name in enumerate(("a", "b")):
+            group = values[row, begin : begin + step]
+            if not np.isnan(group).all():
+                assert np.nanmin(kept[name][here]) == np.nanmin(group)
+                assert np.nanmax(kept[name][here]) == np.nanmax(group)
 
 
 def test_a_reader_gets_what_is_new_to_it_and_no_more_than_is_kept() -> None:

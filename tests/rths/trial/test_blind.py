@@ -6,7 +6,9 @@ import argparse
 import importlib
 import json
 import os
+import signal
 import sys
+import time
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -188,6 +190,24 @@ def test_a_missing_package_is_one_sentence(
     assert capsys.readouterr().err == (
         f"rths: {words[0]} needs the package {package}: install it, or leave the option out.\n"
     )
+
+
+def hears_ctrl_c(_: int) -> bool:
+    return signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])
+
+
+def test_ctrl_c_is_for_the_process_that_spreads_the_work_alone() -> None:
+    assert list(spread(hears_ctrl_c, range(4), jobs=2)) == [False] * 4
+    assert hears_ctrl_c(0)
+
+
+@pytest.mark.filterwarnings("ignore:.*cancelled:UserWarning")  # joblib says so
+def test_work_that_nobody_wants_any_more_is_not_waited_for() -> None:
+    began = time.monotonic()
+    results = spread(time.sleep, [0.0, 0.0, 100.0, 100.0], jobs=2)
+    next(results)
+    results.close()  # type: ignore[attr-defined]
+    assert time.monotonic() - began < 60.0
 
 
 def test_work_is_spread_over_processes() -> None:

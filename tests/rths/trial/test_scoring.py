@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -24,6 +25,7 @@ from rths.trial.measures import (
 from rths.trial.page import page
 from rths.trial.record import Recorded
 from rths.trial.scoring import Outcome, judge, judge_all, same
+from tests.rths.report.pages import check_alone, check_in_browser
 
 SLIP = Laid("column.slip", "column", {"gap": 2e-4}, {"gap": 0.0})
 SOFT = Laid("column.stiffness", "column", {"factor": 0.9}, {"factor": 1.0})
@@ -189,7 +191,7 @@ def test_bins_hold_every_value_once() -> None:
     assert sum(item.count for item in reliability(some())) == 20
 
 
-def test_results_are_json_and_the_page_stands_alone() -> None:
+def test_results_are_json_and_the_page_stands_alone(tmp_path: Path) -> None:
     text = json.dumps(results(some()), allow_nan=False)
     assert len(json.loads(text)["cases"]) == 24
     shown = page(some(), "Made <here>.")
@@ -197,4 +199,9 @@ def test_results_are_json_and_the_page_stands_alone() -> None:
     assert "Made &lt;here&gt;." in shown
     assert "says column.slip, not damper.friction and column.slip" in shown
     assert "http" not in shown
+    text = check_alone(shown).text
+    assert "21 of 24 cases right." in text
+    assert check_alone(page([], "")).text.endswith("Cases that are not right None.")
     assert page([], "").count("data:image/png") == 4
+    (tmp_path / "index.html").write_text(shown, encoding="utf-8")
+    check_in_browser(tmp_path / "index.html", tmp_path)

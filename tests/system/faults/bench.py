@@ -24,7 +24,7 @@ from common.plan import Plan
 from common.recording.reader import Run, read
 from common.zenoh_link import listenable
 from tests.faults.rows import motion_bound
-from tests.helpers import ROOT
+from tests.processes import environment, tied
 from tests.system.faults.rigs import Log, Wish
 
 LABS = ("master", "slave")
@@ -90,11 +90,11 @@ class Process:
         self.said: list[tuple[float, dict[str, Any]]] = []
         self._errors: list[str] = []
         self._popen = subprocess.Popen(
-            [*before, sys.executable, "-m", module, *map(str, words)],
+            tied(*before, sys.executable, "-m", module, *words),
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
-            env={**os.environ, "PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1"},
+            env=environment(OPENBLAS_NUM_THREADS="1"),
         )
         self.pid = self._popen.pid
         self._readers = [

@@ -20,7 +20,7 @@ PORT = 7447
 
 def run(*words: str) -> str:
     """Run a command; what it wrote; raises CalledProcessError where it complains."""
-    return subprocess.run(words, check=True, capture_output=True, text=True).stdout
+    return subprocess.run(words, check=True, capture_output=True, text=True, timeout=30).stdout
 
 
 class Network(NamedTuple):

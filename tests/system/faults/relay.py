@@ -42,7 +42,7 @@ class Relay:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._closing = True
-        self._thread.join()
+        self._thread.join(10.0)
         for end in (self._front, *self._back.values()):
             end.close()
         self._selector.close()

@@ -76,15 +76,17 @@ class Soak:
     def garbage(self) -> None:
         """Strangers send datagrams to the port."""
         words = ("-m", "tests.system.faults.hostile", str(PORT), "5000")
-        subprocess.run([*self._inside, sys.executable, *words], check=True)
+        subprocess.run([*self._inside, sys.executable, *words], check=True, timeout=LASTS + 60.0)
 
     def hogs(self) -> None:
         """Processes that compute as much as they can."""
         busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(HOGS)]
-        time.sleep(LASTS)
-        for process in busy:
-            process.kill()
-            process.wait()
+        try:
+            time.sleep(LASTS)
+        finally:
+            for process in busy:
+                process.kill()
+                process.wait()
 
     def run(self) -> None:
         """All faults once, then as chance has it, until the test is over."""
@@ -131,7 +133,7 @@ class Watch:
 
     def __exit__(self, *_: object) -> None:
         self._over.set()
-        self._thread.join()
+        self._thread.join(10.0)
 
     def _watch(self) -> None:
         while not self._over.wait(1.0):

@@ -3,26 +3,22 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
 import sys
 from pathlib import Path
 
-HOME = Path(__file__).resolve().parents[2]
+import pytest
+
+from tests.helpers import ROOT
+from tests.processes import environment, finished
+
 CASES = 12
 
 
+@pytest.mark.timeout(600)
 def test_the_diagnosis_meets_withheld_effects(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "rths", "blind", "--cases", str(CASES), "--duration", "20"]
     command += ["--jobs", "2", "--seed", "7", "-o", str(tmp_path / "trial"), "--json"]
-    done = subprocess.run(
-        command,
-        capture_output=True,
-        text=True,
-        cwd=HOME,
-        env={**os.environ, "PYTHONPATH": str(HOME)},
-        timeout=500,
-    )
+    done = finished(*command, seconds=500.0, cwd=ROOT, env=environment())
     assert done.returncode in (0, 1), done.stderr
     result = json.loads(done.stdout)
     cases = result["cases"]
