@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from common.tables import Compensator
 
 MOST_PLANTS = 1000
+PROCESSORS = len(os.sched_getaffinity(0))
+USUAL = {"plants": 20, "seed": 2020, "only": None, "jobs": PROCESSORS, "json": False}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -25,20 +27,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--plants",
         type=int,
-        default=20,
+        default=USUAL["plants"],
         metavar="N",
         help="transfer systems drawn beside the nominal (default: 20)",
     )
     parser.add_argument(
-        "--seed", type=int, default=2020, metavar="N", help="seed of the plants (default: 2020)"
+        "--seed", type=int, default=USUAL["seed"], metavar="N", help="seed of the plants (default: 2020)"
     )
     parser.add_argument(
-        "--only", type=words, default=[], metavar="NAME,…", help="these settings of the compensators only"
+        "--only", type=words, metavar="NAME,…", help="these settings of the compensators only"
     )
     parser.add_argument(
         "--jobs",
         type=int,
-        default=len(os.sched_getaffinity(0)),
+        default=PROCESSORS,
         metavar="N",
         help="tests at once (default: one per processor)",
     )
@@ -68,9 +70,9 @@ def words(text: str) -> list[str]:
 
 def run(args: argparse.Namespace) -> int:
     """Play all tests, or write a plan; 1 where a goal is missed."""
+    check(args)
     if args.plan is not None:
         return write_plan(args)
-    check(args)
     settings = chosen(args.only)
     folder = prepared(args.output or Path("runs/benchmark2020"))
     with Progress("benchmark") as progress:
@@ -92,7 +94,12 @@ def run(args: argparse.Namespace) -> int:
 
 
 def check(args: argparse.Namespace) -> None:
-    """Raise InputError for numbers and options that make no comparison."""
+    """Raise InputError for numbers and options that make no comparison, and for those that --plan has no use for."""
+    if args.plan is not None:
+        for name, unused in USUAL.items():
+            if getattr(args, name) != unused:
+                raise InputError(f"--plan writes a plan and plays nothing: leave out --{name}.")
+        return
     if args.compensator is not None:
         raise InputError(
             "--compensator says which plan --plan writes; give --only NAME,… to compare some settings."
@@ -106,10 +113,12 @@ def check(args: argparse.Namespace) -> None:
             raise InputError(f"{name} is {value}, but must be {wanted}.")
 
 
-def chosen(only: list[str]) -> dict[str, Compensator]:
-    """The settings of these names, all of them without any; raises InputError for an unknown one."""
+def chosen(only: list[str] | None) -> dict[str, Compensator]:
+    """The settings of these names, all of them where none are asked for; raises InputError for an unknown one."""
     from rths.yardstick.problem import SETTINGS
 
+    if only == []:
+        raise InputError(f"--only names no setting of the compensators: give some of {', '.join(SETTINGS)}.")
     return {name: setting(name) for name in only or SETTINGS}
 
 

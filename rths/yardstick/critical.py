@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -52,11 +51,8 @@ def critical_delay(case: Case) -> Critical:
 
 def still(case: Case) -> Plan:
     """The case with an ideal transfer system and no delay of its own in the path of the force."""
-    plan = ideal(planned(case, EL_CENTRO))
-    force = replace(plan.compensator.force, unit_delay=False)
-    return replace(plan, compensator=replace(plan.compensator, force=force)).with_ticks(
-        round(LENGTH / plan.test.interval)
-    )
+    plan = ideal(planned(case, EL_CENTRO))  # which has no unit delay of the force either
+    return plan.with_ticks(round(LENGTH / plan.test.interval))
 
 
 def growing(plan: Plan, delay: float) -> bool:
@@ -65,9 +61,9 @@ def growing(plan: Plan, delay: float) -> bool:
     ground[0, 1] = 1.0
     effects = Effects(sensors={"column_force": SensorEffects(delay=delay)})
     rollout = column_loop.simulate(plan, ground, effects=effects)
-    return not rollout.finite or energy(rollout.target[-plan.ticks // 5 :]) > energy(
-        rollout.target[-2 * (plan.ticks // 5) : -(plan.ticks // 5)]
-    )
+    fifth = plan.ticks // 5
+    last, before = rollout.target[-fifth:], rollout.target[-2 * fifth : -fifth]
+    return not rollout.finite or energy(last) > energy(before)
 
 
 def energy(values: Array) -> float:

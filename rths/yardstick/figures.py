@@ -82,10 +82,9 @@ def late_force(evidence: Evidence, canvas: Any) -> None:
         upper.plot(
             x, [one.j2 * 1e2 for one in found], "s:", color=colour, markersize=3, label=f"J2, case {case}"
         )
-        read = [(item.delay * 1e3, item.path.delay * 1e3) for item in some if item.path]
-        lower.plot(
-            *zip(*read, strict=True), "o", color=colour, markersize=3, label=f"force path, case {case}"
-        )
+        said = [(item.delay * 1e3, item.path.delay * 1e3) for item in some if item.path]
+        at, read = [delay for delay, _ in said], [found for _, found in said]
+        lower.plot(at, read, "o", color=colour, markersize=3, label=f"force path, case {case}")
         lower.plot(
             x, [one.j1 * 1e3 for one in found], "s:", color=colour, markersize=3, label=f"J1, case {case}"
         )

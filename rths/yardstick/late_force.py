@@ -21,7 +21,7 @@ class Late(NamedTuple):
 
     delay: float
     result: Result
-    path: ForcePath | None  # None where the loop is unstable
+    path: ForcePath | None  # None where the loop is unstable or nothing can be said
 
 
 def late_forces(stages: Sequence[Stage], tell: Tell = untold) -> list[Late]:

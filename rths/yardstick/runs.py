@@ -18,7 +18,7 @@ from models.labs import noise
 from models.registry import Array
 from models.structures import response
 from models.system import Effects
-from rths.yardstick.criteria import Criteria, criteria, peak, rms
+from rths.yardstick.criteria import Criteria, criteria, near, peak, rms
 from rths.yardstick.problem import EL_CENTRO, Case, Motion, draw, planned, with_compensator, with_plant
 
 RUNAWAY, ASTRAY = 10.0, 100.0  # times the reference's peak: targets and commands beyond are of unstable loops
@@ -52,7 +52,6 @@ class Result(NamedTuple):
     noise_floor: float  # J2 of the displacement sensor's noise alone; nan without `found`
     force: float  # N, largest
     stroke: float  # m, largest
-    speed: float  # m/s, largest of the target
 
 
 def stage(case: Case, motion: Motion, plants: int, seed: int) -> Stage:
@@ -96,13 +95,12 @@ def play(
         on.motion.title,
         plant,
         True,
-        rms(measured - first) / rms(first),
+        near(measured, first),
         criteria(target, measured, rollout.floors, on.reference, interval) if nominal else None,
         indicators.correlation_delay(target, measured, interval, LEAD_MOST) if nominal else math.nan,
         chosen.sensors.column_displacement / rms(target) if nominal else math.nan,
         peak(rollout.force),
         peak(measured),
-        peak(np.diff(target)) / interval,
     )
     return result, rollout
 
@@ -120,7 +118,6 @@ def unstable(on: Stage, setting: str, plant: int) -> Result:
         None,
         none,
         none,
-        worst,
         worst,
         worst,
     )

@@ -115,8 +115,8 @@ def late(evidence: Evidence) -> Table:
     for item in evidence.late:
         found, path = item.result.found, item.path
         start = [f"case {item.result.case}", f"{item.delay * 1e3:g}"]
-        if found is None or path is None:
-            rows.append([*start, *[UNSTABLE] * 4, MISSING])
+        if found is None:
+            rows.append([*start, *[UNSTABLE] * 3, MISSING, MISSING])
             continue
         rows.append(
             [
@@ -124,8 +124,8 @@ def late(evidence: Evidence) -> Table:
                 milliseconds(found.j1, 2),
                 percent(found.j2),
                 percent(found.j4),
-                milliseconds(path.delay, 2),
-                milliseconds(0.5 * (path.interval[1] - path.interval[0]), 2),
+                milliseconds(path.delay, 2) if path else MISSING,
+                milliseconds(0.5 * (path.interval[1] - path.interval[0]), 2) if path else MISSING,
             ]
         )
     head = ["", "force late by, ms", "J1, ms", "J2, %", "J4, %", "force path, ms", "± (95 %), ms"]

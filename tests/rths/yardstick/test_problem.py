@@ -5,9 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from models import preflight
 from models.compensators import COMPENSATORS
 from models.structures import partition, shear_building
-from rths.yardstick.problem import CASES, EL_CENTRO, SETTINGS, draw, planned, with_compensator, with_plant
+from rths.yardstick.problem import (
+    CASES,
+    EL_CENTRO,
+    SETTINGS,
+    Case,
+    draw,
+    planned,
+    with_compensator,
+    with_plant,
+)
 
 FREQUENCIES = {1: (3.59, 16.0, 38.1)}  # Hz, as published
 
@@ -49,3 +59,12 @@ def test_a_setting_leaves_what_is_done_to_the_force() -> None:
     plan = planned(CASES[0], EL_CENTRO)
     assert with_compensator(plan, SETTINGS["amb"]).compensator.force == plan.compensator.force
     assert plan.compensator.force.unit_delay
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+@pytest.mark.parametrize("setting", ["sample", "amb"])
+def test_every_case_passes_the_preflight_of_its_plan(case: Case, setting: str) -> None:
+    plan = with_compensator(planned(case, EL_CENTRO), SETTINGS[setting])
+    found = preflight.checks(plan.with_ticks(round(8.0 / plan.test.interval)))
+    risks = {check.risk.name for check in found if check.risk}
+    assert risks <= ({"partition"} if setting == "sample" else set())
