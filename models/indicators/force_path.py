@@ -18,13 +18,13 @@ from models.registry import Array
 
 Spectra = NDArray[np.complex128]
 
-BLOCK = 4.0  # s; of the blocks that vouch for each other, shorter in a test of fewer than
-LEAST_BLOCKS = 8
+BLOCK = 2.0  # s; of the half-overlapping blocks that vouch for each other, shorter in a test of fewer than
+LEAST_BLOCKS = 15
 LEAST_TICKS = 32  # of a block
-COHERENT = 0.9  # coherence from which on a frequency counts: noise reaches it in 8 blocks once in 10⁷
+COHERENT = 0.9  # coherence from which on a frequency counts,
+CHANCE = 1e-7  # where so many blocks of noise do not reach it more often,
+EFFECTIVE = 4.0  # and this many blocks at least share its power: one strong block is coherent with anything
 ROUNDS = 4  # of aligning the signals: blocks of time cut off what is late
-STUDENT = (2.365, 2.306, 2.262, 2.228, 2.201, 2.179, 2.160, 2.145, 2.131, 2.120)  # 97.5 % at 7 to 16 degrees
-NORMAL = 1.96
 
 
 class ForcePath(NamedTuple):
@@ -50,14 +50,18 @@ def force_path(expected: Array, measured: Array, interval: float, most: float = 
     `f_m(t) = g·f_e(t − τ)` by least squares over the frequencies at which both are coherent in blocks of time;
     `expected` and `measured` (n,) in one unit, `interval` in s. A linear phase weighted by the cross-spectrum's
     size, as in the frequency evaluation index, here with noise left out. The interval of 95 % is that of the
-    jackknife over the blocks, by Student's distribution.
+    jackknife over the blocks, by Student's distribution with as many degrees as blocks that count, less one.
 
     Raises:
-        InputError: signals empty, unequal, not finite, constant, too short, or coherent at no frequency.
+        InputError: signals empty, unequal, not finite, constant, too short, or coherent at no frequency whose power
+            at least four blocks share, as of a single pulse.
 
     Source: Knapp and Carter, IEEE Transactions on Acoustics, Speech, and Signal Processing 24 (1976) 320; Thomson and
-    Chave, in Haykin (ed.), Advances in Spectrum Analysis and Array Processing 1 (1991) 58, for the jackknife.
+    Chave, in Haykin (ed.), Advances in Spectrum Analysis and Array Processing 1 (1991) 58, for the jackknife; Carter, Knapp and
+    Nuttall, IEEE Transactions on Audio and Electroacoustics 21 (1973) 337, for coherence by chance.
     """
+    from scipy.special import stdtrit
+
     checked(expected=expected, measured=measured)
     moving(expected=expected, measured=measured)
     there = blocks(measured, interval)
@@ -65,10 +69,8 @@ def force_path(expected: Array, measured: Array, interval: float, most: float = 
     for _ in range(ROUNDS):
         spectra = cross(blocks(shifted(expected, delay / interval), interval), there, interval)
         delay += left(spectra.omega, spectra.products.sum(axis=0))
-    error = jackknife(spectra)
-    wide = error * (
-        STUDENT[there.shape[0] - LEAST_BLOCKS] if there.shape[0] < LEAST_BLOCKS + len(STUDENT) else NORMAL
-    )
+    shares = np.abs(spectra.products) @ spectra.omega**2
+    wide = jackknife(spectra) * float(stdtrit(float(effective(shares)) - 1.0, 0.975))
     whole = spectra.products.sum(axis=0)
     frequency = float(np.average(spectra.omega, weights=np.abs(whole))) / (2.0 * math.pi)
     gain = float(np.sum(np.real(whole)) / np.sum(spectra.powers))
@@ -91,25 +93,36 @@ def shifted(values: Array, ticks: float) -> Array:
 
 
 def blocks(values: Array, interval: float) -> Spectra:
-    """Spectra of successive blocks of time, each without its mean and under a Hann window; (blocks, frequencies).
+    """Spectra of half-overlapping blocks of time, each without its mean and under a Hann window.
+
+    Shape (blocks, frequencies).
 
     Raises:
         InputError: there are too few values.
     """
-    count = max(LEAST_BLOCKS, int(values.size * interval / BLOCK))
-    size = values.size // count // 2 * 2
+    longest = max(LEAST_TICKS, round(BLOCK / interval))
+    half = min(longest, 2 * values.size // (LEAST_BLOCKS + 1)) // 2
+    size = 2 * half
     if size < LEAST_TICKS:
-        least = LEAST_BLOCKS * LEAST_TICKS
+        least = (LEAST_BLOCKS + 1) * LEAST_TICKS // 2
         raise InputError(f"{values.size} ticks are too few for a delay of the force: give at least {least}.")
     window = np.hanning(size)
-    rows = values[: count * size].reshape(count, size)
+    rows = np.lib.stride_tricks.sliding_window_view(values, size)[::half]
     means = np.average(rows, axis=1, weights=window)
     spectra: Spectra = np.fft.rfft((rows - means[:, None]) * window, axis=1)
     return spectra
 
 
+def effective(shares: Array) -> Array:
+    """How many blocks count, `(Σp)²/Σp²` over the first axis of their shares; 0 where all are 0."""
+    squares = np.sum(shares**2, axis=0)
+    return np.asarray(np.sum(shares, axis=0) ** 2 / np.where(squares > 0.0, squares, 1.0))
+
+
 def cross(expected: Spectra, measured: Spectra, interval: float) -> Cross:
     """What both have in common at the frequencies, other than zero, at which they are coherent over the blocks.
+
+    A block holds at most half of the power there, so that the sums without it never vanish.
 
     Raises:
         InputError: there are none.
@@ -117,10 +130,14 @@ def cross(expected: Spectra, measured: Spectra, interval: float) -> Cross:
     products, powers = measured * np.conj(expected), np.abs(expected) ** 2
     bounds = powers.sum(axis=0) * np.sum(np.abs(measured) ** 2, axis=0)
     common = np.abs(products.sum(axis=0)) ** 2
-    kept = common > COHERENT * bounds
+    count = np.maximum(effective(np.abs(products)), 1.0 + 1e-9)
+    least = np.maximum(COHERENT, 1.0 - CHANCE ** (1.0 / (count - 1.0)))
+    kept = (common > least * bounds) & (count >= EFFECTIVE)
     kept[[0, -1]] = False
     if not kept.any():
-        raise InputError("The measured force has nothing to do with what the specimen's model gives.")
+        raise InputError(
+            "The measured force has nothing to do with what the specimen's model gives, or only in a moment."
+        )
     omega = 2.0 * math.pi * np.fft.rfftfreq(2 * (kept.size - 1), interval)
     return Cross(np.asarray(omega[kept]), products[:, kept], powers[:, kept])
 

@@ -5,6 +5,8 @@ Reading k is taken before the command of tick k acts, as in the test.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from models import substructure
@@ -44,13 +46,17 @@ def laboratory_b(system: System, command: Array, motor: Array, anew: Array | Non
 
 
 def column(system: System, deformation: Array) -> Array:
-    """Force readings (ticks,) of the specimen without noise for its true deformation (ticks,) m at the ticks."""
-    result = np.empty(deformation.size)
-    interval, effects = system.plan.test.interval, system.effects
+    """Force readings (ticks,) of the specimen without noise for its true deformation (ticks,) m at the ticks.
+
+    The plan's mass and dashpot move by central differences, which short steps along straight lines do not give.
+    """
+    force, result = np.empty(deformation.size), np.empty(deformation.size)
+    interval, effects, column = system.plan.test.interval, system.effects, system.plan.column
     sensors = readings.build(interval, ("column_force",), effects.sensors)
     steps = column_lab.substeps(interval) if specimen.needs_substeps(effects.column) else 1
-    parts = specimen.build(system.plan.column, effects.column)
-    play_column(*parts, *sensors, deformation, interval, steps, result)
+    parts = specimen.build(replace(column, mass=0.0, damping=0.0), effects.column)
+    play_column(*parts, deformation, interval, steps, force)
+    play_reading(*sensors, specimen.with_rates(column, force, deformation, interval), interval, result)
     return result
 
 
@@ -152,14 +158,12 @@ def play_column(
     yielding: Array,
     yielded: Array,
     cell: Array,
-    sensors: Array,
-    sensed: Array,
     deformation: Array,
     interval: float,
     steps: int,
     result: Array,
 ) -> None:
-    """Fill `result` (ticks,) from the deformations, which move on straight lines between the ticks."""
+    """Fill the forces `result` (ticks,) from the deformations, which move on straight lines between the ticks."""
     before = deformation[0]
     for tick in range(deformation.size):
         force = 0.0
@@ -170,7 +174,14 @@ def play_column(
                 code, params, memory, effects, yielding, yielded, cell, reached, interval / steps
             )
         before = deformation[tick]
-        result[tick] = readings.step(sensors, sensed, 0, force, 0.0, tick * interval)
+        result[tick] = force
+
+
+@jit
+def play_reading(sensors: Array, sensed: Array, values: Array, interval: float, result: Array) -> None:
+    """Fill `result` (ticks,) with what the first sensor makes of the values (ticks,)."""
+    for tick in range(values.size):
+        result[tick] = readings.step(sensors, sensed, 0, values[tick], 0.0, tick * interval)
 
 
 @jit

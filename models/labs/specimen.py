@@ -69,6 +69,18 @@ def build(column: Column, effects: ColumnEffects | None = None) -> Specimen:
     )
 
 
+def with_rates(column: Column, force: Array, displacement: Array, interval: float) -> Array:
+    """Force (n,) N at a displacement (n,) m with the plan's dashpot and mass, by central differences.
+
+    `force` (n,) N is what the column gives without them, unchanged where it has neither; `interval` in s.
+    """
+    if not (column.mass or column.damping) or displacement.size < 2:
+        return force
+    velocity = np.gradient(displacement, interval)
+    result: Array = force + column.damping * velocity + column.mass * np.gradient(velocity, interval)
+    return result
+
+
 def needs_substeps(effects: ColumnEffects | None) -> bool:
     """Whether rates count, so that an interval must be walked in short steps."""
     more = effects or ColumnEffects()

@@ -14,7 +14,7 @@ from common.plan import Plan
 from common.tables import Compensator
 from common.telling import Tell, untold
 from models import column_loop, indicators, substructure
-from models.labs import noise
+from models.labs import noise, specimen
 from models.registry import Array
 from models.structures import response
 from models.system import Effects
@@ -70,11 +70,8 @@ def stage(case: Case, motion: Motion, plants: int, seed: int) -> Stage:
 
 def specimen_force(plan: Plan, displacement: Array) -> Array:
     """Force (n,) N of the linear specimen under a displacement (n,) m, by central differences."""
-    column, interval = plan.column, plan.test.interval
-    velocity = np.gradient(displacement, interval)
-    acceleration = np.gradient(velocity, interval)
-    force: Array = column.stiffness * displacement + column.damping * velocity + column.mass * acceleration
-    return force
+    column = plan.column
+    return specimen.with_rates(column, column.stiffness * displacement, displacement, plan.test.interval)
 
 
 def play(

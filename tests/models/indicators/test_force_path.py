@@ -86,6 +86,28 @@ def test_the_column_of_a_plan_is_played_over_the_measured_displacement() -> None
     assert found.gain == pytest.approx(1.0, abs=2e-3)
 
 
+@pytest.mark.parametrize("seconds", [10.0, 40.0])
+@pytest.mark.parametrize("width", [0.1, 0.4, 1.0, 3.0])
+def test_unrelated_noise_under_the_same_burst_is_refused(width: float, seconds: float) -> None:
+    """One strong block is coherent with anything."""
+    t = times(round(seconds / DT))
+    for seed in range(10):
+        burst = np.exp(-0.5 * ((t - 4.0 - 0.1 * seed) / width) ** 2)
+        one, other = np.random.default_rng(seed).standard_normal((2, t.size)) * burst
+        with pytest.raises(InputError, match="nothing to do with"):
+            indicators.force_path(one, other, DT)
+
+
+@pytest.mark.parametrize("place", [0, 1000, 4900])
+def test_a_pulse_within_one_block_is_refused(place: int) -> None:
+    """No block vouches for another."""
+    pulse = np.zeros(5000)
+    pulse[place : place + 40] = 1e3 * np.hanning(40)
+    with pytest.raises(InputError, match="or only in a moment"):
+        indicators.force_path(pulse, np.roll(pulse, 3), DT)
+    assert force_path(Plan(), pulse / 12.5e6, np.roll(pulse, 3)) is None
+
+
 def test_what_says_nothing_is_refused() -> None:
     t = times(5000)
     with pytest.raises(InputError, match="nothing to do with"):

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from common.plan import Plan
-from models import substructure
+from models import indicators, substructure
 from models.closed_loop import Rollout, signals, simulate
 from models.effects import CATALOGUE, lay
 from models.effects.effect import Effect
@@ -119,6 +119,30 @@ def test_the_specimen_alone_with_rates_from_the_ticks(
     displacement, force = found.measured_a.T.copy()
     got = replay.column(system, displacement)
     assert np.std(got - force) < share * rest(system, force, displacement)
+
+
+def test_the_plans_mass_and_dashpot_move_as_the_whole_motion_says(plan: Plan) -> None:
+    """Against derivatives written out, to the error of central differences, through a load cell with a gain."""
+    mass, damping, omega, dt = 2000.0, 5e4, 2.0 * math.pi * 3.0, plan.test.interval
+    system = System(plan).moved("column", mass=mass, damping=damping)
+    system = lay(system, [("sensor.column_force.gain", {"factor": 1.07})])
+    t = dt * np.arange(2000)
+    got = replay.column(system, 1e-3 * np.sin(omega * t))
+    stiffness = plan.column.stiffness - mass * omega**2
+    wanted = 1.07e-3 * (stiffness * np.sin(omega * t) + damping * omega * np.cos(omega * t))
+    scale = 1.07e-3 * (mass * omega**2 + damping * omega)
+    assert np.max(np.abs(got - wanted)[2:-2]) < 0.5 * (omega * dt) ** 2 * scale
+
+
+def test_a_column_with_a_dashpot_alone_feels_what_it_felt_in_the_loop(plan: Plan) -> None:
+    """The loop's own short steps beside differences over the ticks."""
+    system = System(plan).moved("column", damping=5e4)
+    found = rollout(system)
+    displacement, force = found.measured_a.T.copy()
+    got = replay.column(system, displacement)
+    assert np.std(got - force) < 2e-4 * np.std(force)
+    path = indicators.force_path(got, force, plan.test.interval)
+    assert path.delay == pytest.approx(0.0, abs=2e-6)
 
 
 def test_the_specimen_alone_reads_through_its_load_cell(plan: Plan) -> None:
