@@ -89,6 +89,11 @@ def check_matrix(rows: Sequence[Any], storeys: int) -> None:
 
 def positive_definite(rows: Sequence[Sequence[float]]) -> bool:
     """Whether a symmetric matrix is positive definite: whether its Cholesky factor exists."""
+    return cholesky(rows) is not None
+
+
+def cholesky(rows: Sequence[Sequence[float]]) -> list[list[float]] | None:
+    """Lower Cholesky factor of a symmetric matrix, its rows up to the diagonal; None where it does not exist."""
     factor: list[list[float]] = []
     for i, row in enumerate(rows):
         new: list[float] = []
@@ -97,9 +102,22 @@ def positive_definite(rows: Sequence[Sequence[float]]) -> bool:
             new.append((row[j] - inner) / factor[j][j])
         left = row[i] - math.fsum(value * value for value in new)
         if not left > 0.0:
-            return False
+            return None
         factor.append([*new, math.sqrt(left)])
-    return True
+    return factor
+
+
+def stiffness_of_drift(rows: Sequence[Sequence[float]], storey: int) -> float:
+    """Stiffness (N/m) `1/(eᵀ·K⁻¹·e)` of a positive definite matrix against the drift e of a storey, from 1."""
+    factor = cholesky(rows)
+    if factor is None:
+        return 0.0
+    solved: list[float] = []
+    for i, row in enumerate(factor):
+        right = float(i == storey - 1) - float(i == storey - 2)
+        inner = math.fsum(row[k] * solved[k] for k in range(i))
+        solved.append((right - inner) / row[i])
+    return 1.0 / math.fsum(value * value for value in solved)
 
 
 def check_damping(structure: Structure) -> None:
@@ -126,19 +144,26 @@ def check_columns(plan: Plan) -> None:
 
 
 def check_experimental(plan: Plan, experimental: Experimental) -> None:
-    """The specimen cannot take over more than the building has."""
+    """The specimen cannot take over more than the building has; nor all of a floor's mass or of a matrix."""
     place = plan.column.storey - 1
+    matrix = is_matrix(plan.structure.stiffness)
     limits = {"mass": ("floor", plan.structure.mass[place])}
-    if not is_matrix(plan.structure.stiffness):
+    if matrix:
+        limits["stiffness"] = (
+            "the drift of storey",
+            stiffness_of_drift(plan.structure.stiffness, plan.column.storey),
+        )
+    else:
         limits["stiffness"] = ("storey", plan.structure.stiffness[place])
     if plan.structure.damping_ratio == 0.0:
         limits["damping"] = ("storey", plan.structure.damping[place])
     for name, (part, most) in limits.items():
         value = getattr(experimental, name)
-        if value > most or (name == "mass" and value == most):
+        whole = name == "mass" or (name == "stiffness" and matrix)
+        if value > most or (whole and value == most):
             raise PlanError(
                 f"{name} in [structure.experimental] is {value:g}, but {part} {place + 1} of the whole building has "
-                f"{most:g}."
+                f"{most:g}: give {'less' if whole else 'no more'} than that."
             )
 
 

@@ -273,7 +273,15 @@ def check_tolerances(plan: Plan) -> None:
     tables = plan.tables()
     tables["actuator"] = building.parameters(plan.actuator)
     known = [name for table in NOMINAL for name in uncertain(table, tables[table])]
+    chosen = plan.actuator.model
+    other = "fopdt" if chosen == "servo_hydraulic" else "servo_hydraulic"
+    foreign = uncertain("actuator", building.parameters(replace(plan.actuator, model=other)))
     for name, value in plan.tolerances.parameters.items():
+        if name in foreign:
+            raise PlanError(
+                f"'{name}' in [tolerances] is of the actuator's model '{other}', but '{chosen}' is chosen in "
+                "[actuator]: leave it out."
+            )
         if name not in known:
             raise PlanError(f"Unknown parameter '{name}' in [tolerances]: {nearest(name, known)}")
         if not 0.0 <= value <= 1.0:
@@ -281,13 +289,16 @@ def check_tolerances(plan: Plan) -> None:
 
 
 def uncertain(where: str, table: dict[str, Any]) -> list[str]:
-    """The parameters of a table that nobody knows exactly; what the specimen takes over is a choice, none of them."""
+    """The parameters of a table that nobody knows exactly: its numbers without those that somebody chose."""
     names = []
-    for name, value in table.items():
-        if isinstance(value, dict) and name != "experimental":
-            names += uncertain(f"{where}.{name}", value)
+    for key, value in table.items():
+        name = f"{where}.{key}"
+        if name in CHOSEN:
+            continue
+        if isinstance(value, dict):
+            names += uncertain(name, value)
         elif isinstance(value, int | float | list):
-            names.append(f"{where}.{name}")
+            names.append(name)
     return names
 
 
@@ -301,6 +312,14 @@ def check_safety(plan: Plan) -> None:
 
 
 NOMINAL = ("structure", "column", "actuator", "table", "damper", "sensors")
+CHOSEN = (
+    "structure.rho_infinity",
+    "structure.columns",
+    "structure.experimental",
+    "column.storey",
+    "column.columns_per_storey",
+    "column.represents",
+)
 
 
 def resolve(plan: Plan, path: str) -> Path:
@@ -314,9 +333,21 @@ def safe_name(text: str) -> str:
 
 
 def ideal(plan: Plan) -> Plan:
-    """The plan with transfer systems that follow at once, and no compensation."""
+    """The plan with transfer systems that follow at once, and no compensation.
+
+    The compensator's `[compensator.force]` goes with it, its unit delay too, and the actuator's command is a ramp even
+    where the plan holds it. The ramp brings the specimen to its target at the interval's end at the interval's mean
+    velocity, so that its dashpot is felt half an interval late and its mass a whole one; its spring is not late.
+    Tolerances of servo-hydraulics that the ideal actuator does not have are left out.
+    """
+    kept = {
+        name: value
+        for name, value in plan.tolerances.parameters.items()
+        if not name.startswith("actuator.servo.")
+    }
     return replace(
         plan.everywhere(table=Table(frequency=float("inf"), damping_ratio=1.0, delay=0.0)),
         actuator=Actuator(gain=1.0, delay=0.0, time_constant=0.0),
         compensator=Compensator(kind="none", parameters={}),
+        tolerances=replace(plan.tolerances, parameters=kept),
     )

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from common.building import OF_FOPDT
 from common.errors import PlanError
 from common.plan import Plan, from_tables
 from common.roles import MASTER, SLAVE, slave_role
@@ -172,16 +173,38 @@ def entries(given: object) -> tuple[Entry, ...]:
 
 
 def true_plan(tables: dict[str, Any], plan: Plan) -> Plan:
-    """The plan with the reality's parameters in place of its own; what holds for all slaves before a slave's own."""
+    """The plan with the reality's parameters in place of its own; what holds for all slaves before a slave's own.
+
+    Its tolerances are the plan's, whose nominal parameters they are of.
+    """
     merged = plan.tables()
+    del merged["tolerances"]
     for name in TRUE_TABLES:
-        merged[name] |= within(merged[name], table_of(tables, name, name))
+        given = table_of(tables, name, name)
+        planned = replaced(name, merged[name], given)
+        merged[name] = planned | within(planned, given)
     for slave in plan.slaves:
         own = tables.get("slave", {}).get(slave, {})
         for name in ("table", "damper"):
             merged["slave"][slave][name] |= table_of(tables, name, name)
             merged["slave"][slave][name] |= table_of(own, name, f"slave.{slave}.{name}")
-    return from_tables(merged, plan.base)
+    return replace(from_tables(merged, plan.base), tolerances=plan.tolerances)
+
+
+def replaced(name: str, planned: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    """What stays of a planned table beside what a reality gives of it.
+
+    Parameters of the planned actuator do not where its model is another; dashpots and a damping ratio stand in
+    each other's place where one of them is given.
+    """
+    gone: tuple[str, ...] = ()
+    if name == "actuator" and given.get("model", planned["model"]) != planned["model"]:
+        gone = (*OF_FOPDT, "servo")
+    if name == "structure" and "damping" in given and "damping_ratio" not in given:
+        gone = ("damping_ratio",)
+    if name == "structure" and given.get("damping_ratio", 0.0) != 0.0 and "damping" not in given:
+        gone = ("damping",)
+    return {key: value for key, value in planned.items() if key not in gone}
 
 
 def within(planned: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:

@@ -63,7 +63,7 @@ class Rule:
 def key(
     text: str,
     *,
-    default: Any,
+    default: Any = dataclasses.MISSING,
     unit: str = "",
     above: float | None = None,
     least: float | None = None,
@@ -75,8 +75,8 @@ def key(
 ) -> Any:
     """Field of a plan's table: a default, a text for the reference, and the allowed range.
 
-    With `more`, the field is a dict that takes every further number of the table: the parameters of
-    a model that a registry checks by the model's name.
+    Without a default the key must be given. With `more`, the field is a dict that takes every further number of the
+    table: the parameters of a model that a registry checks by the model's name.
     """
     rule = Rule(text, unit, above, least, most, tuple(choices), pattern, infinite)
     metadata = {"rule": rule, "more": more}
@@ -96,7 +96,7 @@ def fill(cls: type[Table], values: object, where: str) -> Table:
     """Instance of a table's dataclass from parsed TOML; `where` names the table in errors.
 
     Raises:
-        PlanError: unknown key, wrong type or value out of range.
+        PlanError: unknown key, wrong type, value out of range, or a key without a default that is not given.
     """
     if not isinstance(values, Mapping):
         raise PlanError(f"[{where}] must be a table, not {values!r}.")
@@ -110,7 +110,15 @@ def fill(cls: type[Table], values: object, where: str) -> Table:
             given[open_to_more.name][name] = as_type("float", value, f"{name} in [{where}]")
         else:
             raise PlanError(f"Unknown key '{name}' in [{where}]: {nearest(str(name), fields)}")
+    for name, field in fields.items():
+        if required(field) and field.name not in given:
+            raise PlanError(f"{name} is missing in [{where}], which has no default for it: give it.")
     return cls(**given)
+
+
+def required(field: dataclasses.Field[Any]) -> bool:
+    """Whether a key has no default, so that its table must give it."""
+    return field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
 
 
 def table_fields(cls: object) -> tuple[dataclasses.Field[Any], ...]:

@@ -40,16 +40,17 @@ class NumericalColumns:
     parameters: dict[str, float] = key("parameters of that model beside the stiffness", default={}, more=True)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Experimental:
     """What the specimen takes over of the whole building, left out of the numerical part.
 
     Stiffness and damping act on the drift of the specimen's storey, the mass on the floor above it. Without this table
-    the specimen takes over its share of the storey's columns, `represents` of `columns_per_storey`.
+    the specimen takes over its share of the storey's columns, `represents` of `columns_per_storey`; with it the
+    stiffness must be given.
     """
 
     mass: float = key("of the floor above the specimen's storey", default=0.0, unit="kg", least=0.0)
-    stiffness: float = key("of the specimen's storey", default=0.0, unit="N/m", least=0.0)
+    stiffness: float = key("of the specimen's storey", unit="N/m", least=0.0)
     damping: float = key("of the specimen's storey", default=0.0, unit="N·s/m", least=0.0)
 
 

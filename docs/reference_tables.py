@@ -11,7 +11,7 @@ from typing import Any, get_type_hints
 
 from common import errors
 from common.plan import TABLES, Plan
-from common.schema import Rule, table_fields
+from common.schema import Rule, required, table_fields
 from docs.markdown import quantity, table
 from models.compensators import COMPENSATORS
 from models.effects import FILES, READINGS
@@ -47,13 +47,17 @@ def plan_table(name: str, values: Any) -> list[str]:
     rows = [key_row(field, getattr(values, field.name)) for field in fields if "rule" in field.metadata]
     text = f"## `[{name}]`\n\n{inspect.getdoc(type(values))}\n\n{table(KEY_HEAD, rows)}"
     inner = {
-        field.name: getattr(values, field.name)
-        or field.metadata["table"]()  # one that is absent unless it is given
+        field.name: getattr(values, field.name) or blank(field.metadata["table"])
         for field in fields
         if "table" in field.metadata
     }
     own = [text] if rows else []
     return own + [part for field, within in inner.items() for part in plan_table(f"{name}.{field}", within)]
+
+
+def blank(cls: type[Any]) -> Any:
+    """A table that is absent unless it is given, None for the keys that it must have then."""
+    return cls(**{field.name: None for field in table_fields(cls) if required(field)})
 
 
 def key_row(field: dataclasses.Field[Any], default: Any) -> tuple[str, ...]:
@@ -66,7 +70,7 @@ def key_row(field: dataclasses.Field[Any], default: Any) -> tuple[str, ...]:
     kind = "" if rule.pattern else kind
     return (
         f"`{field.name.rstrip('_')}`",
-        quantity(default),
+        "must be given" if required(field) else quantity(default),
         rule.unit,
         f"{kind}{bounds(rule)}".removeprefix(", "),
         rule.text,

@@ -22,6 +22,7 @@ NEEDED = {
     "table": ("slave", ("table_command", "table_displacement")),
     "damper": ("slave", ("damper_command", "damper_stroke")),
 }
+EQUIVALENT_LAG = "equivalent first-order lag of a servo-hydraulic actuator"
 TAIL = 0.4  # s behind a step that the tangent looks at
 
 
@@ -92,13 +93,18 @@ def of_column(run: Run, _interval: float) -> dict[str, Any]:
 
 
 def of_actuator(run: Run, interval: float) -> dict[str, Any]:
-    """L, T, K by least squares on everything, and by the tangent where there are steps."""
+    """L, T, K by least squares on everything, and by the tangent where there are steps.
+
+    Where the plan's actuator is servo-hydraulic they are those of the lag that comes nearest to it, as `model` says.
+    """
     columns = run.columns["master"]
     command, measured = columns["actuator_command"], columns["column_displacement"]
     plan = plan_of(run)
     held = plan is not None and plan.actuator.command == "held"
     fit = actuator.least_squares(command, measured, interval, held=held)
     result: dict[str, Any] = {"parameters": plain(fit.parameters), "nrmse": fit.nrmse}
+    if plan is not None and plan.actuator.model == "servo_hydraulic":
+        result["model"] = EQUIVALENT_LAG
     begins = [
         tick for segment in segments(run) if segment.name == "step" for tick in step_ticks(command, segment)
     ]

@@ -99,6 +99,8 @@ def show(report: dict[str, Any]) -> None:
             for name, item in report.get(key, {}).items()
         ]
     table(rows)
+    if "model" in report:
+        sys.stdout.write(f"parameters are those of the {report['model']}\n")
     if "nrmse" in report:
         sys.stdout.write(f"misfit (NRMSE): {misfit(report['nrmse'])}\n")
     if "bandwidth" in report:

@@ -34,15 +34,19 @@ class Integrator:
     limit: float = math.inf  # stable while the highest ω·h stays below
     order: int = 2
     of_numerical: bool = False  # whether its K is that of the numerical part alone, not of everything
+    excess: Callable[[Array, Array, Array, float], float] | None = (
+        None  # (M, C, K, interval): beyond 0 it diverges
+    )
     options: Mapping[str, float] = field(default_factory=dict)  # with defaults
     rules: Mapping[str, Rule] = field(default_factory=dict)  # ranges of the options
 
 
 BOUNDED = "stable while the highest ω·interval is below 2, whatever the damping"
 ALWAYS = "stable for any ω·interval while no stiffness exceeds the initial one"
+GROWTH = 1e-9  # of a step, that rounding may make
 HELD = (
-    "stable while the highest ω·interval of the numerical part is below 2.6, for damping ratios up to 1; "
-    "order 4 where nothing but the numerical part acts"
+    "stable while the highest ω·interval of the numerical part is below 2.6, and beyond critical damping the highest "
+    "rate of decay times the interval below 2.78; order 4 where nothing but the numerical part acts"
 )
 
 INTEGRATORS = {
@@ -75,7 +79,15 @@ INTEGRATORS = {
             rules={"rho_infinity": Rule("spectral radius at infinity", least=0.0, most=1.0)},
         ),
         Integrator(
-            "rk4", 4, rk4.coefficients, rk4.initial_state, HELD, limit=2.6, order=1, of_numerical=True
+            "rk4",
+            4,
+            rk4.coefficients,
+            rk4.initial_state,
+            HELD,
+            limit=2.6,
+            order=1,
+            of_numerical=True,
+            excess=rk4.excess,
         ),
     )
 }
@@ -128,18 +140,23 @@ def build(
         rule = integrator.rules[option]
         if not rule.admits(value):
             raise InputError(f"{option} of integrator '{name}' is {value:g}, but must be {rule.allowed()}.")
-    check_stability(integrator, M, K, interval)
+    check_stability(integrator, M, C, K, interval)
     c = integrator.coefficients(M, C, K, interval, **options)
     return Method(integrator.code, c, integrator, M, C, interval)
 
 
-def check_stability(integrator: Integrator, M: Array, K: Array, interval: float) -> None:
-    """Raise InputError where the highest mode of the initial stiffness is beyond the method's limit."""
+def check_stability(integrator: Integrator, M: Array, C: Array, K: Array, interval: float) -> None:
+    """Raise InputError where the highest mode of the initial stiffness, or the method's own step, makes it diverge."""
     omega = math.sqrt(float(np.abs(np.linalg.eigvals(np.linalg.solve(M, K))).max()))
     if omega * interval >= integrator.limit:
         raise InputError(
             f"Integrator '{integrator.name}' diverges at ω·interval = {omega * interval:.3g} of the highest"
             f" mode: take an interval below {integrator.limit / omega:.3g} s, or cr or kr_alpha."
+        )
+    if integrator.excess is not None and integrator.excess(M, C, K, interval) > GROWTH:
+        raise InputError(
+            f"Integrator '{integrator.name}' diverges by the dashpots of the numerical part at an interval of "
+            f"{interval:g} s: take a shorter one, less damping in [structure], or cr or kr_alpha."
         )
 
 

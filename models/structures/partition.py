@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from common.errors import InputError
 from common.plan import Plan
 from common.tables import Experimental
 from models import excitation, indicators
@@ -61,13 +62,39 @@ def matrices(plan: Plan) -> Matrices:
 
 
 def numerical(plan: Plan) -> Matrices:
-    """The numerical part: the whole building without what the specimen takes over."""
+    """The numerical part: the whole building without what the specimen takes over.
+
+    Raises:
+        InputError: a mass, stiffness or dashpot cannot be, or the specimen takes over all of the modal damping.
+    """
     whole, left_out = matrices(plan), taken_over(plan)
+    if plan.structure.damping_ratio > 0.0 and left_out.damping > 0.0:
+        check_damping(plan, whole, left_out.damping)
     M = whole.M.copy()
     M[plan.column.storey - 1, plan.column.storey - 1] -= left_out.mass
     direction = drift_direction(plan)
     outer = np.outer(direction, direction)
     return Matrices(M, whole.C - left_out.damping * outer, whole.K - left_out.stiffness * outer)
+
+
+def check_damping(plan: Plan, whole: Matrices, damping: float) -> None:
+    """Raise InputError where a dashpot (N·s/m) is not below what the modal damping has against the storey's drift.
+
+    That is `1/(eᵀ·C⁻¹·e)`, with `C⁻¹ = Φ·diag(1/(2ζω))·Φᵀ` and Φ of modal mass 1; at or beyond it C_N would not be
+    positive definite.
+    """
+    modes = shear_building.modes(*whole)
+    parts = (drift_direction(plan) @ modes.shapes) ** 2
+    takes_part = parts > np.finfo(np.float64).eps * parts.sum()  # rigid modes without this drift have no say
+    rate = float(parts[takes_part] @ modes.periods[takes_part]) / (
+        4.0 * math.pi * plan.structure.damping_ratio
+    )
+    if damping * rate >= 1.0:
+        raise InputError(
+            f"damping in [structure.experimental] is {damping:g}, but with damping_ratio "
+            f"{plan.structure.damping_ratio:g} the drift of storey {plan.column.storey} of the whole building has "
+            f"{1.0 / rate:g}: give less than that."
+        )
 
 
 def taken_over(plan: Plan) -> Experimental:

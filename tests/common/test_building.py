@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,8 @@ from hypothesis import strategies as st
 
 from common import building, reality
 from common.errors import PlanError
-from common.plan import Plan, parse
+from common.plan import Plan, from_tables, ideal, parse
+from common.tables import Actuator, ServoHydraulics
 from tests.helpers import SERVO_PLAN, with_table
 
 
@@ -51,14 +53,21 @@ WRONG = {
         "knows no columns of model 'bilinear'",
     ),
     "more mass than the floor has": (
-        "[structure.experimental]\nmass = 160e3\n",
+        "[structure.experimental]\nmass = 160e3\nstiffness = 1.0\n",
         "mass in .structure.experimental. is 160000, but floor 1 of the whole building has 160000",
     ),
     "more stiffness than the storey has": (
         "[structure.experimental]\nstiffness = 26e6\n",
         "but storey 1 of the whole building has 2.5e.07",
     ),
-    "more damping than the storey has": ("[structure.experimental]\ndamping = 3e5\n", "has 200000"),
+    "more damping than the storey has": (
+        "[structure.experimental]\nstiffness = 1.0\ndamping = 3e5\n",
+        "has 200000: give no more",
+    ),
+    "a table without the specimen's stiffness": (
+        "[structure.experimental]\nmass = 20\n",
+        "stiffness is missing in .structure.experimental., which has no default for it: give it",
+    ),
     "a model that is none": ("[actuator]\nmodel = 'servo'\n", "one of fopdt, servo_hydraulic"),
     "a command that is neither": ("[actuator]\ncommand = 'step'\n", "one of ramp, held"),
     "servo-hydraulics without a mass": ("[actuator]\nmodel = 'servo_hydraulic'\n", "give the moving mass"),
@@ -68,10 +77,13 @@ WRONG = {
     ),
     "servo-hydraulics of a lag": ("[actuator.servo]\nleakage = 2.0\n", "choose 'servo_hydraulic'"),
     "a tolerance of a choice": (
-        "[structure.experimental]\nmass = 1.0\n[tolerances]\n'structure.experimental.mass' = 0.1\n",
+        "[structure.experimental]\nmass = 1.0\nstiffness = 1.0\n[tolerances]\n'structure.experimental.mass' = 0.1\n",
         "Unknown parameter 'structure.experimental.mass'",
     ),
-    "a tolerance of another model": ("[tolerances]\n'actuator.servo.leakage' = 0.1\n", "Unknown parameter"),
+    "a tolerance of another model": (
+        "[tolerances]\n'actuator.servo.leakage' = 0.1\n",
+        "'actuator.servo.leakage' in .tolerances. is of the actuator's model 'servo_hydraulic', but 'fopdt' is chosen",
+    ),
     "a tolerance of a name": ("[tolerances]\n'actuator.model' = 0.1\n", "Unknown parameter"),
 }
 
@@ -88,8 +100,52 @@ def test_tolerances_of_new_parameters_are_those_of_the_model(plan: Plan) -> None
     names = ("actuator.servo.valve", "column.mass", "column.damping", "structure.damping_ratio")
     found = with_table(plan, "tolerances", **dict.fromkeys(names, 0.05))
     assert set(found.tolerances.parameters) == set(names)
-    with pytest.raises(PlanError, match=r"Unknown parameter 'actuator.time_constant'"):
-        with_table(plan, "tolerances", **{"actuator.time_constant": 0.05})
+    for model in ("time_constant", "gain"):
+        with pytest.raises(PlanError, match=rf"'actuator.{model}' in .tolerances. is of .* model 'fopdt'"):
+            with_table(plan, "tolerances", **{f"actuator.{model}": 0.05})
+    with pytest.raises(PlanError, match=r"Unknown parameter 'actuator.servo.valv'"):
+        with_table(plan, "tolerances", **{"actuator.servo.valv": 0.05})
+
+
+CHOSEN = (
+    "structure.columns.yield_displacement",
+    "structure.rho_infinity",
+    "column.storey",
+    "column.represents",
+    "column.columns_per_storey",
+)
+
+
+@pytest.mark.parametrize("name", CHOSEN)
+def test_what_somebody_chose_has_no_tolerance(name: str) -> None:
+    text = "[structure.columns]\nmodel = 'bilinear'\nyield_displacement = 0.01\n"
+    with pytest.raises(PlanError, match=f"Unknown parameter '{name}' in .tolerances."):
+        parse(f"{text}[tolerances]\n'{name}' = 0.1\n", Path())
+    parse(f"{text}[tolerances]\n'column.deformation_ratio' = 0.1\n'sensors.column_force' = 0.1\n", Path())
+
+
+def of_matrix(plan: Plan, stiffness: float, storey: int = 1) -> Plan:
+    tables = plan.tables()
+    tables["structure"]["experimental"]["stiffness"] = stiffness
+    tables["column"]["storey"] = storey
+    return from_tables(tables, Path())
+
+
+@pytest.mark.parametrize("storey", [1, 2, 3])
+def test_of_a_matrix_less_is_taken_over_than_the_storey_has_against_its_drift(
+    plan: Plan, storey: int
+) -> None:
+    K, drift = np.array(plan.structure.stiffness), np.zeros(3)
+    drift[max(storey - 2, 0)], drift[storey - 1] = -1.0, 1.0
+    most = 1.0 / float(drift @ np.linalg.solve(K, drift))
+    of_matrix(plan, most * (1.0 - 1e-9), storey)
+    with pytest.raises(PlanError, match=f"but the drift of storey {storey} of .*: give less than that"):
+        of_matrix(plan, most * (1.0 + 1e-9), storey)
+
+
+def test_of_the_benchmark_3_18_meganewtons_per_metre_can_be_taken_over(plan: Plan) -> None:
+    with pytest.raises(PlanError, match=r"has 3.1768e.06: give less"):
+        of_matrix(plan, 4e6)
 
 
 @given(
@@ -111,6 +167,65 @@ def test_a_reality_keeps_what_it_does_not_say_of_a_table_within_a_table(plan: Pl
     assert (found.actuator.servo.leakage, found.actuator.servo.valve) == (5.0, 2.0e13)
     assert found.structure.experimental is not None
     assert (found.structure.experimental.mass, found.structure.experimental.stiffness) == (20.0, 1.19e6)
+
+
+def truth(plan: Plan, text: str) -> Plan:
+    return reality.from_reality(tomllib.loads(text), plan, Path()).plan
+
+
+def test_a_reality_cannot_leave_out_the_stiffness_of_a_table_that_the_plan_does_not_have(
+    default_plan: Plan,
+) -> None:
+    with pytest.raises(PlanError, match=r"stiffness is missing in .structure.experimental."):
+        truth(default_plan, "[structure.experimental]\nmass = 20.0\n")
+
+
+def test_a_reality_with_another_actuator_drops_the_parameters_of_the_planned_one(
+    plan: Plan, default_plan: Plan
+) -> None:
+    planned = with_table(plan, "actuator", servo={"valve": 2.0e13})
+    planned = with_table(planned, "tolerances", **{"actuator.servo.leakage": 0.39})
+    found = truth(planned, "[actuator]\nmodel = 'fopdt'\ndelay = 0.01\n")
+    assert found.actuator == Actuator(delay=0.01, command="held")
+    assert found.tolerances == planned.tolerances
+    assert truth(planned, "[actuator]\nmodel = 'servo_hydraulic'\n") == planned
+
+    planned = with_table(default_plan, "actuator", delay=0.02)
+    planned = with_table(planned, "tolerances", **{"actuator.delay": 0.1})
+    found = truth(
+        planned,
+        "[actuator]\nmodel = 'servo_hydraulic'\n[actuator.servo]\nleakage = 2.0\n[column]\nmass = 9.0\n",
+    )
+    assert found.actuator == Actuator(model="servo_hydraulic", servo=ServoHydraulics(leakage=2.0))
+    with pytest.raises(PlanError, match="gain in .actuator. is of the model 'fopdt'"):
+        truth(planned, "[actuator]\nmodel = 'servo_hydraulic'\ngain = 1.1\n[column]\nmass = 9.0\n")
+
+
+def test_dashpots_and_a_damping_ratio_of_a_reality_stand_in_each_others_place(
+    plan: Plan, default_plan: Plan
+) -> None:
+    def damping(planned: Plan, text: str) -> tuple[float, tuple[float, ...]]:
+        found = truth(planned, f"[structure]\n{text}\n").structure
+        return found.damping_ratio, found.damping
+
+    assert damping(default_plan, "damping_ratio = 0.03") == (0.03, (0.0,))
+    assert damping(default_plan, "damping_ratio = 0.0") == (0.0, default_plan.structure.damping)
+    assert damping(default_plan, "damping = 1e5") == (0.0, (1e5,))
+    assert damping(plan, "damping = [1e4, 2e4, 3e4]") == (0.0, (1e4, 2e4, 3e4))
+    assert damping(plan, "damping_ratio = 0.04") == (0.04, (0.0, 0.0, 0.0))
+    assert damping(plan, "mass = [900.0, 900.0, 900.0]") == (0.05, (0.0, 0.0, 0.0))
+    for planned in (plan, default_plan):
+        values = [1e4] * planned.storeys
+        with pytest.raises(PlanError, match="give one of them"):
+            damping(planned, f"damping_ratio = 0.03\ndamping = {values}")
+
+
+def test_an_ideal_plan_of_servo_hydraulics_survives_its_own_text(plan: Plan) -> None:
+    names = ("actuator.servo.leakage", "column.stiffness")
+    made = ideal(with_table(plan, "tolerances", **dict.fromkeys(names, 0.05)))
+    assert made.tolerances.parameters == {"column.stiffness": 0.05}
+    assert (made.actuator.command, made.compensator.force.unit_delay) == ("ramp", False)
+    assert parse(made.toml(), Path()) == made
 
 
 def test_times_of_ticks_do_not_add_up_their_rounding(plan: Plan, default_plan: Plan) -> None:

@@ -114,6 +114,10 @@ def test_the_bench_finds_the_lag_that_comes_nearest(
     capsys.readouterr()
     assert call("identify", path, "--json") == 0
     (report,) = json.loads(capsys.readouterr().out)["parts"]
+    assert report["model"] == "equivalent first-order lag of a servo-hydraulic actuator"
     found = {name: item["value"] for name, item in report["parameters"].items()}
     assert found["delay"] + found["time_constant"] == pytest.approx(0.0251, rel=0.03)
     assert found["gain"] == pytest.approx(1.0 / 0.99254, rel=2e-3)
+    assert call("identify", path) == 0
+    text = capsys.readouterr().out
+    assert "\nparameters are those of the equivalent first-order lag of a servo-hydraulic actuator\n" in text

@@ -14,7 +14,7 @@ from scipy.linalg import expm
 
 from common.errors import InputError
 from models import integrators, specimens
-from models.integrators import INTEGRATORS, kr_alpha
+from models.integrators import INTEGRATORS, kr_alpha, rk4
 from models.integrators.state import (
     ACCELERATION,
     DISPLACEMENT,
@@ -547,6 +547,32 @@ class TestRungeKutta:
     def test_its_limit_is_sharp_near_half_and_that_without_damping_is_the_root_of_eight(self) -> None:
         assert radius("rk4", 1.01 * INTEGRATORS["rk4"].limit, 0.54) > 1.0
         assert radius("rk4", 0.999 * math.sqrt(8.0)) < 1.0 < radius("rk4", 1.001 * math.sqrt(8.0))
+
+    @pytest.mark.parametrize("zeta", [1.5, 5.0, 50.0])
+    def test_dashpots_far_above_critical_are_refused_where_a_free_motion_grows(self, zeta: float) -> None:
+        problem = three()._replace(force=np.zeros(3), omega=0.0)
+        M, K = problem.M, problem.K
+        problem = problem._replace(C=shear_building.modal_damping(M, K, zeta))
+        omega = 2.0 * math.pi / shear_building.modes(M, problem.C, K).periods.min()
+        longest = 2.785293563405282 / (omega * (zeta + math.sqrt(zeta * zeta - 1.0)))
+        s = march(problem._replace(duration=400 * longest), "rk4", 0.995 * longest)
+        assert np.abs(s[-1, NEXT_DISPLACEMENT]).max() <= np.abs(s[0, DISPLACEMENT]).max()
+        with pytest.raises(InputError, match="'rk4' diverges by the dashpots of the numerical part"):
+            integrators.build("rk4", M, problem.C, K, 1.005 * longest)
+        coefficients = rk4.coefficients(M, problem.C, K, 1.005 * longest)
+        s = rk4.initial_state(
+            coefficients, M, problem.C, problem.x0, problem.v0, -K @ problem.x0, 1.005 * longest
+        )
+        sizes = []
+        for _ in range(2000):
+            rk4.step(coefficients, s, -K @ s[NEXT_DISPLACEMENT], 1.005 * longest)
+            sizes.append(np.abs(s[NEXT_DISPLACEMENT]).max())
+        assert sizes[-1] > 1e3 * sizes[0]
+
+    def test_a_numerical_part_that_a_specimen_must_hold_is_none_that_the_step_makes_diverge(self) -> None:
+        M, K = np.diag([1e3, 1e3]), np.array([[1e6, -1e6], [-1e6, 1e6]])
+        for stiffness in (K, K - 1e5 * np.eye(2)):
+            integrators.build("rk4", M, np.zeros((2, 2)), stiffness, 0.01)
 
     @pytest.mark.parametrize("omega_h", [0.1, 0.2, 0.3])
     def test_it_damps_low_modes_by_the_fifth_power(self, omega_h: float) -> None:

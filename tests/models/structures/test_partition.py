@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.optimize import root
 
+from common.errors import InputError
 from common.plan import Plan, parse
 from common.tables import Experimental
 from models.indicators import FrequencyEvaluation
@@ -77,6 +78,38 @@ def test_without_a_word_the_specimen_takes_over_its_share_of_the_columns(default
     assert partition.numerical(plan).M.tolist() == [[160e3]]
 
 
+@pytest.mark.parametrize("storey", [1, 2, 3])
+@pytest.mark.parametrize("matrix", [True, False])
+def test_a_dashpot_cannot_take_over_all_of_the_modal_damping(plan: Plan, storey: int, matrix: bool) -> None:
+    stiffness = plan.structure.stiffness if matrix else (3e6, 2e6, 1e6)
+    structure = replace(plan.structure, mass=(1000.0, 800.0, 600.0), stiffness=stiffness)
+    plan = replace(plan, structure=structure, column=replace(plan.column, storey=storey))
+    direction = partition.drift_direction(plan)
+    most = 1.0 / float(direction @ np.linalg.solve(partition.matrices(plan).C, direction))
+
+    def taking(share: float) -> Plan:
+        taken = Experimental(stiffness=1e5, damping=share * most)
+        return replace(plan, structure=replace(plan.structure, experimental=taken))
+
+    least = np.linalg.eigvalsh(partition.numerical(taking(1.0 - 1e-6)).C).min()
+    assert 0.0 < least < 1e-3 * most
+    with pytest.raises(
+        InputError, match=f"the drift of storey {storey} of the whole building has .*: give less"
+    ):
+        partition.numerical(taking(1.0 + 1e-6))
+
+
+def test_modal_damping_of_a_building_with_a_free_storey_has_a_limit_in_the_others() -> None:
+    text = "[structure]\nmass = [1e3, 1e3, 1e3]\nstiffness = [1e6, 0.0, 2e6]\ndamping_ratio = 0.1\n"
+    text += "[structure.experimental]\nstiffness = 1e5\ndamping = {}\n[column]\nstorey = {}\n"
+    alone = 2.0 * 0.1 * math.sqrt(1e6 * 1e3)  # of the first storey, which moves by itself
+    partition.numerical(parse(text.format(0.999 * alone, 1), Path()))
+    for damping, storey in ((1.001 * alone, 1), (1.0, 2)):
+        free = parse(text.format(damping, storey).replace("stiffness = 1e5", "stiffness = 0.0"), Path())
+        with pytest.raises(InputError, match=rf"damping in .structure.experimental. is {damping:g}"):
+            partition.numerical(free)
+
+
 def decay(plan: Plan, amplitude: float, delay: float) -> float:
     """Decay of the first mode over its frequency, from the characteristic equation with `A·e^(−s·d)` in the path."""
     part, specimen = partition.numerical(plan), partition.felt(plan)
@@ -101,7 +134,7 @@ def test_what_a_path_costs_is_what_the_characteristic_equation_says(
     plan: Plan, amplitude: float, delay: float
 ) -> None:
     heavy = replace(plan, column=replace(plan.column, mass=300.0, damping=2e3))
-    structure = replace(plan.structure, experimental=Experimental(300.0, 1.19e6, 2e3))
+    structure = replace(plan.structure, experimental=Experimental(mass=300.0, stiffness=1.19e6, damping=2e3))
     heavy = replace(heavy, structure=structure)
     path = FrequencyEvaluation(amplitude, delay, 3.59)
     lost = decay(heavy, 1.0, 0.0) - decay(heavy, amplitude, delay)
