@@ -57,8 +57,8 @@ def force_path(expected: Array, measured: Array, interval: float, most: float = 
             at least four blocks share, as of a single pulse.
 
     Source: Knapp and Carter, IEEE Transactions on Acoustics, Speech, and Signal Processing 24 (1976) 320; Thomson and
-    Chave, in Haykin (ed.), Advances in Spectrum Analysis and Array Processing 1 (1991) 58, for the jackknife; Carter, Knapp and
-    Nuttall, IEEE Transactions on Audio and Electroacoustics 21 (1973) 337, for coherence by chance.
+    Chave, in Haykin (ed.), Advances in Spectrum Analysis and Array Processing 1 (1991) 58, for the jackknife; Carter,
+    Knapp and Nuttall, IEEE Transactions on Audio and Electroacoustics 21 (1973) 337, for coherence by chance.
     """
     from scipy.special import stdtrit
 
