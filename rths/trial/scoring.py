@@ -128,7 +128,13 @@ def is_named(case: Case, status: str, names: list[str], sets: list[set[str]]) ->
         return status in UNKNOWN
     if case.inside and status == "no_gap":
         return True
-    return all(any(same(item.name, name, sets) for name in names) for item in case.laid)
+    return all(any(same(true, name, sets) for true in truths(item) for name in names) for item in case.laid)
+
+
+def truths(item: Laid) -> set[str]:
+    """Names that are right for an effect: a maximally flat low-pass is as much a delay as the catalogue's lag."""
+    flat = item.formula == "butterworth"
+    return {item.name} | ({item.name.removesuffix(".lag") + ".delay"} if flat else set())
 
 
 def same(true: str, name: str, sets: Iterable[set[str]]) -> bool:
