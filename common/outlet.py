@@ -19,6 +19,7 @@ from common.plan import Plan
 from common.roles import MASTER
 
 PIECE = 10  # items; at 500 ticks per second a piece leaves every 10 to 20 ms
+AT_ONCE = "event"  # the topic that fills no piece first: a laboratory that has stopped adds no more items to fill one
 PATIENCES = 6  # of the plan's with its recorder are kept for sending again: at the default a minute
 KEPT_BYTES = 64 << 20  # of them at most, which tall buildings with many slaves reach
 EARLY = 4_000  # pieces that wait for one before them; what comes beyond is asked for again
@@ -47,15 +48,18 @@ class Outlet:
         self._pending: list[list[Any]] = []
         self._sent: deque[Samples] = deque()  # one joining the other
         self._sent_bytes = 0
+        self._hurry = False
         self.total = 0
 
     def add(self, topic: str, log_ns: int, publish_ns: int, values: tuple[Any, ...]) -> None:
         """Queue one item."""
         self._pending.append([topic, log_ns, publish_ns, *values])
+        self._hurry = self._hurry or topic == AT_ONCE
         self.total += 1
 
     def pieces(self, *, everything: bool = False) -> list[Message]:
-        """The messages to send now: whole pieces, or `everything` that waits."""
+        """The messages to send now: whole pieces, or `everything` that waits, as where an event is among it."""
+        everything, self._hurry = everything or self._hurry, False
         messages: list[Message] = []
         while len(self._pending) >= PIECE or (everything and self._pending):
             items, self._pending = self._pending[:PIECE], self._pending[PIECE:]

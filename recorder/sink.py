@@ -7,6 +7,7 @@ from queue import Empty, Queue
 from typing import Any, Protocol
 
 from common.clock import Clock
+from common.outlet import AT_ONCE
 from common.recording.reader import MACHINES
 from common.recording.writer import Recording
 
@@ -41,7 +42,7 @@ class Sink(Protocol):
 
 
 class FileSink:
-    """Writes straight away, flushing twenty times a second and syncing once."""
+    """Writes straight away; flushes twenty times a second and after every event, syncs once a second."""
 
     def __init__(self, recording: Recording, clock: Clock) -> None:
         self._recording = recording
@@ -58,13 +59,13 @@ class FileSink:
             return
         for topic, log_ns, publish_ns, *values in items:
             self._recording.add(topic, log_ns, publish_ns, values)
-        self.keep_up()
+        self.keep_up(at_once=any(item[0] == AT_ONCE for item in items))
 
-    def keep_up(self) -> None:
-        """Flush and sync where it is time."""
+    def keep_up(self, *, at_once: bool = False) -> None:
+        """Flush and sync where it is time; flush `at_once` in any case."""
         now = self._clock.now()
         try:
-            if now - self._flushed_ns >= FLUSH_NS:
+            if at_once or now - self._flushed_ns >= FLUSH_NS:
                 self._flushed_ns = now
                 self._recording.flush()
             if now - self._synced_ns >= SYNC_NS:

@@ -15,8 +15,9 @@ from common.errors import InputError
 from common.plan import Plan, parse
 from common.recording.reader import Run, Values
 from common.recording.tail import Tail
-from common.roles import LATENCY, MASTER, RECORDER, SLAVE, kind_of, latency_topic
+from common.roles import LATENCY, MASTER, SLAVE, kind_of, latency_topic
 from common.safety.modes import Mode
+from rths.live.standing import Standing
 from rths.live.trace import Trace, extremes, largest
 
 POINTS = 1000  # of a line: as many as a wide screen has columns for it
@@ -24,7 +25,6 @@ POINTS_WHOLE = 5000  # of a line of a finished recording, which is sent once
 SILENT_NS = 2_000_000_000  # without anything new; the recorder writes twenty times a second
 EVENTS = 100
 EDGES = np.geomspace(50.0, 50_000.0, 61)  # µs, of the histogram's classes
-MODES = [mode.value for mode in Mode]
 SIGNALS = {
     MASTER: ("t", "column_target", "column_displacement", "column_force"),
     SLAVE: ("t", "table_target", "table_displacement", "damper_stroke", "damper_force"),
@@ -77,7 +77,7 @@ class Feed:
         self.roles: tuple[str, ...] = (SLAVE,)
         self.t = 0.0
         self.interval = 0.0  # s, 0 while it is not known
-        self.modes: dict[str, str] = {}
+        self.standing = Standing(clock)
         self.events: deque[dict[str, Any]] = deque(maxlen=EVENTS)
         self.changes = self.happened = 0
         self.failure = ""
@@ -149,8 +149,7 @@ class Feed:
         for event in run.events:
             self.events.append(event)
             self.happened += 1
-            if event["code"] == "mode" and 0 <= event["values"].get("mode", -1) < len(MODES):
-                self.modes[event["lab"]] = MODES[int(event["values"]["mode"])]
+            self.standing.event(event)
 
     def _move(self, role: str, columns: Mapping[str, Values]) -> None:
         """What a laboratory did at some ticks, or on its way to rest."""
@@ -159,6 +158,7 @@ class Feed:
         if not self.interval and columns["seq"][-1] > 0:
             self.interval = float(columns["t"][-1] / columns["seq"][-1])
         self.t = max(self.t, float(columns["t"][-1]))
+        self.standing.row(role, float(columns["t"][-1]))
         nothing = np.full(columns["seq"].size, math.nan)
         names = SIGNALS[MASTER if role == MASTER else SLAVE]
         self._kept(role).add(columns["seq"], {name: columns.get(name, nothing) for name in names})
@@ -198,6 +198,17 @@ class Feed:
         return (MASTER, *self.roles)
 
     @property
+    def beat(self) -> int:
+        """A number that changes every second."""
+        return self._clock.now() // 1_000_000_000
+
+    @property
+    def silent(self) -> float:
+        """Seconds for which the file has not grown, 0 while they are so few that it may be about to."""
+        silent = self._clock.now() - self._grown_ns
+        return silent * 1e-9 if silent > SILENT_NS and not self.ended else 0.0
+
+    @property
     def behind(self) -> bool:
         """Whether more of the file is there than was read."""
         return self._tail.behind
@@ -224,7 +235,9 @@ class Feed:
             return "waiting for the recording to begin"
         if self.behind:
             return "reading what was recorded so far"
-        silent = self._clock.now() - self._grown_ns
-        if silent > SILENT_NS:
-            return f"nothing new from the {RECORDER} for {silent * 1e-9:.0f} s"
-        return "running" if self.t > 0.0 else "starting"
+        said = self.standing.gravest.replace("_", " ") or (Mode.RUNNING.value if self.t else "starting")
+        if self.silent and self.standing.latched:  # a laboratory that waits for its operator measures nothing
+            return f"{said}, t = {self.t:.2f} s; no news for {self.silent:.0f} s"
+        if self.silent:
+            return f"no news for {self.silent:.0f} s; the newest: {said}, t = {self.t:.2f} s"
+        return f"{said}, t = {self.t:.2f} s"

@@ -69,7 +69,14 @@ class Page:
         self.slave = Select(title="slave", options=[], visible=False, width=200, name="slave")
         for name, each in self.plots.items():
             each.name = name
-        texts = (self._heading, self._parting, self.status.tiles, self.slave, self.status.events)
+        texts = (
+            self._heading,
+            self._parting,
+            self.status.banner,
+            self.status.tiles,
+            self.slave,
+            self.status.events,
+        )
         for root in (*texts, *self.plots.values()):
             document.add_root(root)
         self._set_up(document)
@@ -78,8 +85,10 @@ class Page:
     def _set_up(self, document: Document) -> None:
         document.config.update(reconnect_session=False, notify_connection_status=False)
         document.js_on_event(
-            ConnectionLost, CustomJS(args={"text": self._parting}, code="text.visible = true")
+            ConnectionLost,
+            CustomJS(args={"text": self._parting}, code="text.visible = true; window.heard = 0"),
         )
+        self.status.tiles.js_on_change("tags", CustomJS(code="window.heard = Date.now()"))
         document.theme = THEME
         document.template = Template(TEMPLATE.read_text(encoding="utf-8"))
         document.template_variables["plots"] = list(self.plots)
@@ -96,6 +105,7 @@ class Page:
 
     def _update(self, feed: Feed) -> None:
         self._head(feed)
+        self.status.tiles.tags = [feed.beat]  # lets the page say for how long it has heard nothing
         if len(feed.roles) > 1 and not self.slave.visible:
             options: Any = [(role, name_of(role)) for role in feed.roles]
             self.slave.update(options=options, value=feed.roles[0], visible=True)

@@ -215,7 +215,7 @@ def test_samples_that_the_link_loses_are_asked_for_again(
     deliver, lost = MemoryEndpoint.send, []
 
     def leaky(self: MemoryEndpoint, message: Any, to: str = "") -> int:
-        if isinstance(message, Samples) and message.first % 70 == 30 and message.first not in lost:
+        if isinstance(message, Samples) and message.first // 10 % 7 == 3 and message.first not in lost:
             lost.append(message.first)
             return 0
         return deliver(self, message, to)
@@ -236,7 +236,7 @@ def test_what_can_not_be_had_again_is_counted_and_said(
     deliver = MemoryEndpoint.send
 
     def leaky(self: MemoryEndpoint, message: Any, to: str = "") -> int:
-        if isinstance(message, Samples) and message.lab == "slave" and message.first == 500:
+        if isinstance(message, Samples) and message.lab == "slave" and 490 < message.first <= 500:
             return 0
         return deliver(self, message, to)
 

@@ -14,6 +14,7 @@ from bokeh.document import Document
 
 from common import reality
 from common.clock import VirtualClock
+from common.errors import EmergencyStopError
 from common.plan import Plan, load
 from common.recording.reader import Run, read
 from common.recording.tail import Tail, length
@@ -22,6 +23,7 @@ from common.signals import TOPICS
 from rths import virtual
 from rths.live.feed import EDGES, POINTS, POINTS_WHOLE, SILENT_NS, Feed
 from rths.live.page import Page
+from rths.live.standing import Standing
 from rths.live.status import row
 from rths.live.stream import FACTORS
 from tests.helpers import ROOT
@@ -123,9 +125,9 @@ def test_late_ticks_and_the_histogram_count_every_tick(growing: Growing, virtual
 
 def test_events_and_modes_are_shown(growing: Growing) -> None:
     growing.to(0.5)
-    assert growing.feed.modes == {"master": "running", "slave": "running"}
+    assert growing.feed.standing.modes == {"master": "running", "slave": "running"}
     growing.to(1.0)
-    assert growing.feed.modes == {"master": "idle", "slave": "idle"}
+    assert growing.feed.standing.modes == {"master": "idle", "slave": "idle"}
     events = unescape(growing.page.status.events.text)
     assert "running → ramping (end)" in events
     assert events.index("running → ramping (end)") < events.index("recording begun")
@@ -198,12 +200,68 @@ def test_a_silent_recorder_is_said(growing: Growing) -> None:
     assert "running" in growing.feed.state
     growing.clock.time += SILENT_NS + 1_000_000_000
     growing.to(0.5)
-    assert growing.feed.state == "nothing new from the recorder for 3 s"
+    assert growing.feed.state.startswith("no news for 3 s; the newest: running, t = 1.9")
+    assert growing.text.count("no news for 3 s, since t = 1.9") == 2  # a tile for each laboratory
+
+
+def test_a_state_is_said_with_its_age(growing: Growing) -> None:
+    growing.to(0.25)
+    early = growing.feed.t
+    growing.clock.time += 500_000_000
+    growing.to(0.27)  # rows that were measured a little after those before, and come half a second later
+    waited = 0.5 - (growing.feed.t - early)
+    assert 0.2 < waited < 0.5
+    assert growing.feed.standing.age("master") == pytest.approx(waited, abs=0.05)
+    for more in (0.0, 1.0):
+        growing.clock.time += round(more * 1e9)
+        growing.page.update()
+        for lab in ("master", "slave"):
+            t, age = growing.feed.standing.last(lab), growing.feed.standing.age(lab)
+            assert f"as of t = {t:.2f} s, {age:.1f} s ago" in growing.text
+        assert age > more
+    growing.to(1.0)
+    assert " ago" not in growing.text
+
+
+def test_an_emergency_stop_is_there_at_the_next_look_though_nothing_follows_it(
+    short_plan: Plan, tmp_path: Path, grow: Grow
+) -> None:
+    path = tmp_path / "stopped.mcap"
+    bench = virtual.assemble(short_plan, reality.as_planned(short_plan), path)
+    seen: list[str] = []
+
+    def stopped() -> str:
+        if bench.master.ticks < 500:
+            return ""
+        bench.master.emergency(EmergencyStopError("smoke at the pump."))
+        bench.master.lab.send_samples()  # as the loop does while it waits for the operator's reset
+        while (received := bench.endpoints["recorder"].receive()) is not None:
+            assert bench.recorder is not None
+            bench.recorder.take(received.message, received.received_ns)
+        growing = grow(path.read_bytes())
+        growing.to(1.0)
+        seen.extend([growing.page.status.banner.text, growing.text])
+        return "seen."
+
+    virtual.run(bench, stopped)
+    banner, text = seen[0], seen[1]
+    assert "EMERGENCY STOP" in banner
+    assert "<b>master</b>, t = 1.00 s: smoke at the pump." in banner
+    assert "emergency stop, t = 1.00 s" in text
+
+
+def test_the_banner_names_causes_and_not_what_followed_them() -> None:
+    standing = Standing(VirtualClock())
+    event = {"t": 1.2, "level": "error", "values": {}}
+    standing.event({**event, "lab": "slave", "code": "remote_trip", "text": "The master stopped the test"})
+    assert [stop.lab for stop in standing.stops] == ["slave"]
+    standing.event({**event, "lab": "master", "code": "limit", "text": "too far"})
+    assert [(stop.lab, stop.text) for stop in standing.stops] == [("master", "too far")]
 
 
 def test_damage_is_said_and_what_came_before_stays(virtual_recording: Path, grow: Grow) -> None:
     content = bytearray(virtual_recording.read_bytes())
-    content[len(content) // 2] ^= 0xFF
+    content[content.index(b"\x28\xb5\x2f\xfd", len(content) // 2) + 9] ^= 0xFF  # within a compressed chunk
     growing = grow(bytes(content))
     growing.to(1.0)
     assert growing.feed.ended
