@@ -3,8 +3,9 @@ BIN := .venv/bin
 READY := .venv/.ready
 
 FAULT_ROWS := runs/faults.jsonl
+FAULT_TESTS := tests/faults tests/system/faults tests/system/test_recording_faults.py tests/system/test_security.py
 
-.PHONY: setup run test check unit alone again faults docs site benchmark blind clean
+.PHONY: setup run test check slow faults soak matrix opensees docs site benchmark blind clean
 
 setup: $(READY)
 
@@ -25,36 +26,31 @@ check: setup
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
-test: check unit alone
+TESTED := -n 2 --dist worksteal -m "not slow and not faults and not soak"
 
-UNIT := -n 2 -m "not alone"
-UNIT_CACHE := .pytest_cache/unit
+test: check
+	$(BIN)/pytest $(TESTED)
 
-unit: setup
-	@rm -f $(UNIT_CACHE)/passed
-	$(BIN)/pytest -o cache_dir=$(UNIT_CACHE) $(UNIT)
-	@touch $(UNIT_CACHE)/passed
-
-# one worker: nothing else is measured meanwhile, and where a test hangs beyond reach the others get another
-ALONE := -n 1 -m alone tests/docs tests/system
-ALONE_CACHE := .pytest_cache/alone
-
-alone: setup
-	@rm -f $(ALONE_CACHE)/passed
-	$(BIN)/pytest -o cache_dir=$(ALONE_CACHE) $(ALONE)
-	@touch $(ALONE_CACHE)/passed
-
-again: check
-	test -f $(UNIT_CACHE)/passed || $(BIN)/python -m tests.again $(UNIT_CACHE) $(UNIT)
-	test -f $(ALONE_CACHE)/passed || $(BIN)/python -m tests.again $(ALONE_CACHE) $(ALONE)
-
-FAULT_TESTS := tests/system/faults tests/system/test_recording_faults.py tests/system/test_security.py
+# what takes long or needs a machine that does little else; one worker: where a test hangs beyond reach the others get another
+slow: setup
+	$(BIN)/pytest -n 1 -m slow
 
 faults: setup
+	$(BIN)/pytest -n 1 -m faults
+
+soak: setup
+	$(BIN)/pytest -n 1 -m soak
+
+# all rows at the interval of a laboratory, on a machine that does nothing else, and their table
+matrix: setup
 	mkdir -p runs
 	rm -f $(FAULT_ROWS)
-	RTHS_FAULT_INTERVAL=0.002 RTHS_FAULT_ROWS=$(CURDIR)/$(FAULT_ROWS) $(BIN)/pytest tests/faults $(FAULT_TESTS)
+	RTHS_FAULT_INTERVAL=0.002 RTHS_FAULT_ROWS=$(CURDIR)/$(FAULT_ROWS) $(BIN)/pytest $(FAULT_TESTS)
 	$(BIN)/python -m tests.faults.rows $(FAULT_ROWS) docs/reference/faults.md
+
+# the peer of some tests, which skip without it: it needs Python 3.11 and Debian's libblas3 and liblapack3
+opensees: setup
+	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r opensees.lock
 
 docs: setup
 	$(BIN)/python -m docs.generate

@@ -45,23 +45,6 @@ import tests.conftest as guards
 from tests.conftest import no_leaked_process, pytest_configure, pytest_runtest_protocol, pytest_sessionfinish
 guards.OUT_OF_REACH_S = 0.5
 """
-FICKLE = """
-from pathlib import Path
-HERE = Path(__file__).parent
-
-def test_that_fails_once():
-    with (HERE / "runs").open("a+") as runs:
-        runs.write("x")
-        runs.seek(0)
-        assert len(runs.read()) > 1
-
-def test_that_fails_always():
-    assert (HERE / "mended").exists()
-
-def test_that_passes():
-    with (HERE / "passes").open("a") as runs:
-        runs.write("x")
-"""
 
 
 def alive(pid: int) -> bool:
@@ -136,31 +119,6 @@ def test_a_test_that_hangs_fails_with_its_stacks_and_the_others_go_on(tmp_path: 
     assert re.search(r'File ".*test_hangs.py", line 11 in test_that_no_signal_reaches', said)
     assert re.search(r"ERROR .*test_that_leaves_a_process", said)
     assert re.search(r"PASSED .*test_after_them", said)
-
-
-def test_tests_that_failed_are_run_once_more_and_said(tmp_path: Path) -> None:
-    (tmp_path / "test_fickle.py").write_text(FICKLE)
-    own = {name: value for name, value in environment().items() if not name.startswith("PYTEST")}
-    cache = ["-o", "cache_dir=cache"]
-    first = finished(sys.executable, "-m", "pytest", *cache, seconds=60.0, cwd=tmp_path, env=own)
-    assert first.returncode == 1
-    words = [sys.executable, "-m", "tests.again", "cache", "-n", "1"]
-    again = finished(*words, seconds=60.0, cwd=tmp_path, env=own)
-    assert again.returncode == 1
-    assert "failed once, passed when run again: test_fickle.py::test_that_fails_once\n" in again.stdout
-    assert "failed twice: test_fickle.py::test_that_fails_always\n" in again.stdout
-    (tmp_path / "mended").touch()
-    assert finished(*words, seconds=60.0, cwd=tmp_path, env=own).returncode == 0
-    assert (tmp_path / "passes").read_text() == "x"
-
-
-def test_where_many_failed_none_is_run_again(tmp_path: Path) -> None:
-    (tmp_path / "test_all.py").write_text("\n".join(f"def test_{n}(): assert False" for n in range(10)))
-    own = {name: value for name, value in environment().items() if not name.startswith("PYTEST")}
-    words = ["-o", "cache_dir=cache"]
-    finished(sys.executable, "-m", "pytest", *words, seconds=60.0, cwd=tmp_path, env=own)
-    again = finished(sys.executable, "-m", "tests.again", "cache", seconds=60.0, cwd=tmp_path, env=own)
-    assert (again.returncode, again.stdout) == (1, "10 tests have failed: none is run again\n")
 
 
 @LINUX

@@ -46,12 +46,14 @@ UNRUN = {
     ],
     "docs/reference/blind.md": ["rths blind --cases 240 --set judge --seed 2026 --jobs 2 -o runs/blind"],
     "docs/reference/faults.md": [
+        "make test",
         "make faults",
+        "make matrix",
         "rths faults --schedules 1000 --jobs 2",
         "rths faults --recorded --schedules 100",
         "pip install atheris==3.0.0",
         "python fuzz/decode.py -max_total_time=600 -seed=1",
-        "RTHS_SOAK=600 make faults",
+        "RTHS_SOAK=600 make soak",
         "python -m benchmarks false_trips",
         'for seed in 1 2 3 4 5 6 7 8; do rths run --seed $seed -o runs/quiet-$seed.mcap || echo "stopped: $seed"; done',
         "rths budget runs/quiet-1.mcap --json",
@@ -94,7 +96,7 @@ def in_real_time(name: str) -> bool:
 
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[pytest.mark.alone] * in_real_time(name)) for name in RUN]
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * in_real_time(name)) for name in RUN]
 )
 def test_a_page_shows_what_its_commands_print(name: str, tmp_path: Path) -> None:
     complaints = ["not run"]

@@ -10,6 +10,8 @@ import pytest
 from tests.helpers import ROOT
 from tests.processes import finished
 
+pytestmark = pytest.mark.slow
+
 SKIPPED = 77
 
 

@@ -21,6 +21,8 @@ from common.zenoh_link import listenable
 from tests.helpers import patient
 from tests.processes import environment, tied
 
+pytestmark = pytest.mark.slow
+
 PLANTED = 0.003
 SECONDS, SINCE = 8, 4.0  # s of test, and from when on the delay is there
 CLOSE = 0.2e-3  # s

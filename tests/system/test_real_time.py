@@ -84,6 +84,7 @@ def test_every_tick_of_a_real_test_is_recorded(
     assert abs(recording.log_ns["master"][0] * 1e-9 - time.time()) < 3600.0
 
 
+@pytest.mark.slow
 def test_real_time_equals_virtual_time_to_the_last_bit_until_a_message_is_late(tmp_path: Path) -> None:
     path = tmp_path / "slow.toml"
     path.write_text(SLOW + PATIENT)
@@ -207,6 +208,7 @@ def gone(number: int) -> bool:
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 
 
+@pytest.mark.slow
 @LINUX
 @pytest.mark.parametrize("seconds", [0.0, 0.7])
 def test_ctrl_c_in_the_first_moments_ends_soon(seconds: float, tmp_path: Path) -> None:
@@ -220,6 +222,7 @@ def test_ctrl_c_in_the_first_moments_ends_soon(seconds: float, tmp_path: Path) -
     assert "Traceback" not in out + err
 
 
+@pytest.mark.slow
 @LINUX
 @pytest.mark.parametrize("seconds", [0.0, 0.7])
 def test_a_front_door_killed_in_the_first_moments_leaves_nobody(seconds: float, tmp_path: Path) -> None:
@@ -252,6 +255,7 @@ def test_a_killed_slave_is_noticed_by_the_master_and_named(tmp_path: Path) -> No
     assert recording.sequences["master"].tolist() == list(range(recording.ticks("master")))
 
 
+@pytest.mark.slow
 @LINUX
 def test_a_second_ctrl_c_ends_a_run_that_hangs(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
@@ -283,6 +287,7 @@ class Loud:
 """
 
 
+@pytest.mark.slow
 def test_a_rig_that_prints_holds_nobody_up(tmp_path: Path) -> None:
     (tmp_path / "loud.py").write_text(LOUD)
     plan = tmp_path / "loud.toml"
@@ -325,6 +330,7 @@ def three(tmp_path: Path) -> Iterator[dict[str, subprocess.Popen[str]]]:
         process.communicate()
 
 
+@pytest.mark.slow
 def test_a_killed_slave_ends_the_test_with_exit_code_4(three: dict[str, Any], tmp_path: Path) -> None:
     wait_for_ticks(tmp_path / "a.mcap")
     three["slave"].kill()
@@ -335,6 +341,7 @@ def test_a_killed_slave_ends_the_test_with_exit_code_4(three: dict[str, Any], tm
     assert read(tmp_path / "a.mcap").finished
 
 
+@pytest.mark.slow
 def test_a_killed_master_ends_the_slave_with_exit_code_4(three: dict[str, Any], tmp_path: Path) -> None:
     wait_for_ticks(tmp_path / "a.mcap")
     three["master"].kill()
@@ -346,6 +353,7 @@ def test_a_killed_master_ends_the_slave_with_exit_code_4(three: dict[str, Any], 
     assert read(tmp_path / "a.mcap").ticks("slave") > 0
 
 
+@pytest.mark.slow
 def test_a_killed_recorder_loses_a_second_at_most(three: dict[str, Any], tmp_path: Path) -> None:
     wait_for_ticks(tmp_path / "a.mcap", 1500)
     three["recorder"].kill()
@@ -389,6 +397,7 @@ def test_nobody_there_is_exit_code_4_in_the_time_the_plan_allows(tmp_path: Path)
     assert time.monotonic() - began < 15.0
 
 
+@pytest.mark.slow
 def test_ctrl_c_before_the_other_is_there_ends_soon(tmp_path: Path) -> None:
     plan = plan_file(tmp_path)
     processes = [

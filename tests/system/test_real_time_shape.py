@@ -16,6 +16,8 @@ from common.recording.reader import MACHINES, read
 from common.zenoh_link import listenable
 from tests.processes import environment, tied
 
+pytestmark = pytest.mark.slow
+
 RTHS = [sys.executable, "-m", "rths"]
 ALLOWED = subprocess.run(
     [sys.executable, "-c", f"import os; os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param({PRIORITY}))"],

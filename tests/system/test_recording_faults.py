@@ -21,7 +21,10 @@ from tests.faults.rows import Row, passed
 from tests.helpers import PATIENT
 from tests.system.test_real_time import crew, finish, start, wait_for_ticks
 
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc and mounts a tmpfs")
+pytestmark = [
+    pytest.mark.faults,
+    pytest.mark.skipif(sys.platform != "linux", reason="reads /proc and mounts a tmpfs"),
+]
 
 # the processes share a machine with others: a laboratory that is held up shall not end a test of the recorder
 LOSS = "[link]\nloss_timeout = 5.0\n"

@@ -26,7 +26,7 @@ from common.zenoh_link import ZenohLink, key, listenable
 from rths import keys
 from tests.certificates import DAY, NOW, again, identity, made
 from tests.faults.rows import Row, passed
-from tests.helpers import ROOT
+from tests.helpers import PATIENT, ROOT
 
 TEST = "secure"
 WAIT_S = 10.0
@@ -340,7 +340,8 @@ def test_a_visitor_with_a_certificate_of_no_role_is_noticed_and_gets_nothing_thr
 
 # -- whole tests -----------------------------------------------------------------------------------------
 
-PLAN = """
+PLAN = (
+    """
 [test]
 name = "secure"
 duration = 2.0
@@ -348,11 +349,9 @@ duration = 2.0
 loss_timeout = 5.0
 [link.security]
 folder = "keys"
-[safety]
-hold_after = 3000
-ramp_after = 5000
-overrun = 5000
 """
+    + PATIENT
+)
 
 
 def rths(*words: str | Path) -> subprocess.CompletedProcess[str]:

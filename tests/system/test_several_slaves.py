@@ -15,6 +15,8 @@ from common.recording.reader import Run, read
 from tests.helpers import PATIENT, SLOW_TOWER
 from tests.system.test_real_time import equal_to_virtual_time, finish, free_port, start, wait_for_ticks
 
+pytestmark = pytest.mark.slow
+
 TEXT = """
 [test]
 name = "several"

@@ -15,6 +15,8 @@ from common.recording.reader import read
 from tests.helpers import PATIENT, ROOT, patient
 from tests.processes import environment, tied
 
+pytestmark = pytest.mark.slow
+
 ADDRESS_A, ADDRESS_B = ADDRESSES
 
 

@@ -30,6 +30,8 @@ from tests.system.faults.bench import (
 from tests.system.faults.network import ADDRESSES, Network, inside, network
 from tests.system.faults.relay import TO_SLAVE, Relay, untouched
 
+pytestmark = pytest.mark.faults
+
 LEASE = LEASE_MS * 1e-3  # s of silence after which zenoh closes a session
 RATE = round(0.4 / INTERVAL)  # kbit/s, a third of what a test sends
 RECONNECT = LEASE + 0.5  # s from where the link works again to the next word of the other laboratory

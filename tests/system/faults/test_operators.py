@@ -35,6 +35,8 @@ from tests.system.faults.bench import (
 )
 from tests.system.faults.rigs import Wish
 
+pytestmark = pytest.mark.faults
+
 ANSWER_S = 3.0
 
 

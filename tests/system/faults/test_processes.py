@@ -7,6 +7,8 @@ import signal
 import time
 from pathlib import Path
 
+import pytest
+
 from tests.faults.rows import Row, passed
 from tests.system.faults.bench import (
     INTERVAL,
@@ -18,6 +20,8 @@ from tests.system.faults.bench import (
     undisturbed,
     worst,
 )
+
+pytestmark = pytest.mark.faults
 
 HOLD = 25 * INTERVAL  # s
 

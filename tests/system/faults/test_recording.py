@@ -5,12 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from common.recording.reader import Run
 from tests.faults.rows import Row, passed
 from tests.system.faults.bench import AT, INTERVAL, LABS, Bench, DisturbedError, Process, later, undisturbed
 from tests.system.faults.hostile import Stranger
 from tests.system.faults.impostor import FAR
+
+pytestmark = pytest.mark.faults
 
 QUIET = 2.0  # s without strangers
 DOUBLES = 6.0  # s for a second slave and a second master

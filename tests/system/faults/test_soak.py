@@ -34,6 +34,8 @@ from tests.system.faults.bench import (
 )
 from tests.system.faults.network import PORT, Network, inside, network
 
+pytestmark = pytest.mark.soak
+
 SECONDS = float(os.environ.get("RTHS_SOAK", "50"))
 SLOT, LASTS = 10.0, 6.0  # s: a fault begins in every slot, and is over some time before the next
 HOGS = 4
