@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,19 +11,24 @@ import numpy as np
 from common.plan import Plan
 from common.preflight import Check, Risk
 from common.tables import Limits
-from models import limited, several_slaves, substructure
+from models import free_motion, limited, several_slaves, substructure
 from models.closed_loop import signals, simulate
+from models.compensators import COMPENSATORS
 from models.registry import Array
 from models.structures.partition import Partition, assess
 
 MOST_TICKS = 1_000_000  # of the simulation, which is kept in memory
 MOST_SLAVE_TICKS = 60_000  # of all slaves where there are several, which are stepped one by one: about 4 s
+AMPLITUDE_ERROR = (
+    0.2  # of the compensated actuator's amplitude: a stiffness wrong by a fifth is another specimen
+)
 LIMITS: dict[str, Any] = {name: field.metadata["rule"] for name, field in Limits.__dataclass_fields__.items()}
 
 
 def checks(plan: Plan) -> list[Check]:
     """Partition and peaks of a plan, for a gate; raises InputError where a model or parameter cannot be."""
-    return [partition_check(plan, assess(plan)), peaks_check(plan)]
+    found = assess(plan)
+    return [partition_check(plan, found), peaks_check(plan, unstable=found.unstable)]
 
 
 # -- partition ------------------------------------------------------------------------------------
@@ -40,26 +46,86 @@ def partition_check(plan: Plan, found: Partition) -> Check:
 
 def partition_risk(plan: Plan, found: Partition) -> Risk | None:
     """The risk of a delay too near to what the partition bears; None where the plan's margin is kept."""
-    expected, margin = expected_delay(plan, found), plan.preflight.delay_margin
-    if expected <= 0.0 or found.critical_delay >= margin * expected:
+    if not found.stable:
+        return Risk("partition", unstable_path(plan))
+    if keeps_margin(plan, found):
         return None
+    expected, margin = expected_delay(plan, found), plan.preflight.delay_margin
     return Risk(
         "partition",
         f"the column's path is unstable beyond {found.critical_delay * 1e3:.1f} ms of delay and "
-        f"{expected * 1e3:.1f} ms are to be expected, where a margin of {margin:g} is wanted, so compensate the "
-        "actuator in [compensator], give the structure more mass or damping, or let the specimen stand for less "
-        "of its stiffness",
+        f"{expected * 1e3:.1f} ms are to be expected, where a margin of {margin:g} is wanted, so "
+        f"{compensation(plan, found.delay)}, give the structure more mass or damping, or let the specimen stand for "
+        "less of its stiffness",
     )
+
+
+def keeps_margin(plan: Plan, found: Partition) -> bool:
+    """Whether the partition bears the plan's margin of the delay that is to be expected."""
+    expected = expected_delay(plan, found)
+    return expected <= 0.0 or found.critical_delay >= plan.preflight.delay_margin * expected
+
+
+def unstable_path(plan: Plan) -> str:
+    """What is wrong with an actuator that is unstable under its compensator, and what to change."""
+    chosen, actuator = plan.compensator, plan.actuator
+    late = actuator.servo.delay if actuator.model == "servo_hydraulic" else actuator.delay
+    gains = ", ".join(f"{name} = {value:g}" for name, value in chosen.parameters.items()) or "its defaults"
+    return (
+        f"the column's path is unstable by itself: the actuator, with {late * 1e3:.1f} ms of dead time, does not come "
+        f"to rest under compensator '{chosen.kind}' ({gains}), so lower the feedback's gains in [compensator] or take "
+        "one that only feeds forward, lower the delay in [actuator], or shorten interval in [test]"
+    )
+
+
+def compensation(plan: Plan, left: float) -> str:
+    """What to change in [compensator] to take away the delay (s) that it leaves; a lead only where it then serves."""
+    chosen = plan.compensator
+    lead = chosen.parameters.get("lead", 0.0)
+    if chosen.kind == "none":
+        return "compensate the actuator in [compensator]"
+    if "lead" not in chosen.parameters or left <= 0.0:
+        return "compensate the actuator better in [compensator]"
+    longer = round(lead + left * (1.0 + chosen.parameters.get("proportional", 0.0)), 4)
+    if not serves(plan, longer):
+        return (
+            "lower the delay in [actuator] (no lead in [compensator] makes up for the "
+            f"{left * 1e3:.1f} ms that are left)"
+        )
+    return (
+        f"raise lead in [compensator] from {lead * 1e3:.1f} ms to {longer * 1e3:.1f} ms, which takes away the "
+        f"{left * 1e3:.1f} ms that are left"
+    )
+
+
+def serves(plan: Plan, lead: float) -> bool:
+    """Whether the plan's compensator with that lead (s) keeps margin and amplitude."""
+    chosen = plan.compensator
+    if not COMPENSATORS[chosen.kind].rules["lead"].admits(lead):
+        return False
+    led = replace(plan, compensator=replace(chosen, parameters=chosen.parameters | {"lead": lead}))
+    found = assess(led)
+    return found.stable and keeps_margin(led, found) and abs(found.amplitude - 1.0) <= AMPLITUDE_ERROR
 
 
 def partition_text(plan: Plan, found: Partition) -> str:
     """What the partition bears and what is to be expected, in words."""
+    if not found.stable:
+        return "partition unstable, as the actuator is so under its compensator"
     expected = expected_delay(plan, found)
     cost = f"{found.damping_points * 100.0:+.2f} points of damping lost at {found.frequency:.2f} Hz"
     if math.isinf(found.critical_delay):
         return f"partition stable at any delay, {cost}"
-    ratio = f" (× {found.critical_delay / expected:.0f})" if expected > 0.0 else ""
-    return f"partition critical {found.critical_delay * 1e3:.1f} ms, expected {expected * 1e3:.1f} ms{ratio}, {cost}"
+    figures = f"critical {found.critical_delay * 1e3:.1f} ms, expected {expected * 1e3:.1f} ms"
+    if found.unstable:
+        return f"partition unstable, {figures}"
+    ratio = f" (× {times(found.critical_delay / expected)})" if expected > 0.0 else ""
+    return f"partition {figures}{ratio}, {cost}"
+
+
+def times(ratio: float) -> str:
+    """A margin as a factor, with a digit behind the point where it is small enough to matter."""
+    return f"{ratio:.0f}" if ratio >= 10.0 else f"{ratio:.1f}"
 
 
 # -- peaks ----------------------------------------------------------------------------------------
@@ -75,23 +141,29 @@ class Peaks(NamedTuple):
     peak: float  # of that quantity, in its unit
 
 
-def peaks_check(plan: Plan) -> Check:
-    """The check of the simulated peaks, for a gate."""
+def peaks_check(plan: Plan, *, unstable: bool = False) -> Check:
+    """The check of the simulated peaks, for a gate; `unstable` where another check has said that the loop is."""
     most = MOST_SLAVE_TICKS // len(plan.slaves) if plan.slaves else MOST_TICKS
     short = plan.with_ticks(min(plan.ticks, most))
-    ground = substructure.ground_rows(short, substructure.motion(short))
-    if plan.slaves:
-        columns = several_slaves.simulate(short, ground, short.test.seed)
-        finite = columns["actuator_command"].size == short.ticks
-    else:
-        rollout = simulate(short, ground, seed=short.test.seed)
-        columns, finite = signals(short, rollout), rollout.finite
+    columns, finite = simulated(short)
     if not columns["actuator_command"].size:
         return Check(
             "", Risk("peaks", "the simulated test has no finite command at all, so look at [structure]")
         )
     found = peaks(short, columns)
-    return Check(peaks_text(plan, found, short.ticks), peaks_risk(plan, found, finite=finite))
+    if not finite or (not unstable and free_motion.unstable(plan)) or (found.first and unstable):
+        return Check("peaks not known, as the simulated loop is unstable", unstable_risk(plan, found))
+    return Check(peaks_text(plan, found, short.ticks), peaks_risk(plan, found))
+
+
+def simulated(plan: Plan) -> tuple[dict[str, Array], bool]:
+    """Signals of the nominal test with its sensors' noise, and whether they are finite to its end."""
+    ground = substructure.ground_rows(plan, substructure.motion(plan))
+    if plan.slaves:
+        columns = several_slaves.simulate(plan, ground, plan.test.seed)
+        return columns, columns["actuator_command"].size == plan.ticks
+    rollout = simulate(plan, ground, seed=plan.test.seed)
+    return signals(plan, rollout), rollout.finite
 
 
 def peaks(plan: Plan, columns: dict[str, Array]) -> Peaks:
@@ -109,17 +181,48 @@ def peaks(plan: Plan, columns: dict[str, Array]) -> Peaks:
     return Peaks(tops[name], name, first, over.get(first, 0), tops[first] * most[first] if first else 0.0)
 
 
-def peaks_risk(plan: Plan, found: Peaks, *, finite: bool = True) -> Risk | None:
-    """The risk of a peak too near to its limit; None where all keep their distance and the loop stays `finite`."""
+def unstable_risk(plan: Plan, found: Peaks) -> Risk:
+    """The risk of a loop that is unstable, of which no peak means anything and no limit would help."""
+    share = plan.preflight.peak_share
+    seen = ""
+    if found.first:
+        limit, unit = getattr(plan.limits, found.first), LIMITS[found.first].unit
+        seen = (
+            f": {found.first} exceeds {share:.0%} of its limit of {limit:g} {unit} at "
+            f"t = {found.tick * plan.test.interval:.3f} s and grows on"
+        )
+    return Risk(
+        "peaks",
+        f"the simulated loop is unstable{seen}, so {remedy(plan)}; no limit would help",
+    )
+
+
+def remedy(plan: Plan) -> str:
+    """What to change in a plan whose loop is unstable."""
+    calm = plan.everywhere(control=replace(plan.control, amd=False))
+    if any(one.control.amd for one in map(plan.of, plan.roles)) and not free_motion.unstable(calm):
+        return (
+            f"lower gain in [control], {plan.control.gain:g} N·s/m, or quicken the shaking table (delay and frequency "
+            "in [table], its compensator), as the loop is stable without the damper"
+        )
+    found = assess(plan)
+    if not found.stable:
+        return "lower the feedback's gains in [compensator], or the delay in [actuator]"
+    if found.unstable:
+        return compensation(plan, found.delay)
+    return "look at [compensator] and [table.compensator], or shorten interval in [test]"
+
+
+def peaks_risk(plan: Plan, found: Peaks) -> Risk | None:
+    """The risk of a peak of a stable loop too near to its limit; None where all keep their distance."""
     if not found.first:
-        return None if finite else Risk("peaks", "the simulated loop diverges, so look at [compensator]")
+        return None
     unit = LIMITS[found.first].unit
     limit, share = getattr(plan.limits, found.first), plan.preflight.peak_share
-    ends = "" if finite else ", and the loop diverges"
     return Risk(
         "peaks",
         f"the simulated {found.first} exceeds {share:.0%} of its limit of {limit:g} {unit} at "
-        f"t = {found.tick * plan.test.interval:.3f} s and peaks at {found.peak:.4g} {unit}{ends}, so lower scale in "
+        f"t = {found.tick * plan.test.interval:.3f} s and peaks at {found.peak:.4g} {unit}, so lower scale in "
         f"[ground_motion], look at [compensator], or raise {found.first} in [limits] where the laboratory allows it",
     )
 

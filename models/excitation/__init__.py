@@ -42,10 +42,10 @@ class Programme(NamedTuple):
     segments: tuple[Segment, ...]
 
 
-def join(pieces: Sequence[Piece], interval: float) -> Programme:
-    """The pieces one after the other, with a still span before, between and behind them."""
-    still = np.zeros((4, round(STILL / interval)))
-    parts, segments, at = [still], [], still.shape[1]
+def join(pieces: Sequence[Piece], interval: float, *, still: float = STILL) -> Programme:
+    """The pieces one after the other, with a still span (s) before, between and behind them."""
+    span = np.zeros((4, round(still / interval)))
+    parts, segments, at = [span], [], span.shape[1]
     for piece in pieces:
         count = piece.values.size
         motion = np.zeros((4, count))
@@ -53,10 +53,10 @@ def join(pieces: Sequence[Piece], interval: float) -> Programme:
         if piece.smooth:
             for order in range(1, 4):
                 motion[order] = np.gradient(motion[order - 1], interval)
-        parts += [motion, still]
+        parts += [motion, span]
         segments.append(Segment(piece.name, at, at + count, piece.made_with))
-        at += count + still.shape[1]
-    return Programme(np.concatenate([*parts, still[:, :1]], axis=1), tuple(segments))
+        at += count + span.shape[1]
+    return Programme(np.concatenate([*parts, span[:, :1]], axis=1), tuple(segments))
 
 
 def column(interval: float, _seed: int) -> list[Piece]:

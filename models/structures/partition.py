@@ -17,15 +17,10 @@ import numpy as np
 from common.errors import InputError
 from common.plan import Plan
 from common.tables import Experimental
-from models import excitation, indicators
-from models.excitation import Programme, join
-from models.excitation.pieces import sine
-from models.follower import Follower
-from models.labs import column_lab
+from models import indicators
 from models.registry import Array
 from models.structures import shear_building
-
-CYCLES = 12
+from models.structures.path import Path, path_at
 
 
 class Matrices(NamedTuple):
@@ -159,7 +154,7 @@ def critical_delay_of(plan: Plan) -> float:
     )
 
 
-def damping_lost(plan: Plan, path: indicators.FrequencyEvaluation) -> float:
+def damping_lost(plan: Plan, path: indicators.FrequencyEvaluation | Path) -> float:
     """Damping ratio of the building's first mode that an amplitude and a delay of the column's path cost.
 
     Of a specimen `k + jω·c − ω²·m` behind a path `A·e^(−jωd)`: what the spring and the mass lose, as damping
@@ -182,8 +177,14 @@ class Partition(NamedTuple):
     critical_delay: float  # s, inf where no delay makes the loop unstable
     sensitivity: float  # predictive stability indicator, log10 of it in ms
     amplitude: float  # of the compensated actuator at that frequency
-    delay: float  # s, there, with the interval that a unit delay of the force adds
-    damping_points: float  # damping ratio that the path costs the first mode
+    delay: float  # s, there, with the interval that a unit delay of the force adds; inf where the path is unstable
+    damping_points: float  # damping ratio that the path costs the first mode, inf where the loop is unstable
+    stable: bool = True  # whether the compensated actuator comes to rest by itself
+
+    @property
+    def unstable(self) -> bool:
+        """Whether the loop of building and specimen is unstable: its path by itself, or by its delay."""
+        return not self.stable or self.delay >= self.critical_delay
 
 
 def assess(plan: Plan) -> Partition:
@@ -198,30 +199,6 @@ def assess(plan: Plan) -> Partition:
         indicators.predictive_stability_indicator(critical),
         path.amplitude,
         path.delay,
-        damping_lost(plan, path),
+        damping_lost(plan, path) if path.stable and path.delay < critical else math.inf,
+        path.stable,
     )
-
-
-def path_at(plan: Plan, frequency: float) -> indicators.FrequencyEvaluation:
-    """Amplitude and delay of the column's path for a sine of that frequency (Hz).
-
-    The path is the compensated nominal actuator, and the interval by which `unit_delay` holds back the force.
-    """
-    interval = plan.test.interval
-    cycles = max(CYCLES, round(2.0 * frequency))
-    piece = sine(interval, frequency, amplitude=1e-3, cycles=cycles)
-    target, measured = follow(plan, join([piece], interval))
-    found = indicators.frequency_evaluation_index(target, measured, interval)
-    return found._replace(delay=found.delay + interval) if plan.compensator.force.unit_delay else found
-
-
-def follow(plan: Plan, programme: Programme) -> tuple[Array, Array]:
-    """Target and achieved displacement of the compensated nominal actuator, m."""
-    follower = Follower(plan.compensator, programme, plan.test.interval)
-    lab = column_lab.build(plan.test.interval, plan.actuator, plan.column)
-    target = programme.motion[excitation.POSITION]
-    achieved = np.zeros(target.size)
-    for tick in range(target.size - 1):
-        _, command = follower(tick, float(achieved[tick]))
-        achieved[tick + 1] = column_lab.advance(*lab, command)[0]
-    return target, achieved

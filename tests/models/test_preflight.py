@@ -15,7 +15,7 @@ from common.plan import Plan
 from common.tables import Compensator, Control
 from models import limited, preflight, several_slaves, substructure
 from models.closed_loop import signals, simulate
-from models.preflight import expected_delay, partition_check, peaks, peaks_check, peaks_risk
+from models.preflight import expected_delay, partition_check, peaks, peaks_check
 from models.registry import Array
 from models.structures.partition import assess, critical_delay_of
 from rths import virtual
@@ -91,16 +91,45 @@ def test_the_first_quantity_beyond_its_share_is_named(short_plan: Plan) -> None:
     assert "raise damper_stroke in [limits]" in found.sentence
 
 
-def test_a_loop_that_diverges_is_a_risk_whatever_its_limits(default_plan: Plan) -> None:
+def test_a_loop_that_diverges_is_unstable_and_no_limit_is_to_be_raised(default_plan: Plan) -> None:
     wild = {"proportional": 60.0, "integral": 0.0, "derivative": 0.0}
     plan = dataclasses.replace(default_plan, compensator=Compensator("pid", wild))
+    first, second = (one.risk for one in preflight.checks(plan))
+    assert first is not None
+    assert "does not come to rest under compensator 'pid' (proportional = 60" in first.sentence
+    assert second is not None
+    assert second.name == "peaks"
+    assert "the simulated loop is unstable" in second.sentence
+    assert "raise" not in second.sentence
+
+
+def test_a_long_delay_is_unstable_and_no_peak_of_it_is_shown(default_plan: Plan) -> None:
+    plan = with_table(default_plan, "actuator", delay=0.2)
+    made = preflight.checks(plan)
+    assert [one.risk.name for one in made if one.risk] == ["partition", "peaks"]
+    told = " ".join([one.text for one in made] + [one.risk.sentence for one in made if one.risk])
+    assert told.count("unstable") >= 4
+    for word in ("points", "peaks at", "raise", "expected -", "inf"):
+        assert word not in told
+    assert "column_error exceeds 90% of its limit of 0.01 m at t = 1.492 s and grows on" in told
+
+
+def test_a_lead_is_only_advised_where_it_then_serves(default_plan: Plan) -> None:
+    def advice(delay: float, lead: float) -> str:
+        plan = with_table(default_plan, "actuator", delay=delay)
+        plan = dataclasses.replace(plan, compensator=Compensator("taylor", {"lead": lead, "order": 1.0}))
+        risk = partition_check(plan, assess(plan)).risk
+        return risk.sentence if risk else ""
+
+    assert "raise lead in [compensator] from 10.0 ms to 42.8 ms" in advice(0.014, 0.01)
+    assert "no lead in [compensator] makes up for the 218.7 ms that are left" in advice(0.2, 0.01)
+
+
+def test_an_unstable_control_of_the_damper_is_named(default_plan: Plan) -> None:
+    plan = with_table(default_plan, "control", gain=3e6)
     found = peaks_check(plan).risk
     assert found is not None
-    assert found.name == "peaks"
-    assert "and the loop diverges" in found.sentence
-    calm = preflight.Peaks(0.1, "displacement", "", 0, 0.0)
-    assert peaks_risk(plan, calm) is None
-    assert peaks_risk(plan, calm, finite=False) is not None
+    assert "lower gain in [control], 3e+06 N·s/m" in found.sentence
 
 
 def test_limited_quantities_that_are_no_signals(short_plan: Plan) -> None:
