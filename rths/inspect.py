@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from common import cli
+from rths.formats import fixed, milliseconds, reading, tracked
 from rths.progress import Progress
-from rths.terminal import quantity, table
+from rths.terminal import table
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -94,7 +95,7 @@ def write_peaks(peaks: dict[str, dict[str, Any]]) -> None:
     rows += [
         [
             name,
-            quantity(facts["peak"], facts["unit"]),
+            reading(facts["peak"], facts["unit"]),
             f"{facts['t']:.3f} s" if facts["t"] is not None else "",
         ]
         for name, facts in peaks.items()
@@ -108,20 +109,12 @@ def write_tracking(tracking: dict[str, dict[str, Any]]) -> None:
     if not tracking:
         return
     rows = [["tracking", "delay", "by correlation", "amplitude", "at", "NRMSE", "peak error"]]
-    rows += [
-        [
-            part,
-            f"{facts['delay'] * 1e3:.2f} ms",
-            "none" if facts["correlation_delay"] is None else f"{facts['correlation_delay'] * 1e3:.2f} ms",
-            f"{facts['amplitude']:.4f}",
-            f"{facts['frequency']:.2f} Hz",
-            f"{facts['nrmse']:.4f}",
-            f"{facts['peak_error']:.4f}",
-        ]
-        for part, facts in tracking.items()
-    ]
+    rows += [[part, *tracked(facts)] for part, facts in tracking.items()]
     sys.stdout.write("\n")
     table(rows)
+    for part, facts in tracking.items():
+        if facts["undetermined"]:
+            sys.stdout.write(f"The delay of the {part} is not determined: {facts['undetermined']}.\n")
 
 
 def write_force_path(found: dict[str, Any] | None) -> None:
@@ -130,8 +123,8 @@ def write_force_path(found: dict[str, Any] | None) -> None:
         return
     low, high = found["interval"]
     sys.stdout.write(
-        f"force path: delay {found['delay'] * 1e3:.2f} ± {(high - low) * 0.5e3:.2f} ms, gain {found['gain']:.4f} "
-        f"at {found['frequency']:.2f} Hz\n"
+        f"force path: delay {fixed(found['delay'] * 1e3, 2)} ± {milliseconds((high - low) * 0.5)}, "
+        f"gain {found['gain']:.4f} at {found['frequency']:.2f} Hz\n"
     )
 
 

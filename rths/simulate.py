@@ -136,16 +136,17 @@ def beyond(plan: Plan, columns: dict[str, Any], ticks: int) -> str:
 
 def show(plan: Plan, summary: dict[str, Any]) -> None:
     """The summary as text."""
-    from rths.terminal import quantity, table
+    from rths.formats import reading
+    from rths.terminal import table
 
     sys.stdout.write(
         f"simulation of '{plan.test.name}', {summary['ticks']} ticks of {plan.test.interval:g} s\n"
     )
     sys.stdout.write(f"ground motion: {summary['ground_motion']}, scaled by {plan.ground_motion.scale:g}\n\n")
     rows = [["signal", "peak"]]
-    rows += [[name, quantity(facts["peak"], facts["unit"])] for name, facts in summary["peaks"].items()]
+    rows += [[name, reading(facts["peak"], facts["unit"])] for name, facts in summary["peaks"].items()]
     table(rows)
-    sys.stdout.write(f"peak drift of the specimen's storey: {quantity(summary['peak_drift'], 'm')}\n")
+    sys.stdout.write(f"peak drift of the specimen's storey: {reading(summary['peak_drift'], 'm')}\n")
     if summary["beyond_limit"]:
         sys.stdout.write(summary["beyond_limit"][0].upper() + summary["beyond_limit"][1:] + "\n")
     if "file" in summary:

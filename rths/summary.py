@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from models.labs.force_path import force_path as force_path_of
 from models.structures.partition import storey_stiffness
 from rths.accounts import accounts
 
+Result = TypeVar("Result")
 PERCENTILES = (50, 90, 99, 99.9)
 LEAST_TICKS = 500
 # topic, part, target, measurement, ticks by which the target stands before the measurement that it belongs to
@@ -112,12 +113,13 @@ def peaks(run: Run) -> dict[str, dict[str, Any]]:
     return result
 
 
-def tracking(run: Run) -> dict[str, dict[str, float | None]]:
+def tracking(run: Run) -> dict[str, dict[str, Any]]:
     """How the transfer systems followed their targets: delay (s) two ways, amplitude, NRMSE, peak error.
 
-    By part; the table of a named slave is `table.NAME`.
+    By part; the table of a named slave is `table.NAME`. Where the delay is not determined it is None and `undetermined`
+    says why.
     """
-    result: dict[str, dict[str, float | None]] = {}
+    result: dict[str, dict[str, Any]] = {}
     paths = ((path, topic) for path in PATHS for topic in run.columns if kind_of(topic) == path[0])
     for (_, part, target, measured, late), topic in paths:
         columns = run.columns[topic]
@@ -127,12 +129,8 @@ def tracking(run: Run) -> dict[str, dict[str, float | None]]:
         if not np.all(np.isfinite([wanted, got])) or not np.ptp(wanted) or not np.ptp(got):
             continue
         interval = float(np.median(np.diff(columns["t"])))
-        path = indicators.frequency_evaluation_index(wanted, got, interval)
         result[part + topic.removeprefix(kind_of(topic))] = {
-            "delay": path.delay,
-            "amplitude": path.amplitude,
-            "frequency": path.frequency,
-            "correlation_delay": correlation_delay(wanted, got, interval),
+            **following(wanted, got, interval),
             "nrmse": indicators.nrmse(wanted, got),
             "peak_error": indicators.peak_error(wanted, got),
             "enclosed_area": float(indicators.tracking_indicator(wanted, got)[-1]),
@@ -172,10 +170,30 @@ def error_energy(run: Run, plan: Plan) -> float | None:
     return float(share[np.argmax(np.abs(share))])
 
 
-def correlation_delay(wanted: Values, got: Values, interval: float) -> float | None:
-    """Delay (s) by cross-correlation, None where there is none within its search."""
+def following(wanted: Values, got: Values, interval: float) -> dict[str, Any]:
+    """Delay (s) and amplitude of a measurement (n,) behind its target; each None where it is not determined."""
+    path = known(indicators.aligned_evaluation, wanted, got, interval)
+    correlation = known(indicators.correlation_delay, wanted, got, interval)
+    delay, reason = None, "the motion has too few cycles for a delay"
+    if path is not None and correlation is not None:
+        delay = indicators.tracking_delay(path.delay, correlation, interval)
+        reason = (
+            f"{1e3 * path.delay:.1f} ms by the frequency evaluation index and {1e3 * correlation:.1f} ms by "
+            "correlation do not agree"
+        )
+    return {
+        "delay": delay,
+        "amplitude": None if path is None or delay is None else path.amplitude,
+        "frequency": None if path is None or delay is None else path.frequency,
+        "correlation_delay": correlation,
+        "undetermined": "" if delay is not None else reason,
+    }
+
+
+def known(indicator: Callable[..., Result], *signals: Any) -> Result | None:
+    """What an indicator says, None where it refuses."""
     try:
-        return indicators.correlation_delay(wanted, got, interval)
+        return indicator(*signals)
     except InputError:
         return None
 

@@ -101,12 +101,3 @@ def size_of(stream: TextIO) -> tuple[int, int]:
 def microseconds(seconds: float) -> str:
     """A time in µs, a dash where it is not known yet."""
     return "   –" if seconds != seconds else f"{seconds * 1e6:4.0f}"  # noqa: PLR0124 - NaN is not itself
-
-
-def quantity(value: float, unit: str) -> str:
-    """A value with its unit, in the size a reader of the field expects."""
-    factors = {"m": (1e3, "mm"), "N": (1e-3, "kN"), "s": (1e6, "µs")}
-    if unit == "N" and abs(value) < 1e3:
-        return f"{value:.1f} N"
-    factor, name = factors.get(unit, (1.0, unit))
-    return f"{value * factor:.3f} {name}"

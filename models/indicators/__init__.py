@@ -13,17 +13,20 @@ from models.indicators.force_path import ForcePath, force_path
 from models.indicators.stability import critical_delay, predictive_stability_indicator, sensitivity
 from models.indicators.tracking import (
     FrequencyEvaluation,
+    aligned_evaluation,
     correlation_delay,
     correlation_lag,
     frequency_evaluation_index,
     nrmse,
     peak_error,
+    tracking_delay,
     tracking_indicator,
 )
 
 __all__ = [
     "ForcePath",
     "FrequencyEvaluation",
+    "aligned_evaluation",
     "apparent_damping",
     "correlation_delay",
     "correlation_lag",
@@ -38,5 +41,6 @@ __all__ = [
     "peak_error",
     "predictive_stability_indicator",
     "sensitivity",
+    "tracking_delay",
     "tracking_indicator",
 ]

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from markupsafe import Markup
 
 from rths import page
-from rths.diagnosis_report.values import as_float, known, percent
+from rths.formats import as_float, known, percent
 
 
 def esc(text: object) -> str:

@@ -6,8 +6,8 @@ from typing import Any
 
 from rths.diagnosis_report import pictures, wording
 from rths.diagnosis_report.blocks import absent, bar, esc, figure, gallery, paragraph, section, table
-from rths.diagnosis_report.values import MISSING, as_float, known, percent, percent_interval, quantity, times
 from rths.diagnosis_report.wording import Report
+from rths.formats import MISSING, as_float, known, percent, percent_interval, quantity, times
 
 PATHS = {"command": "command path", "force": "force path", "exchange": "exchange with the other lab"}
 MOST_HISTORIES = 4

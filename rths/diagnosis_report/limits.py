@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from rths.diagnosis_report import wording
 from rths.diagnosis_report.blocks import absent, bullets, esc, heading, paragraph, section, table
-from rths.diagnosis_report.values import MISSING, as_float, known
 from rths.diagnosis_report.wording import Report
+from rths.formats import MISSING, as_float, known
 
 GLOSSARY = (
     ("gap", "recorded minus simulated; as a number, rms of the error over rms of the recorded signal"),

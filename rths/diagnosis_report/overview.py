@@ -7,7 +7,8 @@ from typing import Any
 
 from rths.diagnosis_report import wording
 from rths.diagnosis_report.blocks import absent, bar, esc, paragraph, section, table
-from rths.diagnosis_report.values import (
+from rths.diagnosis_report.wording import Report
+from rths.formats import (
     MISSING,
     as_float,
     known,
@@ -17,7 +18,6 @@ from rths.diagnosis_report.values import (
     quantity,
     times,
 )
-from rths.diagnosis_report.wording import Report
 
 
 def overview(report: Report) -> str:

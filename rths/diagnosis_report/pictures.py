@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rths.diagnosis_report import wording
-from rths.diagnosis_report.values import bare_percent, known, scale
 from rths.figure import COLOURS, STAMPS, figure
+from rths.formats import bare_percent, known, scale
 
 Piece = Mapping[str, Any]
 Values = NDArray[np.float64]

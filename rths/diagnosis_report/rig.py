@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from rths.diagnosis_report import wording
-from rths.diagnosis_report.values import as_float, known, percent
+from rths.formats import as_float, known, percent
 
 WIDTH, HEIGHT = 480, 352
 HALF_WIDTH, HALF_HEIGHT = 50, 27

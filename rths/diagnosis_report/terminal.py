@@ -6,8 +6,8 @@ import textwrap
 from collections.abc import Sequence
 
 from rths.diagnosis_report import wording
-from rths.diagnosis_report.values import as_float, known, percent, percent_interval, probability, span, times
 from rths.diagnosis_report.wording import Report
+from rths.formats import as_float, known, percent, percent_interval, probability, span, times
 
 WIDTH = 100
 LABEL = 12

@@ -8,8 +8,8 @@ from typing import Any
 from rths.diagnosis_report import pictures, wording
 from rths.diagnosis_report.blocks import absent, bar, esc, figure, gallery, heading, paragraph, section, table
 from rths.diagnosis_report.rig import rig
-from rths.diagnosis_report.values import MISSING, percent, percent_interval, span, times
 from rths.diagnosis_report.wording import Report
+from rths.formats import MISSING, percent, percent_interval, span, times
 
 MOST_PARTS = 4
 MOST_WINDOWS = 4

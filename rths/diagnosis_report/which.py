@@ -7,8 +7,8 @@ from typing import Any
 
 from rths.diagnosis_report import pictures, wording
 from rths.diagnosis_report.blocks import absent, bar, esc, figure, gallery, heading, paragraph, section, table
-from rths.diagnosis_report.values import as_float, known, percent, probability, quantity
 from rths.diagnosis_report.wording import Report
+from rths.formats import as_float, known, percent, probability, quantity
 
 Candidate = Mapping[str, Any]
 MOST_PICTURES = 6

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from models.effects import CATALOGUE
-from rths.diagnosis_report.values import as_float, known, percent, quantity
+from rths.formats import as_float, known, percent, quantity
 
 Report = Mapping[str, Any]
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from common import signals
 from common.errors import InputError
 from common.recording.reader import Run
+from rths.formats import milliseconds
 
 Values = NDArray[np.float64]
 
@@ -93,16 +94,17 @@ def matched(
 def quality(pair: Pair) -> str:
     """Delay, amplitude and error of a transfer system in words, as `inspect` has them; empty where undefined."""
     from models import indicators
-    from rths.summary import LEAST_TICKS
+    from rths.summary import LEAST_TICKS, following
 
     if pair.t.size < LEAST_TICKS:
         return ""
     try:
-        path = indicators.frequency_evaluation_index(pair.wanted, pair.got, interval(pair.t))
         error = indicators.nrmse(pair.wanted, pair.got)
     except InputError:
         return ""
-    return f"delay {1e3 * path.delay:.2f} ms\namplitude {path.amplitude:.3f}\nNRMSE {100.0 * error:.1f} %"
+    path = following(pair.wanted, pair.got, interval(pair.t))
+    size = "" if path["delay"] is None else f"\namplitude {path['amplitude']:.3f}"
+    return f"delay {milliseconds(path['delay'])}{size}\nNRMSE {100.0 * error:.1f} %"
 
 
 def interval(t: Values) -> float:

@@ -11,13 +11,12 @@ from typing import Any, NamedTuple
 from common.limits import UNITS
 from common.recording.reader import GROUND, MACHINES, Run
 from common.roles import MASTER, name_of
+from rths.formats import MISSING, milliseconds, reading, tracked
 from rths.page import breakable
 from rths.run_report.verdict import Margin, Summary, amount
 from rths.summary import plan_of
-from rths.terminal import quantity
 
 EVENTS = 400  # rows of the page; JSON of rths inspect has all
-NONE = "–"
 SHOWN = ("plan", GROUND, MACHINES)  # metadata that have a place of their own
 
 
@@ -99,7 +98,7 @@ def rejected(summary: Summary) -> Table:
 def peaks(summary: Summary) -> Table:
     """Largest magnitudes."""
     rows = [
-        [breakable(name), quantity(found["peak"], found["unit"]), seconds(found["t"])]
+        [breakable(name), reading(found["peak"], found["unit"]), seconds(found["t"])]
         for name, found in summary["peaks"].items()
     ]
     return Table("", ("signal", "peak", "at"), rows)
@@ -107,7 +106,7 @@ def peaks(summary: Summary) -> Table:
 
 def seconds(t: float | None) -> str:
     """A test time."""
-    return NONE if t is None else f"{t:.3f} s"
+    return MISSING if t is None else f"{t:.3f} s"
 
 
 def limits(found: list[Margin]) -> Table:
@@ -115,25 +114,14 @@ def limits(found: list[Margin]) -> Table:
     rows = []
     for item in found:
         unit = UNITS[item.signal.partition("/")[2]]
-        peak, limit = quantity(item.peak, unit), quantity(item.limit, unit)
+        peak, limit = reading(item.peak, unit), reading(item.limit, unit)
         rows.append([breakable(item.signal), peak, limit, f"{100.0 * item.share:.1f} %"])
     return Table("", ("signal", "peak", "limit", "share"), rows)
 
 
 def tracking(summary: Summary) -> Table:
     """How the transfer systems followed their targets."""
-    rows = [
-        [
-            part,
-            milliseconds(found["delay"]),
-            milliseconds(found["correlation_delay"]),
-            f"{found['amplitude']:.4f}",
-            f"{found['frequency']:.2f} Hz",
-            f"{found['nrmse']:.4f}",
-            f"{found['peak_error']:.4f}",
-        ]
-        for part, found in summary["tracking"].items()
-    ]
+    rows = [[part, *tracked(found)] for part, found in summary["tracking"].items()]
     head = ("part", "delay", "by correlation", "amplitude", "at", "NRMSE", "peak error")
     return Table("", head, rows)
 
@@ -151,11 +139,6 @@ def force_path(summary: Summary) -> Table:
         f"{found['frequency']:.2f} Hz",
     ]
     return Table("Force path", ("delay", "95 %", "gain", "at"), [row])
-
-
-def milliseconds(value: float | None) -> str:
-    """A delay."""
-    return "none" if value is None else f"{value * 1e3:.2f} ms"
 
 
 def latency(summary: Summary) -> list[Table]:
@@ -186,7 +169,7 @@ def machines(run: Run) -> Table:
     }
     kept = {lab: values for lab, values in found.items() if values}
     names = dict.fromkeys(name for values in kept.values() for name in values)
-    rows = [[breakable(name), *(shortened(kept[lab].get(name, NONE)) for lab in kept)] for name in names]
+    rows = [[breakable(name), *(shortened(kept[lab].get(name, MISSING)) for lab in kept)] for name in names]
     return Table("", ("", *(lab.replace("_", " ") for lab in kept)), rows)
 
 

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 from common.limits import UNITS
 from common.recording.reader import Run
 from common.roles import LATENCY, MASTER, SLAVE, kind_of, name_of, title
+from rths.formats import milliseconds, reading
 from rths.summary import plan_of
-from rths.terminal import quantity
 
 Summary = Mapping[str, Any]
 ENDS = {
@@ -131,12 +131,18 @@ def lateness(run: Run, summary: Summary) -> str:
 
 def tracking(summary: Summary) -> list[str]:
     """How the transfer systems followed their targets."""
-    return [
-        f"The {name.replace('.', ' of slave ')} followed its target with a delay of {facts['delay'] * 1e3:.2f} ms and "
-        f"{facts['amplitude']:.4f} of its amplitude at {facts['frequency']:.2f} Hz; rms error "
-        f"{100.0 * facts['nrmse']:.2f} % of the target's rms."
-        for name, facts in summary["tracking"].items()
-    ]
+    return [followed(name.replace(".", " of slave "), facts) for name, facts in summary["tracking"].items()]
+
+
+def followed(name: str, facts: Mapping[str, Any]) -> str:
+    """How one transfer system followed its target."""
+    error = f"rms error {100.0 * facts['nrmse']:.2f} % of the target's rms"
+    if facts["delay"] is None:
+        return f"The delay of the {name} is not determined: {facts['undetermined']}; {error}."
+    return (
+        f"The {name} followed its target with a delay of {milliseconds(facts['delay'])} and "
+        f"{facts['amplitude']:.4f} of its amplitude at {facts['frequency']:.2f} Hz; {error}."
+    )
 
 
 def force_path(summary: Summary) -> str:
@@ -146,8 +152,8 @@ def force_path(summary: Summary) -> str:
         return ""
     low, high = found["interval"]
     return (
-        f"The column force came {found['delay'] * 1e3:.2f} ms (95 %: {low * 1e3:.2f} to {high * 1e3:.2f} ms) after "
-        f"what the plan's specimen gives at the measured displacement, with {found['gain']:.4f} of its size."
+        f"The column force came {milliseconds(found['delay'])} (95 %: {milliseconds(low)} to {milliseconds(high)}) "
+        f"after what the plan's specimen gives at the measured displacement, with {found['gain']:.4f} of its size."
     )
 
 
@@ -187,6 +193,6 @@ def nearest(run: Run, summary: Summary) -> str:
     first = found[0]
     unit = UNITS[first.signal.partition("/")[2]]
     return (
-        f"Nearest to its limit came the {first.words}: {quantity(first.peak, unit)} of {quantity(first.limit, unit)} "
+        f"Nearest to its limit came the {first.words}: {reading(first.peak, unit)} of {reading(first.limit, unit)} "
         f"({100.0 * first.share:.0f} %)."
     )

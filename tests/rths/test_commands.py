@@ -61,7 +61,10 @@ def test_inspect_says_what_is_in_a_recording(call: Any, capsys: Any, virtual_rec
     assert call("inspect", virtual_recording, "--json") == 0
     summary = json.loads(capsys.readouterr().out)
     assert summary["tracking"]["actuator"]["delay"] == pytest.approx(0.0002, abs=2e-4)
-    assert summary["tracking"]["table"]["correlation_delay"] == pytest.approx(0.0189, abs=5e-4)
+    table = summary["tracking"]["table"]
+    assert table["correlation_delay"] == pytest.approx(0.0189, abs=5e-4)
+    assert table["delay"] == pytest.approx(0.0189, abs=2e-4)  # 4 ms and 2·0.7/ω of 15 Hz
+    assert table["undetermined"] == ""
     assert summary["tracking"]["table"]["enclosed_area"] > 0.0
     assert 0.0 < summary["error_energy"] < 0.02
     assert "outcome: completed" in out

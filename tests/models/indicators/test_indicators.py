@@ -25,6 +25,12 @@ def chirp(delay: float = 0.0) -> Array:
     return np.sin(2.0 * np.pi * (0.5 + 0.1 * t) * t) * np.exp(-0.02 * t)
 
 
+def drifting(seconds: float, delay: float) -> Array:
+    """A vibration at 2 Hz on a drift that takes a minute, as a floor moves over ground that moves."""
+    t = np.arange(0.0, seconds, DT) - delay
+    return np.asarray(0.05 * np.sin(2.0 * np.pi * t / 60.0) + 0.003 * np.sin(4.0 * np.pi * t))
+
+
 class TestTracking:
     @pytest.mark.parametrize("delay", [-0.031, -0.0012, 0.0, 0.0005, 0.012, 0.044, 0.15])
     def test_a_known_delay_is_found_both_ways(self, delay: float) -> None:
@@ -90,6 +96,24 @@ class TestTracking:
         assert indicators.correlation_lag(chirp(), chirp(0.03), DT, ticks=10) == pytest.approx(9 * DT)
         with pytest.raises(InputError, match="50 ticks are too few for 50 delays: give at least 51"):
             indicators.correlation_lag(chirp()[:50], chirp()[:50], DT)
+
+    @pytest.mark.parametrize("seconds", [2.0, 5.0, 12.0, 40.0])
+    @pytest.mark.parametrize("delay", [-0.012, 0.0189, 0.044])
+    def test_a_motion_on_a_slow_drift_has_its_delay_however_short_it_is(
+        self, seconds: float, delay: float
+    ) -> None:
+        target, measured = (drifting(seconds, late) for late in (0.0, delay))
+        found = indicators.aligned_evaluation(target, measured, DT)
+        plain = indicators.frequency_evaluation_index(target, measured, DT)
+        assert found.delay == pytest.approx(delay, abs=1e-5)
+        assert found.amplitude == pytest.approx(1.0, abs=1e-4)
+        assert abs(plain.delay - delay) > 0.1 * abs(delay)  # why it has to be aligned
+        correlation = indicators.correlation_delay(target, measured, DT)
+        assert indicators.tracking_delay(found.delay, correlation, DT) == found.delay
+
+    def test_two_estimates_that_differ_determine_no_delay(self) -> None:
+        assert indicators.tracking_delay(0.0164, 0.0189, DT) is None
+        assert indicators.tracking_delay(0.0188, 0.0189, DT) == 0.0188
 
     def test_a_delay_beyond_the_search_is_said(self) -> None:
         with pytest.raises(InputError, match="not within ±0.02 s"):

@@ -14,7 +14,7 @@ from rths.diagnosis_report import pictures, which, wording
 from rths.diagnosis_report.page import page, write
 from rths.diagnosis_report.schema import schema
 from rths.diagnosis_report.terminal import summary
-from rths.diagnosis_report.values import percent, percent_interval, probability, quantity, span, times
+from rths.formats import percent, percent_interval, probability, quantity, span, times
 from tests.rths.diagnosis_report.reports import REPORTS, Report, bare, fresh
 
 VOID = {"meta", "br", "img"}

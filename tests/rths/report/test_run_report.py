@@ -18,12 +18,12 @@ from common.recording.reader import Run, read
 from common.telling import untold
 from rths import virtual
 from rths.diagnosis_report.page import page as diagnosis_page
+from rths.formats import reading
 from rths.page import numeric
 from rths.pictures import PICTURES
 from rths.run_report import drawing, verdict
 from rths.run_report.page import page
 from rths.summary import summarize
-from rths.terminal import quantity
 from tests.rths.diagnosis_report.reports import REPORTS, fresh
 from tests.rths.report.pages import check_alone, check_in_browser
 
@@ -65,7 +65,7 @@ def test_the_page_has_the_figures_of_inspect(
     summary = json.loads(capsys.readouterr().out)
     text = check_alone(reported.read_text(encoding="utf-8")).text.replace(" ", "")
     for name, facts in summary["peaks"].items():
-        assert f"{name}{quantity(facts['peak'], facts['unit'])}{facts['t']:.3f}s".replace(" ", "") in text
+        assert f"{name}{reading(facts['peak'], facts['unit'])}{facts['t']:.3f}s".replace(" ", "") in text
     for topic, facts in summary["topics"].items():
         assert f"{topic}{summary['ticks_expected']}{facts['recorded']}{facts['missing']}" in text
     for part, facts in summary["tracking"].items():

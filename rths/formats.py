@@ -1,9 +1,10 @@
-"""Numbers as a reader of the field expects them: SI prefixes, few digits, intervals in one unit."""
+"""Numbers as a reader of the field expects them, for every terminal and page: SI prefixes, few digits, one unit."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 MISSING = "–"
 PREFIXES = ((1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
@@ -110,3 +111,35 @@ def span(bounds: Sequence[object] | None, unit: str) -> str:
         return ""
     lower, upper = map(as_float, bounds)
     return f"{lower:.3g}–{upper:.3g} {unit}"
+
+
+def reading(value: float, unit: str) -> str:
+    """A value in the one prefix that its unit has in columns: mm, kN above 1 kN, µs; others as they are."""
+    factors = {"m": (1e3, "mm"), "N": (1e-3, "kN"), "s": (1e6, "µs")}
+    if unit == "N" and abs(value) < 1e3:
+        return f"{fixed(value, 1)} N"
+    factor, name = factors.get(unit, (1.0, unit))
+    return f"{fixed(value * factor, 3)} {name}"
+
+
+def fixed(value: float, places: int) -> str:
+    """A number with so many decimals, and no sign before a zero."""
+    return f"{value:z.{places}f}"
+
+
+def milliseconds(value: float | None, places: int = 2) -> str:
+    """A time (s) in milliseconds."""
+    return MISSING if value is None else f"{fixed(value * 1e3, places)} ms"
+
+
+def tracked(facts: Mapping[str, Any]) -> list[str]:
+    """How a transfer system followed, cell by cell: delay, by correlation, amplitude, at, NRMSE, peak error."""
+    amplitude, frequency = facts["amplitude"], facts["frequency"]
+    return [
+        milliseconds(facts["delay"]),
+        milliseconds(facts["correlation_delay"]),
+        MISSING if amplitude is None else f"{amplitude:.4f}",
+        MISSING if frequency is None else f"{frequency:.2f} Hz",
+        f"{facts['nrmse']:.4f}",
+        f"{facts['peak_error']:.4f}",
+    ]
