@@ -52,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
     ground = substructure.ground_rows(plan, motion)
     link = process.join(plan, "recorder", stopping, report, connect=args.connect)
     try:
-        recording = files.begin(path, plan, motion, ground, unix_ns(), gate.overruled)
+        recording = files.begin(path, plan, motion, ground, unix_ns(), gate.overruled, clock="real")
         setting = Setting(plan, FrameEndpoint(link, plan.digest()), MonotonicClock(), report)
         loop = RecorderLoop(setting, ThreadedSink(FileSink(recording, setting.clock)))
         try:

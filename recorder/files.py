@@ -14,7 +14,7 @@ from common.errors import InputError
 from common.machine import facts
 from common.plan import Plan
 from common.preflight import ACCEPTED, Risk
-from common.recording.reader import GROUND
+from common.recording.reader import CLOCK, GROUND
 from common.recording.writer import Recording
 from common.signals import topics
 from models.ground_motion import GroundMotion
@@ -55,9 +55,18 @@ def checked(path: Path) -> Path:
 
 
 def begin(
-    path: Path, plan: Plan, record: GroundMotion, ground: Array, at_ns: int = 0, accepted: Sequence[Risk] = ()
+    path: Path,
+    plan: Plan,
+    record: GroundMotion,
+    ground: Array,
+    at_ns: int = 0,
+    accepted: Sequence[Risk] = (),
+    *,
+    clock: str = "virtual",
 ) -> Recording:
     """A recording with schemas, plan, versions, host, ground motion and a first event at `at_ns` (Unix), flushed.
+
+    `clock` is the kind of clock that the test runs on, `virtual` or `real`.
 
     The first chunk and the metadata reach the file with the first message only, so that event must not wait.
 
@@ -68,6 +77,7 @@ def begin(
     recording.metadata("plan", {"toml": plan.toml(), "digest": plan.digest()})
     recording.metadata("versions", {name: metadata.version(name) for name in PACKAGES})
     recording.metadata("host", host() | facts())
+    recording.metadata(CLOCK, {"kind": clock})
     recording.metadata(GROUND, {"record": record.describe(), "scale": repr(plan.ground_motion.scale)})
     recording.attach(GROUND, ground.astype("<f8").tobytes(), "application/octet-stream")
     recording.add("event", at_ns, at_ns, (0.0, "recorder", "info", "begin", "recording begun", {}))

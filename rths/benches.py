@@ -15,6 +15,7 @@ from common.errors import InputError, InterlockError, RigError, RthsError
 from common.limits import Guard, Violation
 from common.plan import Plan
 from common.reality import Reality
+from common.recording.reader import CLOCK
 from common.recording.writer import Recording
 from common.rig import ColumnCommand, ColumnMeasurement, GuardedRig, TableCommand, TableMeasurement
 from common.tables import TableCompensator
@@ -195,6 +196,7 @@ def begin(
     recording.metadata("plan", {"toml": plan.toml(), "digest": plan.digest()})
     recording.metadata("versions", {name: metadata.version(name) for name in files.PACKAGES})
     recording.metadata("host", files.host())
+    recording.metadata(CLOCK, {"kind": "real" if order.real_time else "virtual"})
     segments = json.dumps([segment._asdict() for segment in programme.segments])
     asked = {"part": order.part, "compensated": json.dumps(order.compensated), "segments": segments}
     recording.metadata("bench", asked)

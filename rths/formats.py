@@ -143,3 +143,38 @@ def tracked(facts: Mapping[str, Any]) -> list[str]:
         f"{facts['nrmse']:.4f}",
         f"{facts['peak_error']:.4f}",
     ]
+
+
+STOREY = {
+    "drift": "drift",
+    "displacement": "displacement",
+    "absolute_acceleration": "acceleration",
+    "shear": "shear",
+}
+
+
+def storey_rows(found: Sequence[Mapping[str, Any]]) -> list[list[str]]:
+    """Peaks of every storey under their head."""
+    names = [name for name in STOREY if name in found[0]]
+    rows = [
+        [str(item["storey"]), *(MISSING if item[name] is None else peak_of(item[name]) for name in names)]
+        for item in found
+    ]
+    return [["storey", *(STOREY[name] for name in names)], *rows]
+
+
+def peak_of(item: Mapping[str, Any]) -> str:
+    """A peak with its unit."""
+    return reading(item["peak"], item["unit"])
+
+
+def modes(found: Sequence[Mapping[str, float | None]], most: int = 6) -> str:
+    """Periods with their damping in words, of the longest ones."""
+    texts = [
+        "no restoring force"
+        if item["period"] is None
+        else f"{item['period']:.4g} s"
+        + ("" if item["damping_ratio"] is None else f" ({percent(item['damping_ratio'])})")
+        for item in found[:most]
+    ]
+    return ", ".join(texts) + (f" and {len(found) - most} shorter ones" if len(found) > most else "")

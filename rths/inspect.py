@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from common import cli
-from rths.formats import fixed, milliseconds, reading, tracked
+from rths.formats import fixed, milliseconds, modes, reading, storey_rows, tracked
 from rths.progress import Progress
 from rths.terminal import table
 
@@ -38,11 +38,14 @@ def write_report(summary: dict[str, Any]) -> None:
     """The report as text."""
     say = sys.stdout.write
     say(f"\n{summary['file']}: test '{summary['test']}'{ending(summary)}\n")
+    if summary["circumstances"]:
+        say(f"{summary['circumstances']}\n")
     motion = summary["ground_motion"]
     if motion:
         say(f"ground motion: {motion['record']}, scaled by {motion['scale']}\n")
     write_completeness(summary)
     write_peaks(summary["peaks"])
+    write_storeys(summary)
     write_tracking(summary["tracking"])
     write_force_path(summary["force_path"])
     if summary["error_energy"] is not None:
@@ -104,6 +107,16 @@ def write_peaks(peaks: dict[str, dict[str, Any]]) -> None:
     table(rows)
 
 
+def write_storeys(summary: dict[str, Any]) -> None:
+    """Peaks of every storey, and the modes of the plan's building."""
+    if not summary["storeys"]:
+        return
+    sys.stdout.write("\n")
+    table(storey_rows(summary["storeys"]))
+    if summary["modes"]:
+        sys.stdout.write(f"modes of the plan's building, without dampers: {modes(summary['modes'])}\n")
+
+
 def write_tracking(tracking: dict[str, dict[str, Any]]) -> None:
     """How the transfer systems followed their targets."""
     if not tracking:
@@ -133,7 +146,7 @@ def write_latency(summary: dict[str, Any]) -> None:
     tables = summary["latency"] if summary["slaves"] else {"": summary["latency"]}
     for slave, segments in tables.items():
         if not segments:
-            return
+            continue
         names = list(next(iter(segments.values())))
         rows = [[f"latency {slave}, µs" if slave else "latency, µs", *names]]
         rows += [
@@ -141,4 +154,7 @@ def write_latency(summary: dict[str, Any]) -> None:
         ]
         sys.stdout.write("\n")
         table(rows)
-    sys.stdout.write(f"late ticks: {summary['late_ticks']}, missed altogether: {summary['missed_ticks']}\n")
+    if summary["late_ticks"] is not None and (summary["latency"] or summary["late_ticks"]):
+        sys.stdout.write(
+            f"late ticks: {summary['late_ticks']}, missed altogether: {summary['missed_ticks']}\n"
+        )

@@ -82,6 +82,7 @@ def draw_all(
     recording: Run, chosen: list[Picture], place: Place, width: str
 ) -> tuple[list[str], dict[str, str]]:
     """Files of the pictures that were drawn, and what the others lack."""
+    from rths.pictures import needs
     from rths.progress import Progress
 
     made: list[str] = []
@@ -96,7 +97,7 @@ def draw_all(
             }
             made += sorted(drawn)
             if not drawn:
-                left_out[picture.name] = picture.needs
+                left_out[picture.name] = needs(recording, picture)
     return made, left_out
 
 

@@ -16,6 +16,7 @@ from common.signals import Kind
 from models import indicators
 from models.labs.force_path import force_path as force_path_of
 from models.structures.partition import storey_stiffness
+from rths import circumstances, storeys
 from rths.accounts import accounts
 
 Result = TypeVar("Result")
@@ -56,6 +57,8 @@ def summarize(run: Run) -> dict[str, Any]:
         "finished": run.finished,
         "damage": run.damage,
         "slaves": [name_of(role) for role in run.roles if name_of(role)],
+        "clock": circumstances.clock_of(run),
+        "circumstances": circumstances.sentence(run, plan),
         "ground_motion": run.metadata.get("ground_motion", {}),
         "ticks_expected": plan.ticks if plan else None,
         "topics": {
@@ -65,6 +68,8 @@ def summarize(run: Run) -> dict[str, Any]:
         },
         "recorder": dict(run.metadata.get("summary", {})),
         "peaks": peaks(run),
+        "storeys": (floors := storeys.storeys(run, plan) if plan else []),
+        "modes": storeys.modes(plan) if plan and floors else [],
         "tracking": tracking(run),
         "force_path": force_path(run, plan) if plan else None,
         "error_energy": error_energy(run, plan) if plan else None,
@@ -226,7 +231,9 @@ def ticks_where(run: Run, condition: Callable[[dict[str, Values]], Values]) -> i
 
 
 def latencies(run: Run) -> dict[str, Any]:
-    """Percentiles of every segment, of named slaves a table each by name."""
+    """Percentiles of every segment, of named slaves a table each by name; none in virtual time, which measures none."""
+    if circumstances.clock_of(run) == circumstances.VIRTUAL:
+        return {}
     if run.roles == (SLAVE,):
         return latency(run, LATENCY)
     tables = {name_of(role): latency(run, latency_topic(role)) for role in run.roles}

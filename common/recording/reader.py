@@ -28,6 +28,7 @@ from common.roles import LATENCY, MASTER, SLAVE, latency_topic, ramps_of, title
 Values = NDArray[Any]
 
 GROUND = "ground_motion"
+CLOCK = "clock"  # metadata: `kind`, virtual or real
 MACHINES = (
     "real_time"  # metadata: real-time shape and time of the laboratories' machines, and the bare timing loop
 )

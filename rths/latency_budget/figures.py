@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from common.errors import InputError
 from common.recording.reader import Run, Values
 from common.roles import MASTER, latency_topic, name_of
+from rths.circumstances import NO_LATENCY, VIRTUAL, clock_of
 from rths.latency_budget.limits import PERCENTILES, WAITS
 
 Numbers = NDArray[np.float64]
@@ -231,6 +232,8 @@ def bare_loop(record: Mapping[str, str]) -> Bare | None:
 def warnings(run: Run, ticks: Values, exchanges: list[Exchange]) -> list[str]:
     """What makes the figures less than those of the whole test, a sentence each; `ticks` have a row of the master's."""
     found = [] if run.finished else ["The recording was cut off before its end: judged as far as it goes."]
+    if clock_of(run) == VIRTUAL:
+        found.append(f"{NO_LATENCY}: the times above come from the interval and the link's model alone.")
     planned = number(run.metadata.get("summary", {}), "ticks_expected")
     end = int(ticks[-1]) + 1
     if run.finished and planned is not None and end < planned:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from common.recording.reader import Run
+from rths.circumstances import VIRTUAL, clock_of
 from rths.figure import DOUBLE, SINGLE
 from rths.pictures import histories, hysteresis, latency, spectra, synchronisation, tracking
 
@@ -30,6 +31,12 @@ class Picture(NamedTuple):
             return self.draw(recording, canvas)
         except (ValueError, ArithmeticError, MemoryError):
             return False
+
+
+def needs(recording: Run, picture: Picture) -> str:
+    """The signals that a picture needs, and why a test in virtual time has no latency."""
+    virtual = picture.name == "latency" and clock_of(recording) == VIRTUAL
+    return picture.needs + (", and this one ran in virtual time" if virtual else "")
 
 
 _ALL = (

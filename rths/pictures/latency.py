@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from common.recording.reader import Run
+from rths.circumstances import VIRTUAL, clock_of
 from rths.figure import COLOURS
 from rths.pictures.curves import Values, interval
 from rths.pictures.layout import bound, decades, legend_above
@@ -25,7 +26,7 @@ MARKS = (
 def draw(recording: Run, canvas: Any) -> bool:
     """Percentiles by segment above, the round trip below; False where nothing was measured, as in virtual time."""
     measured = segments(recording)
-    if "round_trip" not in measured:
+    if "round_trip" not in measured or clock_of(recording) == VIRTUAL:
         return False
     period = interval(recording.columns.get("master", {}).get("t", np.array([])))
     halves = canvas.subfigures(2, 1, height_ratios=(3, 2))  # each with a left margin of its own

@@ -10,7 +10,7 @@ from common.roles import name_of, title
 from common.telling import Tell
 from rths import figure
 from rths.page import data_uri
-from rths.pictures import PICTURES, Picture
+from rths.pictures import PICTURES, Picture, needs
 
 INCH = 96  # CSS pixels
 WIDE = ("histories",)  # their time is the whole test's, which two columns show better where there is room
@@ -39,7 +39,7 @@ def draw_all(run: Run, tell: Tell) -> tuple[Pictures, dict[str, str]]:
         if drawn := draw(run, role, picture):
             found[role].append(drawn)
     names = {drawn.name for several in found.values() for drawn in several}
-    return found, {name: picture.needs for name, picture in PICTURES.items() if name not in names}
+    return found, {name: needs(run, picture) for name, picture in PICTURES.items() if name not in names}
 
 
 def draw(run: Run, role: str, picture: Picture) -> Drawn | None:

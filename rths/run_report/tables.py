@@ -9,15 +9,15 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from common.limits import UNITS
-from common.recording.reader import GROUND, MACHINES, Run
+from common.recording.reader import CLOCK, GROUND, MACHINES, Run
 from common.roles import MASTER, name_of
-from rths.formats import MISSING, milliseconds, reading, tracked
+from rths.formats import MISSING, milliseconds, reading, storey_rows, tracked
 from rths.page import breakable
 from rths.run_report.verdict import Margin, Summary, amount
 from rths.summary import plan_of
 
 EVENTS = 400  # rows of the page; JSON of rths inspect has all
-SHOWN = ("plan", GROUND, MACHINES)  # metadata that have a place of their own
+SHOWN = ("plan", CLOCK, GROUND, MACHINES)  # metadata that have a place of their own
 
 
 class Table(NamedTuple):
@@ -36,6 +36,7 @@ def facts(run: Run, summary: Summary) -> list[tuple[str, str]]:
         ("test", summary["test"]),
         ("recording", Path(summary["file"]).name),
         ("recorded", date(run)),
+        ("time and rigs", summary["circumstances"]),
         ("ground motion", motion.get("record", "")),
         ("scale", motion.get("scale", "")),
         ("data", run.metadata.get("import", {}).get("data", "")),
@@ -102,6 +103,14 @@ def peaks(summary: Summary) -> Table:
         for name, found in summary["peaks"].items()
     ]
     return Table("", ("signal", "peak", "at"), rows)
+
+
+def storeys(summary: Summary) -> Table:
+    """Peaks of every storey."""
+    if not summary["storeys"]:
+        return Table("", (), [])
+    head, *rows = storey_rows(summary["storeys"])
+    return Table("Building", tuple(head), rows)
 
 
 def seconds(t: float | None) -> str:

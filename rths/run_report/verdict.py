@@ -123,7 +123,7 @@ def rejected(summary: Summary) -> str:
 def lateness(run: Run, summary: Summary) -> str:
     """Ticks in which a deadline was missed."""
     late, missed = summary["late_ticks"], summary["missed_ticks"]
-    if late is None:
+    if late is None or (not late and not summary["latency"]):
         return ""
     ticks = max(run.ticks(topic) for topic in run.columns if kind_of(topic) == LATENCY)
     return f"{late} of {ticks} ticks were late, {missed} of them missed altogether."

@@ -1,0 +1,95 @@
+"""What is said of the clock and the rigs of a recording, and its response storey by storey."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from common.plan import Plan, from_tables
+from common.recording.reader import CLOCK, Run, read
+from common.tables import Laboratory, Rig
+from rths import circumstances, storeys
+from rths.summary import plan_of, summarize
+
+
+def without_the_record(path: Path) -> Run:
+    """A recording as one was before it said what kept its time."""
+    run = read(path)
+    del run.metadata[CLOCK]
+    return run
+
+
+def test_a_virtual_run_says_so_and_shows_no_latency(call: Any, capsys: Any, virtual_recording: Path) -> None:
+    assert call("inspect", virtual_recording) == 0
+    out = capsys.readouterr().out.splitlines()
+    assert out[2] == (
+        "Virtual time in one process, where nothing takes time and no latency is measured; by the plan both "
+        "laboratories are emulated."
+    )
+    assert not [line for line in out if line.startswith(("latency, µs", "late ticks", "round_trip"))]
+    assert call("budget", virtual_recording) == 0
+    assert f"{circumstances.NO_LATENCY}: the times above" in capsys.readouterr().out
+    assert call("plot", virtual_recording, "latency") == 2
+    assert "needs latency of a test in real time, and this one ran in virtual time" in capsys.readouterr().err
+
+
+def test_an_old_recording_says_what_its_times_show_and_nothing_else(virtual_recording: Path) -> None:
+    run = without_the_record(virtual_recording)
+    assert circumstances.clock_of(run) == circumstances.VIRTUAL
+    run.columns["latency"]["compute_time"][7] = 4e-5
+    assert circumstances.clock_of(run) == circumstances.REAL
+    del run.columns["latency"]
+    assert circumstances.clock_of(run) == circumstances.UNKNOWN
+    assert summarize(run)["circumstances"] == ""
+
+
+@pytest.mark.parametrize(
+    ("rig", "said"),
+    [
+        ("", "by the plan both laboratories are emulated."),
+        ("lab.py:TableLab", "the plan's rigs: master emulated, slave lab.py:TableLab."),
+    ],
+)
+def test_of_the_rigs_the_plan_alone_is_asked(
+    rig: str, said: str, virtual_recording: Path, short_plan: Plan
+) -> None:
+    run = read(virtual_recording)
+    run.metadata[CLOCK]["kind"] = circumstances.REAL
+    plan = replace(short_plan, slave=Laboratory(Rig(rig)))
+    assert circumstances.sentence(run, plan).endswith(said)
+
+
+def test_three_storeys_have_a_drift_and_a_shear_each() -> None:
+    t = np.array([0.0, 0.002, 0.004])
+    plan = from_tables(
+        {"structure": {"mass": [1e5] * 3, "stiffness": [8e7, 6e7, 4e7], "damping": [1e5] * 3}}, Path()
+    )
+    floors = np.array([[0.0, 0.0, 0.0], [1e-3, 3e-3, 2e-3], [2e-3, 3e-3, 7e-3]])
+    numerical = np.array([[0.0, 0.0, 0.0], [10.0, 20.0, -30.0], [-40.0, 50.0, 60.0]])
+    columns = {"t": t, "displacement": floors, "absolute_acceleration": 10.0 * floors}
+    columns |= {"numerical_force": numerical, "column_force": np.array([0.0, 5.0, 0.0])}
+    run = Run(Path("x"), columns={"master": columns})
+    found = storeys.storeys(run, plan)
+    assert [item["drift"]["peak"] for item in found] == pytest.approx([2e-3, 2e-3, 4e-3])
+    assert [item["displacement"]["peak"] for item in found] == pytest.approx([2e-3, 3e-3, 7e-3])
+    assert [item["shear"]["peak"] for item in found] == [40.0, 50.0, 60.0]
+    assert found[1]["drift"]["t"] == 0.002
+    columns["column_force"] = np.array([0.0, 500.0, 0.0])
+    assert storeys.storeys(run, plan)[0]["shear"]["peak"] == 510.0
+
+
+def test_the_modes_are_those_of_the_plan(call: Any, capsys: Any, virtual_recording: Path) -> None:
+    assert call("inspect", virtual_recording, "--json") == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["modes"][0]["period"] == pytest.approx(0.5027, abs=1e-4)
+    assert found["modes"][0]["damping_ratio"] == pytest.approx(0.05, abs=1e-4)
+    assert found["storeys"][0]["drift"] == found["peaks"]["master/displacement"]
+    plan = plan_of(read(virtual_recording))
+    assert plan is not None
+    free = replace(plan, structure=replace(plan.structure, stiffness=(0.0,), damping=(0.0,)))
+    assert storeys.modes(free) == [{"period": None, "damping_ratio": None}]
