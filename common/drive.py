@@ -10,12 +10,13 @@ from typing import Protocol
 from common.endpoint import Received
 from common.exchange import State
 from common.laboratory import Laboratory
+from common.plan import Plan
 from common.realtime import freeze
 from common.safety.modes import Mode
 from common.surroundings import Surroundings
 
 IDLE_NS = 5_000_000  # how often the handshake looks after itself
-LEAVE_NS = 5_000_000_000  # how long the last words may take
+LEAVE_NS = 5_000_000_000  # how long the last words may take where the recorder is not waited for
 PROGRESS_NS = 200_000_000
 
 
@@ -187,12 +188,25 @@ def fetch(loop: Loop, deadline: int) -> bool:
 
 
 def depart(loop: Loop) -> None:
-    """Last words until they are heard, for a bounded time."""
-    deadline = loop.lab.clock.now() + LEAVE_NS
-    while not loop.left and loop.lab.clock.now() < deadline:
+    """Last words until they are heard, for a bounded time: what the recorder lacks it may still ask for.
+
+    A recorder that is held up is waited for as long as during the test, counted from when it was last heard, and then
+    has as long as any other to come back to the link and to ask.
+    """
+    lab = loop.lab
+    begun, patience = lab.clock.now(), round(lab.plan.recording.patience * 1e9)
+    while not loop.left:
+        heard = lab.recorder_heard_ns if lab.recorded else begun - patience
+        if lab.clock.now() >= max(begun, min(heard, begun) + patience) + LEAVE_NS:
+            break
         loop.leave()
-        fetch(loop, loop.lab.clock.now() + IDLE_NS)
+        fetch(loop, lab.clock.now() + IDLE_NS)
     loop.leave()
+
+
+def longest_leave(plan: Plan) -> float:
+    """How long the last words of a laboratory may take at most, s."""
+    return LEAVE_NS * 1e-9 + plan.recording.patience
 
 
 class Stopper:

@@ -41,6 +41,15 @@ class InterlockError(RthsError):
     exit_code = 3
 
 
+class IncompleteError(RthsError):
+    """The test is done, but its recording is not whole though the plan requires it (exit 1).
+
+    Both laboratories came to their end in order, so it is neither an interlock nor a loss of one of them.
+    """
+
+    exit_code = 1
+
+
 class LostError(RthsError):
     """The other laboratory, the recorder or the network was lost or never came (exit 4)."""
 

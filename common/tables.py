@@ -435,5 +435,8 @@ class Recording:
     folder: str = key("folder of recordings, relative to where the command is started", default="runs")
     required: bool = key("whether the test waits for a recorder and stops without it", default=True)
     patience: float = key(
-        "silence of the recorder after which the test stops", default=10.0, unit="s", above=0.0
+        "silence of the recorder after which the test stops, and time for what it lacks to be sent again",
+        default=10.0,
+        unit="s",
+        above=0.0,
     )

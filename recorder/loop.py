@@ -8,21 +8,21 @@ from typing import Any, NamedTuple
 from common import signals
 from common.clock import Clock
 from common.endpoint import Endpoint
-from common.errors import InputError, LostError
+from common.errors import IncompleteError, InputError, LostError
 from common.laboratory import REPEAT_NS, Report, Setting
 from common.messages import Finished, Message, Recorder, Register, Resend, Samples
 from common.outlet import BURST, PIECE, Inlet, pack_nexts
 from common.plan import Plan
-from common.roles import LATENCY, MASTER, kind_of
+from common.roles import LATENCY, MASTER, RECORDER, kind_of, title
 from common.surroundings import CODES, described
 from recorder.items import Items
 from recorder.sink import Item, Sink
 
-PATIENCE_NS = 1_000_000_000  # a hole that is not filled by then is lost
 SILENCE_NS = 5_000_000_000  # a test from which nothing is heard for so long is over
 ITEMS_PER_TICK, SPARE_TICKS = 4, 100_000  # bounds a stream's items: its topics of every tick, and events
 ASK_NS = 20_000_000  # from asking a laboratory to asking it again, where the answer has come
 STALL_NS = 1_000_000_000  # a recorder that did nothing for so long was held up itself
+ROWS_LOST = "rows_lost"  # code of the event that says what a laboratory did not send again
 CONSEQUENCE = "remote_trip"  # the other laboratory's cause counts
 MISSED_AT = [row.name for row in signals.LATENCY].index("deadline_missed")
 
@@ -63,7 +63,10 @@ class RecorderLoop:
         self._machines: dict[str, str] = {}  # metadata of the recording
         self._outcome = ("", "")
         self._said_failure = False
-        self.error: InputError | LostError | None = None
+        self._unended: list[str] = []  # laboratories the end of whose stream never came
+        self._settled = False  # the test had ended when somebody stopped the recorder
+        self._newest: list[Any] = ["", 0, 0, 0]  # item of the newest tick
+        self.error: IncompleteError | InputError | LostError | None = None
         self.done = False
 
     # -- messages ---------------------------------------------------------------------------------
@@ -110,6 +113,7 @@ class RecorderLoop:
             self._take_event(values)
             return
         if topic in self._seen:
+            self._newest = max(self._newest, item, key=lambda one: one[3])
             self._note(self._seen[topic], values[0])
         if kind_of(topic) == LATENCY:
             self._missed += bool(values[MISSED_AT])
@@ -154,6 +158,9 @@ class RecorderLoop:
         if held > STALL_NS:
             self._stalled_ns += held
             self._heard_ns = now
+            self._holes = {
+                lab: hole._replace(since_ns=hole.since_ns + held) for lab, hole in self._holes.items()
+            }
 
     def _say(self) -> None:
         failure = self._sink.failure or (str(self.error) if self.error else "")
@@ -167,15 +174,45 @@ class RecorderLoop:
         self._endpoint.send(Recorder(self._session, state, self._digest, failure, nexts))
 
     def _fill_holes(self, now: int) -> None:
+        patience_ns = self._plan.recording.patience * 1e9
         for lab, inlet in self._inlets.items():
             missing, hole = inlet.missing(), self._holes.get(lab)
             if missing is None:
                 self._holes.pop(lab, None)
-            elif hole is not None and hole.first == missing[0] and now - hole.since_ns > PATIENCE_NS:
+            elif hole is not None and hole.first == missing[0] and now - hole.since_ns > patience_ns:
                 del self._holes[lab]
-                self._write(inlet.give_up())
+                self._give_up(lab)
             else:
                 self._ask(lab, missing[0], hole, now)
+
+    def _give_up(self, lab: str) -> None:
+        """Count the first hole of a stream as lost, say so, and go on behind it."""
+        inlet = self._inlets[lab]
+        before = inlet.lost
+        items = inlet.give_up()
+        self._say_lost(
+            f"{inlet.lost - before} rows and events of the {title(lab)} are lost: they did not reach the recorder, and "
+            "were not sent again in time.",
+            {"items": float(inlet.lost - before)},
+        )
+        self._write(items)
+
+    def _give_up_rest(self) -> None:
+        """Write what came behind holes that are still open, and say what of the streams is missing."""
+        for lab, inlet in self._inlets.items():
+            while inlet.missing() is not None:
+                self._give_up(lab)
+            if self._session and inlet.total is None:
+                self._unended.append(lab)
+                self._say_lost(f"The end of what the {title(lab)} records did not reach the recorder.", {})
+
+    def _say_lost(self, text: str, values: Mapping[str, float]) -> None:
+        """Record and report that something is missing, at the time of the newest tick."""
+        _, log_ns, _, tick, *_ = self._newest
+        t = tick * self._plan.test.interval
+        self._sink.put([["event", log_ns, log_ns, t, RECORDER, "error", ROWS_LOST, text, dict(values)]])
+        said = {"t": t, "lab": RECORDER, "level": "error", "code": ROWS_LOST, "text": text}
+        self._report("event", said | dict(values))
 
     def _ask(self, lab: str, first: int, hole: Hole | None, now: int) -> None:
         """Ask for what is missing first, again at once where the last answer has come."""
@@ -210,13 +247,16 @@ class RecorderLoop:
     def stop(self, reason: str) -> None:
         """End the recording because somebody wants it so; why the test ended before stays the outcome."""
         self.error = LostError(reason)
-        if not self._outcome[0]:
+        self._settled = bool(self._outcome[0])
+        if not self._settled:
             self._outcome = ("stop", reason)
         self._say()
         self.done = True
 
     def close(self) -> Mapping[str, str]:
         """Say goodbye, write the summary, close the file; the summary as written, and in `error` what is lost of it."""
+        self._give_up_rest()
+        self._judge()
         self._say()
         summary = self.summary()
         self._sink.close(summary, self._machines)
@@ -225,6 +265,19 @@ class RecorderLoop:
                 f"The recording is lost from some point on: {self._sink.failure} What came before is in the file."
             )
         return summary
+
+    def _judge(self) -> None:
+        """An error where the plan requires the recording, something is missing, and nothing worse has happened."""
+        lost = sum(inlet.lost for inlet in self._inlets.values())
+        worse = self.error is not None and not self._settled
+        if not self._plan.recording.required or worse or not (lost or self._unended):
+            return
+        ends = " and ".join(title(lab) for lab in self._unended)
+        missing = [f"{lost} rows and events"] * bool(lost) + [f"the end of {ends}"] * bool(ends)
+        self.error = IncompleteError(
+            f"The test is over, but its recording lacks {' and '.join(missing)}: the recorder was held up or cut off, "
+            "so free its processor and link (`rths doctor`) and repeat the test if they count."
+        )
 
     def summary(self) -> dict[str, str]:
         """What was expected, what is recorded, what is missing, how it ended."""

@@ -6,19 +6,19 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Protocol
 
-from common.drive import LEAVE_NS
-from common.errors import InputError, InterlockError, LostError, RthsError
+from common.drive import LEAVE_NS, longest_leave
+from common.errors import IncompleteError, InputError, InterlockError, LostError, RthsError
 from common.plan import Plan
 from common.roles import MASTER, RECORDER, title
-from recorder.loop import CONSEQUENCE, SILENCE_NS
+from recorder.loop import CONSEQUENCE, ROWS_LOST, SILENCE_NS
 
 MARGIN_S = 1.0  # on what a process allows itself, for it to leave
-LEAVE_S = LEAVE_NS * 1e-9 + MARGIN_S
+LEAVE_S = LEAVE_NS * 1e-9 + MARGIN_S  # before there are rows that a recorder could ask for again
 SILENCE_S = SILENCE_NS * 1e-9 + MARGIN_S
 KILL_S = 3.0  # from asking to killing
 WRITE_S = 30.0  # for the recorder to bring to a slow disk what it holds: the file is what the test was for
 
-USED, OWN, CRASHED, LOST, WISHED, LED, ASKED = range(7)
+USED, OWN, CRASHED, LOST, WISHED, LED, ASKED, LACKING = range(8)
 STOP = "stop"
 ERRORS = {2: InputError, 3: InterlockError, 4: LostError}
 
@@ -38,8 +38,12 @@ class Ending:
     """
 
     def __init__(self, plan: Plan) -> None:
-        self._notice = plan.link.loss_timeout + LEAVE_S + resting(plan)
-        self._miss_recorder = plan.recording.patience + LEAVE_S if plan.recording.required else math.inf
+        leave = longest_leave(plan) + MARGIN_S
+        self._recorder = min(
+            SILENCE_S + plan.recording.patience, WRITE_S - KILL_S
+        )  # it may be held up itself
+        self._notice = plan.link.loss_timeout + leave + resting(plan)
+        self._miss_recorder = plan.recording.patience + leave if plan.recording.required else math.inf
         self._wished = self._ask = self._alone = math.inf  # since when, from when, since when
         self.agreed = False  # the start: from now on there are ticks
         self.insisted = False
@@ -59,7 +63,7 @@ class Ending:
     def ask_at(self, name: str) -> float:
         """When a process is asked, s."""
         if name == RECORDER:
-            return self._alone + (SILENCE_S if self.agreed else MARGIN_S)
+            return self._alone + (self._recorder if self.agreed else MARGIN_S)
         return min(self._wished, self._ask) if name == MASTER else self._ask
 
     def kill_at(self, name: str) -> float:
@@ -104,6 +108,7 @@ def verdict(processes: Ended, wish: str) -> RthsError | None:
     - WISHED: no process, but the user, who wanted to stop.
     - LED: it followed another, as the report of a code "remote_trip" says.
     - ASKED: it was asked to stop, or killed, from here.
+    - LACKING: it is the recorder, and its recording is not whole: the test itself is done (exit 1).
     """
     ranks = {name: rank(processes, name, code) for name, code in processes.ended().items() if code}
     if not ranks:
@@ -115,11 +120,13 @@ def verdict(processes: Ended, wish: str) -> RthsError | None:
 
 
 def rank(processes: Ended, name: str, code: int) -> int:
-    """How near the end of a process is to the cause, from `USED` to `ASKED`."""
+    """How near the end of a process is to the cause, from `USED` to `LACKING`."""
     reported = processes.errors.get(name, "")
     from_here = name in processes.asked or name in processes.killed
     if code == 2:
         return USED
+    if name == RECORDER and reported == ROWS_LOST:
+        return LACKING
     if from_here and (name == RECORDER or reported in ("", STOP)):  # the recorder is asked when all is over
         return ASKED
     if code not in ERRORS and not reported:
@@ -138,4 +145,6 @@ def complaint(processes: Ended, name: str, code: int) -> RthsError:
             f"The {title(name)} was killed (signal {-code}); the recording holds what came until then."
         )
     text = processes.complaint(name).removeprefix("rths: ").splitlines()
+    if name == RECORDER and processes.errors.get(name) == ROWS_LOST:
+        return IncompleteError(text[-1] if text else "The recording is not whole.")
     return ERRORS.get(code, LostError)(text[-1] if text else f"The {title(name)} stopped before its end.")

@@ -128,7 +128,8 @@ def run(bench: Bench, stopping: Callable[[], str], tell: Tell = untold) -> RthsE
     causes = [error for role, error in failed.items() if codes.get(role) != CONSEQUENCE]
     if not failed and bench.master.ticks < ticks:
         return InterlockError(bench.master.lab.exchange.cause or "The test never began.")
-    return next(iter([*causes, *failed.values()]), None)
+    incomplete = [bench.recorder.error] if bench.recorder is not None and bench.recorder.error else []
+    return next(iter([*causes, *failed.values(), *incomplete]), None)
 
 
 def _listening(bench: Bench) -> dict[str, str]:

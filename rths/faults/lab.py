@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple, cast
 
-from common.drive import LEAVE_NS, Loop, Stopper, drive
+from common.drive import Loop, Stopper, drive, longest_leave
 from common.laboratory import Report, Setting
 from common.plan import Plan
 from common.reality import Reality
@@ -68,7 +68,7 @@ class Simulation:
         self.plan = plan
         self.recording = surrounding.recording
         timeout = plan.link.connect_timeout + plan.link.loss_timeout + plan.test.duration
-        self.world = World(round(timeout * 1e9) + 3 * LEAVE_NS)
+        self.world = World(round((timeout + 3.0 * longest_leave(plan)) * 1e9))
         self.wire = Wire(self.world, plan.roles, surrounding.base, surrounding.seed)
         self.events: dict[str, list[Told]] = {}
         self.ports: dict[str, Port] = {}

@@ -12,7 +12,7 @@ import pytest
 
 from common import reality
 from common.clock import MonotonicClock, VirtualClock
-from common.errors import InputError, InterlockError, LostError
+from common.errors import IncompleteError, InputError, InterlockError, LostError
 from common.memory_link import MemoryEndpoint
 from common.messages import Samples
 from common.plan import Plan
@@ -190,23 +190,57 @@ def test_a_recorder_that_lost_its_disk_ends_with_a_sentence(short_plan: Plan, tm
     assert "the disk does not take it (No space left on device)" in str(recorder.error)
 
 
-def test_a_recorder_that_was_held_up_gets_what_it_missed(short_plan: Plan, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("first", "last"), [(400, 950), (400, 1_990), (1_300, 1_990)])
+def test_a_recorder_that_was_held_up_gets_what_it_missed(
+    first: int, last: int, short_plan: Plan, tmp_path: Path
+) -> None:
     bench = virtual.assemble(short_plan, reality.as_planned(short_plan), tmp_path / "a.mcap")
     recorder = bench.recorder
     assert recorder is not None
     take, poll = recorder.take, recorder.poll
 
     def held() -> bool:
-        return 400 < bench.master.ticks < 1500
+        return first < bench.master.ticks < last
 
-    recorder.take = lambda *words: None if held() else take(*words)  # type: ignore[method-assign]
+    def hole_before(message: Any, received_ns: int) -> None:
+        """A piece is lost just before the recorder is held up, so that it wakes up with a hole as old as its sleep."""
+        if not (
+            isinstance(message, Samples)
+            and first - 30 < message.first < first
+            and not bench.master.ticks > last
+        ):
+            take(message, received_ns)
+
+    recorder.take = lambda *words: None if held() else hole_before(*words)  # type: ignore[method-assign]
     recorder.poll = lambda: None if held() else poll()  # type: ignore[method-assign]
     assert virtual.run(bench, lambda: "") is None
     run = read(tmp_path / "a.mcap")
     for topic in ("master", "slave", "latency"):
         assert run.sequences[topic].tolist() == list(range(short_plan.ticks))
-    assert float(run.metadata["summary"]["recorder_stalled_s"]) == pytest.approx(2.2, abs=0.1)
+    stalled = (last - first) * short_plan.test.interval
+    assert float(run.metadata["summary"]["recorder_stalled_s"]) == pytest.approx(stalled, abs=0.1)
     assert run.metadata["summary"]["items_lost"] == "0"
+    assert not [event for event in run.events if event["code"] == "rows_lost"]
+
+
+def test_the_end_of_a_stream_that_never_comes_is_said(short_plan: Plan, tmp_path: Path) -> None:
+    bench = virtual.assemble(short_plan, reality.as_planned(short_plan), tmp_path / "a.mcap")
+    recorder = bench.recorder
+    assert recorder is not None
+    take = recorder.take
+
+    def deaf(message: Any, received_ns: int) -> None:
+        """The recorder is held up from tick 1,500 on until both laboratories have left."""
+        if bench.master.ticks < 1_500:
+            take(message, received_ns)
+
+    recorder.take = deaf  # type: ignore[method-assign]
+    error = virtual.run(bench, lambda: "")
+    assert isinstance(error, LostError)
+    lost = [event["text"] for event in read(tmp_path / "a.mcap").events if event["code"] == "rows_lost"]
+    assert lost == [
+        f"The end of what the {lab} records did not reach the recorder." for lab in ("master", "slave")
+    ]
 
 
 def test_samples_that_the_link_loses_are_asked_for_again(
@@ -242,12 +276,19 @@ def test_what_can_not_be_had_again_is_counted_and_said(
 
     monkeypatch.setattr(MemoryEndpoint, "send", leaky)
     bench = virtual.assemble(short_plan, reality.as_planned(short_plan), tmp_path / "a.mcap")
-    virtual.run(bench, lambda: "")
+    error = virtual.run(bench, lambda: "")
     run = read(tmp_path / "a.mcap")
     summary = run.metadata["summary"]
     assert summary["items_lost"] == "10"
     assert summary["slave_gaps"] == "10"
     assert run.ticks("slave") == short_plan.ticks - 10
+    lost = [event for event in run.events if event["code"] == "rows_lost"]
+    assert [(event["lab"], event["level"], event["values"]) for event in lost] == [
+        ("recorder", "error", {"items": 10.0})
+    ]
+    assert "10 rows and events of the slave are lost" in lost[0]["text"]
+    assert isinstance(error, IncompleteError)
+    assert error.exit_code == 1
 
 
 def test_the_default_name_is_in_the_plans_folder(short_plan: Plan, tmp_path: Path) -> None:

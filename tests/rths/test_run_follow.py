@@ -15,14 +15,15 @@ import pytest
 
 from common import reality
 from common.clock import VirtualClock
-from common.errors import InputError, InterlockError, LostError, RigError
+from common.drive import longest_leave
+from common.errors import IncompleteError, InputError, InterlockError, LostError, RigError
 from common.laboratory import Setting
 from common.memory_link import MemoryHub
 from common.plan import Plan
 from common.tables import Rig
 from recorder.loop import RecorderLoop
 from rths import virtual
-from rths.ending import KILL_S, LEAVE_S, MARGIN_S, SILENCE_S, WRITE_S, Ending, resting, verdict
+from rths.ending import KILL_S, MARGIN_S, SILENCE_S, WRITE_S, Ending, resting, verdict
 from rths.processes import Leash, Processes, understood
 from rths.run import follow
 from rths.terminal import Progress
@@ -106,11 +107,11 @@ def test_a_failure_before_the_start_reaches_the_others_after_a_moment(short_plan
 
 def test_a_wish_during_ticks_reaches_the_master_alone_and_who_hangs_is_killed(short_plan: Plan) -> None:
     times = Times(ending(short_plan, agreed=True), {"master": 2.0, "recorder": 18.0}, wish=1.0)
-    notice = short_plan.link.loss_timeout + LEAVE_S + resting(short_plan)
+    notice = short_plan.link.loss_timeout + longest_leave(short_plan) + MARGIN_S + resting(short_plan)
     assert times.asked["master"] == near(1.0)
     assert times.asked["slave"] == near(1.0 + notice)
     assert times.killed == {"slave": near(1.0 + notice + KILL_S)}
-    assert notice + KILL_S == pytest.approx(16.0, abs=1.0)
+    assert notice + KILL_S == pytest.approx(26.0, abs=1.0)
 
 
 def test_a_lost_slave_is_the_masters_to_notice_and_the_recorder_ends_by_itself(short_plan: Plan) -> None:
@@ -118,7 +119,7 @@ def test_a_lost_slave_is_the_masters_to_notice_and_the_recorder_ends_by_itself(s
     assert not times.asked
     assert not times.killed
     hanging = Times(ending(short_plan, agreed=True), {"slave": 1.0, "master": 2.5})
-    assert hanging.asked == {"recorder": near(2.5 + SILENCE_S)}
+    assert hanging.asked == {"recorder": near(2.5 + SILENCE_S + short_plan.recording.patience)}
     assert hanging.killed == {"recorder": near(2.5 + WRITE_S)}
 
 
@@ -189,6 +190,14 @@ NONE: tuple[tuple[str, int, str], ...] = (("master", 0, ""), ("slave", 0, ""), (
             WISH,
         ),
         (Over(("master", 4, "lost"), ("slave", -9, "")), "", LostError, "The slave was killed (signal 9)"),
+        (Over(("master", 0, ""), ("recorder", 1, "rows_lost")), "", IncompleteError, "of the recorder"),
+        (
+            Over(("master", 0, ""), ("recorder", 4, "rows_lost"), asked="recorder"),
+            "",
+            IncompleteError,
+            "recorder",
+        ),
+        (Over(("master", 4, "lost"), ("recorder", 1, "rows_lost")), "", LostError, "of the master"),
         (Over(("master", 4, "lost"), ("slave", 1, "")), "", LostError, "of the slave"),
         (
             Over(("master", 3, "remote_trip"), ("slave", 3, "stop")),
