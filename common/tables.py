@@ -27,9 +27,18 @@ class GroundMotion:
     """The earthquake."""
 
     record: str = key(
-        "name of a shipped record, or path of an AT2, K-NET or CSV file", default="el_centro_1940_ns"
+        "name of a shipped record, or path of a file: AT2, K-NET or columns of text",
+        default="el_centro_1940_ns",
     )
     scale: float = key("factor on the record", default=0.1)
+    dt: float = key(
+        "time between samples of a file of one column; 0: the file says it", default=0.0, unit="s", least=0.0
+    )
+    unit: str = key(
+        "acceleration of a file of columns whose header names no unit; empty: m/s2",
+        default="",
+        choices=("", "g", "gal", "cm/s2", "m/s2", "mm/s2"),
+    )
 
 
 @dataclass(frozen=True)

@@ -145,7 +145,8 @@ def damper(plan: Plan) -> tuple[float, float, float]:
 
 def motion(plan: Plan) -> GroundMotion:
     """The record of the plan, unscaled; raises InputError where it cannot be read."""
-    return load(plan.ground_motion.record, resolve(plan, ""))
+    chosen = plan.ground_motion
+    return load(chosen.record, resolve(plan, ""), chosen.dt, chosen.unit)
 
 
 def ground_rows(plan: Plan, record: GroundMotion, shift: float = 0.0) -> Array:

@@ -5,6 +5,7 @@ The format: NIED, "About K-NET ASCII format", www.kyoshin.bosai.go.jp/kyoshin/ma
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 
@@ -46,7 +47,7 @@ def read_knet(path: Path) -> GroundMotion:
     header = {name: field(source, name) for name in LINES}
     (frequency,) = positive(source, FREQUENCY, HERTZ.fullmatch(header[FREQUENCY]))
     gal, count = positive(source, SCALE, RATIO.fullmatch(header[SCALE]))
-    points = round(frequency * number(header[DURATION], source.at(LINES[DURATION])))
+    points = announced(frequency * number(header[DURATION], source.at(LINES[DURATION])))
     counts = numbers(source, HEADER)
     if counts.size != points or points < 2:
         raise InputError(
@@ -56,6 +57,11 @@ def read_knet(path: Path) -> GroundMotion:
     direction = KIK_NET_CHANNELS.get(header[DIRECTION], header[DIRECTION])
     name = f"{header[STATION]} {direction}, {header[ORIGIN]}"
     return GroundMotion(name, source.version, 1.0 / frequency, GAL * gal / count * (counts - counts.mean()))
+
+
+def announced(points: float) -> int:
+    """A number of points as a whole one; −1, which no file holds, where it is beyond all numbers."""
+    return round(points) if math.isfinite(points) else -1
 
 
 def field(source: Source, name: str) -> str:

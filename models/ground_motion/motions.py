@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from common.errors import InputError
 from models.ground_motion.at2 import read_at2
-from models.ground_motion.csv import read_csv
+from models.ground_motion.csv import read_csv, same_interval
 from models.ground_motion.knet import read_knet
 from models.ground_motion.record import GroundMotion
 from models.ground_motion.source import read_source
@@ -38,28 +41,55 @@ MOTIONS = {
     ),
 }
 
-READERS: dict[str, Callable[[Path], GroundMotion]] = {
+Reader = Callable[[Path], GroundMotion]
+
+READERS: dict[str, Reader] = {
     ".at2": read_at2,
-    ".csv": read_csv,
     # K-NET, then KiK-net in the borehole (1) and at the surface (2)
     **dict.fromkeys((".ns", ".ew", ".ud", ".ns1", ".ew1", ".ud1", ".ns2", ".ew2", ".ud2"), read_knet),
 }
+COLUMNS = (".csv", ".dat", ".tsv", ".txt")
+LEAST_INTERVAL = (
+    1e-6  # s; nothing that shakes a building is sampled more often, so that the file means another unit
+)
 
 
-def load(record: str, base: Path) -> GroundMotion:
+def load(record: str, base: Path, dt: float = 0.0, unit: str = "") -> GroundMotion:
     """The record that ships under this name, or the file at this path, relative to the folder `base`.
 
+    `dt` (s) and `unit` are for files of columns that do not say theirs; 0 and empty where the plan gives none.
+
     Raises:
-        InputError: there is neither, or the file cannot be read.
+        InputError: there is neither, the file cannot be read, or it says another interval or unit.
     """
-    if record in MOTIONS:
-        shipped = MOTIONS[record]
-        motion = reader(FOLDER / shipped.file)(FOLDER / shipped.file)
-        return replace(motion, name=shipped.name, version=shipped.version)
-    path = base / record
+    shipped = MOTIONS.get(record)
+    path = FOLDER / shipped.file if shipped else base / record
     if not path.is_file():
         raise InputError(missing(record, path))
-    return reader(path)(path)
+    own = reader(path)
+    with np.errstate(over="ignore", invalid="ignore"):
+        motion = own(path) if own else read_csv(path, dt, "" if shipped else unit)
+    if own and unit:
+        raise InputError(
+            f"{path} says its unit itself: leave out unit in [ground_motion], which is for files of columns."
+        )
+    if own:
+        same_interval(path, motion.interval, dt)
+    check(path, motion)
+    return replace(motion, name=shipped.name, version=shipped.version) if shipped else motion
+
+
+def check(path: Path, motion: GroundMotion) -> None:
+    """Raise InputError where a motion is none that could be computed with."""
+    if not LEAST_INTERVAL <= motion.interval < math.inf:
+        raise InputError(
+            f"The samples of {path} come every {motion.interval:g} s, which no record of an earthquake does: correct "
+            "its times, or dt in [ground_motion]."
+        )
+    if not np.all(np.isfinite(motion.acceleration)):
+        raise InputError(
+            f"{path} holds accelerations that are too large to be computed with: correct the file."
+        )
 
 
 def missing(record: str, path: Path) -> str:
@@ -72,8 +102,8 @@ def missing(record: str, path: Path) -> str:
     )
 
 
-def reader(path: Path) -> Callable[[Path], GroundMotion]:
-    """The reader for a file, by its suffix, or by its first lines where the suffix says nothing.
+def reader(path: Path) -> Reader | None:
+    """The reader of a format that says interval and unit itself, by suffix or first lines; None for columns of text.
 
     Raises:
         InputError: neither tells the format.
@@ -81,14 +111,16 @@ def reader(path: Path) -> Callable[[Path], GroundMotion]:
     suffix = path.suffix.lower()
     if suffix in READERS:
         return READERS[suffix]
+    if suffix == ".csv":
+        return None
     head = read_source(path).lines[:4]
     if head and head[0].startswith("Origin Time"):
         return read_knet
     if any("NPTS" in line.upper() for line in head):
         return read_at2
-    if suffix == ".txt":
-        return read_csv
-    names = ", ".join(sorted({*READERS, ".txt"}))
+    if suffix in COLUMNS:
+        return None
+    names = ", ".join(sorted({*READERS, *COLUMNS}))
     raise InputError(
         f"The format of ground motion {path} is unknown: give it the suffix of its format ({names})."
     )

@@ -46,6 +46,11 @@ def read_source(path: Path) -> Source:
     return Source(path, tuple(text.splitlines()), digest)
 
 
+def printable(text: str) -> str:
+    """A piece of a file as a sentence may hold it."""
+    return "".join(letter if letter.isprintable() else "?" for letter in text[:60])
+
+
 def number(word: str, where: str) -> float:
     """A finite number from text.
 
@@ -55,7 +60,7 @@ def number(word: str, where: str) -> float:
     try:
         value = float(word.replace("_", "?"))  # float() would take 1_000
     except ValueError:
-        raise InputError(f"'{word}' at {where} is not a number: correct the file.") from None
+        raise InputError(f"'{printable(word)}' at {where} is not a number: correct the file.") from None
     if not math.isfinite(value):
         raise InputError(f"The value at {where} is {word}, but must be finite: correct the file.")
     return value

@@ -66,11 +66,24 @@ HEADER = "time (s),acceleration (g)\n"
     ("text", "words"),
     [
         ("", "mine.csv is empty: write a first line such as: time"),
-        (ROWS, "mine.csv:1 names no unit of the acceleration .*write a first line such as"),
-        ("time (s),acceleration\n" + ROWS, "mine.csv:1 names no unit"),
+        ("# nothing but a remark\n", "mine.csv is empty"),
+        ("time,a_g\n" + ROWS, "'a_g' at .*:1 may be a ground acceleration or an acceleration in g"),
+        (
+            "time,drift\n" + ROWS,
+            "'drift' at .*:1 is neither time nor acceleration: name it as one of time, t or s",
+        ),
+        ("time,t\n" + ROWS, "columns at .*:1 must be time and acceleration"),
+        (
+            "0,00;0,1\n0,02;0,2\n",
+            "mine.csv:1 seem to have decimal commas: write numbers with a decimal point",
+        ),
+        ("0,00 0,1\n0,02 0,2\n", "mine.csv:1 holds 3 columns.*where these are decimal commas"),
+        ("0,00,0,1\n0,02,0,2\n", "mine.csv:1 holds 4 columns.*where these are decimal commas"),
+        ("0,1\n0,2\n", "time at .*mine.csv:2 does not increase.*where these are decimal commas"),
+        ("0.0 0.1 0.2\n", "mine.csv:1 holds 3 columns, but must hold time and acceleration, or"),
         ("time (s),acceleration (ft/s2)\n" + ROWS, "Unit 'ft/s2' at .*:1 is none of g, gal"),
-        ("time (ms),acceleration (g)\n" + ROWS, "time at .*:1 must be in seconds"),
-        ("acceleration (g)\n0.1\n0.2\n", "mine.csv:1 holds 1 column, but must hold time and acceleration"),
+        ("time (min),acceleration (g)\n" + ROWS, "time at .*:1 must be in seconds"),
+        ("acceleration (g)\n0.1\n0.2\n", "holds one column: give the time between its samples in s as dt"),
         (HEADER + "0.0,0.1\n0.02\n", "mine.csv:3 holds 1 column,"),
         (HEADER + "0.0,0.1,0.2\n", "mine.csv:2 holds 3 columns,"),
         (HEADER + "0.0,0.1\n0.02,\n", "The acceleration is missing at .*mine.csv:3"),
@@ -87,3 +100,47 @@ HEADER = "time (s),acceleration (g)\n"
 def test_what_is_wrong_is_named_with_its_line(tmp_path: Path, text: str, words: str) -> None:
     with pytest.raises(InputError, match=words):
         read_csv(written(tmp_path, text))
+
+
+@pytest.mark.parametrize(
+    ("text", "factor"),
+    [
+        ("0.00 0.0\n0.02 1.5\n0.04 -2.5\n", 1.0),
+        ("  0.00   0.0\n  0.02   1.5\n  0.04  -2.5\n", 1.0),
+        ("0.00\t0.0\n0.02\t1.5\n0.04\t-2.5\n", 1.0),
+        (ROWS, 1.0),
+        ("time,acc\n" + ROWS, 1.0),
+        ("time,acceleration_m_s2\n" + ROWS, 1.0),
+        ("t,ag\n" + ROWS, 1.0),
+        ("t [s];a [mm/s^2]\n" + ROWS.replace(",", ";"), 1e-3),
+        ("time_s,acc_g\n" + ROWS, 9.80665),
+        ("time (s) acceleration (cm/s2)\n" + ROWS.replace(",", " "), 0.01),
+        ("Time\tAcceleration, cm/s/s\n" + ROWS.replace(",", "\t"), 0.01),
+        ("time (ms),accel/gal\n0,0\n20,1.5\n40,-2.5\n", 0.01),
+        ("acceleration (m/s2),time (s)\n0.0,0.00\n1.5,0.02\n-2.5,0.04\n", 1.0),
+        ("% a remark\n// another\ntime,ground_acceleration_g\n" + ROWS, 9.80665),
+    ],
+)
+def test_columns_of_many_shapes_are_read(tmp_path: Path, text: str, factor: float) -> None:
+    motion = read_csv(written(tmp_path, text))
+    assert motion.interval == pytest.approx(0.02, rel=1e-12)
+    np.testing.assert_allclose(motion.acceleration, factor * np.array([0.0, 1.5, -2.5]), rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    "text", ["0.0\n1.5\n-2.5\n", "acceleration\n0.0\n1.5\n-2.5\n", "acc (m/s2)\n0.0\n1.5\n-2.5\n"]
+)
+def test_one_column_takes_its_interval_from_the_plan(tmp_path: Path, text: str) -> None:
+    motion = read_csv(written(tmp_path, text), dt=0.01)
+    assert (motion.interval, motion.acceleration.tolist()) == (0.01, [0.0, 1.5, -2.5])
+
+
+def test_what_the_plan_says_must_be_what_the_file_says(tmp_path: Path) -> None:
+    path = written(tmp_path, "time,acc (g)\n" + ROWS)
+    assert read_csv(path, dt=0.02, unit="g").points == 3
+    assert read_csv(written(tmp_path, ROWS), unit="gal").peak == pytest.approx(0.025)
+    path = written(tmp_path, "time,acc (g)\n" + ROWS)
+    with pytest.raises(InputError, match="says that its acceleration is in g, and unit in .* says gal"):
+        read_csv(path, unit="gal")
+    with pytest.raises(InputError, match="come every 0.02 s, and dt in .ground_motion. is 0.01 s"):
+        read_csv(path, dt=0.01)

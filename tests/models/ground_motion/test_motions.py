@@ -3,6 +3,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from common.errors import InputError
 from models.ground_motion import MOTIONS, STANDARD_GRAVITY, load
@@ -114,3 +116,44 @@ def test_a_missing_record_lists_the_shipped_ones_and_the_nearest(tmp_path: Path)
 def test_a_record_like_none_gets_no_guess(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"one of el_centro_1940_ns.*\.$"):
         load("zzz.at2", tmp_path)
+
+
+LETTERS = st.text(alphabet='0123456789.,;\t -+eE#"()/\n²agcms_timeNPTSDORIGU\x00\x1b', max_size=200)
+
+
+BEGINNINGS = (
+    b"",
+    b"time,acc\n0,1\n0.02,2\n",
+    b"a\nb\nUNITS OF G\nNPTS= 2, DT= .01 SEC\n",
+    b"1e308 1e308\n-1e308 1\n",
+)
+SHARED = settings(
+    suppress_health_check=[HealthCheck.function_scoped_fixture]
+)  # an example writes its file anew
+
+
+@settings(SHARED, max_examples=200, deadline=None, derandomize=True)
+@given(
+    st.one_of(LETTERS.map(str.encode), st.binary(max_size=200)),
+    st.sampled_from(BEGINNINGS),
+    st.sampled_from(["csv", "txt", "dat", "at2", "ns"]),
+)
+def test_whatever_a_file_holds_only_a_sentence_comes_out(
+    tmp_path: Path, content: bytes, begin: bytes, suffix: str
+) -> None:
+    (tmp_path / f"a.{suffix}").write_bytes(begin + content)
+    try:
+        motion = load(f"a.{suffix}", tmp_path, 0.01)
+    except InputError as error:
+        assert "\n" not in str(error)
+        assert str(error).isprintable()
+    else:
+        assert np.all(np.isfinite(motion.acceleration))
+        assert motion.interval >= 1e-6
+
+
+def test_a_record_that_says_its_interval_and_unit_is_not_told_others(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="come every 0.02 s, and dt in .ground_motion. is 0.01 s"):
+        load("el_centro_1940_ns", tmp_path, 0.01)
+    with pytest.raises(InputError, match="says its unit itself: leave out unit"):
+        load("san_fernando_1971_pacoima_dam_164", tmp_path, 0.0, "gal")
