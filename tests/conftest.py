@@ -22,7 +22,9 @@ KEPT = ("joblib.externals.loky", "resource_tracker")
 OUT_OF_REACH_S = 60.0  # after its limit a test that no signal has ended takes its interpreter with it
 STDERR = pytest.StashKey[int]()
 
-settings.register_profile("rths", deadline=None, derandomize=True)  # the same cases on every machine
+settings.register_profile(
+    "rths", deadline=None, derandomize=True, max_examples=50
+)  # the same on every machine
 settings.load_profile("rths")
 
 

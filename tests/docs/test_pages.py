@@ -22,6 +22,7 @@ NAMES = [str(path.relative_to(ROOT)) for path in PAGES]
 # is held up for long enough ends a test, as it should
 REAL_TIME = re.compile(r"\brths (?:run(?!.* --virtual)|master|record|doctor)\b")
 TRIES = 3
+LONG = {"docs/how-to/try-compensators.md"}  # whole tests of a benchmark: a minute
 
 COMMAND = re.compile(
     r"(?:\$ |[A-Z_]+=\S+ )?(?:\S*/)?(?:rths|make|python3?|pip|pytest|git|docker|ssh|scp|for|until)\b(?!:)"
@@ -96,7 +97,8 @@ def in_real_time(name: str) -> bool:
 
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[pytest.mark.slow] * in_real_time(name)) for name in RUN]
+    "name",
+    [pytest.param(name, marks=[pytest.mark.slow] * (name in LONG or in_real_time(name))) for name in RUN],
 )
 def test_a_page_shows_what_its_commands_print(name: str, tmp_path: Path) -> None:
     complaints = ["not run"]

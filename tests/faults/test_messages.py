@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from common.roles import MASTER, SLAVE
 from rths.faults.wire import Conditions
@@ -92,6 +93,7 @@ def test_f03_five_samples_lost(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_f04_five_percent_lost_for_a_minute(tmp_path: Path) -> None:
     scene = Scene(tmp_path, 60.0)
     scene.impair(0, scene.plan.ticks, Conditions(loss=0.05))

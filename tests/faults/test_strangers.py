@@ -179,6 +179,7 @@ def test_f28_stamps_in_the_future_and_clocks_apart(tmp_path: Path, undisturbed: 
     )
 
 
+@pytest.mark.slow
 def test_f29_clocks_drift_apart(tmp_path: Path) -> None:
     drifts = {SLAVE: Drift(offset=10**9, ppb=200_000)}
     course = Scene(tmp_path, 20.0, surrounding=Surrounding(seed=1, drifts=drifts)).play()

@@ -6,6 +6,8 @@ import gc
 import tracemalloc
 from pathlib import Path
 
+import pytest
+
 from common import reality
 from common.outlet import kept_seconds
 from common.plan import Plan
@@ -19,6 +21,7 @@ KEPT_FROM = 2**32 * 1e-9  # s
 MOST = 8.0  # bytes a tick; the recording's index takes 1.5
 
 
+@pytest.mark.slow
 def test_a_test_that_goes_on_takes_no_more_memory(default_plan: Plan, tmp_path: Path) -> None:
     plan = with_table(default_plan.with_ticks(TO + 10), "recording", patience=0.5)
     assert KEPT_FROM + kept_seconds(plan) < FROM * plan.test.interval

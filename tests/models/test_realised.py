@@ -21,6 +21,7 @@ from models.effects import CATALOGUE, lay
 from models.realised import laboratory, true_system
 from models.system import System
 from rths import virtual
+from tests.models.effects.distinct import DISTINCT
 
 
 @pytest.fixture(scope="module")
@@ -184,7 +185,7 @@ def size(name: str) -> dict[str, float]:
     return {item.name: item.sizes[0]}
 
 
-@pytest.mark.parametrize("name", CATALOGUE)
+@pytest.mark.parametrize("name", DISTINCT)
 @pytest.mark.parametrize("lab", ["master", "slave"])
 def test_effects_on_a_plug_in_rig_are_refused_with_one_sentence(name: str, lab: str, plan: Plan) -> None:
     assert laboratory(CATALOGUE[name].site) == site_of(name)

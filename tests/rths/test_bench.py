@@ -108,8 +108,8 @@ def test_wrong_wishes_get_a_sentence(
 ) -> None:
     assert call("bench", "column", "default", "--only", "sweep", "-o", tmp_path / "a.mcap") == 2
     assert capsys.readouterr().err == "rths: The bench test of the column has no piece 'sweep': static.\n"
-    path = tmp_path / "damper.mcap"
-    assert call("bench", "damper", "default", "-o", path) == 0
+    path = tmp_path / "table.mcap"
+    assert call("bench", "table", "default", "--only", "step", "-o", path) == 0
     capsys.readouterr()
     assert call("identify", path, "--part", "column") == 2
     assert "it needs column_displacement, column_force of the master" in capsys.readouterr().err

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 import os
@@ -72,6 +73,7 @@ def bits(number: float) -> str:
     return struct.pack(">d", number).hex()
 
 
+@functools.cache
 def by_python(path: Path) -> Read:
     """A recording as the MCAP project's Python libraries read it."""
     messages: dict[str, list[Told]] = {}

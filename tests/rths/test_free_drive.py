@@ -44,6 +44,7 @@ def drive() -> tuple[Array, Array]:
     return force, position + 1e-6 * np.random.default_rng(3).standard_normal(count)
 
 
+@pytest.mark.slow
 def test_friction_of_a_drive_without_a_spring(tmp_path: Path) -> None:
     import argparse
 

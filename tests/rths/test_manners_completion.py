@@ -99,9 +99,7 @@ zle -N zle-line-init
 """
 
 
-@pytest.mark.parametrize(
-    "way", ["source ./.zsh", 'eval "$(<.zsh)"', "fpath=($PWD/.found $fpath) && compinit -u -D"]
-)
+@pytest.mark.parametrize("way", ["source ./.zsh", "fpath=($PWD/.found $fpath) && compinit -u -D"])
 def test_zsh_completes_verbs_options_choices_plans_and_files(way: str, folder: Path) -> None:
     need("zsh")
     (folder / ".asked").write_text("\n".join(ASKED) + "\n")

@@ -21,9 +21,18 @@ def call(monkeypatch: Any) -> Any:
     return lambda *words: rths(monkeypatch, "plot", *words)
 
 
-@pytest.mark.parametrize("record", [RECORD, f"{RECORD}, {RECORD}", "W" * 50 + " " + "W" * 50, "$x$ a_b"])
-@pytest.mark.parametrize("role", [SLAVE, "slave.a_table_with_quite_a_long_name_of_its_own"])
-@pytest.mark.parametrize("width", plot.WIDTHS)
+LONG_NAME = "slave.a_table_with_quite_a_long_name_of_its_own"
+
+
+@pytest.mark.parametrize(
+    ("record", "role", "width"),
+    [
+        (RECORD, SLAVE, "double"),
+        (f"{RECORD}, {RECORD}", LONG_NAME, "single"),
+        ("W" * 50 + " " + "W" * 50, LONG_NAME, "single"),
+        ("$x$ a_b", SLAVE, "single"),
+    ],
+)
 def test_the_caption_stays_inside_the_picture_and_off_the_axes(record: str, role: str, width: str) -> None:
     canvas = plot.draw(made_up(role=role, record=record), role, PICTURES["tracking"], width)
     assert canvas is not None
@@ -52,9 +61,7 @@ def test_named_pictures_are_drawn_and_no_others(call: Any, virtual_recording: Pa
     assert {path.name for path in (tmp_path / "some").iterdir()} == {"spectra.png", "tracking.png"}
 
 
-@pytest.mark.parametrize(
-    ("ending", "head"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF"), ("SVG", b"<?xml")]
-)
+@pytest.mark.parametrize(("ending", "head"), [("png", b"\x89PNG"), ("pdf", b"%PDF"), ("SVG", b"<?xml")])
 def test_one_picture_goes_into_a_file_of_its_format(
     ending: str, head: bytes, call: Any, virtual_recording: Path, tmp_path: Path
 ) -> None:
@@ -75,10 +82,10 @@ def test_what_is_left_out_is_said_in_json_only(
     assert [Path(path).stem for path in result["pictures"]] == [
         name for name in PICTURES if name != "latency"
     ]
-    assert call(virtual_recording, "-o", tmp_path) == 0
+    assert call(virtual_recording, "-o", tmp_path, "tracking") == 0
     shown = capsys.readouterr()
     assert shown.err == ""
-    assert shown.out.split("\n")[:-1] == result["pictures"]
+    assert shown.out == f"{tmp_path / 'tracking.png'}\n"
 
 
 WRONG: dict[str, tuple[list[str], str]] = {

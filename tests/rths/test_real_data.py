@@ -67,7 +67,13 @@ def test_what_is_left_of_the_force_rigs_gap_is_said(rig: tuple[Path, dict[str, A
     assert report["where"][0]["site"] == "actuator"
 
 
-@pytest.mark.parametrize("name", ["4-D22", "8-D22", "4-D22_bondslip", "8-D22_bondslip"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "8-D22_bondslip",
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ("4-D22", "8-D22", "4-D22_bondslip")),
+    ],
+)
 def test_a_fibre_column_yields_and_softens_with_the_drift_it_has_seen(name: str, tmp_path: Path) -> None:
     report = diagnose_file(imported(COLUMNS / f"column_{name}.csv", f"column_{name}", tmp_path))
     assert set(report["which"][0]["effects"]) == {"column.yielding", "column.degradation"}

@@ -27,12 +27,14 @@ def evidence(tmp_path_factory: pytest.TempPathFactory) -> Evidence:
     return experiments.gather(tmp_path_factory.mktemp("experiments"), untold)
 
 
+@pytest.mark.slow
 def test_every_row_is_within_its_tolerance(evidence: Evidence) -> None:
     table = rows(evidence)
     assert len(table) >= 19
     assert [f"{row.name}: {row.computed}" for row in table if not row.passed] == []
 
 
+@pytest.mark.slow
 def test_a_row_fails_where_its_number_is_wrong(evidence: Evidence) -> None:
     wrong = copy.copy(evidence)
     wrong.damping = evidence.damping | {"paper": 0.05, "ideal": 0.045, "beyond": 0.05}
@@ -43,6 +45,7 @@ def test_a_row_fails_where_its_number_is_wrong(evidence: Evidence) -> None:
         assert not all(row.passed for row in maker(wrong)), maker.__name__
 
 
+@pytest.mark.slow
 def test_the_command_ends_with_1_where_a_row_fails(
     evidence: Evidence, tmp_path: Path, monkeypatch: Any, capsys: Any
 ) -> None:
@@ -56,6 +59,7 @@ def test_the_command_ends_with_1_where_a_row_fails(
     assert out.count("FAIL") == 1
 
 
+@pytest.mark.slow
 def test_the_command_leaves_recordings_pictures_and_one_page(
     tmp_path: Path, monkeypatch: Any, capsys: Any
 ) -> None:
@@ -74,6 +78,7 @@ def test_the_command_leaves_recordings_pictures_and_one_page(
         assert read(path).finished, path
 
 
+@pytest.mark.slow
 def test_the_page_stands_alone_and_in_a_browser(evidence: Evidence, tmp_path: Path) -> None:
     table, drawn = rows(evidence), figures.draw_all(evidence, tmp_path)
     table[0] = replace(table[0], name="<b>period</b>", note="<script>")

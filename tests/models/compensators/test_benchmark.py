@@ -28,6 +28,7 @@ def test_adaptation_meets_the_reference(
     assert run(kind, settings, case, record).j4 <= 4.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "settings"), [("amb", {}), ("ats", ATS)])
 def test_adaptation_bears_plants_off_nominal_which_a_fixed_inverse_does_not(
     kind: str, settings: dict[str, float]

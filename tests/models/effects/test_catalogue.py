@@ -16,6 +16,7 @@ from models import effects
 from models.effects import CATALOGUE, lay, null_parameters, of_site
 from models.effects.effect import Effect, Kind, Parameter
 from models.system import Effects, SensorEffects, System
+from tests.models.effects.distinct import DISTINCT
 
 FOLDER = Path(effects.__file__).parent
 BASE = System(Plan())
@@ -80,7 +81,7 @@ for signal, unit in SIGNALS.items():
         f"sensor.{signal}.quantization": {"step": unit},
         f"sensor.{signal}.noise": {"rms": unit},
     }
-EACH = pytest.mark.parametrize("effect", CATALOGUE.values(), ids=list(CATALOGUE))
+EACH = pytest.mark.parametrize("effect", DISTINCT.values(), ids=list(DISTINCT))
 
 
 def strengths(effect: Effect) -> list[Parameter]:
@@ -114,7 +115,7 @@ def test_each_effect_has_its_file() -> None:
     assert files == physics | sensors
 
 
-@EACH
+@pytest.mark.parametrize("effect", CATALOGUE.values(), ids=list(CATALOGUE))
 def test_names_sites_and_kinds_agree(effect: Effect) -> None:
     is_sensor = effect.name.startswith("sensor.")
     assert effect.name.rsplit(".", 1)[0] == effect.site

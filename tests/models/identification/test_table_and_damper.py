@@ -16,7 +16,7 @@ from models.identification import damper, table
 from models.labs import table_lab
 
 DT = 0.002
-SEEDS = range(40)
+SEEDS = range(20)
 Array = NDArray[np.float64]
 TRUE = {"mass": 16.0, "damping": 6.0, "stiffness": 56.8, "motor_time_constant": 0.003, "gain": 1.0}
 OFF = Damper(mass=18.0, damping=4.0, stiffness=40.0, motor_time_constant=0.006)

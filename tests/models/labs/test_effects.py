@@ -28,6 +28,7 @@ from models.effects.effect import Effect, Parameter
 from models.labs import column_lab, specimen, table_lab
 from models.system import ActuatorEffects, ColumnEffects, DamperEffects, System, TableEffects
 from slave.rig import TableLab
+from tests.models.effects.distinct import DISTINCT
 
 Array = NDArray[np.floating[Any]]
 
@@ -36,7 +37,7 @@ SHORT = 0.25e-3
 K = 12.5e6
 DIRECT = Actuator(gain=1.0, delay=0.0, time_constant=0.0)
 PART_A, PART_B = ("actuator", "column", "sensors"), ("table", "damper", "sensors")
-EACH = pytest.mark.parametrize("effect", CATALOGUE.values(), ids=list(CATALOGUE))
+EACH = pytest.mark.parametrize("effect", DISTINCT.values(), ids=list(DISTINCT))
 
 
 # ---------------------------------------------------------------- the whole catalogue

@@ -15,10 +15,11 @@ from models.effects import CATALOGUE, lay
 from models.effects.effect import Effect
 from models.labs import replay
 from models.system import ColumnEffects, Effects, System
+from tests.models.effects.distinct import DISTINCT
 
 Array = NDArray[np.float64]
 
-EACH = pytest.mark.parametrize("effect", CATALOGUE.values(), ids=list(CATALOGUE))
+EACH = pytest.mark.parametrize("effect", DISTINCT.values(), ids=list(DISTINCT))
 MOTOR = substructure.DAMPER_COMMAND
 COMMAND = substructure.ACTUATOR_COMMAND
 IN_SHORT_STEPS = ("viscous", "friction", "inertia")  # of the column: rates count

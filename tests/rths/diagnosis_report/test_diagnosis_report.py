@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 from html.parser import HTMLParser
 from pathlib import Path
@@ -16,6 +17,7 @@ from rths.diagnosis_report.schema import schema
 from rths.diagnosis_report.terminal import summary
 from rths.formats import percent, percent_interval, probability, quantity, span, times
 from tests.rths.diagnosis_report.reports import REPORTS, Report, bare, fresh
+from tests.rths.report.pages import check_alone
 
 VOID = {"meta", "br", "img"}
 SECTIONS = (
@@ -57,6 +59,12 @@ def text_of(html: str) -> str:
     parser.feed(html)
     assert parser.open == []
     return " ".join(" ".join(parser.words).split())
+
+
+@functools.cache
+def page_of(name: str) -> str:
+    """The page of one of the reports; drawing it takes long."""
+    return page(fresh(name))
 
 
 def validator() -> Any:
@@ -132,8 +140,11 @@ def test_the_force_path_stands_on_the_terminal_and_the_page() -> None:
 @pytest.mark.parametrize("name", REPORTS)
 def test_the_page_stands_alone(name: str, tmp_path: Path) -> None:
     path = tmp_path / "report.html"
-    write(fresh(name), path)
-    html = path.read_text(encoding="utf-8")
+    if name == "no_gap":
+        write(fresh(name), path)
+        assert path.read_text(encoding="utf-8") == page_of(name)
+    html = page_of(name)
+    check_alone(html)
     text_of(html)
     assert re.findall(r'<section id="([^"]+)"', html) == list(SECTIONS)
     assert "<script" not in html
@@ -146,7 +157,7 @@ def test_the_page_stands_alone(name: str, tmp_path: Path) -> None:
 
 
 def test_the_page_shows_every_picture_of_a_whole_report() -> None:
-    html = page(fresh("explained"))
+    html = page_of("explained")
     assert html.count("<figure") == 13
     assert (
         html.index("Physics effects") < html.index("damper.motor_lag") < html.index("Measurement artefacts")
@@ -161,8 +172,8 @@ def test_the_page_shows_every_picture_of_a_whole_report() -> None:
 
 
 def test_pages_say_what_is_absent() -> None:
-    assert "No part leaves a residual above its noise" in page(fresh("no_gap"))
-    poor = text_of(page(fresh("not_enough_data")))
+    assert "No part leaves a residual above its noise" in page_of("no_gap")
+    poor = text_of(page_of("not_enough_data"))
     for words in (
         "The gap could not be placed",
         "No effect is named: the recording does not hold enough",
@@ -172,7 +183,7 @@ def test_pages_say_what_is_absent() -> None:
         "No nominal parameter was moved.",
     ):
         assert words in poor
-    assert "An effect that the catalogue lacks" in page(fresh("unknown_effect"))
+    assert "An effect that the catalogue lacks" in page_of("unknown_effect")
     assert "is not in this report" in page(bare("unknown_effect"))
 
 
@@ -185,9 +196,9 @@ def strings_replaced(piece: Any, text: str) -> Any:
     return text if isinstance(piece, str) else piece
 
 
-@pytest.mark.parametrize("text", ["<script>alert(1)</script>", "\"'><b>", "$\\frac{$", "a & b -- >"])
 @pytest.mark.parametrize("name", ["explained", "unknown_effect"])
-def test_no_text_of_a_report_becomes_markup(name: str, text: str) -> None:
+def test_no_text_of_a_report_becomes_markup(name: str) -> None:
+    text = "<script>alert(1)</script>\"'><b> $\\frac{$ a & b -- >"
     report = strings_replaced(fresh(name), text)
     report["tolerances"] = {text: {"factor": 1.1, "z": 2.0}}
     html = page(report)
@@ -220,8 +231,9 @@ def empty(report: Report, path: tuple[Any, ...]) -> None:
 @pytest.mark.parametrize("name", ["explained", "unknown_effect"])
 def test_every_piece_may_be_missing(name: str, monkeypatch: Any) -> None:
     monkeypatch.setattr(pictures, "svg", lambda _canvas: "<svg></svg>")
+    first = pieces(fresh("explained")) if name != "explained" else []
     for path in pieces(fresh(name)):
-        if path[-1] in ("site", "effects"):
+        if path[-1] in ("site", "effects") or path in first:
             continue
         report = fresh(name)
         report["details"] = {key: value for key, value in report["details"].items() if key in path[:2]}

@@ -120,7 +120,6 @@ def test_where_rths_is_installed_the_fixture_is_there_by_itself(tmp_path: Path) 
     ("words", "more"),
     [
         (["-p", "rths"], {}),
-        (["-p", "rths"], {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}),
         (["-p", "rths.pytest_plugin"], {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}),
         (["-p", "no:rths", "-p", "rths.pytest_plugin"], {}),
     ],

@@ -14,6 +14,7 @@ from tests.processes import environment, finished
 CASES = 12
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(600)
 def test_the_diagnosis_meets_withheld_effects(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "rths", "blind", "--cases", str(CASES), "--duration", "20"]
