@@ -29,7 +29,7 @@ INTERVAL = 0.002
 LOCAL = ("127.0.0.1", "127.0.0.1")
 PEERS = {"zenoh": "bare zenoh", "tcp": "bare TCP", "udp": "bare UDP"}
 OURS = {"rths": "exchange", "rths_lab": "exchange with the emulated laboratory"}
-HOUR = timedelta(hours=1)
+DAY = timedelta(days=1)
 
 
 class Scenario(NamedTuple):
@@ -125,7 +125,7 @@ def once(scenario: Scenario) -> dict[str, Any]:
             here, there = ADDRESSES
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         now = datetime.now(UTC)
-        keys.write(folder, keys.certificates(("master", "slave"), (here,), now - HOUR, now + HOUR))
+        keys.write(folder, keys.certificates(("master", "slave"), (here,), now - DAY, now + DAY))
         ports = [listenable().rpartition(":")[2] for _ in NAMES]
         processors = [[] if place is None else ["--processor", str(place)] for place in assign(2)]
         answering = ["answer", "--asking", here, "--here", there, "--ports", *ports, *processors[1]]
