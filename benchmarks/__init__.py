@@ -1,8 +1,11 @@
-"""Benchmarks: figures with their peers in the same run; never part of the tests."""
+"""Benchmarks: figures with their peers in the same run.
+
+Each takes `quick`: the same work in the least time, which shows that it runs; its figures then say little.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from typing import Protocol
 
 from benchmarks import (
     closed_loop,
@@ -18,7 +21,15 @@ from benchmarks import (
 )
 from benchmarks.result import Figure
 
-BENCHMARKS: dict[str, Callable[[], list[Figure]]] = {
+
+class Benchmark(Protocol):
+    """One benchmark."""
+
+    def __call__(self, *, quick: bool = False) -> list[Figure]:
+        """Its figures."""
+
+
+BENCHMARKS: dict[str, Benchmark] = {
     "exchange": exchange.run,
     "real_time": real_time.run,
     "live": live.run,

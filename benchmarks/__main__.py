@@ -16,13 +16,12 @@ from rths.terminal import table
 
 def machine() -> dict[str, str]:
     """The machine the figures are from."""
-    info = Path("/proc/cpuinfo")
-    models = [
-        line.partition(":")[2].strip() for line in info.read_text().splitlines() if "model name" in line
-    ]
+    info = Path("/proc/cpuinfo")  # on Linux alone
+    lines = info.read_text().splitlines() if info.exists() else []
+    models = [line.partition(":")[2].strip() for line in lines if "model name" in line]
     return {
         "processor": models[0] if models else platform.processor(),
-        "cores": str(os.cpu_count()),
+        "cores": str(len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count()),
         "python": platform.python_version(),
         "load": " ".join(f"{value:.2f}" for value in os.getloadavg()),
     }
@@ -52,13 +51,14 @@ def main() -> int:
     """Run what is asked for."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(BENCHMARKS)} (default: all)")
+    parser.add_argument("--quick", action="store_true", help="the least of each: shows that it runs, no more")
     parser.add_argument("--json", type=Path, default=Path("runs/benchmarks.json"), metavar="FILE")
     args = parser.parse_args()
     unknown = [name for name in args.names if name not in BENCHMARKS]
     if unknown:
         parser.error(f"unknown benchmark '{unknown[0]}': choose of {', '.join(BENCHMARKS)}")
     host = machine()
-    figures = {name: BENCHMARKS[name]() for name in args.names or BENCHMARKS}
+    figures = {name: BENCHMARKS[name](quick=args.quick) for name in args.names or BENCHMARKS}
     sys.stdout.write(", ".join(f"{name} {value}" for name, value in host.items()) + "\n\n")
     rows = [["figure", "best", "median", "unit", "target", "", "ratio of medians"]]
     table(rows + [row(figure) for found in figures.values() for figure in found])

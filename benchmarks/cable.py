@@ -20,6 +20,19 @@ def ip(*words: str) -> None:
     subprocess.run(["ip", *words], check=True, capture_output=True, text=True)  # noqa: S607 - found on the path
 
 
+def lay(names: tuple[str, str]) -> None:
+    """Make both namespaces and the cable; raises CalledProcessError where that is not allowed."""
+    for name in names:
+        ip("netns", "add", name)
+    ends = (f"rva{os.getpid()}", f"rvb{os.getpid()}")
+    ip("link", "add", ends[0], "type", "veth", "peer", "name", ends[1])
+    for name, end, address in zip(names, ends, ADDRESSES, strict=True):
+        ip("link", "set", end, "netns", name)
+        ip("-n", name, "addr", "add", f"{address}/24", "dev", end)
+        ip("-n", name, "link", "set", end, "up")
+        ip("-n", name, "link", "set", "lo", "up")
+
+
 @contextlib.contextmanager
 def cable() -> Iterator[tuple[str, str]]:
     """Names of two namespaces, with `ADDRESSES[0]` in the first and `ADDRESSES[1]` in the second.
@@ -31,18 +44,10 @@ def cable() -> Iterator[tuple[str, str]]:
         raise NoCableError("there is no ip command: install iproute2")
     names = (f"rths-a-{os.getpid()}", f"rths-b-{os.getpid()}")
     try:
-        for name in names:
-            ip("netns", "add", name)
-    except subprocess.CalledProcessError as error:
-        raise NoCableError(f"network namespaces are not allowed here: {error.stderr.strip()}") from None
-    try:
-        ends = (f"rva{os.getpid()}", f"rvb{os.getpid()}")
-        ip("link", "add", ends[0], "type", "veth", "peer", "name", ends[1])
-        for name, end, address in zip(names, ends, ADDRESSES, strict=True):
-            ip("link", "set", end, "netns", name)
-            ip("-n", name, "addr", "add", f"{address}/24", "dev", end)
-            ip("-n", name, "link", "set", end, "up")
-            ip("-n", name, "link", "set", "lo", "up")
+        try:
+            lay(names)
+        except subprocess.CalledProcessError as error:
+            raise NoCableError(f"network namespaces are not allowed here: {error.stderr.strip()}") from None
         yield names
     finally:
         for name in names:

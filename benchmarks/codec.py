@@ -12,37 +12,39 @@ from common import codec
 from common.messages import Command, Feedback
 
 COUNT = 20_000
+REPEATS = 7
 COMMAND = Command(2**60, 10_000, 2**60, 1_000, 9_999, 0.01, 50.0, 0.1, 1.0, 10.0)
 FEEDBACK = Feedback(2**60, 10_000, 10_000, 2**60, 10_000, 2**60, 2**60, 2**60, 0.01, 0.2, 0.03, 50.0)
-LAYOUT = struct.Struct("<Bqqqqddddd")
+LAYOUT = struct.Struct(f"<B{''.join('q' if type(value) is int else 'd' for value in COMMAND)}")
 
 
-def run() -> list[Figure]:
+def run(*, quick: bool = False) -> list[Figure]:
     """Encoding and decoding of the two frames of a tick."""
+    count, repeats = (100, 1) if quick else (COUNT, REPEATS)
     key = codec.session_key(2**60, "plan")
     frames = {message: codec.encode(message, key) for message in (COMMAND, FEEDBACK)}
 
     def packed() -> int:
-        for _ in range(COUNT):
+        for _ in range(count):
             msgpack.unpackb(msgpack.packb(tuple(COMMAND)))
-        return COUNT
+        return count
 
     def laid_out() -> int:
-        for _ in range(COUNT):
+        for _ in range(count):
             LAYOUT.unpack(LAYOUT.pack(9, *COMMAND))
-        return COUNT
+        return count
 
     def there_and_back(message: Command | Feedback) -> int:
-        for _ in range(COUNT):
+        for _ in range(count):
             codec.decode(codec.encode(message, key), key)
-        return COUNT
+        return count
 
-    bare, struct_only = rates(packed), rates(laid_out)
+    bare, struct_only = rates(packed, repeats), rates(laid_out, repeats)
     figures = [
         rate_figure(
             f"codec, {type(message).__name__.lower()} of {len(frames[message])} bytes there and back",
             "frames/s",
-            rates(lambda message=message: there_and_back(message)),  # type: ignore[misc]
+            rates(lambda message=message: there_and_back(message), repeats),  # type: ignore[misc]
             peer="bare msgpack of a command, no check, no validation",
             beside=statistics.median(bare),
         )

@@ -18,12 +18,13 @@ from rths import virtual
 
 TARGET = 50_000
 REPEATS = 7
+QUICK_S = 1.0  # of the test
 
 
-def played(plan: Plan, output: Callable[[], Path | None]) -> list[float]:
+def played(plan: Plan, output: Callable[[], Path | None], repeats: int) -> list[float]:
     """Ticks per second of several tests; building and warming up are not counted."""
     found = []
-    for _ in range(REPEATS):
+    for _ in range(repeats):
         bench = virtual.assemble(plan, reality.as_planned(plan), output())
         gc.collect()
         gc.disable()
@@ -36,12 +37,12 @@ def played(plan: Plan, output: Callable[[], Path | None]) -> list[float]:
     return found
 
 
-def run() -> list[Figure]:
+def run(*, quick: bool = False) -> list[Figure]:
     """The default test through the loop objects over the link in memory."""
-    plan = Plan()
-    alone = played(replace(plan, recording=Recording(required=False)), lambda: None)
+    plan, repeats = (Plan().with_test(duration=QUICK_S), 1) if quick else (Plan(), REPEATS)
+    alone = played(replace(plan, recording=Recording(required=False)), lambda: None, repeats)
     with tempfile.TemporaryDirectory() as folder:
-        recorded = played(plan, lambda: Path(folder) / "a.mcap")
+        recorded = played(plan, lambda: Path(folder) / "a.mcap", repeats)
     return [
         rate_figure("loops in virtual time", "ticks/s", alone, least=TARGET),
         rate_figure(

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import statistics
 import subprocess
 import sys
 import tempfile
 import time
-from itertools import count
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -27,9 +28,10 @@ from common.zenoh_link import ZenohLink, listenable
 
 ROOT = Path(__file__).resolve().parent.parent
 COUNT = 20_000
+REPEATS = 5
 NEEDED = 1_500  # per second of a default test
-BURSTS = (1, 20, 40, 60, 80, 120)  # times what a default test needs
-BURST_S = 3.0
+BURSTS = tuple(times * NEEDED for times in (1, 20, 40, 60, 80, 120))  # messages/s
+BURST_S, QUICK_BURST_S = 3.0, 0.3
 SLOT_S = 0.002  # samples leave a laboratory between ticks
 SESSION = 1
 REPEAT_S = 0.1
@@ -50,28 +52,28 @@ def values_of(topic: str) -> list[Any]:
     return [0.1 if row.kind in (Kind.NUMBER, Kind.STOREYS) else 1 for row in TOPICS[topic]]
 
 
-def recorded(path: Path) -> int:
+def recorded(path: Path, count: int) -> int:
     """Write samples of the master, flushed as often as in a test; how many."""
     values = values_of("master")
     recording = Recording(path, "trial", 1, TOPICS)
-    for seq in range(COUNT):
+    for seq in range(count):
         recording.add("master", seq, seq, [seq, *values[1:]])
         if seq % 150 == 0:
             recording.flush()
     recording.close({})
-    return COUNT
+    return count
 
 
-def bare(path: Path) -> int:
+def bare(path: Path, count: int) -> int:
     """Write as many ready-made bytes with the MCAP writer alone; how many."""
     with path.open("wb") as stream:
         writer = Writer(stream, chunk_size=CHUNK_SIZE, compression=CompressionType.ZSTD)
         writer.start()
         channel = writer.register_channel("a", "", 0)
-        for seq in range(COUNT):
+        for seq in range(count):
             writer.add_message(channel, log_time=seq, data=b"x" * 130, publish_time=seq, sequence=seq)
         writer.finish()  # type: ignore[no-untyped-call]
-    return COUNT
+    return count
 
 
 # -- the process behind a burst -----------------------------------------------------------------------
@@ -160,7 +162,7 @@ class Laboratories:
     def finish(self, recorder: subprocess.Popen[bytes]) -> float:
         """Say how long the streams are until the recorder has ended; the seconds it took, at most `END_S`."""
         began = time.monotonic()
-        for turn in count():
+        for turn in itertools.count():
             if recorder.poll() is not None or time.monotonic() - began > END_S:
                 break
             if turn % round(REPEAT_S / SLOT_S) == 0:
@@ -231,12 +233,12 @@ def reported(run: Run) -> int:
     return int(summary["items_lost"]) + int(summary["items_dropped"]) if summary else -1
 
 
-def bursts() -> list[Burst]:
+def bursts(rates_per_s: Sequence[float], seconds: float) -> list[Burst]:
     """Bursts of rising rate up to the first that loses something."""
     found: list[Burst] = []
     with tempfile.TemporaryDirectory() as folder:
-        for times in BURSTS:
-            found.append(burst(times * NEEDED, BURST_S, Path(folder)))
+        for rate in rates_per_s:
+            found.append(burst(rate, seconds, Path(folder)))
             if not found[-1].whole:
                 break
     return found
@@ -262,12 +264,14 @@ def figures(found: list[Burst]) -> list[Figure]:
     return results
 
 
-def run() -> list[Figure]:
+def run(*, quick: bool = False) -> list[Figure]:
     """The writer beside the bare MCAP writer, and the recorder's process behind bursts."""
+    count, repeats = (100, 1) if quick else (COUNT, REPEATS)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "a.mcap"
-        beside = statistics.median(rates(lambda: bare(path), repeats=5))
-        found = rates(lambda: recorded(path), repeats=5)
+        beside = statistics.median(rates(lambda: bare(path, count), repeats))
+        found = rates(lambda: recorded(path, count), repeats)
     words = "bare MCAP writer with ready-made bytes"
     alone = rate_figure("recording", "messages/s", found, least=20 * NEEDED, peer=words, beside=beside)
-    return [alone, *figures(bursts())]
+    whole = bursts(BURSTS[:1], QUICK_BURST_S) if quick else bursts(BURSTS, BURST_S)
+    return [alone, *figures(whole)]

@@ -22,7 +22,7 @@ class Figure(NamedTuple):
     points: Sequence[Mapping[str, Any]] = ()  # of a curve, in the order of its values
 
 
-def rates(work: Callable[[], int], repeats: int = 7) -> list[float]:
+def rates(work: Callable[[], int], repeats: int) -> list[float]:
     """Items per second of each repeat; `work` does some and says how many. The first run is not counted."""
     work()
     found = []

@@ -26,9 +26,6 @@ from models.registry import Array
 from models.structures import partition, shear_building
 from rths import virtual
 
-REPEATS = 5
-TICKS = 4_000  # of a test through the loop objects
-COMPILED_TICKS = 10_000  # of a compiled one, so that building its arrays counts little
 STOREYS = (1, 2, 5, 10, 20, 50, 100)
 LABORATORIES = (1, 2, 4, 8)
 RATES_HZ = (500, 1_000, 2_000, 4_000, 8_000)
@@ -37,6 +34,19 @@ DAMPING_RATIO = 0.05  # of the first mode
 SCALE = 0.02  # of the ground motion: far from every limit
 FREE = 8_000  # ticks of free vibration in which the first frequency is looked for
 SAME = 1e-4  # what that frequency and the closed form's may differ by, relative
+
+
+class Effort(NamedTuple):
+    """How much is done for a point, and how many values of a curve are."""
+
+    repeats: int
+    ticks: int  # of a test through the loop objects
+    compiled_ticks: int  # of a compiled one
+    values: int | None  # None for all
+
+
+FULL = Effort(5, 4_000, 10_000, None)  # so long that building a compiled test's arrays counts little
+QUICK = Effort(1, 20, 20, 2)
 
 
 class Point(NamedTuple):
@@ -102,14 +112,14 @@ def uniform(storeys: int) -> Plan:
     )
     column = replace(plan.column, stiffness=plan.column.stiffness * each / stiffness)
     motion = replace(plan.ground_motion, scale=SCALE)
-    return short(replace(plan, structure=structure, column=column, ground_motion=motion))
+    return light(replace(plan, structure=structure, column=column, ground_motion=motion))
 
 
 def at_rate(hertz: int) -> Plan:
     """The default test at another tick rate."""
     plan = Plan()
     motion = replace(plan.ground_motion, scale=SCALE)
-    return short(replace(plan, test=replace(plan.test, interval=1.0 / hertz), ground_motion=motion))
+    return light(replace(plan, test=replace(plan.test, interval=1.0 / hertz), ground_motion=motion))
 
 
 def laboratories(count: int) -> Plan:
@@ -120,12 +130,12 @@ def laboratories(count: int) -> Plan:
     control = replace(plan.control, gain=share * plan.control.gain)
     slave = SlaveLaboratory(plan.table, damper, control, plan.slave.rig)
     slaves = {f"part_{place}": slave for place in range(count)} if count > 1 else {}
-    return short(replace(plan, slaves=slaves))
+    return light(replace(plan, slaves=slaves))
 
 
-def short(plan: Plan) -> Plan:
-    """The plan over so many ticks, without a recorder."""
-    return replace(plan.with_ticks(TICKS), recording=Recording(required=False))
+def light(plan: Plan) -> Plan:
+    """The plan without a recorder."""
+    return replace(plan, recording=Recording(required=False))
 
 
 def first_frequency(storeys: int) -> float:
@@ -143,7 +153,7 @@ CURVES = (
 # -- costs ------------------------------------------------------------------------------------------
 
 
-def costs(work: Callable[[], float], repeats: int = REPEATS) -> list[float]:
+def costs(work: Callable[[], float], repeats: int) -> list[float]:
     """What each repeat says it cost, the first not counted; the collector of garbage waits."""
     work()
     found = []
@@ -173,13 +183,13 @@ def objects(plan: Plan) -> float:
     return spent * 1e6 / bench.master.ticks
 
 
-def point(value: int, plan: Plan, repeats: int = REPEATS) -> Point:
+def point(value: int, plan: Plan, effort: Effort) -> Point:
     """Cost of a tick of one plan."""
-    longer = plan.with_ticks(COMPILED_TICKS)
+    shorter, longer = plan.with_ticks(effort.ticks), plan.with_ticks(effort.compiled_ticks)
     ground = substructure.ground_rows(longer, substructure.motion(plan))
     # the compiled rollout knows one slave
-    fast = [] if plan.slaves else costs(lambda: compiled(longer, ground), repeats)
-    slow = costs(lambda: objects(plan), repeats)
+    fast = [] if plan.slaves else costs(lambda: compiled(longer, ground), effort.repeats)
+    slow = costs(lambda: objects(shorter), effort.repeats)
     return Point(
         value,
         plan.test.interval,
@@ -253,11 +263,12 @@ def figures(curve: Curve, points: list[Point]) -> list[Figure]:
     ]
 
 
-def run() -> list[Figure]:
+def run(*, quick: bool = False) -> list[Figure]:
     """All curves, and whether the tallest buildings vibrate as the closed form has it."""
-    found = []
+    found, effort = [], QUICK if quick else FULL
     for curve in CURVES:
-        found += figures(curve, [point(value, curve.plan(value)) for value in curve.values])
-    error = max(frequency_error(storeys) for storeys in STOREYS)
+        values = curve.values[: effort.values]
+        found += figures(curve, [point(value, curve.plan(value), effort) for value in values])
+    error = max(frequency_error(storeys) for storeys in STOREYS[: effort.values])
     name = "first frequency of uniform buildings, off the closed form"
     return [*found, Figure(name, "relative", error, error, f"≤ {SAME:g}", error <= SAME)]

@@ -1,0 +1,59 @@
+"""A whole test in processes of its own, which may end early: that is a figure, too."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from benchmarks.result import Figure
+from common.errors import RthsError
+from common.recording.reader import Run, read
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+class Ending(NamedTuple):
+    """How a test ended: its exit code, the last thing it said, and its recording where there is one."""
+
+    code: int
+    said: str
+    run: Run | None
+
+    @property
+    def completed(self) -> bool:
+        """Whether it came to its end, with a recording."""
+        return self.code == 0 and self.run is not None
+
+
+def command(path: Path, *words: str) -> list[str]:
+    """The command line of a test that is recorded to `path`."""
+    return [sys.executable, "-m", "rths", "run", *words, "-o", str(path)]
+
+
+def played(path: Path, *words: str) -> Ending:
+    """Run a test to its end, whatever that is."""
+    done = subprocess.run(command(path, *words), cwd=ROOT, check=False, capture_output=True, text=True)
+    return ending(done.returncode, done.stderr, path)
+
+
+def ending(code: int, said: str, path: Path) -> Ending:
+    """How a test ended that gave this exit code and said this on its standard error."""
+    lines = [line for line in said.splitlines() if line.strip()]
+    try:
+        run = read(path)
+    except (RthsError, OSError):  # it ended before anything was recorded
+        run = None
+    return Ending(code, lines[-1] if lines else "", run)
+
+
+def ended_early(name: str, endings: Sequence[Ending]) -> Figure:
+    """How many of several tests did not come to their end, and what each of those said."""
+    early = [one for one in endings if not one.completed]
+    points = [{"exit code": one.code, "said": one.said} for one in early]
+    count = float(len(early))
+    return Figure(
+        f"{name}, ended early", f"of {len(endings)} tests", count, count, "0", not early, points=points
+    )

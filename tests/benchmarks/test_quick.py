@@ -1,0 +1,58 @@
+"""The benchmarks that wait for no clock, in their shortest form: each runs, and gives figures that JSON can hold."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from benchmarks import BENCHMARKS, live, real_time
+from benchmarks.exchange import transports
+from benchmarks.result import Figure
+from benchmarks.whole_test import Ending, ended_early, ending
+from common.tables import Safety
+
+IN_REAL_TIME = {"exchange", "real_time", "live", "start", "recorder"}  # tests/system/test_benchmarks.py
+
+
+def plain(figures: list[Figure]) -> list[dict[str, Any]]:
+    """What a benchmark writes, once it is shown that there are figures, each under a name of its own."""
+    assert figures
+    assert len({figure.name for figure in figures}) == len(figures)
+    found: list[dict[str, Any]] = json.loads(
+        json.dumps([figure._asdict() for figure in figures], allow_nan=False)
+    )
+    return found
+
+
+@pytest.mark.parametrize("name", sorted(BENCHMARKS.keys() - IN_REAL_TIME))
+def test_a_benchmark_runs(name: str) -> None:
+    assert any(figure["median"] is not None for figure in plain(BENCHMARKS[name](quick=True)))
+
+
+def test_false_trips_hold_what_must_hold() -> None:
+    trips, _, *gaps = BENCHMARKS["false_trips"](quick=True)[:4]
+    assert trips.points[0]["violations"] == 0
+    assert trips.met == (trips.points[0]["trips"] == 0)
+    assert all(gap.median is None or 0.0 < gap.median < 0.1 for gap in gaps)
+
+
+def test_a_test_that_ends_early_is_a_figure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    early = ending(3, "t 0.1\nThe master was held up.\n\n", tmp_path / "none.mcap")
+    assert early == Ending(3, "The master was held up.", None)
+    (figure,) = plain([ended_early("any", [early])])
+    assert (figure["median"], figure["unit"], figure["met"]) == (1.0, "of 1 tests", False)
+    assert figure["points"] == [{"exit code": 3, "said": "The master was held up."}]
+
+    monkeypatch.setattr(real_time, "played", lambda *_: early)
+    assert [one["met"] for one in plain(real_time.run(quick=True))] == [False, False]
+    monkeypatch.setattr(live, "played", lambda *_: live.Turn(early, None))
+    assert not any(one["met"] for one in plain(live.run(quick=True)))
+
+
+def test_the_exchanges_start_is_one_that_the_slave_takes() -> None:
+    plan = transports.bench_plan("rths", Path("any"))
+    assert plan.link.connect_timeout > transports.LEAD_S
+    assert plan.window * plan.test.interval > 2.0 * transports.LEAD_S > Safety().message_age
