@@ -23,12 +23,23 @@ import zenoh
 
 from common.access import access_control, guests
 from common.address import checked, dialled, secured
+from common.codec import MOST_FRAME
 from common.errors import InputError, InterlockError, LostError
 from common.roles import MASTER, SLAVE
 from common.transport import SAMPLES, Packet, Route, heard, said
 
 LEASE_MS = 1000
 ATTEMPT_MS = 500  # opening a session cannot be interrupted, so it is tried again and again for this long
+# A connection on which nobody completes zenoh's handshake is dropped after this time. Our own processes give a dial up
+# after half of it. With zenoh's 10 s, strangers who say nothing keep everybody else out for as long.
+ACCEPT_MS = 2 * ATTEMPT_MS
+# So many such connections are open at a time, and others wait until they are dropped. It is half of the 1024 open files
+# that a process usually may have.
+ACCEPT_PENDING = 512
+# zenoh puts the fragments of a message together up to this size and drops a larger one while it comes in. No frame of
+# ours is larger than MOST_FRAME (a piece of the stream to the recorder has some 2 kB, 50 kB with 100 storeys), and the
+# codec rejects any that is; the rest is for zenoh's header with the key. Its default is 1 GiB.
+MOST_MESSAGE = MOST_FRAME + (1 << 12)
 PREFIX = "rths"
 REFUSED = "zenoh_link_tls=warn"  # log of zenoh's that names every dial it refuses
 YIELD = getattr(os, "sched_yield", lambda: None)  # not every system has it
@@ -49,6 +60,9 @@ def configuration(role: str, listen: str, connect: str) -> zenoh.Config:
         "connect/retry": {"period_init_ms": 20, "period_max_ms": 20, "period_increase_factor": 1},
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,
+        "transport/unicast/accept_timeout": ACCEPT_MS,
+        "transport/unicast/accept_pending": ACCEPT_PENDING,
+        "transport/link/rx/max_message_size": MOST_MESSAGE,
         "transport/link/tx/lease": LEASE_MS,
         "transport/link/tx/queue/congestion_control/drop/wait_before_drop": 0,
         "transport/shared_memory/enabled": False,
