@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.special import betaincinv
 
 from common.errors import InputError
 from models.registry import Array
@@ -39,6 +40,22 @@ def wilson(successes: int, n: int, level: float = 0.95) -> tuple[float, float]:
     half = z / scale * math.sqrt(share * (1.0 - share) / n + z * z / (4.0 * n * n))
     low = 0.0 if successes == 0 else centre - half
     high = 1.0 if successes == n else centre + half
+    return low, high
+
+
+def clopper_pearson(successes: int, n: int, level: float = 0.95) -> tuple[float, float]:
+    """Exact interval of a proportion: it holds the true one at least as often as its level, however few the cases.
+
+    Source: Clopper and Pearson, Biometrika 26 (1934).
+
+    Raises:
+        InputError: no cases, or more successes than cases.
+    """
+    if n < 1 or not 0 <= successes <= n:
+        raise InputError(f"{successes} successes of {n} cases are no proportion.")
+    tail = 0.5 * (1.0 - level)
+    low = float(betaincinv(successes, n - successes + 1, tail)) if successes else 0.0
+    high = float(betaincinv(successes + 1, n - successes, 1.0 - tail)) if successes < n else 1.0
     return low, high
 
 

@@ -72,7 +72,7 @@ def words(text: str) -> list[str]:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Draw, record, diagnose, score; 1 where a goal is missed."""
+    """Draw, record, diagnose, score; 1 where a goal is missed, which a few cases cannot show."""
     from rths.trial.draw import draw
     from rths.trial.measures import measures
     from rths.trial.scoring import judge_all
@@ -179,9 +179,8 @@ def show(table: Sequence[Measure], outcomes: Sequence[Outcome]) -> None:
     from rths import terminal
     from rths.trial.page import hidden, number
 
-    marks = {True: "pass", False: "FAIL", None: ""}
     rows = [["measure", "value", "cases", "goal", ""]]
-    rows += [[item.name, item.text, str(item.count), item.goal, marks[item.passed]] for item in table]
+    rows += [[item.name, item.text, str(item.count), item.goal, item.verdict] for item in table]
     terminal.table(rows)
     wrong = [item for item in outcomes if not item.right]
     sys.stdout.write(f"\n{len(outcomes) - len(wrong)} of {len(outcomes)} cases right\n")

@@ -10,10 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.calibration import brier, expected_calibration_error, wilson
+from diagnosis.calibration import brier, clopper_pearson, expected_calibration_error, wilson
+from diagnosis.calibration import reliability as stated_and_observed
 from rths.trial.scoring import NAMING, Estimate, Outcome
 
 ABSTAINING = ("unknown_effect", "not_enough_data", "ambiguous")
+GOALS = 9  # judged at once
+LEVEL = (
+    1.0 - 0.05 / GOALS
+)  # of each interval, so that all verdicts of a trial together are right in 95 % of trials
+UNDECIDED = "too few cases to say"
 EDGES = (0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, math.inf)
 
 
@@ -30,17 +36,16 @@ class Measure:
     least: float | None = None
     most: float | None = None
     unit: str = ""
+    passed: bool | None = (
+        None  # whether the goal is met; None without goal or case, and where the cases are too few
+    )
 
     @property
-    def passed(self) -> bool | None:
-        """Whether the goal is met; None where there is no goal or no case."""
-        if self.count == 0 or (self.least is None and self.most is None):
-            return None
-        if not math.isfinite(self.value):
-            return False
-        return (self.least is None or self.value >= self.least) and (
-            self.most is None or self.value <= self.most
-        )
+    def verdict(self) -> str:
+        """The verdict in words, empty where there is no goal or no case."""
+        if self.count == 0 or not self.goal:
+            return ""
+        return UNDECIDED if self.passed is None else "pass" if self.passed else "FAIL"
 
     @property
     def goal(self) -> str:
@@ -66,18 +71,24 @@ class Measure:
         return f"{self.shown(self.value)} [{self.shown(self.low)}, {self.shown(self.high)}]"
 
 
+def reached(hits: int, count: int, share: float) -> bool | None:
+    """Whether a proportion is at least `share`; None where the exact interval includes both, or there is no case."""
+    low, high = clopper_pearson(hits, count, LEVEL) if count else (0.0, 1.0)
+    return True if low >= share else False if high < share else None
+
+
 def rate(
     name: str,
     cases: Sequence[Outcome],
     good: Callable[[Outcome], bool],
     least: float | None = None,
-    most: float | None = None,
 ) -> Measure:
     """A share of cases with its Wilson interval."""
     hits = sum(map(good, cases))
     low, high = wilson(hits, len(cases)) if cases else (math.nan, math.nan)
     value = hits / len(cases) if cases else math.nan
-    return Measure(name, value, low, high, len(cases), rate=True, least=least, most=most)
+    passed = None if least is None else reached(hits, len(cases), least)
+    return Measure(name, value, low, high, len(cases), rate=True, least=least, passed=passed)
 
 
 def quantile(
@@ -90,13 +101,23 @@ def quantile(
     unit: str = "",
     share: bool = False,
 ) -> Measure:
-    """A quantile of values with the range of their middle 80 %; one that is not there is the worst there is."""
+    """A quantile of values with the range of their middle 80 %; one that is not there is the worst there is.
+
+    It is within its goal where the share of the values that are is at least that of the quantile.
+    """
     worst = -math.inf if least is not None else math.inf
     known = np.sort([worst if math.isnan(value) else value for value in values])
     if not known.size:
         return Measure(name, math.nan, math.nan, math.nan, 0, rate=share, least=least, most=most, unit=unit)
     middle, low, high = (float(np.quantile(known, q, method="higher")) for q in (at, 0.1, 0.9))
-    return Measure(name, middle, low, high, known.size, rate=share, least=least, most=most, unit=unit)
+    passed = None
+    if most is not None:
+        passed = reached(int(np.count_nonzero(known <= most)), known.size, at)
+    elif least is not None:
+        passed = reached(int(np.count_nonzero(known >= least)), known.size, 1.0 - at)
+    return Measure(
+        name, middle, low, high, known.size, rate=share, least=least, most=most, unit=unit, passed=passed
+    )
 
 
 def measures(outcomes: Sequence[Outcome]) -> list[Measure]:
@@ -186,7 +207,22 @@ def calibration_error(outcomes: Sequence[Outcome]) -> Measure:
     """Expected calibration error of the verdict's probability."""
     stated = _stated(outcomes)
     value = float(expected_calibration_error(*_columns(stated))) if stated else math.nan
-    return Measure("calibration error", *_thrice(value), len(stated), rate=False, most=0.05)
+    low, high = calibration_bounds(stated) if stated else (0.0, 1.0)
+    most = 0.05
+    passed = True if high <= most else False if low > most else None
+    return Measure("calibration error", *_thrice(value), len(stated), rate=False, most=most, passed=passed)
+
+
+def calibration_bounds(stated: Sequence[tuple[float, bool]]) -> tuple[float, float]:
+    """Smallest and largest calibration error that the exact intervals of the bins' shares allow."""
+    table = stated_and_observed(*_columns(stated))
+    low = high = 0.0
+    for mean, share, count in zip(*table, strict=True):
+        if count:
+            least, most = clopper_pearson(round(share * count), int(count), LEVEL)
+            low += count * max(least - mean, mean - most, 0.0)
+            high += count * max(mean - least, most - mean)
+    return low / len(stated), high / len(stated)
 
 
 def _thrice(value: float) -> tuple[float, float, float]:
@@ -289,7 +325,7 @@ def as_plain(value: Any) -> Any:
 
 def results(outcomes: Sequence[Outcome]) -> dict[str, Any]:
     """Everything that is written as JSON."""
-    table = [asdict(item) | {"goal": item.goal, "passed": item.passed} for item in measures(outcomes)]
+    table = [asdict(item) | {"goal": item.goal, "verdict": item.verdict} for item in measures(outcomes)]
     plain: dict[str, Any] = as_plain(
         {
             "measures": table,

@@ -9,16 +9,19 @@ from typing import Any
 
 import pytest
 
+from diagnosis.calibration import clopper_pearson
 from rths.trial.draw import Case, Laid
 from rths.trial.judge import Answer
 from rths.trial.measures import (
     binned,
     by_size,
+    calibration_bounds,
     confusion,
     confusion_by_site,
     measures,
     quantile,
     rate,
+    reached,
     reliability,
     results,
 )
@@ -151,13 +154,20 @@ def some() -> list[Outcome]:
 def test_measures_pass_and_fail_against_their_goals() -> None:
     table = {item.name: item for item in measures(some())}
     first = table["right effect first"]
-    assert (first.value, first.count, first.passed, first.goal) == (0.95, 20, True, "≥ 95.0 %")
+    assert (first.value, first.count, first.verdict, first.goal) == (
+        0.95,
+        20,
+        "too few cases to say",
+        "≥ 95.0 %",
+    )
     assert first.low < 0.8
     assert 0.95 < first.high < 1.0
     assert table["right site first"].value == 1.0
-    assert table["both of a pair"].passed is False
-    assert table["clean laboratory: no gap"].passed is True
+    assert table["both of a pair"].verdict == "too few cases to say"  # one case
+    assert table["clean laboratory: no gap"].verdict == "too few cases to say"
+    assert table["both of a pair whose strongest is visible"].verdict == ""
     assert table["parameter error, median"].value == pytest.approx(0.01)
+    assert table["parameter error, median"].verdict == "pass"
     assert table["shrinkage over the best possible, median"].value == pytest.approx(0.97)
     assert table["right effect first, all sizes"].count == 21
     assert table["right effect first, formula"].value == 0.0
@@ -169,9 +179,27 @@ def test_measures_pass_and_fail_against_their_goals() -> None:
 def test_nothing_is_passed_where_there_is_no_case() -> None:
     assert rate("x", [], lambda _: True, 0.9).passed is None
     assert quantile("x", [], least=0.9).passed is None
-    assert quantile("x", [1.0, math.nan, math.nan], least=0.9).passed is False
-    assert quantile("x", [0.01, math.nan, math.nan], most=0.9).passed is False
-    assert all(item.passed is None for item in measures([]))
+    assert all(item.passed is None and not item.verdict for item in measures([]))
+
+
+def test_a_goal_is_missed_only_where_the_cases_show_it() -> None:
+    assert quantile("x", [1.0, math.nan, math.nan], least=0.9).verdict == "too few cases to say"
+    assert quantile("x", [1.0] + [math.nan] * 20, least=0.9).verdict == "FAIL"
+    assert quantile("x", [0.01] + [math.nan] * 20, most=0.9).verdict == "FAIL"
+    assert quantile("x", [0.01] * 20, most=0.9).verdict == "pass"
+    for hits, count, verdict in (
+        (0, 1, None),
+        (1, 1, None),
+        (0, 5, False),
+        (90, 100, None),
+        (80, 100, False),
+    ):
+        assert reached(hits, count, 0.95) is verdict
+    assert reached(298, 300, 0.95) is True
+    low, high = clopper_pearson(8, 10)
+    assert (low, high) == (pytest.approx(0.4439, abs=1e-4), pytest.approx(0.9748, abs=1e-4))  # their table
+    assert calibration_bounds([(0.9, False)])[0] < 0.05
+    assert calibration_bounds([(0.9, False)] * 50)[0] > 0.5
 
 
 def test_matrices_hold_every_case_but_pairs() -> None:
