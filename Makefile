@@ -63,7 +63,7 @@ benchmark: setup
 	$(BIN)/python -m benchmarks
 
 blind: setup
-	$(BIN)/rths blind --cases 300 --jobs 2 -o runs/blind
+	$(BIN)/rths blind --cases 300 --jobs 2 -o runs/blind --force
 
 clean:
 	rm -rf .venv build runs site *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

@@ -22,7 +22,6 @@ from common.plan import Plan
 from common.reality import Reality
 
 SHIPPED = ("benchmark2020", "default", "paper", "rc_column", "two_dampers")
-MAGIC = b"\x89MCAP0\r\n"  # with which every recording begins
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 
 
@@ -86,6 +85,13 @@ def processor_argument(parser: argparse.ArgumentParser) -> None:
 def json_argument(parser: argparse.ArgumentParser, text: str) -> None:
     """The option for machine-readable output."""
     parser.add_argument("--json", action="store_true", help=text)
+
+
+def force_argument(parser: argparse.ArgumentParser) -> None:
+    """The option without which no file is replaced."""
+    parser.add_argument(
+        "--force", action="store_true", help="replace what exists under the name of an output"
+    )
 
 
 def accept_argument(parser: argparse.ArgumentParser) -> None:
@@ -225,11 +231,3 @@ def drain() -> None:
 def unread() -> None:
     """The reader of standard output has gone: what is still to be written goes nowhere."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-def spared(path: Path) -> Path:
-    """A path to write to; raises InputError where a recording stands there, which no other output may replace."""
-    with contextlib.suppress(OSError), path.open("rb") as stream:
-        if stream.read(len(MAGIC)) == MAGIC:
-            raise InputError(f"{path} is a recording; give another file for the output.")
-    return path

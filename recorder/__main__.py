@@ -15,6 +15,7 @@ from common.laboratory import Setting
 from common.preflight import Gate
 
 if TYPE_CHECKING:
+    from common.plan import Plan
     from recorder.loop import RecorderLoop
 
 WAIT_S = 0.02
@@ -31,12 +32,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="the recording (default: a name in the plan's folder)",
     )
+    cli.force_argument(parser)
     cli.accept_argument(parser)
     cli.json_argument(parser, "report as JSON lines on standard output")
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the recorder; its exit code."""
+    from recorder import files
+
+    plan = cli.load_plan(args)
+    with files.reserved(args.output, plan, force=args.force) as path:
+        return record(args, plan, path)
+
+
+def record(args: argparse.Namespace, plan: Plan, path: Path) -> int:
+    """Record a test into a file; the exit code."""
     from models import substructure
     from recorder import files, space
     from recorder.loop import RecorderLoop
@@ -44,8 +55,6 @@ def run(args: argparse.Namespace) -> int:
 
     stopping = Stopper()
     report = cli.reporter(args.json)
-    plan = cli.load_plan(args)
-    path = files.choose_path(args.output, plan)
     gate = Gate(cli.accepted_risks(args))
     gate.judge([space.check(plan, path.parent)])
     motion = substructure.motion(plan)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import platform
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from importlib import metadata
 from pathlib import Path
 
+from common import outputs
 from common.clock import unix_ns
 from common.errors import InputError
 from common.machine import facts
@@ -23,14 +25,20 @@ from models.registry import Array
 PACKAGES = ("rths", "eclipse-zenoh", "mcap", "msgpack", "numba", "numpy", "protobuf", "scipy")
 
 
-def choose_path(given: Path | None, plan: Plan, label: str = "") -> Path:
-    """Where a recording goes: the file given, or `<folder>/<test>[-<label>]-<time>.mcap` in a folder that is made.
+@contextlib.contextmanager
+def reserved(given: Path | None, plan: Plan, label: str = "", *, force: bool = False) -> Iterator[Path]:
+    """A new file for a recording: the one given, or `<folder>/<test>[-<label>]-<time>.mcap` in a folder that is made.
+
+    It is this command's from the context's beginning on, and gone at its end if nothing was recorded. Where two tests
+    begin in one second, the second file's name ends in `-2`.
 
     Raises:
-        InputError: nothing can be written there.
+        InputError: a file is there and `force` is not given, or no recording can be written there.
     """
     if given is not None:
-        return checked(given)
+        with outputs.reserved(checked(given), force) as path:
+            yield path
+        return
     folder = Path(plan.recording.folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -39,18 +47,14 @@ def choose_path(given: Path | None, plan: Plan, label: str = "") -> Path:
             f"Cannot make the folder {folder} for recordings: {error.strerror}; give a file with -o."
         ) from None
     name = f"{plan.test.name}-{label}" if label else plan.test.name
-    return checked(folder / f"{name}-{time.strftime('%Y%m%d-%H%M%S')}.mcap")
+    with outputs.free_name(folder, f"{name}-{time.strftime('%Y%m%d-%H%M%S')}", ".mcap") as path:
+        yield path
 
 
 def checked(path: Path) -> Path:
-    """The path itself; raises InputError where a recording cannot be written there."""
-    folder = path.parent
-    if not folder.is_dir():
-        raise InputError(
-            f"There is no folder {folder} for the recording: make it, or give another file with -o."
-        )
-    if not os.access(folder, os.W_OK) or path.is_dir() or (path.exists() and not os.access(path, os.W_OK)):
-        raise InputError(f"Cannot write the recording {path}: give a writable place with -o.")
+    """The path, where a test can be recorded: a pipe may hold the recorder up; raises InputError."""
+    if outputs.is_stream(path) and (str(path) in outputs.STANDARD or not path.is_char_device()):
+        raise InputError(f"Cannot record a test into {path}, which is no file: give a file with -o.")
     return path
 
 

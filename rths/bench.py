@@ -52,6 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="the recording (default: runs/<test>-bench-<part>-<time>.mcap)",
     )
+    cli.force_argument(parser)
     cli.json_argument(parser, "write the summary as JSON on standard output")
 
 
@@ -63,6 +64,7 @@ def run(args: argparse.Namespace) -> int:
     plan = plans.load(cli.plan_path(args.plan)).with_test(seed=args.seed)
     # in real time nothing may run beside the loop
     with contextlib.nullcontext() if args.real_time else Progress("bench test") as progress:
+        from recorder import files
         from rths import benches
 
         order = benches.Order(args.part, args.compensated, tuple(args.only), args.real_time)
@@ -72,9 +74,9 @@ def run(args: argparse.Namespace) -> int:
         if args.part in OF_SLAVE:
             role = plan.slave_role(args.name or "")
             plan, reality = plan.of(role), reality.of(role)
-        result = benches.play(
-            plan, reality, order, args.output, Stopper(), progress.tell if progress else untold
-        )
+        tell = progress.tell if progress else untold
+        with files.reserved(args.output, plan, f"bench-{args.part}", force=args.force) as path:
+            result = benches.play(plan, reality, order, path, Stopper(), tell)
     if args.json:
         sys.stdout.write(json.dumps(summary(result)) + "\n")
     else:

@@ -70,7 +70,7 @@ def play(
     plan: Plan,
     reality: Reality,
     order: Order,
-    output: Path | None,
+    path: Path,
     stopping: Callable[[], str],
     tell: Tell = untold,
 ) -> Result:
@@ -85,7 +85,6 @@ def play(
     bench = (ColumnBench if order.part in ("column", "actuator") else TableBench)(
         plan, reality, order, programme
     )
-    path = files.choose_path(output, plan, f"bench-{order.part}")
     clock: Clock = MonotonicClock() if order.real_time else VirtualClock()
     epoch_ns = unix_ns() if order.real_time else 0
     recording = begin(path, plan, bench, order, programme, epoch_ns)

@@ -9,9 +9,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from common import cli
+from common import cli, outputs
 from common.errors import InputError
-from rths.folder import prepared
 from rths.progress import Progress
 
 if TYPE_CHECKING:
@@ -60,6 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--compensator", metavar="NAME", help="with --plan: its setting of the compensator (default: sample)"
     )
+    cli.force_argument(parser)
     cli.json_argument(parser, "write the results as JSON on standard output")
 
 
@@ -74,8 +74,8 @@ def run(args: argparse.Namespace) -> int:
     if args.plan is not None:
         return write_plan(args)
     settings = chosen(args.only)
-    folder = prepared(args.output or Path("runs/benchmark2020"))
-    with Progress("benchmark") as progress:
+    place = outputs.folder(args.output or Path("runs/benchmark2020"), args.force)
+    with place as folder, Progress("benchmark") as progress:
         from rths.yardstick import evidence, figures, page, text
 
         found = evidence.gather(settings, args.plants, args.seed, args.jobs, progress.tell)
@@ -134,14 +134,13 @@ def setting(name: str) -> Compensator:
 
 def write_plan(args: argparse.Namespace) -> int:
     """Write the plan of one case, to be run, recorded and diagnosed as any other."""
-    from recorder.files import checked
     from rths.yardstick.problem import CASES, EL_CENTRO, planned, with_compensator
 
     cases = {case.number: case for case in CASES}
     if args.plan not in cases:
         raise InputError(f"--plan is {args.plan}, but must be a case of the benchmark, 1 to {len(CASES)}.")
     plan = with_compensator(planned(cases[args.plan], EL_CENTRO), setting(args.compensator or "sample"))
-    path = checked(args.output or Path(f"{plan.test.name}.toml"))
-    path.write_text(plan.toml(), encoding="utf-8")
-    sys.stdout.write(f"written: {path}\n")
+    path = args.output or Path(f"{plan.test.name}.toml")
+    outputs.write_text(path, plan.toml(), args.force)
+    outputs.aside(path).write(f"written: {path}\n")
     return 0

@@ -10,10 +10,9 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from common import cli
+from common import cli, outputs
 from common.errors import InputError
 from common.telling import Tell
-from rths.folder import prepared
 from rths.progress import Progress
 from rths.trial.worker import DIAGNOSIS
 
@@ -63,6 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="where the page and the results go (default: runs/blind)",
     )
     parser.add_argument("--keep", action="store_true", help="keep recordings, plans and realities there too")
+    cli.force_argument(parser)
     cli.json_argument(parser, "write the results as JSON on standard output")
 
 
@@ -81,18 +81,21 @@ def run(args: argparse.Namespace) -> int:
     cases = draw(
         args.cases, args.seed, args.set, duration=args.duration, only=args.only, effects=args.effects
     )
-    folder = prepared(args.output)
-    with tempfile.TemporaryDirectory(prefix="rths-recordings-") as place, Progress("blind trial") as progress:
+    about = (
+        f"{len(cases)} cases of the set '{args.set}', seed {args.seed}, {args.duration:g} s each, "
+        f"{', '.join(args.only) or 'all kinds'}; diagnosis {args.diagnosis}."
+    )
+    with (
+        outputs.folder(args.output, args.force) as folder,
+        tempfile.TemporaryDirectory(prefix="rths-recordings-") as place,
+        Progress("blind trial") as progress,
+    ):
         recorded = record_cases(cases, Path(place), args.jobs, progress.tell)
         answers = diagnose_cases(Path(place), len(cases), args, progress.tell)
         outcomes = judge_all(cases, recorded, answers)
         if args.keep:
             keep(cases, recorded, Path(place), folder)
-    about = (
-        f"{len(cases)} cases of the set '{args.set}', seed {args.seed}, {args.duration:g} s each, "
-        f"{', '.join(args.only) or 'all kinds'}; diagnosis {args.diagnosis}."
-    )
-    found = write(folder, outcomes, about)
+        found = write(folder, outcomes, about)
     if args.json:
         sys.stdout.write(json.dumps(found) + "\n")
     else:

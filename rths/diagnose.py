@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from common import cli
+from common import cli, outputs
 from common.errors import InputError
 from common.telling import Tell, untold
 from rths.progress import Progress
@@ -30,6 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--json", type=Path, metavar="OUT", help="write the report as JSON; - for standard output"
     )
     parser.add_argument("--html", type=Path, metavar="OUT", help="write the report as one HTML page")
+    cli.force_argument(parser)
     parser.add_argument(
         "--validate",
         type=Path,
@@ -42,9 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Diagnose and report; 0 whatever the verdict is."""
-    for path in (args.html, args.json):
-        if path and str(path) != "-":
-            writable(path)
+    check(args)
     with Progress("diagnosing") as progress:
         report = diagnose_file(
             args.file, plan=args.plan, validate=args.validate, against_ideal=args.ideal, tell=progress.tell
@@ -53,29 +52,27 @@ def run(args: argparse.Namespace) -> int:
             from rths.diagnosis_report import page
 
             progress.tell("page")
-            page.write(report, args.html)
+            outputs.write_text(args.html, page.page(report), args.force)
     if args.json:
         text = json.dumps(report, allow_nan=False) + "\n"
         if str(args.json) == "-":
             sys.stdout.write(text)
             return 0
-        args.json.write_text(text, encoding="utf-8")
+        outputs.write_text(args.json, text, args.force)
     from rths.diagnosis_report import terminal
 
-    sys.stdout.write(terminal.summary(report) + "\n")
+    outputs.aside(args.html, args.json).write(terminal.summary(report) + "\n")
     return 0
 
 
-def writable(path: Path) -> Path:
-    """The path, if a file can be written there; raises InputError."""
-    cli.spared(path)
-    if path.is_dir():
-        raise InputError(f"Cannot write {path}: it is a folder; give the name of a file.")
-    try:
-        path.touch()
-    except OSError as error:
-        raise InputError(f"Cannot write {path}: {error.strerror}.") from None
-    return path
+def check(args: argparse.Namespace) -> None:
+    """Raise InputError where the report cannot be written, before any work is done."""
+    files = [path for path in (args.html, args.json) if path and str(path) != "-"]
+    inputs = [args.file, *args.validate, *([cli.plan_path(args.plan)] if args.plan else [])]
+    for path in files:
+        outputs.checked(path, args.force, inputs)
+    if len({outputs.target(path) for path in files}) < len(files):
+        raise InputError(f"--html and --json both name {args.html}: give each a file of its own.")
 
 
 def diagnose_file(

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from common import cli
+from common import cli, outputs
 from common.errors import InputError
 
 if TYPE_CHECKING:
@@ -31,6 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="the events too, in a table of their own: OUT-events.csv (a .mat has them anyway, as `events`)",
     )
+    cli.force_argument(parser)
     cli.json_argument(parser, "say what was written as JSON on standard output")
 
 
@@ -40,14 +41,18 @@ def run(args: argparse.Namespace) -> int:
     from rths import tabular
     from rths.progress import Progress
 
-    apart = None
+    tabular.format_of(args.output)
+    apart = args.output.with_stem(f"{args.output.stem}-events") if beside(args) else None
+    for path in filter(None, (args.output, apart)):
+        outputs.checked(path, args.force, [args.file])
     with Progress("exporting"):
         recording = read(args.file)
         columns, units, happened = flat(recording), flat_units(recording), events(recording)
-        tabular.write(args.output, columns, units, events=structs(happened))
-        if beside(args):
-            apart = args.output.with_stem(f"{args.output.stem}-events")
-            tabular.write(apart, happened, {"t": "s"})
+        with outputs.writing(args.output, args.force) as path:
+            tabular.write(path, columns, units, events=structs(happened))
+        if apart:
+            with outputs.writing(apart, args.force) as path:
+                tabular.write(path, happened, {"t": "s"})
     ticks, count = len(columns["seq"]), len(happened["t"])
     if args.json:
         said: dict[str, Any] = {

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from common import cli, signals
+from common import cli, outputs, signals
 from common import plan as plans
 from common.errors import InputError, PlanError
 from common.plan import Plan
@@ -69,18 +68,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-o", "--output", type=Path, required=True, metavar="FILE", help="the recording to write"
     )
+    cli.force_argument(parser)
     cli.json_argument(parser, "say what was written as JSON on standard output")
 
 
 def run(args: argparse.Namespace) -> int:
     """Import."""
+    inputs = (args.data, args.map)
+    outputs.checked(args.output, args.force, inputs)
     with Progress("importing"):
         from rths import tabular
 
         mapping = load_map(args.map)
         columns = tabular.read(args.data)
         t, values = resampled(mapping, columns, args.data)
-        write(args.output, mapping, t, values, args.data.name)
+        with outputs.writing(args.output, args.force, inputs) as path:
+            write(path, mapping, t, values, args.data.name)
     show(args, mapping, t.size, list(values))
     return 0
 
@@ -88,13 +91,14 @@ def run(args: argparse.Namespace) -> int:
 def show(args: argparse.Namespace, mapping: Mapping, ticks: int, present: list[str]) -> None:
     """Say what was written, and which signals are absent."""
     absent = [name for name in lab_signals(mapping.plan) if name not in present]
+    say = outputs.aside(args.output).write
     if args.json:
         report = {"file": str(args.output), "ticks": ticks, "signals": present, "absent": absent}
-        sys.stdout.write(json.dumps(report) + "\n")
+        say(json.dumps(report) + "\n")
         return
     interval = mapping.plan.test.interval
-    sys.stdout.write(f"{args.output}: {ticks} ticks of {interval:g} s; signals: {', '.join(present)}\n")
-    sys.stdout.write(f"absent: {', '.join(absent) or 'none'}\n")
+    say(f"{args.output}: {ticks} ticks of {interval:g} s; signals: {', '.join(present)}\n")
+    say(f"absent: {', '.join(absent) or 'none'}\n")
 
 
 def load_map(path: Path) -> Mapping:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from string import Template
 from typing import TYPE_CHECKING, Any
 
-from common import cli, signals
+from common import cli, outputs, signals
 from common.errors import InputError
 from common.roles import LATENCY, MASTER, SLAVE, latency_topic, name_of
 
@@ -53,27 +52,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-o", "--output", type=Path, required=True, metavar="OUT.json", help="the layout file to write"
     )
+    cli.force_argument(parser)
     cli.json_argument(parser, "say what was written as JSON on standard output")
 
 
 def run(args: argparse.Namespace) -> int:
     """Write a layout."""
-    cli.spared(args.output)
+    outputs.checked(args.output, args.force, [args.file] if args.file else [])
     subject = of_default_test() if args.file is None else of_recording(args.file)
     made = layout(subject)
-    try:
-        args.output.write_text(json.dumps(made, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise InputError(
-            f"Cannot write {args.output}: {error.strerror}; give a writable place with -o."
-        ) from None
+    text = json.dumps(made, indent=2, ensure_ascii=False) + "\n"
+    outputs.write_text(args.output, text, args.force)
     if args.json:
         said = json.dumps(
             {"file": str(args.output), "test": subject.test, "panels": list(made["configById"])}
         )
     else:
         said = f"{args.output}: {len(made['configById'])} panels for recordings of the test '{subject.test}'"
-    sys.stdout.write(said + "\n")
+    outputs.aside(args.output).write(said + "\n")
     return 0
 
 

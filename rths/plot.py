@@ -9,7 +9,7 @@ import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from common import cli
+from common import cli, outputs
 from common.errors import InputError
 from common.roles import name_of, title
 
@@ -28,6 +28,7 @@ class Place(NamedTuple):
     folder: Path
     format: str
     stem: str = ""  # of the file
+    force: bool = False  # to replace files that exist
 
     def path(self, name: str, role: str) -> Path:
         """The file of a picture that concerns a slave."""
@@ -49,6 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="PLACE",
         help="a folder (default: beside the recording), or for one picture a file: its ending says the format",
     )
+    cli.force_argument(parser)
     parser.add_argument("--format", choices=FORMATS, help="format of the pictures (default: png)")
     parser.add_argument(
         "--width", choices=WIDTHS, default="single", help="columns of a page (default: single, 85 mm)"
@@ -70,8 +72,12 @@ def run(args: argparse.Namespace) -> int:
     chosen = choose(args.names)
     recording = read(args.file)
     place = place_of(args)
-    made, left_out = draw_all(recording, chosen, place, args.width)
-    complain(args, made, left_out)
+    with outputs.folder(place.folder, force=True):
+        for picture in chosen:
+            for role in recording.roles:
+                outputs.checked(place.path(picture.name, role), args.force, [args.file])
+        made, left_out = draw_all(recording, chosen, place, args.width)
+        complain(args, made, left_out)
     result = {"pictures": made, "left_out": left_out}
     sys.stdout.write(json.dumps(result) if args.json else "\n".join(made))
     sys.stdout.write("\n")
@@ -93,7 +99,9 @@ def draw_all(
             drawn = {
                 str(path)
                 for role in recording.roles
-                if save(recording, role, picture, path := place.path(picture.name, role), width)
+                if save(
+                    recording, role, picture, path := place.path(picture.name, role), width, force=place.force
+                )
             }
             made += sorted(drawn)
             if not drawn:
@@ -124,7 +132,7 @@ def complain(args: argparse.Namespace, made: list[str], left_out: dict[str, str]
 
 
 def place_of(args: argparse.Namespace) -> Place:
-    """Where the command line wants its pictures, the folder made.
+    """Where the command line wants its pictures.
 
     Raises:
         InputError: a file for several pictures, in another format than asked for or an unknown one, or no folder.
@@ -135,14 +143,14 @@ def place_of(args: argparse.Namespace) -> Place:
     if folder or ending.removeprefix(".") not in FORMATS:
         if ending in OTHER_FORMATS and not folder:
             raise InputError(f"Cannot write {path}: give a file that ends in .{', .'.join(FORMATS)}.")
-        return Place(folder_at(path), args.format or FORMATS[0])
+        return Place(path, args.format or FORMATS[0], force=args.force)
     if len(set(args.names)) != 1:
         raise InputError(f"{path} is one file: name the one picture that shall be in it, or give a folder.")
     if args.format not in (None, ending[1:]):
         raise InputError(
             f"{path} is no {args.format} file: leave --format away or end the file's name in it."
         )
-    return Place(folder_at(path.parent), ending[1:], path.stem)
+    return Place(path.parent, ending[1:], path.stem, args.force)
 
 
 def is_folder(path: Path) -> bool:
@@ -151,17 +159,6 @@ def is_folder(path: Path) -> bool:
         return path.is_dir()
     except OSError:
         return False
-
-
-def folder_at(folder: Path) -> Path:
-    """A folder that is there; raises InputError where it cannot be made."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(
-            f"Cannot make the folder {folder}: {error.strerror}; give another with -o."
-        ) from None
-    return folder
 
 
 def labelled(name: str, role: str) -> str:
@@ -181,17 +178,17 @@ def draw(recording: Run, role: str, picture: Picture, width: str = "single") -> 
     return canvas
 
 
-def save(recording: Run, role: str, picture: Picture, path: Path, width: str = "single") -> bool:
+def save(
+    recording: Run, role: str, picture: Picture, path: Path, width: str = "single", *, force: bool = False
+) -> bool:
     """Draw one picture into a file; False where the recording lacks its signals."""
     from rths import figure
 
     canvas = draw(recording, role, picture, width)
     if canvas is None:
         return False
-    try:
-        figure.save(canvas, path)
-    except OSError as error:
-        raise InputError(f"Cannot write {path}: {error.strerror}; give another place with -o.") from None
+    with outputs.writing(path, force) as temporary:
+        figure.save(canvas, temporary)
     return True
 
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
-from common import cli
+from common import cli, outputs
 from rths.progress import Progress
 from rths.terminal import table
 
@@ -26,8 +25,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--output",
         type=Path,
         metavar="OUT.mcap",
-        help="the recovered recording, a file that does not exist yet (default: FILE-recovered.mcap)",
+        help="the recovered recording (default: FILE-recovered.mcap)",
     )
+    cli.force_argument(parser)
     cli.json_argument(parser, "write the account as JSON on standard output")
 
 
@@ -37,17 +37,18 @@ def run(args: argparse.Namespace) -> int:
     with Progress("recovering"):
         from common.recording.recovery import recover
 
-        found = recover(args.file, output)
+        found = recover(args.file, output, force=args.force)
+    stream = outputs.aside(output)
     if args.json:
-        sys.stdout.write(json.dumps(found.plain(), allow_nan=False) + "\n")
+        stream.write(json.dumps(found.plain(), allow_nan=False) + "\n")
     else:
-        write_account(found)
+        write_account(found, stream)
     return 0 if found.complete else 1
 
 
-def write_account(found: Recovery) -> None:
+def write_account(found: Recovery, stream: TextIO) -> None:
     """The account as text."""
-    say = sys.stdout.write
+    say = stream.write
     say(f"\n{found.path}: {found.size} bytes" + ("" if found.finished else ", without a whole end") + "\n")
     say(f"lost: {found.bytes_lost} bytes, {found.chunks_lost} of {found.chunks + found.chunks_lost} chunks\n")
     for hole in found.lossy[:SHOWN]:
@@ -61,7 +62,7 @@ def write_account(found: Recovery) -> None:
     rows = [["topic", "recovered", "lost", "sequence numbers lost", "last"]]
     rows += [[name, *cells(topic, found.origin_ns)] for name, topic in found.topics.items()]
     say("\n")
-    table(rows)
+    table(rows, stream)
     say(f"\n{verdict(found)}\nrecovered: {found.output}\n")
 
 

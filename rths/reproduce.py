@@ -9,8 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from common import cli
-from rths.folder import prepared
+from common import cli, outputs
 from rths.progress import Progress
 
 if TYPE_CHECKING:
@@ -27,14 +26,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FOLDER",
         help="where recordings, figures and the page go (default: runs/reproduce)",
     )
+    cli.force_argument(parser)
     cli.json_argument(parser, "write the table as JSON on standard output")
 
 
 def run(args: argparse.Namespace) -> int:
     """Run every experiment; 1 where a row is outside its tolerance."""
-    folder = prepared(args.output)
-    target = folder / "index.html"
-    with Progress("reproducing") as progress:
+    target = args.output / "index.html"
+    with outputs.folder(args.output, args.force) as folder, Progress("reproducing") as progress:
         from rths.reproduction import experiments, figures, page
         from rths.reproduction.rows import rows
 
@@ -42,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
         progress.tell("figures")
         table = rows(evidence)
         pictures = figures.draw_all(evidence, folder)
-    target.write_text(page.page(table, pictures, folder), encoding="utf-8")
+        target.write_text(page.page(table, pictures, folder), encoding="utf-8")
     if args.json:
         sys.stdout.write(json.dumps({"rows": [asdict(row) for row in table], "page": str(target)}))
         sys.stdout.write("\n")

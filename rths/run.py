@@ -54,6 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-o", "--output", type=Path, metavar="FILE", help="the recording (default: runs/<test>-<time>.mcap)"
     )
+    cli.force_argument(parser)
     parser.add_argument("--live", action="store_true", help="show it in a browser page while it runs")
     parser.add_argument(
         "--live-port", type=int, default=0, metavar="N", help="of that page (default: a free one)"
@@ -63,7 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run a test; its exit code."""
-    from recorder.files import choose_path
+    from recorder.files import reserved
 
     gate = Gate(cli.accepted_risks(args))
     if not 0 <= args.live_port <= 65535:
@@ -74,15 +75,15 @@ def run(args: argparse.Namespace) -> int:
         )
     plan = cli.load_plan(args)
     reality = cli.load_reality(args.reality, plan)
-    output = choose_path(args.output, plan)
     stopping = Stopper()
-    error = (
-        in_virtual_time(plan, reality, output, stopping, gate)
-        if args.virtual
-        else in_real_time(args, plan, reality, output, stopping, gate)
-    )
-    if output.exists() and output.stat().st_size:
-        show(output, args.json)
+    with reserved(args.output, plan, force=args.force) as output:
+        error = (
+            in_virtual_time(plan, reality, output, stopping, gate)
+            if args.virtual
+            else in_real_time(args, plan, reality, output, stopping, gate)
+        )
+        if output.is_file() and output.stat().st_size:
+            show(output, args.json)
     if error is not None:
         raise error
     return 0
@@ -161,7 +162,7 @@ def in_real_time(
         progress.end()
         if view is not None:
             view.close()
-            if output.is_file():
+            if output.is_file() and output.stat().st_size:
                 progress.say(f"live view: {view.again} shows it again")
     return verdict(processes, stopping())
 
@@ -222,7 +223,8 @@ def start_all(
     processes.start("master", [*words, *secret, *places[0], "--listen", endpoint])
     for role, place in zip(roles, places[1:], strict=True):
         processes.start(role, [*words, *secret, *place, "--connect", endpoint])
-    processes.start("recorder", [*words, "--connect", endpoint, "-o", str(output)])
+    # the file is this command's already: it stands there empty, or the user wants it replaced
+    processes.start("recorder", [*words, "--connect", endpoint, "-o", str(output), "--force"])
 
 
 def real_time_words(mode: str, processor: int | None) -> list[str]:

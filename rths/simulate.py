@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
-import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
-from common import cli
+from common import cli, outputs
 from common.errors import InterlockError
 from common.plan import Plan, ideal
 from common.tables import Compensator, Control
@@ -32,12 +32,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-o", "--output", type=Path, metavar="FILE", help="write the simulation as a recording"
     )
+    cli.force_argument(parser)
     cli.json_argument(parser, "write the summary as JSON on standard output")
 
 
 def run(args: argparse.Namespace) -> int:
     """Simulate; 1 where the loop left the plan's limits."""
     plan = adapted(cli.load_plan(args), args)
+    if args.output:
+        outputs.checked(args.output, args.force, [cli.plan_path(args.plan)])
     with Progress("simulating") as progress:
         from models import substructure
 
@@ -48,10 +51,11 @@ def run(args: argparse.Namespace) -> int:
     summary = summarize(plan, columns, beyond_limit) | {"ground_motion": motion.describe()}
     if args.output:
         summary["file"] = str(args.output)
+    stream = outputs.aside(args.output)
     if args.json:
-        sys.stdout.write(json.dumps(summary) + "\n")
+        stream.write(json.dumps(summary) + "\n")
     else:
-        show(plan, summary)
+        show(plan, summary, stream)
     return 1 if summary["beyond_limit"] else 0
 
 
@@ -63,18 +67,20 @@ def rolled_out(plan: Plan, motion: Any, args: argparse.Namespace) -> tuple[dict[
     ground = substructure.ground_rows(plan, motion)
     rollout = simulate(plan, ground, seed=plan.test.seed if args.noise else None)
     if args.output:
-        write(args.output, plan, rollout, motion, ground)
+        with outputs.writing(args.output, args.force) as path:
+            write(path, plan, rollout, motion, ground)
     columns = signals(plan, rollout)
     return columns, beyond(plan, columns, rollout.ticks)
 
 
 def played(plan: Plan, args: argparse.Namespace, tell: Tell) -> tuple[dict[str, Any], str]:
     """The same of several slaves: the loops themselves in virtual time, which a limit stops."""
-    from recorder.files import checked
     from rths.source import recorded
     from rths.virtual import simulated
 
-    found, error = simulated(plan, args.output and checked(args.output), noise=args.noise, tell=tell)
+    place = outputs.writing(args.output, args.force) if args.output else contextlib.nullcontext()
+    with place as path:
+        found, error = simulated(plan, path, noise=args.noise, tell=tell)
     if error is not None and not isinstance(error, InterlockError):
         raise error
     return recorded(found).signals, str(error or "")
@@ -134,23 +140,21 @@ def beyond(plan: Plan, columns: dict[str, Any], ticks: int) -> str:
     return first[1]
 
 
-def show(plan: Plan, summary: dict[str, Any]) -> None:
+def show(plan: Plan, summary: dict[str, Any], stream: TextIO) -> None:
     """The summary as text."""
     from rths.formats import reading
     from rths.terminal import table
 
-    sys.stdout.write(
-        f"simulation of '{plan.test.name}', {summary['ticks']} ticks of {plan.test.interval:g} s\n"
-    )
-    sys.stdout.write(f"ground motion: {summary['ground_motion']}, scaled by {plan.ground_motion.scale:g}\n\n")
+    stream.write(f"simulation of '{plan.test.name}', {summary['ticks']} ticks of {plan.test.interval:g} s\n")
+    stream.write(f"ground motion: {summary['ground_motion']}, scaled by {plan.ground_motion.scale:g}\n\n")
     rows = [["signal", "peak"]]
     rows += [[name, reading(facts["peak"], facts["unit"])] for name, facts in summary["peaks"].items()]
-    table(rows)
-    sys.stdout.write(f"peak drift of the specimen's storey: {reading(summary['peak_drift'], 'm')}\n")
+    table(rows, stream)
+    stream.write(f"peak drift of the specimen's storey: {reading(summary['peak_drift'], 'm')}\n")
     if summary["beyond_limit"]:
-        sys.stdout.write(summary["beyond_limit"][0].upper() + summary["beyond_limit"][1:] + "\n")
+        stream.write(summary["beyond_limit"][0].upper() + summary["beyond_limit"][1:] + "\n")
     if "file" in summary:
-        sys.stdout.write(f"written to {summary['file']}\n")
+        stream.write(f"written to {summary['file']}\n")
 
 
 def write(path: Path, plan: Plan, rollout: Rollout, motion: Any, ground: Any) -> None:

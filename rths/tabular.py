@@ -80,24 +80,25 @@ def _read_npz(path: Path) -> Columns:
 def write(
     path: Path, columns: dict[str, NDArray[Any]], units: dict[str, str] | None = None, **more: Any
 ) -> None:
-    """Write columns of equal length; raises InputError where the format is unknown or the file not writable.
+    """Write columns of equal length; raises InputError where the format is unknown or does not take them.
 
     Parquet has the `units` of columns in the metadata of its fields, MAT in a struct `units`. MAT has `more` variables.
     """
+    suffix = format_of(path)
+    if suffix == ".mat":
+        _write_mat(path, columns, {"units": units or {}, **more})
+    elif suffix == ".parquet":
+        _write_parquet(path, columns, units or {})
+    else:
+        _write_csv(path, columns)
+
+
+def format_of(path: Path) -> str:
+    """The ending of a file that can be written; raises InputError for any other."""
     suffix = path.suffix.lower()
     if suffix not in WRITABLE:
         raise InputError(f"Cannot write {path}: give a file that ends in {', '.join(WRITABLE)}.")
-    try:
-        if suffix == ".mat":
-            _write_mat(path, columns, {"units": units or {}, **more})
-        elif suffix == ".parquet":
-            _write_parquet(path, columns, units or {})
-        else:
-            _write_csv(path, columns)
-    except OSError as error:
-        raise InputError(
-            f"Cannot write {path}: {error.strerror or error}; give a writable place with -o."
-        ) from None
+    return suffix
 
 
 def _write_mat(path: Path, columns: dict[str, NDArray[Any]], more: dict[str, Any]) -> None:
@@ -106,7 +107,7 @@ def _write_mat(path: Path, columns: dict[str, NDArray[Any]], more: dict[str, Any
     long = [name for name in columns if len(name) > MAT_NAME]
     if long:
         raise InputError(
-            f"Cannot write {path}: MATLAB has no name as long as '{long[0]}' ({len(long[0])} characters, at most "
+            f"Cannot write a .mat file: MATLAB has no name as long as '{long[0]}' ({len(long[0])} characters, at most "
             f"{MAT_NAME}); write .parquet or .csv."
         )
     savemat(

@@ -15,6 +15,7 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Header, Metadata, Schema, Statistics
 from mcap.writer import CompressionType, Writer
 
+from common import outputs
 from common.errors import InputError
 from common.recording.checksums import CHECKSUMS, checksum, fits, opened, sealed
 from common.recording.salvage import (
@@ -252,14 +253,17 @@ class Survey:
             self.header = record
 
 
-def recover(path: Path, output: Path) -> Recovery:
+def recover(path: Path, output: Path, *, force: bool = False) -> Recovery:
     """Write all that is whole in a recording into a new, finished one; the account of it.
+
+    A file that exists is replaced with `force` only.
 
     Memory does not grow with the file beyond a few hundred bytes per chunk.
 
     Raises:
         InputError: nothing can be recovered, a file cannot be read or written, or the output exists already.
     """
+    outputs.checked(output, force, [path])
     try:
         with path.open("rb") as stream:
             source = Source(stream)
@@ -268,7 +272,7 @@ def recover(path: Path, output: Path) -> Recovery:
                 raise InputError(
                     f"Nothing can be recovered from {path}: it holds no complete chunk of an MCAP recording."
                 )
-            return Salvage(path, output, source, survey).write()
+            return Salvage(path, output, source, survey, force=force).write()
     except OSError as error:
         raise InputError(f"Cannot read {path}: {error.strerror}.") from None
 
@@ -276,7 +280,8 @@ def recover(path: Path, output: Path) -> Recovery:
 class Salvage:
     """The output being written."""
 
-    def __init__(self, path: Path, output: Path, source: Source, survey: Survey) -> None:
+    def __init__(self, path: Path, output: Path, source: Source, survey: Survey, *, force: bool) -> None:
+        self._force = force
         self._path, self._output, self._source, self._survey = path, output, source, survey
         self._topics: dict[str, Topic] = {}
         self._channels: dict[int, tuple[int, Topic]] = {}  # by the number in the damaged file
@@ -289,21 +294,8 @@ class Salvage:
 
     def write(self) -> Recovery:
         """Write all; where that fails nothing is left behind."""
-        try:
-            stream = self._output.open("xb")
-        except FileExistsError:
-            raise InputError(f"{self._output} exists already: give another file with -o.") from None
-        except OSError as error:
-            raise InputError(f"Cannot write {self._output}: {error.strerror}.") from None
-        try:
-            with stream:
-                return self._fill(stream)
-        except OSError as error:
-            self._output.unlink(missing_ok=True)
-            raise InputError(f"Cannot recover {self._path} into {self._output}: {error.strerror}.") from None
-        except BaseException:
-            self._output.unlink(missing_ok=True)
-            raise
+        with outputs.writing(self._output, self._force) as temporary, temporary.open("wb") as stream:
+            return self._fill(stream)
 
     def _fill(self, stream: io.BufferedWriter) -> Recovery:
         self._writer = Writer(stream, chunk_size=CHUNK_SIZE, compression=CompressionType.ZSTD)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from markupsafe import Markup
 
 from rths.diagnosis_report import how_far, limits, overview
@@ -11,11 +9,6 @@ from rths.diagnosis_report.where import where
 from rths.diagnosis_report.which import which
 from rths.diagnosis_report.wording import Report
 from rths.page import frame
-
-
-def write(report: Report, path: Path) -> None:
-    """Write the page."""
-    path.write_text(page(report), encoding="utf-8")
 
 
 def page(report: Report) -> str:

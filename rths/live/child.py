@@ -86,7 +86,7 @@ class View:
     def close(self) -> None:
         """Let it show the end for a moment, then end it."""
         if self._process is not None:
-            if not self._recording.is_file():  # there is no end to show
+            if not (self._recording.is_file() and self._recording.stat().st_size):  # there is no end to show
                 self._process.terminate()
             self._await(self._process)
             if self._reader is not None:

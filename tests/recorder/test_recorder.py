@@ -19,7 +19,7 @@ from common.plan import Plan
 from common.recording.reader import read
 from common.recording.writer import Recording
 from common.signals import TOPICS
-from recorder.files import choose_path
+from recorder.files import reserved
 from recorder.sink import FileSink, ThreadedSink
 from rths import virtual
 from tests.helpers import with_table
@@ -293,9 +293,21 @@ def test_what_can_not_be_had_again_is_counted_and_said(
 
 def test_the_default_name_is_in_the_plans_folder(short_plan: Plan, tmp_path: Path) -> None:
     plan = with_table(short_plan, "recording", folder=str(tmp_path / "new" / "folder"))
-    path = choose_path(None, plan)
-    assert path.parent == tmp_path / "new" / "folder"
-    assert re.fullmatch(r"default-\d{8}-\d{6}\.mcap", path.name)
+    with reserved(None, plan) as path:
+        assert path.parent == tmp_path / "new" / "folder"
+        assert re.fullmatch(r"default-\d{8}-\d{6}\.mcap", path.name)
     (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match="Cannot make the folder"):
-        choose_path(None, with_table(short_plan, "recording", folder=str(tmp_path / "file" / "x")))
+    nowhere = with_table(short_plan, "recording", folder=str(tmp_path / "file" / "x"))
+    with pytest.raises(InputError, match="Cannot make the folder"), reserved(None, nowhere):
+        pass
+
+
+def test_tests_that_begin_in_one_second_have_files_of_their_own(
+    short_plan: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("recorder.files.time.strftime", lambda _: "20260101-120000")
+    plan = with_table(short_plan, "recording", folder=str(tmp_path))
+    with reserved(None, plan) as one, reserved(None, plan) as two:
+        one.write_bytes(b"recorded")
+    assert [one.name, two.name] == ["default-20260101-120000.mcap", "default-20260101-120000-2.mcap"]
+    assert list(tmp_path.iterdir()) == [one]  # of what recorded nothing, no empty file is left

@@ -254,10 +254,10 @@ WRONG_CALLS: dict[str, tuple[list[str], str]] = {
     ),
     "unwritable place": (
         ["run", "--virtual", "-o", "/proc/a.mcap"],
-        "Cannot write the recording /proc/a.mcap",
+        "Cannot write /proc/a.mcap",
     ),
     "missing folder": (["run", "--virtual", "-o", "{tmp}/no/a.mcap"], "There is no folder"),
-    "folder for a file": (["run", "--virtual", "-o", "{tmp}"], "Cannot write the recording"),
+    "folder for a file": (["run", "--virtual", "-o", "{tmp}"], "it is a folder"),
     "missing recording": (["inspect", "{tmp}/a.mcap"], "Cannot read the recording"),
     "no recording": (["inspect", "{tmp}/model.toml"], "not a readable MCAP"),
     "unknown format": (

@@ -78,8 +78,12 @@ MISTAKES = {
     "empty file": (["{tmp}/empty.mcap"], "not a readable MCAP recording"),
     "no such plan": (["{file}", "--plan", "nowhere.toml"], "Cannot read the plan nowhere.toml"),
     "no such other": (["{file}", "--validate", "{tmp}/none.mcap"], "Cannot read the recording"),
-    "unwritable report": (["{file}", "--json", "{tmp}/no/a.json"], "Cannot write"),
-    "unwritable page": (["{file}", "--html", "{tmp}/no/a.html"], "Cannot write"),
+    "unwritable report": (["{file}", "--json", "{tmp}/no/a.json"], "There is no folder"),
+    "unwritable page": (["{file}", "--html", "{tmp}/no/a.html"], "There is no folder"),
+    "one file for both": (
+        ["{file}", "--json", "{tmp}/a", "--html", "{tmp}/a"],
+        "--html and --json both name {tmp}/a",
+    ),
     "a head alone": (["{tmp}/head.mcap"], "holds no topic"),
 }
 TO_FOLDER = {"report": "--json", "page": "--html"}

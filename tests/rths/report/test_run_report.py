@@ -220,8 +220,8 @@ def test_a_test_that_was_stopped_says_why(virtual_recording: Path) -> None:
         (["{tmp}"], "Cannot read the recording {tmp}: Is a directory."),
         (["{tmp}/text.mcap"], "is not a readable MCAP recording"),
         (["{file}", "-o", "{tmp}"], "Cannot write {tmp}: it is a folder"),
-        (["{file}", "-o", "{tmp}/no/a.html"], "There is no folder {tmp}/no for the page"),
-        (["{file}", "-o", "{file}"], "is a recording; give another file"),
+        (["{file}", "-o", "{tmp}/no/a.html"], "There is no folder {tmp}/no for a.html"),
+        (["{file}", "-o", "{file}", "--force"], "Cannot write {file}: the command reads it"),
     ],
 )
 def test_mistakes_get_one_sentence(
@@ -233,7 +233,7 @@ def test_mistakes_get_one_sentence(
     said = capsys.readouterr().err
     assert said.startswith("rths: ")
     assert said.count("\n") == 1
-    assert sentence.format(tmp=tmp_path) in said
+    assert sentence.format(tmp=tmp_path, file=virtual_recording) in said
     assert virtual_recording.read_bytes() == before
 
 
@@ -247,7 +247,7 @@ def test_a_file_that_must_not_be_read_or_written_is_said(
     with monkeypatch.context() as patched:
         patched.setattr(Path, "write_text", refuse)
         assert call("report", virtual_recording, "-o", tmp_path / "a.html") == 2
-    assert "a.html: Permission denied; give another file with -o." in capsys.readouterr().err
+    assert "a.html: Permission denied; give another place." in capsys.readouterr().err
     monkeypatch.setattr(Path, "open", refuse)
     assert call("report", virtual_recording, "-o", tmp_path / "a.html") == 2
     assert "Permission denied" in capsys.readouterr().err

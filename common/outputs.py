@@ -1,0 +1,224 @@
+"""Where commands write: nothing that exists is replaced unless the user insists, and nothing half-done is left.
+
+A command judges its outputs before it begins to work (`checked`), then makes them. What is computed goes into a
+temporary file beside its place and takes its name when it is whole (`writing`). A recording that is written while a
+test runs must be readable at any moment, so its name is taken at once (`reserved`).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+import shutil
+import stat
+import sys
+import tempfile
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import TextIO
+
+from common.errors import InputError
+
+MODE = 0o666  # less the user's umask, as of any new file
+STANDARD = {"/dev/stdout": 1, "/dev/fd/1": 1, "/proc/self/fd/1": 1, "/dev/stderr": 2}
+
+
+def checked(path: Path, force: bool = False, inputs: Iterable[Path] = ()) -> Path:
+    """The path itself, where a command that reads `inputs` may write a file there.
+
+    Raises:
+        InputError: a file is there and `force` is not given, it is one of the inputs, or no file can be written there.
+    """
+    if is_stream(path):
+        return path
+    for read in inputs:
+        if same(path, read):
+            raise InputError(f"Cannot write {path}: the command reads it; give another name for the output.")
+    folder = path.parent
+    if not (there(folder) and folder.is_dir()):
+        raise InputError(f"There is no folder {folder} for {path.name}: make it, or give another name.")
+    taken = there(path)
+    if taken and path.is_dir():
+        raise InputError(f"Cannot write {path}: it is a folder; give the name of a file.")
+    if taken and not force:
+        raise exists(path)
+    if not os.access(target(path).parent, os.W_OK | os.X_OK):
+        raise InputError(f"Cannot write {path}: the folder {folder} is not writable; give another place.")
+    return path
+
+
+def there(path: Path) -> bool:
+    """Whether the name is taken, be it by a link that leads nowhere; raises InputError where no file can have it."""
+    try:
+        path.lstat()
+    except FileNotFoundError:
+        return False
+    except OSError as error:
+        raise InputError(f"Cannot write {path}: {error.strerror}; give another name.") from None
+    return True
+
+
+def exists(path: Path) -> InputError:
+    """What a user hears who would replace something."""
+    return InputError(f"{path} exists and is not replaced: give another name, or --force to replace it.")
+
+
+def same(one: Path, other: Path) -> bool:
+    """Whether two paths are one file."""
+    try:
+        return one.samefile(other)
+    except OSError:
+        return False
+
+
+def is_stream(path: Path) -> bool:
+    """Whether a path is a pipe, a device or the command's own standard output: there is nothing to replace in it."""
+    if str(path) in STANDARD:
+        return True
+    try:
+        mode = path.stat().st_mode
+    except OSError:
+        return False
+    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
+
+
+def aside(*paths: Path | None) -> TextIO:
+    """Where a command says what it has done: standard error where one of its outputs is the standard output."""
+    return sys.stderr if any(STANDARD.get(str(path)) == 1 for path in paths) else sys.stdout
+
+
+def target(path: Path) -> Path:
+    """The file that a path means: what links lead to."""
+    return Path(os.path.realpath(path))
+
+
+@contextlib.contextmanager
+def writing(path: Path, force: bool = False, inputs: Iterable[Path] = ()) -> Iterator[Path]:
+    """A temporary file to fill in the context; at its end it takes the name `path`, and after an error it is gone.
+
+    It has the ending of `path`. A stream gets it as a whole at the end.
+
+    Raises:
+        InputError: a file is there and `force` is not given, or none can be written.
+    """
+    checked(path, force, inputs)
+    stream = is_stream(path)
+    place = target(path)
+    folder = Path(tempfile.gettempdir()) if stream else place.parent
+    temporary = folder / f".rths-{secrets.token_hex(8)}{path.suffix}"
+    try:
+        os.close(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, MODE))
+        yield temporary
+        if stream:
+            poured(temporary, path)
+        else:
+            named(temporary, path, place, force)
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise InputError(f"Cannot write {path}: {error.strerror}; give another place.") from None
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def named(temporary: Path, path: Path, place: Path, force: bool) -> None:
+    """Give a file its name; raises InputError where another command took the name meanwhile."""
+    if not force:
+        claim(path)
+    temporary.replace(path if not force else place)
+
+
+def claim(path: Path) -> None:
+    """Make an empty file, which nobody else can do any more; raises InputError where one is there."""
+    try:
+        os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, MODE))
+    except FileExistsError:
+        raise exists(path) from None
+    except OSError as error:
+        raise InputError(f"Cannot write {path}: {error.strerror}; give another place.") from None
+
+
+def poured(file: Path, path: Path) -> None:
+    """Write a file's content into a stream, behind what was printed before."""
+    sys.stdout.flush()
+    number = STANDARD.get(str(path))
+    with file.open("rb") as source, open(path if number is None else os.dup(number), "wb") as sink:  # noqa: PTH123 - a descriptor
+        shutil.copyfileobj(source, sink)
+
+
+def write_text(path: Path, text: str, force: bool = False) -> None:
+    """Write a text as a whole; raises InputError as `writing` does."""
+    with writing(path, force) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+@contextlib.contextmanager
+def reserved(path: Path, force: bool = False) -> Iterator[Path]:
+    """A file that is this command's from now on, for a recording to begin in; gone after the context if still empty.
+
+    With `force` a file that exists stays as it is until the recording begins.
+
+    Raises:
+        InputError: a file is there and `force` is not given, or none can be written.
+    """
+    checked(path, force)
+    if not (is_stream(path) or (force and there(path))):
+        claim(path)
+    try:
+        yield path
+    finally:
+        with contextlib.suppress(OSError):
+            if path.is_file() and not path.stat().st_size:
+                path.unlink()
+
+
+@contextlib.contextmanager
+def free_name(folder: Path, stem: str, ending: str) -> Iterator[Path]:
+    """A new file of the name `stem` that is this command's, `stem-2` where it is taken; gone if it stays empty.
+
+    Raises:
+        InputError: none can be written there.
+    """
+    number = 1
+    path = folder / f"{stem}{ending}"
+    while True:
+        try:
+            os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, MODE))
+            break
+        except FileExistsError:
+            number += 1
+            path = folder / f"{stem}-{number}{ending}"
+        except OSError as error:
+            raise InputError(f"Cannot write {path}: {error.strerror}; give another place with -o.") from None
+    with reserved(path, force=True):
+        yield path
+
+
+@contextlib.contextmanager
+def folder(path: Path, force: bool = False) -> Iterator[Path]:
+    """A folder for the files of a command, made where there is none; gone if it was made and stays empty.
+
+    Raises:
+        InputError: there are files in it and `force` is not given, or none can be written there.
+    """
+    made = not path.exists()
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        empty = not any(path.iterdir())
+    except OSError as error:
+        raise InputError(
+            f"Cannot write into {path}: {error.strerror}; give another folder with -o."
+        ) from None
+    if not (empty or force):
+        raise InputError(
+            f"The folder {path} is not empty and nothing in it is replaced: give another with -o, or --force."
+        )
+    if not os.access(path, os.W_OK | os.X_OK):
+        raise InputError(f"Cannot write into {path}: Permission denied; give another folder with -o.")
+    try:
+        yield path
+    finally:
+        with contextlib.suppress(OSError):
+            if made:
+                path.rmdir()
