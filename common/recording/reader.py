@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import json
+import os
+import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -14,14 +16,17 @@ import numpy as np
 import zstandard
 from google.protobuf import descriptor_pb2
 from google.protobuf.message import DecodeError
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, Footer, McapRecord, Message, Metadata, Schema
-from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.stream_reader import StreamReader
 from numpy.typing import NDArray
 
 from common import signals
 from common.errors import InputError
+from common.recording.bounds import Bounds
 from common.recording.checksums import CHECKSUMS, fits, opened
-from common.recording.salvage import DAMAGE, HEAD, RECORD_LIMIT
+from common.recording.salvage import DAMAGE, HEAD, KINDS, MESSAGE, RECORD_LIMIT, inner
 from common.recording.schema import message_class
 from common.roles import LATENCY, MASTER, SLAVE, latency_topic, ramps_of, title
 
@@ -173,7 +178,8 @@ def _check(run: Run) -> None:
 def _records(path: Path, run: Run) -> Iterator[Any]:
     try:
         with path.open("rb") as stream:
-            yield from _up_to_damage(stream, run)
+            bounds = Bounds(path, os.fstat(stream.fileno()).st_size)
+            yield from _up_to_damage(stream, run, bounds)
     except OSError as error:
         raise InputError(f"Cannot read the recording {path}: {error.strerror}.") from None
     except DAMAGE as error:
@@ -183,13 +189,13 @@ def _records(path: Path, run: Run) -> Iterator[Any]:
         ) from None
 
 
-def _up_to_damage(stream: io.BufferedReader, run: Run) -> Iterator[Any]:
+def _up_to_damage(stream: io.BufferedReader, run: Run, bounds: Bounds) -> Iterator[Any]:
     records = StreamReader(stream, emit_chunks=True, record_size_limit=RECORD_LIMIT).records
     place = 0  # behind the newest whole record
     while True:
         try:
             record = next(records)
-            inner = list(unpacked(record))
+            contents = list(unpacked(record, bounds))
         except StopIteration:
             return
         except DAMAGE:
@@ -199,7 +205,7 @@ def _up_to_damage(stream: io.BufferedReader, run: Run) -> Iterator[Any]:
             return
         place = stream.tell()
         run.finished = isinstance(record, Footer)
-        yield from inner
+        yield from contents
 
 
 def _torn(stream: io.BufferedReader, place: int) -> bool:
@@ -210,19 +216,53 @@ def _torn(stream: io.BufferedReader, place: int) -> bool:
     return len(head) < HEAD.size or size - place - HEAD.size < HEAD.unpack(head)[1] <= RECORD_LIMIT
 
 
-def unpacked(record: McapRecord) -> Iterator[McapRecord]:
+def unpacked(record: McapRecord, bounds: Bounds) -> Iterator[McapRecord]:
     """What counts of a record: definitions and messages are those of chunks, which have a checksum.
 
     Raises:
         ValueError: a chunk would unpack to more than any of a recording holds.
+        InputError: the file holds more than any of its size does.
     """
     if isinstance(record, Chunk):
-        size = zstandard.frame_content_size(record.data) if record.compression == "zstd" else 0
-        if max(size, record.uncompressed_size) > RECORD_LIMIT:
-            raise ValueError("a chunk is larger than any of a recording")
-        yield from breakup_chunk(record, validate_crc=True)
+        for opcode, body in inner(_content(record, bounds)):
+            bounds.record()
+            if opcode == Opcode.MESSAGE:
+                channel, sequence, log_ns, publish_ns = MESSAGE.unpack_from(body)
+                yield Message(channel, log_ns, body[MESSAGE.size :], publish_ns, sequence)
+            elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+                yield KINDS[opcode].read(ReadDataStream(io.BytesIO(body)))
     elif not isinstance(record, Schema | Channel | Message):
         yield record
+
+
+def _content(chunk: Chunk, bounds: Bounds) -> bytes:
+    """The records of a chunk, as any program may have packed them."""
+    size = zstandard.frame_content_size(chunk.data) if chunk.compression == "zstd" else 0
+    if max(size, chunk.uncompressed_size) > RECORD_LIMIT:
+        raise ValueError("a chunk is larger than any of a recording")
+    bounds.unpack(max(size, chunk.uncompressed_size))
+    match chunk.compression:
+        case "":
+            data = chunk.data
+        case "zstd":
+            data = zstandard.decompress(chunk.data, chunk.uncompressed_size)
+        case "lz4":  # which other programs write
+            data = _lz4(chunk)
+        case _:
+            raise ValueError(f"a chunk is packed by '{chunk.compression}', which is not known here")
+    if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
+        raise ValueError("a chunk does not have its checksum")
+    return data
+
+
+def _lz4(chunk: Chunk) -> bytes:
+    """A chunk unpacked by LZ4, at most as large as it says itself."""
+    from lz4.frame import LZ4FrameDecompressor
+
+    try:
+        return bytes(LZ4FrameDecompressor().decompress(chunk.data, max_length=chunk.uncompressed_size))
+    except RuntimeError as error:  # which is how the library says it
+        raise ValueError(str(error)) from None
 
 
 def _take(run: Run, channel: Channel, schemas: dict[int, Schema], messages: list[Message]) -> None:

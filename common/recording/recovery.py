@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import os
-import struct
 from bisect import bisect
 from collections import Counter
 from dataclasses import dataclass, field
@@ -20,6 +19,7 @@ from common.errors import InputError
 from common.recording.checksums import CHECKSUMS, checksum, fits, opened, sealed
 from common.recording.salvage import (
     HEAD,
+    MESSAGE,
     Hole,
     Piece,
     Source,
@@ -37,7 +37,6 @@ from common.roles import ramps_of
 RECOVERY = "recovery"  # metadata of a recovered recording
 DAMAGED = " (damaged)"  # after the name of what is there, but not as it was written
 SEEN_ELSEWHERE = 1_000_000  # weight of a definition under a checksum against those without
-MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 Place = tuple[int, int, int]  # opcode, begin and end
 
 
@@ -218,6 +217,7 @@ class Survey:
         self.statistics: Statistics | None = None
         self.promised: Counter[tuple[int, str]] = Counter()  # attachments, by the summary
         self.chunks = 0
+        self._bounds = source.bounds
         found = summary(source)
         self.finished = found is not None
         for opcode, record in found.records if found else []:
@@ -243,6 +243,7 @@ class Survey:
         if piece.opcode == Opcode.CHUNK:
             self.chunks += 1
             for opcode, body in inner(content(record)):
+                self._bounds.record()
                 if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
                     self.definitions.add(opcode, parsed(opcode, body).id, body, sure=True)
         elif isinstance(record, Schema | Channel):

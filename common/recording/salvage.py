@@ -10,7 +10,9 @@ import io
 import re
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import zstandard
@@ -35,9 +37,12 @@ from mcap.records import (
 )
 from mcap.writer import MCAP0_MAGIC
 
+from common.recording.bounds import Bounds
+
 RECORD_LIMIT = 64 << 20
 DAMAGE = (McapError, ValueError, struct.error, zstandard.ZstdError, MemoryError)  # what libraries raise on it
 HEAD = struct.Struct("<BQ")  # opcode and length of a record
+MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 WINDOW = 1 << 20
 KINDS: dict[int, Any] = {
     Opcode.HEADER: Header,
@@ -88,6 +93,14 @@ class Source:
     def __init__(self, stream: io.BufferedReader) -> None:
         self._stream = stream
         self.size = stream.seek(0, io.SEEK_END)
+        self.bounds = Bounds(Path(stream.name), self.size)
+        self._admitted: set[int] = set()  # places of chunks that were counted: each is judged several times
+
+    def admit(self, offset: int, size: int) -> None:
+        """Count the chunk at a place by its size unpacked; raises InputError where that is too much."""
+        if offset not in self._admitted:
+            self._admitted.add(offset)
+            self.bounds.unpack(size)
 
     def at(self, offset: int, length: int) -> bytes:
         """Bytes from a place on, fewer at the end."""
@@ -104,11 +117,12 @@ class Source:
         return end
 
 
-def content(chunk: Chunk) -> bytes:
-    """The records of a chunk.
+def content(chunk: Chunk, admit: Callable[[int], None] | None = None) -> bytes:
+    """The records of a chunk; `admit` is asked with their size before they are unpacked.
 
     Raises:
         ValueError: they are not those that were written, or cannot be had.
+        InputError: `admit` does not admit so many bytes.
     """
     if chunk.uncompressed_size > RECORD_LIMIT or chunk.compression not in ("zstd", ""):
         raise ValueError("no chunk of a recording")
@@ -117,6 +131,8 @@ def content(chunk: Chunk) -> bytes:
         size = zstandard.get_frame_parameters(data).content_size
         if size not in (zstandard.CONTENTSIZE_UNKNOWN, chunk.uncompressed_size):
             raise ValueError("size of the content")
+        if admit:
+            admit(chunk.uncompressed_size)
         data = zstandard.decompress(data, chunk.uncompressed_size)
     if zlib.crc32(data) != chunk.uncompressed_crc or len(data) != chunk.uncompressed_size:
         raise ValueError("checksum of the content")
@@ -163,7 +179,7 @@ def judge(source: Source, offset: int, end: int) -> Piece | None:
     try:
         record = parsed(opcode, source.at(offset + HEAD.size, length))
         if isinstance(record, Chunk):
-            content(record)
+            content(record, partial(source.admit, offset))
     except DAMAGE:
         return None
     return Piece(offset, after, opcode, record)

@@ -17,6 +17,7 @@ from mcap.records import Statistics
 from mcap.writer import MCAP0_MAGIC
 
 from common.errors import InputError
+from common.recording.bounds import Bounds
 from common.recording.reader import Contents, Run, unpacked
 from common.recording.salvage import DAMAGE, HEAD, RECORD_LIMIT, Source, parsed, summary
 
@@ -54,6 +55,7 @@ class Tail:
         self._stream: io.BufferedReader | None = None
         self._place = 0
         self._contents = Contents()
+        self._bounds = Bounds(path, 0)
         self._metadata: dict[str, dict[str, str]] = {}
 
     def __enter__(self) -> Self:
@@ -98,9 +100,10 @@ class Tail:
         self.damage, self.behind = damage, False
 
     def _read(self, source: Source, most: int, run: Run) -> None:
+        self._bounds.size = source.size
         try:
             for record in self._records(source, self._place + most):
-                for each in list(unpacked(record)):
+                for each in list(unpacked(record, self._bounds)):
                     self._contents.take(each, run)
         except DAMAGE:
             self._end(f"at byte {self._place}")
