@@ -19,6 +19,7 @@ from common import reality as realities
 from common.errors import InputError, RthsError
 from common.laboratory import Report
 from common.plan import Plan
+from common.printable import escaping, shown
 from common.reality import Reality
 
 SHIPPED = ("benchmark2020", "default", "paper", "rc_column", "two_dampers")
@@ -30,7 +31,7 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Say what is wrong and where help is; exit code 2."""
-        self.exit(2, f"rths: {message}; see {self.prog} --help.\n")
+        self.exit(2, f"rths: {shown(message)}; see {self.prog} --help.\n")
 
 
 def plan_arguments(parser: argparse.ArgumentParser, *, optional: bool = False) -> None:
@@ -140,9 +141,9 @@ def text_report(kind: str, data: Mapping[str, Any]) -> None:
     """Plain lines on standard error."""
     match kind:
         case "state":
-            line = f"{data['lab']}: {data['state']}"
+            line = shown(f"{data['lab']}: {data['state']}")
         case "event":
-            line = f"{data['lab']}: {data['text']}"
+            line = shown(f"{data['lab']}: {data['text']}")
         case "progress" if "drift" in data:
             line = (
                 f"t {data['t']:7.2f} s  drift {data['drift'] * 1e3:+7.3f} mm  "
@@ -161,7 +162,7 @@ def reporter(as_json: bool) -> Report:
 def guarded(main: Callable[[], int]) -> int:
     """Run a command; a user's mistake becomes one sentence on standard error and an exit code."""
     try:
-        with interruptible():
+        with interruptible(), escaping():
             return answered(main)
     except BrokenPipeError:
         unread()
@@ -216,7 +217,7 @@ def answered(main: Callable[[], int]) -> int:
 def complained(text: str, code: int) -> int:
     """Say an error after all that was printed before it; its exit code."""
     drain()
-    sys.stderr.write(f"rths: {text}\n")
+    sys.stderr.write(f"rths: {shown(text)}\n")
     return code
 
 

@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+from common.printable import shown
 from common.safety.modes import Mode
 
 BLOCKS = "▁▂▃▄▅▆▇█"
@@ -89,7 +90,11 @@ class Board:
         return [
             span
             for lab, mode in self.modes.items()
-            for span in (Span(f"{lab} "), Span(mode.replace("_", " "), IN_MODE.get(mode, "")), Span("   "))
+            for span in (
+                Span(f"{shown(lab)} "),
+                Span(shown(mode).replace("_", " "), IN_MODE.get(mode, "")),
+                Span("   "),
+            )
         ]
 
 

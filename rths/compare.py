@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from common import cli
 from common.errors import InputError
+from common.printable import shown
 from rths.progress import Progress
 
 if TYPE_CHECKING:
@@ -93,9 +94,9 @@ def show(args: argparse.Namespace, result: dict[str, Any]) -> None:
     for name, facts in result["signals"].items():
         numbers = [f"{facts[key]:.4g}" for key in ("nrmse", "largest", "peak_a", "peak_b")]
         rows.append([name, *numbers, "equal" if facts["equal"] else ""])
-    sys.stdout.write(
-        f"A {args.a}: {result['motion_a']}\nB {args.b}: {result['motion_b']}\n{result['ticks']} ticks in common\n\n"
-    )
+    for name, source in (("A", args.a), ("B", args.b)):
+        sys.stdout.write(shown(f"{name} {source}: {result[f'motion_{name.lower()}']}") + "\n")
+    sys.stdout.write(f"{result['ticks']} ticks in common\n\n")
     table(rows)
     for name in result["beyond_tolerance"]:
-        sys.stdout.write(f"{name} differs by more than the tolerance {args.tolerance:g}\n")
+        sys.stdout.write(f"{shown(name)} differs by more than the tolerance {args.tolerance:g}\n")

@@ -11,6 +11,7 @@ from typing import Any
 
 from common import cli, outputs
 from common.errors import InputError
+from common.printable import all_shown
 from common.telling import Tell, untold
 from rths.progress import Progress
 
@@ -61,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
         outputs.write_text(args.json, text, args.force)
     from rths.diagnosis_report import terminal
 
-    outputs.aside(args.html, args.json).write(terminal.summary(report) + "\n")
+    outputs.aside(args.html, args.json).write(terminal.summary(all_shown(report)) + "\n")
     return 0
 
 

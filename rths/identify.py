@@ -10,6 +10,7 @@ from typing import Any
 
 from common import cli
 from common.errors import InputError
+from common.printable import all_shown
 from common.roles import name_of
 from common.telling import Tell
 from rths.bench import OF_SLAVE
@@ -89,6 +90,7 @@ def fitted(recording: Any, model: str) -> dict[str, Any]:
 
 def show(report: dict[str, Any]) -> None:
     """One part's report as text."""
+    report = all_shown(report)
     from rths.terminal import table
 
     sys.stdout.write(f"\n{report['part']}\n")

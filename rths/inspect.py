@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from common import cli
+from common.printable import all_shown
 from rths.formats import fixed, milliseconds, modes, reading, storey_rows, tracked
 from rths.progress import Progress
 from rths.terminal import table
@@ -36,6 +37,7 @@ def run(args: argparse.Namespace) -> int:
 
 def write_report(summary: dict[str, Any]) -> None:
     """The report as text."""
+    summary = all_shown(summary)
     say = sys.stdout.write
     say(f"\n{summary['file']}: test '{summary['test']}'{ending(summary)}\n")
     if summary["circumstances"]:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from common import cli, outputs, signals
 from common.errors import InputError
+from common.printable import shown
 from common.roles import LATENCY, MASTER, SLAVE, latency_topic, name_of
 
 if TYPE_CHECKING:
@@ -69,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
         )
     else:
         said = f"{args.output}: {len(made['configById'])} panels for recordings of the test '{subject.test}'"
-    outputs.aside(args.output).write(said + "\n")
+    outputs.aside(args.output).write(shown(said) + "\n")
     return 0
 
 

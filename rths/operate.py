@@ -15,6 +15,7 @@ from common.endpoint import Endpoint
 from common.errors import LostError
 from common.messages import Answer, Operator
 from common.plan import Plan, parse
+from common.printable import shown
 from common.roles import MASTER, OPERATOR, title
 from rths import running
 
@@ -94,4 +95,4 @@ def show(answers: dict[str, Answer], *, as_json: bool) -> None:
         sys.stdout.write(json.dumps(plain) + "\n")
         return
     for role, one in answers.items():
-        sys.stdout.write(f"{role}: {'done' if one.accepted else 'refused'}: {one.text}\n")
+        sys.stdout.write(shown(f"{role}: {'done' if one.accepted else 'refused'}: {one.text}") + "\n")

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from common import cli, outputs
 from common.errors import InputError
+from common.printable import shown
 from common.roles import name_of, title
 
 if TYPE_CHECKING:
@@ -79,7 +80,7 @@ def run(args: argparse.Namespace) -> int:
         made, left_out = draw_all(recording, chosen, place, args.width)
         complain(args, made, left_out)
     result = {"pictures": made, "left_out": left_out}
-    sys.stdout.write(json.dumps(result) if args.json else "\n".join(made))
+    sys.stdout.write(json.dumps(result) if args.json else "\n".join(map(shown, made)))
     sys.stdout.write("\n")
     return 0
 
@@ -195,6 +196,6 @@ def save(
 def caption(recording: Run, role: str) -> str:
     """What was tested, which slave is shown where it has a name; under it, under which motion."""
     motion = recording.metadata.get("ground_motion", {})
-    test = f"{recording.test}, {title(role)}" if name_of(role) else recording.test
+    test = shown(f"{recording.test}, {title(role)}" if name_of(role) else recording.test)
     record, scale = motion.get("record"), motion.get("scale")
-    return f"{test}\n{record}, × {scale}" if record and scale else test
+    return f"{test}\n{shown(record)}, × {shown(scale)}" if record and scale else test

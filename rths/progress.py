@@ -10,6 +10,8 @@ import time
 from types import TracebackType
 from typing import Self, TextIO
 
+from common.printable import behind, shown
+
 BAR = 24
 UNSAID = 2.0  # s that go by without a word
 REDRAW = 0.25  # s between two lines on a terminal,
@@ -25,7 +27,7 @@ class Progress:
 
     def __init__(self, doing: str, stream: TextIO | None = None, began: float | None = None) -> None:
         self._doing = doing
-        self._stream = stream or sys.stderr
+        self._stream = behind(stream or sys.stderr)
         self._live = self._stream.isatty()
         self._began = time.monotonic() if began is None else began
         self._now: tuple[str, int, int] = ("", 0, 0)
@@ -57,7 +59,7 @@ class Progress:
             return
         self._said = self._now
         self._next = now + (REDRAW if self._live else EVERY)
-        text = self.text(now - self._began)
+        text = shown(self.text(now - self._began))
         if self._live:
             text = text[: shutil.get_terminal_size().columns - 1]
             self._stream.write("\r" + text.ljust(self._width))

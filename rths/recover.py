@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 from common import cli, outputs
+from common.printable import shown
 from rths.progress import Progress
 from rths.terminal import table
 
@@ -49,21 +50,25 @@ def run(args: argparse.Namespace) -> int:
 def write_account(found: Recovery, stream: TextIO) -> None:
     """The account as text."""
     say = stream.write
-    say(f"\n{found.path}: {found.size} bytes" + ("" if found.finished else ", without a whole end") + "\n")
+    say(
+        f"\n{shown(str(found.path))}: {found.size} bytes"
+        + ("" if found.finished else ", without a whole end")
+        + "\n"
+    )
     say(f"lost: {found.bytes_lost} bytes, {found.chunks_lost} of {found.chunks + found.chunks_lost} chunks\n")
     for hole in found.lossy[:SHOWN]:
         say(f"unreadable: bytes {hole.offset} to {hole.end - 1} ({hole.end - hole.offset})\n")
     if len(found.lossy) > SHOWN:
         say(f"unreadable: {len(found.lossy) - SHOWN} more places, all with --json\n")
     for part in found.parts:
-        say(f"lost: {part}\n")
+        say(f"lost: {shown(part)}\n")
     if found.undefined:
         say(f"lost: {found.undefined} messages that no schema in the file describes\n")
     rows = [["topic", "recovered", "lost", "sequence numbers lost", "last"]]
     rows += [[name, *cells(topic, found.origin_ns)] for name, topic in found.topics.items()]
     say("\n")
     table(rows, stream)
-    say(f"\n{verdict(found)}\nrecovered: {found.output}\n")
+    say(f"\n{verdict(found)}\nrecovered: {shown(str(found.output))}\n")
 
 
 def cells(topic: Topic, origin_ns: int) -> list[str]:

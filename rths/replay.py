@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from common import cli
 from common.errors import InputError
+from common.printable import shown
 from common.roles import MASTER, SLAVE, latency_topic, title
 from common.telling import Tell, untold
 from rths.progress import Progress
@@ -67,7 +68,8 @@ def run(args: argparse.Namespace) -> int:
         sys.stdout.write(json.dumps({"matches": same, "signals": result}) + "\n")
     else:
         motion = recording.metadata.get("ground_motion", {})
-        sys.stdout.write(f"ground motion: {motion.get('record')}, scaled by {motion.get('scale')}\n\n")
+        line = f"ground motion: {motion.get('record')}, scaled by {motion.get('scale')}"
+        sys.stdout.write(f"{shown(line)}\n\n")
         show(matches, same)
     return 0 if same else 1
 

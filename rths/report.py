@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 
 from common import cli, outputs
+from common.printable import shown
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -44,5 +45,6 @@ def run(args: argparse.Namespace) -> int:
         result = {"page": str(output), "verdict": sentences, "pictures": names, "left_out": left_out}
         say(json.dumps(result) + "\n")
     else:
-        say("\n".join([*filter(None, [verdict.lost(summary)]), *sentences, f"page: {output}"]) + "\n")
+        lines = [*filter(None, [verdict.lost(summary)]), *sentences, f"page: {output}"]
+        say("".join(f"{shown(line)}\n" for line in lines))
     return 0

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any, TextIO
 
+from common.printable import behind, shown
 from rths.board import Board, coloured
 
 LINE_EVERY = 5.0  # s of test, where there is no terminal
@@ -15,6 +16,7 @@ LINE_EVERY = 5.0  # s of test, where there is no terminal
 
 def table(rows: Sequence[Sequence[str]], stream: TextIO | None = None) -> None:
     """Write rows in aligned columns, the first column to the left, the others to the right."""
+    rows = [[shown(cell) for cell in row] for row in rows]
     widths = [max(len(row[place]) for row in rows) for place in range(len(rows[0]))]
     for row in rows:
         cells = [
@@ -29,7 +31,7 @@ class Progress:
 
     def __init__(self, duration: float, stream: TextIO | None = None) -> None:
         self._duration = duration
-        self._stream = stream or sys.stderr
+        self._stream = behind(stream or sys.stderr)
         self._live = self._stream.isatty() and os.environ.get("TERM") != "dumb"
         self._next = 0.0
         self._board = Board(duration)
@@ -56,7 +58,7 @@ class Progress:
         """A line of its own, above the board."""
         drawn = self._drawn
         self._clear()
-        self._stream.write(text + "\n")
+        self._stream.write(shown(text) + "\n")
         if drawn:
             self._draw()
         self._stream.flush()

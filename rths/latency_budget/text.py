@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 
+from common.printable import shown
 from rths.latency_budget.checks import DOUBT, OVER, Check
 from rths.latency_budget.judge import NOT_JUDGED, WITHIN, Report, counts, percentiles
 from rths.latency_budget.limits import PERCENTILES
@@ -20,7 +21,9 @@ def text(report: Report) -> str:
     """Figures, checks, remarks and the verdict, for a terminal."""
     stream = io.StringIO()
     found = report.figures
-    stream.write(f"{found.recording}: {ticks(report)} against the budget {report.budget.name}\n\n")
+    stream.write(
+        shown(f"{found.recording}: {ticks(report)} against the budget {report.budget.name}") + "\n\n"
+    )
     table(figure_rows(report), stream)
     stream.write("\n")
     table(check_rows(report.checks), stream)
@@ -29,10 +32,10 @@ def text(report: Report) -> str:
         stolen = found.stolen.get(lab)
         facts = [f"scheduler {found.schedulers[lab]}"] if lab in found.schedulers else []
         facts += [f"{stolen:.2%} of the processors' time taken by the host"] if stolen is not None else []
-        stream.write(f"{lab}: {', '.join(facts)}\n")
+        stream.write(shown(f"{lab}: {', '.join(facts)}") + "\n")
     for line in [*report.warnings, *report.doubts]:
-        stream.write(f"{line}\n")
-    stream.write(f"{verdict(report)}\n")
+        stream.write(f"{shown(line)}\n")
+    stream.write(f"{shown(verdict(report))}\n")
     return stream.getvalue()
 
 

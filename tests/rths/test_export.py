@@ -48,7 +48,7 @@ def test_another_library_reads_every_column_to_the_last_bit(
     suffix: str, call: Any, recording: Path, virtual_recording: Path, tmp_path: Path
 ) -> None:
     for source in (recording, virtual_recording):
-        out = tmp_path / f"out{suffix}"
+        out = tmp_path / f"{source.stem}{suffix}"
         assert call("export", source, "-o", out) == 0
         returned, wanted = READERS[suffix](out), export.flat(read(source))
         assert list(returned) == list(wanted)
@@ -136,7 +136,7 @@ def test_events_come_back(
         ".mat": rows_of_mat,
     }
     for source in (recording, virtual_recording):
-        out = tmp_path / f"out{suffix}"
+        out = tmp_path / f"{source.stem}{suffix}"
         assert call("export", source, "-o", out, "--events") == 0
         returned = [{**row, "values": json.loads(row["values"])} for row in rows[suffix](out)]
         assert returned == read(source).events

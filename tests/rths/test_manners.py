@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -228,20 +227,6 @@ def test_ctrl_c_within_code_that_is_made_as_it_goes_keeps_its_exit_code(tmp_path
     own = environment(PYTHONPATH=f"{tmp_path}{os.pathsep}{ROOT}")
     done = finished(sys.executable, "-m", "made", seconds=60.0, env=own)
     assert (done.returncode, done.stdout, done.stderr) == (3, "", "rths: stopped by the user.\n")
-
-
-@pytest.mark.parametrize(
-    "line",
-    ["layout {recording} -o {other}", "report {recording} -o {other}", "diagnose {recording} --html {other}"],
-)
-def test_no_output_replaces_a_recording(
-    line: str, call: Call, virtual_recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    other = Path(shutil.copy(virtual_recording, tmp_path / "other.mcap"))
-    before = other.read_bytes()
-    assert call(line.replace("{other}", str(other))) == 2
-    assert f"{other} is a recording" in capsys.readouterr().err
-    assert other.read_bytes() == before
 
 
 def test_a_file_that_is_not_there_leaves_no_folder_behind(call: Call, tmp_path: Path) -> None:

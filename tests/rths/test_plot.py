@@ -82,7 +82,7 @@ def test_what_is_left_out_is_said_in_json_only(
     assert [Path(path).stem for path in result["pictures"]] == [
         name for name in PICTURES if name != "latency"
     ]
-    assert call(virtual_recording, "-o", tmp_path, "tracking") == 0
+    assert call(virtual_recording, "-o", tmp_path, "tracking", "--force") == 0
     shown = capsys.readouterr()
     assert shown.err == ""
     assert shown.out == f"{tmp_path / 'tracking.png'}\n"
@@ -96,7 +96,7 @@ WRONG: dict[str, tuple[list[str], str]] = {
     "two in a file": (["-o", "{tmp}/a.svg", "tracking", "spectra"], "name the one picture"),
     "two formats": (["-o", "{tmp}/a.svg", "--format", "png", "tracking"], "a.svg is no png file"),
     "other format": (["-o", "{tmp}/a.jpg", "tracking"], "give a file that ends in .png, .svg, .pdf"),
-    "no folder": (["-o", "{tmp}/file/a.svg", "tracking"], "Cannot make the folder"),
+    "no folder": (["-o", "{tmp}/file/a.svg", "tracking"], "Cannot write into"),
     "no file": (["-o", "{tmp}/" + 300 * "n" + ".svg", "tracking"], "Cannot write"),
 }
 
