@@ -18,6 +18,7 @@ from common import preflight, realtime
 from common import reality as realities
 from common.errors import InputError, RthsError
 from common.laboratory import Report
+from common.plain_report import PlainReport, plain, say
 from common.plan import Plan
 from common.printable import escaping, shown
 from common.reality import Reality
@@ -139,24 +140,13 @@ def json_report(kind: str, data: Mapping[str, Any]) -> None:
 
 def text_report(kind: str, data: Mapping[str, Any]) -> None:
     """Plain lines on standard error."""
-    match kind:
-        case "state":
-            line = shown(f"{data['lab']}: {data['state']}")
-        case "event":
-            line = shown(f"{data['lab']}: {data['text']}")
-        case "progress" if "drift" in data:
-            line = (
-                f"t {data['t']:7.2f} s  drift {data['drift'] * 1e3:+7.3f} mm  "
-                f"round trip {data['round_trip'] * 1e6:5.0f} µs  late {data['missed']:.0f}"
-            )
-        case _:
-            return
-    sys.stderr.write(line + "\n")
+    if line := plain(kind, data):
+        say(line)
 
 
-def reporter(as_json: bool) -> Report:
-    """The report that the command line asks for."""
-    return json_report if as_json else text_report
+def reporter(as_json: bool, duration: float) -> Report:
+    """The report that the command line asks for, of a test of `duration` s."""
+    return json_report if as_json else PlainReport(duration)
 
 
 def guarded(main: Callable[[], int]) -> int:
@@ -203,7 +193,7 @@ def answered(main: Callable[[], int]) -> int:
     try:
         return main()
     except RthsError as error:
-        return complained(str(error), error.exit_code)
+        return error.exit_code if error.said else complained(str(error), error.exit_code)
     except BrokenPipeError:
         raise
     except OSError as error:

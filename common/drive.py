@@ -14,6 +14,7 @@ from common.plan import Plan
 from common.realtime import freeze
 from common.safety.modes import Mode
 from common.surroundings import Surroundings
+from common.waited import Waited
 
 IDLE_NS = 5_000_000  # how often the handshake looks after itself
 LEAVE_NS = 5_000_000_000  # how long the last words may take where the recorder is not waited for
@@ -81,6 +82,10 @@ class Loop(Protocol):
         """Whether other laboratories that are latched are reached through this one alone."""
 
     @property
+    def awaited(self) -> str:
+        """Who has not joined the test yet, empty where all have."""
+
+    @property
     def progress(self) -> Mapping[str, float]:
         """What a user watches."""
 
@@ -110,8 +115,11 @@ def drive(loop: Loop, stopping: Callable[[], str], surroundings: Surroundings) -
 def handshake(loop: Loop, stopping: Callable[[], str]) -> None:
     """Until the start is agreed or the test is over."""
     lab = loop.lab
+    waited = Waited(lab.clock.now())
     while lab.exchange.state in (State.IDLE, State.REGISTERED, State.ARMED) and not stopping():
         loop.poll()
+        if text := waited.news(loop.awaited, lab.plan.link.connect_timeout, lab.clock.now()):
+            lab.report("waiting", {"lab": lab.name, "text": text})
         fetch(loop, lab.clock.now() + IDLE_NS)
 
 

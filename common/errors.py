@@ -15,6 +15,7 @@ class RthsError(Exception):
     """Base of all errors shown to the user as one sentence; `exit_code` is the process's (0 is success)."""
 
     exit_code = 2
+    said = False  # whether the user has read it already
 
 
 class InputError(RthsError):

@@ -11,13 +11,15 @@ from common.address import loopback
 from common.clock import MonotonicClock
 from common.drive import Loop, Stopper, drive
 from common.endpoint import FrameEndpoint
-from common.errors import InterlockError
+from common.errors import InterlockError, RthsError
 from common.laboratory import Report, Setting
+from common.plain_report import PlainReport
 from common.plan import Plan
 from common.preflight import Check, Gate
 from common.reality import Reality
-from common.roles import SLAVE
+from common.roles import RECORDER, SLAVE, title
 from common.surroundings import Surroundings
+from common.waited import Waited
 
 if TYPE_CHECKING:
     from common.zenoh_link import ZenohLink
@@ -50,9 +52,9 @@ def conduct(
         RthsError: what ended the test before its last tick.
     """
     stopping = Stopper()
-    report = cli.reporter(args.json)
     gate = Gate(cli.accepted_risks(args))
     plan = cli.load_plan(args)
+    report = cli.reporter(args.json, plan.test.duration)
     reality = cli.load_reality(args.reality, plan)
     if role == SLAVE:
         role = plan.slave_role(args.name or "")
@@ -72,10 +74,34 @@ def conduct(
         link.close()
         stopping.ignore()
     if loop.lab.error is not None:
-        raise loop.lab.error
+        raise last_word(loop.lab.error, report)
     if not loop.completed:
         raise InterlockError(loop.lab.exchange.cause or "The test was stopped before its end.")
     return 0
+
+
+def last_word(error: RthsError, report: Report) -> RthsError:
+    """The error that ends a process, marked where the report has said it already."""
+    error.said = isinstance(report, PlainReport) and str(error) in report.errors
+    return error
+
+
+class Search:
+    """A wish to stop, asked for again and again while a master is looked for: says now and then how long it takes."""
+
+    def __init__(self, role: str, plan: Plan, report: Report, stopping: Callable[[], str]) -> None:
+        self._role = role
+        self._patience = plan.link.connect_timeout
+        self._report = report
+        self._stopping = stopping
+        self._clock = MonotonicClock()
+        self._waited = Waited(self._clock.now())
+
+    def __call__(self) -> str:
+        """The wish, empty while there is none."""
+        if text := self._waited.news("master", self._patience, self._clock.now()):
+            self._report("waiting", {"lab": self._role, "text": text})
+        return self._stopping()
 
 
 def join(
@@ -108,6 +134,9 @@ def join(
             "open_link",
             f"The link on {listen} is open: whoever reaches it can move the rigs; see docs/how-to/security.md.",
         )
+    others = [title(one) for one in (*plan.roles, RECORDER)]
+    text = f"waits on {listen} for {', '.join(others)}" if listen else f"looks for the master at {connect}"
+    report("waiting", {"lab": role, "text": f"{text}, {plan.link.connect_timeout:g} s at most."})
     return ZenohLink(
         role,
         plan.test.name,
@@ -115,7 +144,7 @@ def join(
         listen=listen,
         connect=connect,
         patience=plan.link.connect_timeout,
-        stopping=stopping,
+        stopping=Search(role, plan, report, stopping),
         identity=identity,
         noticed=lambda text: warn("stranger", text),
     )

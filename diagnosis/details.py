@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from common.recording.outcome import outcome
 from diagnosis import fitting, where
 from diagnosis.ceilings import ceilings, unknown
 from diagnosis.paths import force_path, paths
@@ -57,7 +58,7 @@ def details(found: Diagnosis, far: HowFar, which: list[dict[str, Any]]) -> dict[
             "interval": record.plan.test.interval,
             "ticks": record.ticks,
             "motion": f"{motion.get('record', 'not recorded')}, scaled by {motion.get('scale', '?')}",
-            "outcome": summary.get("outcome", "cut off"),
+            "outcome": outcome(summary),
         },
         "parts": [part(found, trace) for trace in far.traces if trace.series.size],
         "paths": paths(record, nominal_signals(found)),

@@ -30,7 +30,7 @@ from common.operation import obey
 from common.plan import PROTOCOL_VERSION
 from common.preflight import Gate
 from common.rig import ColumnCommand, ColumnMeasurement, GuardedRig
-from common.roles import MASTER
+from common.roles import MASTER, RECORDER
 from common.safety.descent import Descent
 from common.safety.modes import Turn
 from common.safety.watchdog import Finding
@@ -333,6 +333,15 @@ class MasterLoop:
         """Whether a slave that has tripped still says so: an operator reaches it through this session."""
         now = self.lab.clock.now()
         return any(now - partner.tripped_ns < GIVEN_UP_NS for partner in self._partners)
+
+    @property
+    def awaited(self) -> str:
+        """Slaves and recorder that have not joined yet."""
+        if self.lab.exchange.state is not State.IDLE:
+            return ""
+        missing = [partner.title for partner in self._partners if not partner.registered]
+        missing += [RECORDER] * (self.lab.recorder is None and self.lab.plan.recording.required)
+        return " and ".join(missing)
 
     @property
     def progress(self) -> dict[str, float]:

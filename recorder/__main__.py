@@ -54,7 +54,7 @@ def record(args: argparse.Namespace, plan: Plan, path: Path) -> int:
     from recorder.sink import FileSink, ThreadedSink
 
     stopping = Stopper()
-    report = cli.reporter(args.json)
+    report = cli.reporter(args.json, plan.test.duration)
     gate = Gate(cli.accepted_risks(args))
     gate.judge([space.check(plan, path.parent)])
     motion = substructure.motion(plan)
@@ -73,7 +73,7 @@ def record(args: argparse.Namespace, plan: Plan, path: Path) -> int:
         stopping.ignore()
     report("recording", {"file": str(path), "summary": dict(summary)})
     if loop.error is not None:
-        raise loop.error
+        raise process.last_word(loop.error, report)
     return 0
 
 

@@ -10,6 +10,7 @@ from typing import Any
 
 from common import cli
 from common.printable import all_shown
+from common.recording.outcome import outcome
 from rths.formats import fixed, milliseconds, modes, reading, storey_rows, tracked
 from rths.progress import Progress
 from rths.terminal import table
@@ -66,9 +67,7 @@ def write_report(summary: dict[str, Any]) -> None:
     for lab, counts in summary["rejected"].items():
         reasons = ", ".join(f"{count} by {reason}" for reason, count in counts.items())
         say(f"frames rejected by the {lab}: {reasons} (docs/reference/rejections.md)\n")
-    outcome = summary["recorder"]
-    if outcome:
-        say(f"outcome: {outcome.get('cause') or outcome.get('outcome', 'unknown')}\n")
+    say(f"outcome: {outcome(summary['recorder'])}\n")
     say(
         f"open it: rths plot {summary['file']}, or any MCAP viewer (Foxglove, Lichtblick, PlotJuggler, Rerun)\n"
     )

@@ -27,6 +27,7 @@ REPORTS = {  # what a process of ours says, and what belongs to it
     "state": {"lab", "state"},
     "mode": {"lab", "mode"},
     "progress": {"tick", "t"},
+    "waiting": {"lab", "text"},
     "recording": {"file", "summary"},
 }
 

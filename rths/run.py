@@ -131,7 +131,7 @@ def checks(plan: Plan, output: Path) -> list[Check]:
 
 def virtual_report(working: Working, kind: str, data: Any) -> None:
     """Events of a test in virtual time, on standard error."""
-    if kind == "event" and data["code"] not in UNSAID:
+    if kind == "event" and data["code"] not in UNSAID and data["level"] != "error":  # that is the last word
         working.leave(wipe=True)
         cli.text_report(kind, data)
 

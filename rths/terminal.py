@@ -8,10 +8,9 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any, TextIO
 
+from common.plain_report import LINE_EVERY, facts
 from common.printable import behind, shown
 from rths.board import Board, coloured
-
-LINE_EVERY = 5.0  # s of test, where there is no terminal
 
 
 def table(rows: Sequence[Sequence[str]], stream: TextIO | None = None) -> None:
@@ -82,24 +81,9 @@ class Progress:
             self._drawn = 0
 
 
-def facts(data: Mapping[str, Any], duration: float) -> str:
-    """A report of progress as one line."""
-    text = f"t {data['t']:6.2f}/{duration:g} s"
-    if "drift" in data:
-        text += f"  drift {data['drift'] * 1e3:+7.3f} mm"
-    if "round_trip" in data:
-        text += f"  round trip {microseconds(data['round_trip'])} µs  late {data['missed']:.0f}"
-    return text
-
-
 def size_of(stream: TextIO) -> tuple[int, int]:
     """Columns and rows of the terminal behind a stream."""
     try:
         return os.get_terminal_size(stream.fileno())
     except (OSError, ValueError):
         return shutil.get_terminal_size()
-
-
-def microseconds(seconds: float) -> str:
-    """A time in µs, a dash where it is not known yet."""
-    return "   –" if seconds != seconds else f"{seconds * 1e6:4.0f}"  # noqa: PLR0124 - NaN is not itself

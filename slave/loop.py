@@ -28,7 +28,7 @@ from common.messages import (
 )
 from common.operation import obey
 from common.rig import GuardedRig, TableCommand, TableMeasurement
-from common.roles import SLAVE
+from common.roles import MASTER, SLAVE
 from common.safety.descent import Descent
 from common.safety.modes import Turn
 from common.safety.watchdog import Finding, Watchdog
@@ -336,6 +336,11 @@ class SlaveLoop:
     def needed(self) -> bool:
         """Nobody is reached through a slave."""
         return False
+
+    @property
+    def awaited(self) -> str:
+        """The master, until it has called."""
+        return MASTER if self.lab.exchange.state is State.IDLE else ""
 
     @property
     def progress(self) -> dict[str, float]:

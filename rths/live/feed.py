@@ -13,6 +13,7 @@ import numpy as np
 from common.clock import Clock
 from common.errors import InputError
 from common.plan import Plan, parse
+from common.recording.outcome import outcome
 from common.recording.reader import Run, Values
 from common.recording.tail import Tail
 from common.roles import LATENCY, MASTER, SLAVE, kind_of, latency_topic
@@ -226,7 +227,7 @@ class Feed:
         if self._tail.damage:
             return f"the recording is damaged {self._tail.damage}"
         if self._tail.finished:
-            return f"ended: {self._summary.get('cause') or self._summary.get('outcome', 'nobody knows how')}"
+            return f"ended: {outcome(self._summary)}"
         return self._progress()
 
     def _progress(self) -> str:

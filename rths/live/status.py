@@ -9,11 +9,11 @@ from typing import Any
 from bokeh.models.widgets import Div
 
 from common.operation import EMERGENCY
+from common.plain_report import microseconds
 from common.roles import title
 from common.safety.modes import LATCHED, Mode
 from rths.figure import COLOURS
 from rths.live.feed import SILENT_NS, Feed
-from rths.terminal import microseconds
 
 SHOWN = 40  # events
 STOPS = 4  # causes in the banner: more than a test with a few laboratories has

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from common.limits import UNITS
+from common.recording.outcome import outcome
 from common.recording.reader import CLOCK, GROUND, MACHINES, Run
 from common.roles import MASTER, name_of
 from rths.formats import MISSING, milliseconds, reading, storey_rows, tracked
@@ -45,7 +46,7 @@ def facts(run: Run, summary: Summary) -> list[tuple[str, str]]:
         ("storeys", str(plan.storeys) if plan else ""),
         ("slaves", ", ".join(summary["slaves"])),
         ("part tested", run.metadata.get("bench", {}).get("part", "")),
-        ("outcome", ended.get("cause") or ended.get("outcome", "")),
+        ("outcome", outcome(ended)),
     ]
     return [(name, text) for name, text in found if text]
 

@@ -287,7 +287,7 @@ def test_a_recording_without_plan_or_with_one_topic_is_shown_too(tmp_path: Path,
     assert growing.feed.interval == pytest.approx(0.01)
     assert growing.source("slave")["t"][-1] == pytest.approx(1.99)
     assert np.isnan(growing.source("slave")["damper_force"]).all()
-    assert growing.feed.state == "ended: nobody knows how"
+    assert growing.feed.state == "ended: cut off"
 
 
 def test_a_file_of_a_test_before_is_not_shown(virtual_recording: Path, tmp_path: Path) -> None:

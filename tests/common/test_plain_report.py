@@ -1,0 +1,61 @@
+"""What a process of a test says on standard error while it waits, runs and ends."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from common import cli, process
+from common.errors import LostError
+from common.plain_report import PlainReport
+from common.recording.outcome import outcome
+from common.waited import SAY_NS, Waited
+
+
+def test_progress_is_a_line_now_and_then_without_numbers_that_are_none(capsys: Any) -> None:
+    report = PlainReport(40.0)
+    for tick in range(0, 3_500, 100):
+        data = {
+            "t": tick * 0.002,
+            "drift": 1e-3,
+            "round_trip": math.nan if tick == 0 else 3e-4,
+            "missed": 2.0,
+        }
+        report("progress", {"tick": tick, **data})
+    assert capsys.readouterr().err.splitlines() == [
+        "t   0.00/40 s  drift  +1.000 mm  round trip    – µs  late 2",
+        "t   5.00/40 s  drift  +1.000 mm  round trip  300 µs  late 2",
+    ]
+
+
+def test_an_error_is_said_once(capsys: Any) -> None:
+    report = PlainReport(40.0)
+
+    def main() -> int:
+        report("event", {"lab": "master", "level": "error", "code": "nobody", "text": "No slave joined."})
+        raise process.last_word(LostError("No slave joined."), report)
+
+    assert cli.guarded(main) == 4
+    assert capsys.readouterr().err == "rths: No slave joined.\n"
+    with pytest.raises(LostError) as raised:
+        raise process.last_word(LostError("another"), report)
+    assert not raised.value.said
+
+
+def test_who_is_waited_for_is_said_once_in_a_while() -> None:
+    waited = Waited(0)
+    said = [waited.news("slave and recorder", 30.0, second * 10**9) for second in range(26)]
+    assert [text for text in said if text] == [
+        "still waits for slave and recorder, for 10 of 30 s.",
+        "still waits for slave and recorder, for 20 of 30 s.",
+    ]
+    assert waited.news("", 30.0, 100 * SAY_NS) == ""
+    assert waited.news("slave", 30.0, 100 * SAY_NS + 1) == ""
+
+
+def test_a_completed_test_has_one_word_everywhere() -> None:
+    assert outcome({"outcome": "stop", "cause": "completed"}) == "completed"
+    assert outcome({"outcome": "limit"}) == "limit"
+    assert outcome({}) == "cut off"
