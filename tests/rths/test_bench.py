@@ -88,6 +88,7 @@ def test_a_limit_stops_a_bench_test_and_the_recording_stays(
     assert 0.002 < np.max(np.abs(run.columns["master"]["column_displacement"])) < 0.0021
 
 
+@pytest.mark.slow
 def test_in_real_time_it_gives_the_same_numbers(call: Any, tmp_path: Path) -> None:  # noqa: F811
     runs = []
     for clock in ("--virtual", "--real-time"):

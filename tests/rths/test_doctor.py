@@ -179,6 +179,7 @@ def test_times_that_cannot_be_used_are_refused(option: tuple[str, str]) -> None:
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.slow
 def test_a_short_check_has_all_parts_and_says_yes_or_no(tmp_path: Path) -> None:
     words = [*RTHS, "--seconds", "4", "--json", "-o", str(tmp_path / "runs")]
     done = subprocess.run(words, capture_output=True, text=True, env=ENVIRONMENT, timeout=60)

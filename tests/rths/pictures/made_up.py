@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from common.recording.reader import Run
+from common.recording.reader import CLOCK, Run
 from common.roles import SLAVE
+from rths.circumstances import REAL
 from rths.summary import SEGMENTS
 
 RECORD = "El Centro 1940 NS (1,559-point version after a zero at t = 0), dt 0.02 s, 1560 points, PGA 0.3188 g"
@@ -61,4 +62,5 @@ def with_latency(run: Run, seed: int = 1) -> Run:
         "seq": np.arange(spread.size),
         "deadline_missed": spread > INTERVAL,
     }
+    run.metadata[CLOCK] = {"kind": REAL}
     return run
