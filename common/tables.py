@@ -408,10 +408,14 @@ class Tolerances:
 
 @dataclass(frozen=True)
 class Rig:
-    """The laboratory behind the rig interface."""
+    """The laboratory behind the rig interface.
+
+    A class is code that runs with your rights: only run plans that you trust.
+    """
 
     class_: str = key(
-        "'file.py:Class' or 'package.module:Class', empty for the emulated laboratory", default=""
+        "'file.py:Class' or 'package.module:Class', whose code the test then runs; empty for the emulated laboratory",
+        default="",
     )
     options: dict[str, Any] = key("keyword arguments of the class", default={})
 

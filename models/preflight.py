@@ -25,10 +25,25 @@ AMPLITUDE_ERROR = (
 LIMITS: dict[str, Any] = {name: field.metadata["rule"] for name, field in Limits.__dataclass_fields__.items()}
 
 
+class Findings(NamedTuple):
+    """What nominal models say of a plan: the partition, the peaks of the simulated test, and both as checks."""
+
+    partition: Partition
+    peaks: Peaks | None  # None where the simulated loop has no finite command
+    unstable: bool  # whether the simulated loop is, so that no peak means anything
+    checks: list[Check]
+
+
+def findings(plan: Plan) -> Findings:
+    """What nominal models say of a plan; raises InputError where a model or parameter cannot be."""
+    found = assess(plan)
+    top, unstable, check = simulated_peaks(plan, known_unstable=found.unstable)
+    return Findings(found, top, unstable, [partition_check(plan, found), check])
+
+
 def checks(plan: Plan) -> list[Check]:
     """Partition and peaks of a plan, for a gate; raises InputError where a model or parameter cannot be."""
-    found = assess(plan)
-    return [partition_check(plan, found), peaks_check(plan, unstable=found.unstable)]
+    return findings(plan).checks
 
 
 # -- partition ------------------------------------------------------------------------------------
@@ -139,21 +154,34 @@ class Peaks(NamedTuple):
     first: str  # quantity that first exceeds its share of the limit, empty where none does
     tick: int  # at which it does
     peak: float  # of that quantity, in its unit
+    every: dict[str, float]  # peak of each limited quantity, in its unit
 
 
-def peaks_check(plan: Plan, *, unstable: bool = False) -> Check:
-    """The check of the simulated peaks, for a gate; `unstable` where another check has said that the loop is."""
+def peaks_check(plan: Plan) -> Check:
+    """The check of the simulated peaks, for a gate."""
+    return simulated_peaks(plan)[2]
+
+
+def simulated_peaks(plan: Plan, *, known_unstable: bool = False) -> tuple[Peaks | None, bool, Check]:
+    """Peaks of the simulated test, whether its loop is unstable, and the check of both.
+
+    Of a loop that is `known_unstable`, which another check refuses, only peaks beyond their share are refused.
+    """
     most = MOST_SLAVE_TICKS // len(plan.slaves) if plan.slaves else MOST_TICKS
     short = plan.with_ticks(min(plan.ticks, most))
     columns, finite = simulated(short)
     if not columns["actuator_command"].size:
-        return Check(
-            "", Risk("peaks", "the simulated test has no finite command at all, so look at [structure]")
-        )
+        risk = Risk("peaks", "the simulated test has no finite command at all, so look at [structure]")
+        return None, True, Check("", risk)
     found = peaks(short, columns)
-    if not finite or (not unstable and free_motion.unstable(plan)) or (found.first and unstable):
-        return Check("peaks not known, as the simulated loop is unstable", unstable_risk(plan, found))
-    return Check(peaks_text(plan, found, short.ticks), peaks_risk(plan, found))
+    grows = not finite or free_motion.unstable(plan)
+    if grows and (found.first or not finite or not known_unstable):
+        return (
+            found,
+            True,
+            Check("peaks not known, as the simulated loop is unstable", unstable_risk(plan, found)),
+        )
+    return found, grows, Check(peaks_text(plan, found, short.ticks), peaks_risk(plan, found))
 
 
 def simulated(plan: Plan) -> tuple[dict[str, Array], bool]:
@@ -169,7 +197,8 @@ def simulated(plan: Plan) -> tuple[dict[str, Array], bool]:
 def peaks(plan: Plan, columns: dict[str, Array]) -> Peaks:
     """Peaks of simulated signals over the plan's limits."""
     most = vars(plan.limits)
-    shares = {name: values / most[name] for name, values in limited.magnitudes(plan, columns).items()}
+    magnitudes = limited.magnitudes(plan, columns)
+    shares = {name: values / most[name] for name, values in magnitudes.items()}
     tops = {name: float(np.max(share)) for name, share in shares.items()}
     over = {
         name: int(np.argmax(~(share <= plan.preflight.peak_share)))
@@ -178,7 +207,8 @@ def peaks(plan: Plan, columns: dict[str, Array]) -> Peaks:
     }
     name = max(tops, key=lambda one: tops[one])
     first = min(over, key=lambda one: over[one], default="")
-    return Peaks(tops[name], name, first, over.get(first, 0), tops[first] * most[first] if first else 0.0)
+    every = {name: float(np.max(values)) for name, values in magnitudes.items()}
+    return Peaks(tops[name], name, first, over.get(first, 0), every.get(first, 0.0), every)
 
 
 def unstable_risk(plan: Plan, found: Peaks) -> Risk:

@@ -24,7 +24,8 @@ LEAST_PULSE = 8  # ticks
 WATCHED = (
     50  # of the actuator's own delay after the pulse: ten turns of the slowest loop that it can make unstable
 )
-LEAST_WATCHED = 2.0  # s
+LEAST_WATCHED, MOST_WATCHED = 2.0, 40.0  # s
+LOWEST = 0.2  # Hz, below which a transfer system is late by as much as there
 FARTHEST = 1e6  # m, from where on the motion has diverged
 
 
@@ -45,7 +46,7 @@ def path_at(plan: Plan, frequency: float) -> Path:
     The path is the compensated nominal actuator, and the interval by which `unit_delay` holds back the force. The
     delay follows the phase continuously from frequency zero, so that it may be longer than half a period.
     """
-    interval = plan.test.interval
+    interval, frequency = plan.test.interval, max(frequency, LOWEST)
     programme = join([pulse(interval, frequency)], interval, still=watched(plan, frequency))
     target, achieved = follow(plan, programme)
     begin = programme.segments[0].end
@@ -66,7 +67,7 @@ def watched(plan: Plan, frequency: float) -> float:
     own = actuator.delay + actuator.time_constant
     if actuator.model == "servo_hydraulic":
         own = actuator.servo.delay
-    return max(LEAST_WATCHED, 4.0 / frequency, WATCHED * own)
+    return min(max(LEAST_WATCHED, 4.0 / frequency, WATCHED * own), MOST_WATCHED)
 
 
 def pulse(interval: float, frequency: float) -> Piece:

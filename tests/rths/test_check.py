@@ -1,0 +1,150 @@
+"""`rths check`: the figures of a plan, slips of units, and classes that are named and never run."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from common import cli
+from common import plan as plans
+from models import preflight
+from rths.plan_check import classes
+from rths.run import checks
+
+SHORT = "[test]\nduration = 4.0\n[control]\namd = false\n"
+
+
+def checked(call: Any, capsys: Any, path: Path | str) -> tuple[int, dict[str, Any]]:
+    code = call("check", path, "--json")
+    return code, json.loads(capsys.readouterr().out)
+
+
+def test_the_default_plan_in_figures(call: Any, capsys: Any) -> None:
+    code, facts = checked(call, capsys, "default")
+    assert (code, facts["ready"], facts["stable"]) == (0, True, True)
+    assert (facts["slips"], facts["classes"], facts["refused"]) == ([], [], [])
+    (mode,) = facts["structure"]["modes"]
+    assert mode["period"] == pytest.approx(0.5027, abs=1e-4)
+    assert mode["damping_ratio"] == pytest.approx(0.05, abs=1e-3)
+    assert facts["delay"]["critical"] == pytest.approx(0.0329, abs=1e-4)
+    assert facts["delay"]["margin"] == pytest.approx(facts["delay"]["critical"] / facts["delay"]["expected"])
+    assert facts["peaks"]["damper_stroke"]["peak"] == pytest.approx(0.048, abs=1e-3)
+    assert facts["recording"]["bytes"] == pytest.approx(10e6, rel=0.2)
+
+
+def test_it_computes_what_pre_flight_computes(tmp_path: Path) -> None:
+    path = tmp_path / "p.toml"
+    path.write_text(SHORT)
+    plan = plans.load(path)
+    assert preflight.findings(plan).checks == preflight.checks(plan) == checks(plan, tmp_path / "a.mcap")[:2]
+
+
+@pytest.mark.parametrize("name", cli.SHIPPED)
+def test_the_plans_that_ship_have_no_slips(name: str, call: Any, capsys: Any) -> None:
+    code, facts = checked(call, capsys, name)
+    assert (code, facts["slips"]) == (0, [])
+
+
+@pytest.mark.parametrize(
+    ("text", "where", "words"),
+    [
+        (
+            "[structure]\nmass = 160.0\n",
+            "[structure]",
+            "mass in [structure] (t in place of kg), with which it would be 0.503 s",
+        ),
+        (
+            "[structure]\nstiffness = 25e3\n[column]\nstiffness = 12.5e3\n",
+            "[structure]",
+            "(kN/m in place of N/m)",
+        ),
+        (
+            "[structure]\nstiffness = 25.0\n[column]\nstiffness = 12.5\n",
+            "[structure]",
+            "(kN/mm in place of N/m)",
+        ),
+        ("[structure]\ndamping = 200.0\n", "damping in [structure]", "N·s/m"),
+        ("[column]\nstiffness = 12.5e3\n", "stiffness in [column]", "1e+03 times as much"),
+        ("[limits]\ndisplacement = 150.0\n", "displacement in [limits]", "0.15 for 150 mm"),
+        (
+            "[limits]\ncolumn_force = 400.0\n[ground_motion]\nscale = 1.0\n",
+            "column_force in [limits]",
+            "400e3 for",
+        ),
+        ("[sensors]\ncolumn_displacement = 5.0\n", "column_displacement in [sensors]", "must be in m"),
+        ("[ground_motion]\nscale = 1e-4\n", "scale in [ground_motion]", "0.1 for 10 %"),
+        ("[actuator]\ntime_constant = 30.0\n", "time_constant in [actuator]", "must be in s"),
+    ],
+)
+def test_a_slip_of_units_is_pointed_at(
+    text: str, where: str, words: str, call: Any, capsys: Any, tmp_path: Path
+) -> None:
+    (tmp_path / "p.toml").write_text(SHORT + text)
+    _, facts = checked(call, capsys, tmp_path / "p.toml")
+    (slip,) = [slip for slip in facts["slips"] if slip["where"] == where]
+    assert words in slip["text"]
+
+
+@pytest.mark.parametrize(
+    ("numbers", "words"), [("0.0\n0.3\n-0.2\n", "numbers are in g"), ("0.0\n300\n-200\n", "are in gal")]
+)
+def test_a_record_in_another_unit_is_pointed_at(
+    numbers: str, words: str, call: Any, capsys: Any, tmp_path: Path
+) -> None:
+    (tmp_path / "site.txt").write_text(numbers * 50)
+    (tmp_path / "p.toml").write_text(
+        SHORT + '[ground_motion]\nrecord = "site.txt"\ndt = 0.01\nscale = 0.01\n'
+    )
+    _, facts = checked(call, capsys, tmp_path / "p.toml")
+    assert [words in slip["text"] for slip in facts["slips"]] == [True]
+
+
+def test_what_pre_flight_would_refuse_is_exit_1(call: Any, capsys: Any, tmp_path: Path) -> None:
+    (tmp_path / "p.toml").write_text("[actuator]\ndelay = 0.2\n")
+    code, facts = checked(call, capsys, tmp_path / "p.toml")
+    assert (code, facts["ready"], facts["stable"], facts["peaks"]) == (1, False, False, {})
+    assert [risk["name"] for risk in facts["refused"]] == ["partition", "peaks"]
+    assert call("check", tmp_path / "p.toml") == 1
+    text = capsys.readouterr().out
+    assert "unstable" in text
+    assert "raise" not in text
+
+
+def test_a_plan_that_cannot_be_used_is_exit_2(call: Any, capsys: Any, tmp_path: Path) -> None:
+    (tmp_path / "p.toml").write_text("[test]\ninterval = 2\n")
+    assert call("check", tmp_path / "p.toml") == 2
+    assert "interval in [test] is 2.0, but must be" in capsys.readouterr().err
+
+
+def test_classes_are_named_with_their_files_and_never_imported(
+    call: Any, capsys: Any, tmp_path: Path
+) -> None:
+    for folder in (tmp_path, tmp_path / "package"):
+        folder.mkdir(exist_ok=True)
+        (folder / "lab.py").write_text(f"open({str(tmp_path / 'ran')!r}, 'w')\nclass Lab: ...\n")
+    (tmp_path / "package" / "__init__.py").write_text(f"open({str(tmp_path / 'ran')!r}, 'w')\n")
+    (tmp_path / "p.toml").write_text(
+        SHORT + '[master.rig]\nclass = "lab.py:Lab"\n[slave.rig]\nclass = "gone\\u001b[2J.py:Lab"\n'
+    )
+    assert call("check", tmp_path / "p.toml") == 0
+    text = capsys.readouterr().out
+    assert f"[master.rig] runs the class 'lab.py:Lab' from {tmp_path / 'lab.py'}, with your rights" in text
+    assert "only run plans that you trust" in text
+    assert "from a file that is not there" in text
+    assert "\x1b" not in text
+    assert not (tmp_path / "ran").exists()
+
+
+def test_the_file_of_a_module_is_found_without_importing_its_package(
+    monkeypatch: Any, tmp_path: Path
+) -> None:
+    (tmp_path / "package7").mkdir()
+    for name in ("__init__", "lab"):
+        (tmp_path / "package7" / f"{name}.py").write_text("raise SystemExit\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    assert classes.file_of("package7.lab:Lab", tmp_path) == str(tmp_path / "package7" / "lab.py")
+    assert classes.file_of("package7.none:Lab", tmp_path) == ""
+    assert classes.file_of("none7.lab:Lab", tmp_path) == ""
