@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections import Counter
 
 NOT_SEEN, REJECTED, ADMITTED, USED = range(4)
+AHEAD, REPEATED = "ahead", "repeated"  # reasons of frames that the sender of a test has not sent: see Tally
 
 
 class Tally:
     """Admits what is fresh and keeps the fate of every number; `ticks` are those of the test.
 
     Fresh is what is newer than all before and was sent within `window` intervals of when it came, by the receiver's
-    own clock: what an interrupted transport delivers late is not, nor is a number far ahead.
+    own clock: what an interrupted transport delivers late is not, nor is a number far ahead. Of a number ahead nothing
+    is kept, for its sender cannot have come to it yet; and no transport of ours delivers a message twice, so that of a
+    number that is repeated one frame is another's.
     """
 
     def __init__(self, ticks: int, window: int) -> None:
@@ -28,15 +31,15 @@ class Tally:
             self._fates[seq] = ADMITTED
             return True
         self.reasons[reason] += 1
-        if 0 <= seq < len(self._fates) and self._fates[seq] == NOT_SEEN:
+        if reason != AHEAD and self._fates[seq] == NOT_SEEN:
             self._fates[seq] = REJECTED
         return False
 
     def _reason(self, seq: int, expected: int) -> str:
         if not 0 <= seq < len(self._fates) or seq > expected + self._window:
-            return "ahead"
+            return AHEAD
         if seq <= self._newest:
-            return "old" if self._fates[seq] == NOT_SEEN else "repeated"
+            return "old" if self._fates[seq] == NOT_SEEN else REPEATED
         return "stale" if seq < expected - self._window else ""
 
     def lose(self, seq: int) -> None:

@@ -1,16 +1,48 @@
-"""What became of every message between the laboratories: sent = used + rejected + lost, by direction."""
+"""What became of every message between the laboratories: sent = used + rejected + lost, by direction.
+
+What came although the other laboratory did not send it is counted apart, as foreign. A frame does not say who made
+it, so a foreign one is known by its number: the sender never came to it, it came before, or it is far ahead of the test.
+"""
 
 from __future__ import annotations
 
-from common.recording.reader import Run
-from common.roles import MASTER
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from common.recording.reader import Run, Values
+from common.roles import MASTER, SLAVE
+from common.tally import AHEAD, REPEATED
+
+
+class Account(NamedTuple):
+    """Messages of one direction: those of the sender by their fate, and at least how many others came."""
+
+    sent: int
+    used: int
+    rejected: int  # too late, overtaken or not fresh
+    lost: int
+    foreign: int
+
+
+def account(sent: int, used: int, rejected: int, beyond: int, extra: int) -> Account:
+    """The account of what a sender sent and a receiver says that it used and rejected, numbers both.
+
+    `beyond` of the numbers used were higher than any sent, and `extra` frames came under a number that was known
+    already or that could not be yet. More numbers than were sent cannot be the sender's; up to there they are taken
+    for its own.
+    """
+    own = min(max(used - beyond, 0), sent)
+    late = min(rejected, sent - own)
+    return Account(sent, own, late, sent - own - late, (used - own) + (rejected - late) + extra)
 
 
 def accounts(run: Run) -> dict[str, dict[str, int]]:
-    """By `<slave's role>/<direction>`: messages sent, used, rejected (too late, overtaken or not fresh) and lost.
+    """The accounts by `<slave's role>/<direction>`.
 
-    Each end counts what it sent and what came of what it received; lost is what was sent and never came. A direction of
-    which an end has not told its count, because it was killed or cut off, is absent.
+    Each end counts what it sent and what came of what it received. A direction of which an end has not told its count,
+    because it was killed or cut off, is absent.
     """
     told: dict[str, dict[str, float]] = {}  # by laboratory; the master tells of each slave apart
     for event in run.events:
@@ -19,17 +51,29 @@ def accounts(run: Run) -> dict[str, dict[str, int]]:
     found = {}
     for role in run.roles:
         master, slave = told.get(MASTER, {}), told.get(role, {})
+        part = run.of(role)
+        commands = beyond(part, SLAVE, "command_seq", MASTER)
+        feedbacks = beyond(part, MASTER, "damper_force_seq", SLAVE)
         ends = {
-            "commands": (master.get(f"{role}.commands_sent"), slave, "commands"),
-            "feedbacks": (slave.get("feedbacks_sent"), master, f"{role}.feedbacks"),
+            "commands": (master.get(f"{role}.commands_sent"), slave, "commands", commands),
+            "feedbacks": (slave.get("feedbacks_sent"), master, f"{role}.feedbacks", feedbacks),
         }
-        for direction, (sent, receiver, prefix) in ends.items():
+        for direction, (sent, receiver, prefix, above) in ends.items():
             if sent is not None and f"{prefix}.used" in receiver:
                 used, rejected = int(receiver[f"{prefix}.used"]), int(receiver[f"{prefix}.rejected"])
-                found[f"{role}/{direction}"] = {
-                    "sent": int(sent),
-                    "used": used,
-                    "rejected": rejected,
-                    "lost": int(sent) - used - rejected,
-                }
+                one = account(int(sent), used, rejected, above, extra(receiver, prefix))
+                found[f"{role}/{direction}"] = one._asdict()
     return found
+
+
+def extra(told: Mapping[str, float], prefix: str) -> int:
+    """Frames that a receiver turned away as none of the sender's."""
+    return sum(int(told.get(f"{prefix}.turned_away.{reason}", 0)) for reason in (AHEAD, REPEATED))
+
+
+def beyond(run: Run, receiver: str, name: str, sender: str) -> int:
+    """How many messages a receiver used under numbers higher than any of its sender's ticks."""
+    used: Values | None = run.columns.get(receiver, {}).get(name)
+    if used is None or not run.has(sender):
+        return 0
+    return int(np.count_nonzero(np.unique(used) > run.sequences[sender].max()))

@@ -178,3 +178,8 @@ def modes(found: Sequence[Mapping[str, float | None]], most: int = 6) -> str:
         for item in found[:most]
     ]
     return ", ".join(texts) + (f" and {len(found) - most} shorter ones" if len(found) > most else "")
+
+
+def apart(counts: dict[str, int]) -> str:
+    """What came beside the messages of the other laboratory, empty where nothing did."""
+    return f"; at least {counts['foreign']} more came that it did not send" if counts["foreign"] else ""

@@ -11,7 +11,7 @@ from typing import Any
 from common import cli
 from common.printable import all_shown
 from common.recording.outcome import outcome
-from rths.formats import fixed, milliseconds, modes, reading, storey_rows, tracked
+from rths.formats import apart, fixed, milliseconds, modes, reading, storey_rows, tracked
 from rths.progress import Progress
 from rths.terminal import table
 
@@ -62,7 +62,7 @@ def write_report(summary: dict[str, Any]) -> None:
     for name, counts in summary["exchange"].items():
         say(
             f"{name.replace('/', ', ')}: {counts['sent']} sent = {counts['used']} used + {counts['rejected']} rejected "
-            f"+ {counts['lost']} lost\n"
+            f"+ {counts['lost']} lost{apart(counts)}\n"
         )
     for lab, counts in summary["rejected"].items():
         reasons = ", ".join(f"{count} by {reason}" for reason, count in counts.items())

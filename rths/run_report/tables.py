@@ -79,12 +79,15 @@ def holes(found: Mapping[str, Any]) -> str:
 
 
 def exchange(summary: Summary) -> Table:
-    """The account of every message: sent = used + rejected + lost."""
+    """The account of every message: sent = used + rejected + lost, and what came beside them where anything did."""
+    columns = {"sent": "sent", "used": "= used", "rejected": "+ rejected", "lost": "+ lost"}
+    if any(counts["foreign"] for counts in summary["exchange"].values()):
+        columns["foreign"] = "not sent by it, at least"
     rows = [
-        [name.replace("/", ", "), *(str(counts[key]) for key in ("sent", "used", "rejected", "lost"))]
+        [name.replace("/", ", "), *(str(counts[key]) for key in columns)]
         for name, counts in summary["exchange"].items()
     ]
-    return Table("", ("messages", "sent", "= used", "+ rejected", "+ lost"), rows)
+    return Table("", ("messages", *columns.values()), rows)
 
 
 def rejected(summary: Summary) -> Table:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from common.limits import UNITS
 from common.recording.reader import Run
 from common.roles import LATENCY, MASTER, SLAVE, kind_of, name_of, title
-from rths.formats import milliseconds, reading
+from rths.formats import apart, milliseconds, reading
 from rths.summary import plan_of
 
 Summary = Mapping[str, Any]
@@ -107,7 +107,7 @@ def exchange(summary: Summary) -> list[str]:
     """What became of the messages, by direction."""
     return [
         f"{name.replace('/', ', ').capitalize()}: {counts['sent']} sent, of which {counts['used']} used, "
-        f"{counts['rejected']} rejected as late or out of order, {counts['lost']} lost."
+        f"{counts['rejected']} rejected as late or out of order, {counts['lost']} lost{apart(counts)}."
         for name, counts in summary["exchange"].items()
     ]
 
