@@ -1,7 +1,7 @@
 """What became of every message between the laboratories: sent = used + rejected + lost, by direction.
 
 What came although the other laboratory did not send it is counted apart, as foreign. A frame does not say who made
-it, so a foreign one is known by its number: the sender never came to it, it came before, or it is far ahead of the test.
+it, so a foreign one is known by its number: the sender never came to it, it came before, or it is far ahead.
 """
 
 from __future__ import annotations
