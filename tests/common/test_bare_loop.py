@@ -76,7 +76,7 @@ def test_a_loop_beside_a_test_says_what_it_found() -> None:
     time.sleep(0.2)
     values = loop.stop()
     assert values["interval"] == 0.002
-    assert values["ticks"] + values["late"] >= 90
+    assert values["ticks"] + values["late"] >= 50  # of 100: it may have begun late
     assert 0.0 < values["p50"] <= values["p90"] <= values["p99"] <= values["p99.9"] <= values["max"]
     assert (values["priority"], values["processor"]) == (0.0, -1.0)
     assert not Path(f"/proc/{pid}").exists()
@@ -91,15 +91,15 @@ def test_a_stopped_process_skips_its_ticks_and_accounts_for_all_time() -> None:
     ready = time.monotonic()
     time.sleep(0.1)
     os.kill(pid, signal.SIGSTOP)
-    time.sleep(0.03)
+    time.sleep(0.2)
     os.kill(pid, signal.SIGCONT)
     time.sleep(0.1)
     stopping = time.monotonic()
     values = loop.stop()
     ended = time.monotonic()
-    assert values["late"] >= 13
-    assert values["max"] >= 0.027
-    assert (stopping - ready) / 0.002 - 2 <= values["ticks"] + values["late"] <= (ended - began) / 0.002 + 1
+    assert values["late"] >= 95
+    assert values["max"] >= 0.195
+    assert (stopping - ready) / 0.002 - 25 <= values["ticks"] + values["late"] <= (ended - began) / 0.002 + 1
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="real-time scheduling is made for Linux here")
