@@ -17,7 +17,7 @@ from common.plain_report import PlainReport
 from common.plan import Plan
 from common.preflight import Check, Gate
 from common.reality import Reality
-from common.roles import RECORDER, SLAVE, title
+from common.roles import MASTER, RECORDER, SLAVE, title
 from common.surroundings import Surroundings
 from common.waited import Waited
 
@@ -99,7 +99,7 @@ class Search:
 
     def __call__(self) -> str:
         """The wish, empty while there is none."""
-        if text := self._waited.news("master", self._patience, self._clock.now()):
+        if text := self._waited.news(f"the {MASTER}", self._patience, self._clock.now()):
             self._report("waiting", {"lab": self._role, "text": text})
         return self._stopping()
 
@@ -135,7 +135,9 @@ def join(
             f"The link on {listen} is open: whoever reaches it can move the rigs; see docs/how-to/security.md.",
         )
     others = [title(one) for one in (*plan.roles, RECORDER)]
-    text = f"waits on {listen} for {', '.join(others)}" if listen else f"looks for the master at {connect}"
+    text = (
+        f"waits on {listen} for {' and '.join(others)}" if listen else f"looks for the {MASTER} at {connect}"
+    )
     report("waiting", {"lab": role, "text": f"{text}, {plan.link.connect_timeout:g} s at most."})
     return ZenohLink(
         role,

@@ -340,7 +340,7 @@ class SlaveLoop:
     @property
     def awaited(self) -> str:
         """The master, until it has called."""
-        return MASTER if self.lab.exchange.state is State.IDLE else ""
+        return f"the {MASTER}" if self.lab.exchange.state is State.IDLE else ""
 
     @property
     def progress(self) -> dict[str, float]:
