@@ -8,6 +8,7 @@ get another whose letters have other widths, and labels that run into each other
 
 from __future__ import annotations
 
+import textwrap
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ REFERENCE = "0.35"  # grey of lines that are no measurement: bounds, nominal val
 
 SINGLE, DOUBLE = 3.35, 7.0  # inches: 85 mm and 178 mm
 TEXT, SMALL = 8, 7  # pt
+PLAIN = (-9, 9)  # powers of ten within which numbers stand at their ticks, not as a factor above the axis
 DOTS = 300  # per inch of a saved picture
 STAMPS: dict[str, dict[str, Any]] = {
     ".svg": {"Date": None},
@@ -32,6 +34,8 @@ def style() -> dict[str, Any]:
     return {
         "axes.prop_cycle": cycler(color=COLOURS),
         "axes.grid": True,
+        "axes.formatter.useoffset": False,
+        "axes.formatter.limits": PLAIN,
         "grid.alpha": 0.3,
         "axes.spines.top": False,
         "axes.spines.right": False,
@@ -64,6 +68,22 @@ def figure(width: float = DOUBLE, height: float = 6.0) -> Any:
     return Figure(figsize=(width, height), layout="constrained")
 
 
+def fit_labels(canvas: Any) -> None:
+    """Break the labels of axes that would be cut off by the figure's edge into lines."""
+    canvas.draw_without_rendering()
+    for axis in canvas.axes:
+        for label, size in ((axis.xaxis.label, canvas.bbox.width), (axis.yaxis.label, canvas.bbox.height)):
+            box = label.get_window_extent()
+            begin, end = (box.x0, box.x1) if label is axis.xaxis.label else (box.y0, box.y1)
+            words = label.get_text()
+            if begin < 0.0 or end > size:
+                middle = 0.5 * (begin + end)
+                room = 2.0 * min(middle, size - middle)
+                letters = max(int(len(words) * room / (end - begin)), 8)
+                label.set_text("\n".join(textwrap.wrap(words, letters)))
+
+
 def save(canvas: Any, path: Path) -> None:
     """Write a figure for print, in the format of the file's ending; raises OSError."""
+    fit_labels(canvas)
     canvas.savefig(path, dpi=DOTS, metadata=STAMPS[path.suffix.lower()])

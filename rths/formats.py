@@ -13,12 +13,16 @@ RANGES = {
     "m": (1e-9, 1.0),
     "s": (1e-9, 1.0),
     "m/s": (1e-3, 1.0),
-    "N": (1.0, 1e6),
+    "m/s²": (1e-6, 1.0),
+    "N": (1e-3, 1e6),
     "Hz": (1.0, 1e3),
     "N/m": (1.0, 1e6),
     "N·s/m": (1.0, 1e6),
     "m/N": (1e-9, 1.0),
+    "J": (1e-9, 1.0),
 }
+LEAST_ON_AXIS = 0.01  # ends below which the numbers of an axis would need four decimals
+NOTHING = 1e-3  # of the smallest prefix: what is below it is rounding
 NO_UNIT = ("", "-", "–", "1")
 
 
@@ -37,6 +41,13 @@ def scale(size: float, unit: str) -> tuple[float, str]:
     return 1.0 / found[0], found[1] + unit
 
 
+def axis_scale(size: float, unit: str) -> tuple[float, str]:
+    """Factor and unit of an axis up to this size: the unit of `reading`, another prefix where its ticks were tiny."""
+    usual = {"m": (1e3, "mm"), "N": (1e-3, "kN") if size >= 1e3 else (1.0, "N")}
+    factor, name = usual.get(unit, (1.0, unit))
+    return (factor, name) if not 0.0 < size * factor < LEAST_ON_AXIS else scale(size, unit)
+
+
 def decimals(size: float, width: float = 0.0) -> int:
     """Decimals that show three digits of a value, and two of an interval's width."""
     places = 2 - math.floor(math.log10(abs(size))) if size else 0
@@ -50,14 +61,41 @@ def quantity(value: object, unit: str, bounds: Sequence[object] | None = None) -
     if not isinstance(value, int | float) or not math.isfinite(value):
         return MISSING
     ends = [float(end) for end in bounds or () if isinstance(end, int | float) and math.isfinite(end)]
-    factor, name = scale(max(map(abs, (value, *ends))), unit)
+    size = max(map(abs, (value, *ends)))
+    if size < NOTHING * RANGES.get(unit, (0.0, 0.0))[0]:
+        return f"0 {unit}".rstrip()
+    factor, name = scale(size, unit)
     width = (ends[1] - ends[0]) * factor if len(ends) == 2 else 0.0
     places = decimals(value * factor, width)
-    text = f"{value * factor:.{places}f} {name}".rstrip()
+    text = f"{fixed(value * factor, places)} {name}".rstrip()
+    return text + interval(bounds, factor, places)
+
+
+def interval(bounds: Sequence[object] | None, factor: float, places: int) -> str:
+    """An interval behind its value, of one known end `from` or `up to`; nothing where neither is known."""
     if bounds is None or len(bounds) != 2:
-        return text
-    lower, upper = (f"{end * factor:.{places}f}" if known(end) else "?" for end in map(as_float, bounds))
-    return f"{text} ({lower} … {upper})"
+        return ""
+    lower, upper = (fixed(as_float(end) * factor, places) if known(end) else "" for end in bounds)
+    if lower and upper:
+        return f" ({lower} … {upper})"
+    return f" (from {lower})" if lower else f" (up to {upper})" if upper else ""
+
+
+def axis_unit(label: str, size: float) -> tuple[float, str]:
+    """Factor and label of an axis whose label ends in `, unit` or a line with the unit, in a prefix that reads well."""
+    for mark in (", ", "\n"):
+        head, found, unit = label.rpartition(mark)
+        if found and unit in RANGES and math.isfinite(size):
+            factor, name = scale(size, unit)
+            return factor, f"{head}{mark}{name}"
+    return 1.0, label
+
+
+def nats(value: float) -> str:
+    """A distance of two scores in words; beyond a thousand nats it says no more."""
+    if abs(value) >= 1000.0:
+        return "more than 1,000 nats"
+    return f"{value:.0f} nats" if abs(value) >= 10.0 else f"{value:.1f} nats"
 
 
 def as_float(value: object) -> float:
@@ -102,14 +140,18 @@ def times(value: object) -> str:
     number = as_float(value)
     if not math.isfinite(number):
         return MISSING
+    if 0.0 <= number < 0.05:
+        return "< 0.1×"
     return f"{number:.0f}×" if number >= 10.0 else f"{number:.1f}×"
 
 
 def span(bounds: Sequence[object] | None, unit: str) -> str:
-    """A stretch on an axis: `2.1–9.8 s`; nothing where it is unknown."""
+    """A stretch on an axis: `2.1–9.8 s`; nothing where it is unknown or has no length."""
     if bounds is None or len(bounds) != 2 or not all(map(known, bounds)):
         return ""
     lower, upper = map(as_float, bounds)
+    if upper <= lower:
+        return ""
     return f"{lower:.3g}–{upper:.3g} {unit}"
 
 

@@ -32,14 +32,14 @@ GLOSSARY = (
 
 def equivalents(report: Report) -> str:
     """Effects that cannot be told apart."""
-    found = [wording.equivalent(names) for names in report.get("equivalent") or []]
+    found = [wording.equivalent(names) for names in wording.sets(report)]
     none = absent("No such set of effects is listed in this report.")
     return section("equivalent", "What cannot be told apart", bullets(found) or none)
 
 
 def not_exercised(report: Report) -> str:
     """Effects that this recording could not have shown."""
-    names = list(report.get("not_exercised") or [])
+    names = list(dict.fromkeys(report.get("not_exercised") or []))
     items = "".join(
         f"<li>{esc(wording.effect(name))} <code>{esc(name)}</code>"
         f"{': ' + esc(wording.says(name)) if wording.says(name) else ''}</li>"

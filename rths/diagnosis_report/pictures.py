@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rths.diagnosis_report import wording
-from rths.figure import COLOURS, STAMPS, figure
-from rths.formats import bare_percent, known, scale
+from rths.figure import COLOURS, STAMPS, figure, fit_labels
+from rths.formats import axis_unit, bare_percent, known, scale
 
 Piece = Mapping[str, Any]
 Values = NDArray[np.float64]
@@ -30,6 +30,7 @@ ZOOM = 4.0  # s around the worst seconds
 
 def svg(canvas: Any) -> str:
     """A figure as SVG to stand inside a page: black and blue follow the page's colours, no background."""
+    fit_labels(canvas)
     stream = io.StringIO()
     canvas.savefig(stream, format="svg", transparent=True, metadata=STAMPS[".svg"])
     text = stream.getvalue()
@@ -258,6 +259,10 @@ def curve(item: Piece, names: tuple[str, str] = ("without the effect", "with the
     drawn = [found for found in series if found[0].size == x.size and np.isfinite(found[0]).any()]
     if not x.size or not drawn:
         return ""
+    x_factor, x_label = axis_unit(str(item["x"].get("label", "")), float(np.nanmax(np.abs(x))))
+    most = max(float(np.nanmax(np.abs(y))) for y, _colour, _label in drawn)
+    y_factor, y_label = axis_unit(str((item.get("y") or {}).get("label", "")), most)
+    x, drawn = x_factor * x, [(y_factor * y, colour, label) for y, colour, label in drawn]
     canvas = figure(WIDTH, 3.0)
     axis = canvas.subplots()
     steady = bool(np.all(np.diff(x) >= 0.0))
@@ -267,9 +272,8 @@ def curve(item: Piece, names: tuple[str, str] = ("without the effect", "with the
         else:
             size = 9 if colour == GREY else 3
             axis.scatter(x, y, size, color=colour, label=label, linewidths=0, rasterized=True)
-    axis.set(xlabel=literal(str(item["x"].get("label", ""))))
-    axis.set_ylabel(literal(str((item.get("y") or {}).get("label", ""))))
-    axis.ticklabel_format(scilimits=(-3, 4))
+    axis.set(xlabel=literal(x_label))
+    axis.set_ylabel(literal(y_label))
     legend(canvas, axis)
     return svg(canvas)
 

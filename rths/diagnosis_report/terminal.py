@@ -105,7 +105,7 @@ def placed(report: Report) -> bool:
 def which(report: Report) -> list[str]:
     """The foremost candidates with probability and parameters."""
     lines: list[str] = []
-    for item in (report.get("which") or [])[:3]:
+    for item in wording.once(report.get("which") or [])[:3]:
         found = wording.parameters(item)
         several = len(item.get("effects") or []) > 1
         texts = [setting(*each, several=several) for each in found]
@@ -156,13 +156,13 @@ def tolerances(report: Report) -> list[str]:
 
 def equivalents(report: Report) -> list[str]:
     """What these signals cannot tell apart, in words."""
-    found = report.get("equivalent") or []
+    found = wording.sets(report)
     return row("equivalent", " ".join(map(wording.equivalent, found)), 2)
 
 
 def not_exercised(report: Report) -> list[str]:
     """Effects that the recording could not have shown."""
-    names = [wording.effect(name) for name in report.get("not_exercised") or []]
+    names = list(dict.fromkeys(map(wording.effect, report.get("not_exercised") or [])))
     return row("not shown", f"could not have appeared here: {', '.join(names)}" if names else "", 2)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 from rths.diagnosis_report import pictures, wording
 from rths.diagnosis_report.blocks import absent, bar, esc, figure, gallery, heading, paragraph, section, table
 from rths.diagnosis_report.wording import Report
-from rths.formats import as_float, known, percent, probability, quantity
+from rths.formats import as_float, known, nats, percent, probability, quantity
 
 Candidate = Mapping[str, Any]
 MOST_PICTURES = 6
@@ -28,8 +28,7 @@ def which(report: Report) -> str:
 def candidates(report: Report) -> list[Candidate]:
     """The candidates, ranked; those of the verdict where the report has no details."""
     detailed = (report.get("details") or {}).get("candidates")
-    chosen = detailed or report.get("which") or []
-    return sorted(chosen, key=lambda item: -(item.get("probability") or 0.0))
+    return wording.once(detailed or report.get("which") or [])
 
 
 def nothing(report: Report) -> str:
@@ -72,7 +71,7 @@ def worth(item: Candidate) -> str:
     score = item.get("score", item.get("held_out_score"))
     if known(score):
         behind = abs(as_float(score))
-        facts.append("best score" if behind < 0.05 else f"{behind:.3g} nats worse than the best")
+        facts.append("best score" if behind < 0.05 else f"{nats(behind)} worse than the best")
     return paragraph("; ".join(facts))
 
 

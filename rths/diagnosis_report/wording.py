@@ -69,6 +69,21 @@ def says(name: str) -> str:
     return entry.says if entry else ""
 
 
+def once(candidates: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """Candidates, the most probable first; of those with the same effects the most probable one."""
+    ordered = sorted(candidates, key=lambda item: -(item.get("probability") or 0.0))
+    found: dict[tuple[str, ...], Mapping[str, Any]] = {}
+    for item in ordered:
+        found.setdefault(tuple(sorted(map(str, item.get("effects") or []))), item)
+    return list(found.values())
+
+
+def sets(report: Report) -> list[Sequence[str]]:
+    """Sets of effects that cannot be told apart, each once."""
+    groups = report.get("equivalent") or []
+    return list({frozenset(names): names for names in reversed(groups)}.values())[::-1]
+
+
 def kind(candidate: Mapping[str, Any]) -> str:
     """Whether a candidate is physics or measurement; a mixture counts as physics."""
     if candidate.get("kind"):
@@ -142,7 +157,7 @@ def place(report: Report) -> str:
 
 def rivals(report: Report) -> str:
     """The foremost candidates."""
-    names = [effects(item.get("effects") or []) for item in (report.get("which") or [])[:3]]
+    names = [effects(item.get("effects") or []) for item in once(report.get("which") or [])[:3]]
     return joined(names, "or") or "none is named"
 
 

@@ -5,33 +5,37 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from common.recording.reader import Run
 from rths.figure import COLOURS, SMALL
+from rths.formats import axis_scale
 from rths.pictures.curves import curve
 from rths.pictures.layout import legend_above, shrink
 
 ROWS = (
-    ("ground_acceleration", 1.0, "ground\nm/s²"),
-    ("column_displacement", 1e3, "column\nmm"),
-    ("column_force", 1e-3, "column\nkN"),
-    ("absolute_acceleration", 1.0, "floor\nm/s²"),
-    ("damper_stroke", 1e3, "damper\nmm"),
-    ("damper_force", 1.0, "damper\nN"),
+    ("ground_acceleration", "m/s²", "ground"),
+    ("column_displacement", "m", "column"),
+    ("column_force", "N", "column"),
+    ("absolute_acceleration", "m/s²", "floor"),
+    ("damper_stroke", "m", "damper"),
+    ("damper_force", "N", "damper"),
 )
 LEGEND_COLUMNS = 6
 
 
 def draw(recording: Run, canvas: Any) -> bool:
     """One row per quantity over the whole test; False where there is none."""
-    rows = [(curve(recording, name), factor, label) for name, factor, label in ROWS]
-    present = [(found, factor, label) for found, factor, label in rows if found is not None]
+    rows = [(curve(recording, name), unit, label) for name, unit, label in ROWS]
+    present = [(found, unit, label) for found, unit, label in rows if found is not None]
     if not present:
         return False
     shrink(canvas, len(present), len(ROWS))
     axes = canvas.subplots(len(present), 1, sharex=True, squeeze=False)[:, 0]
-    for axis, (found, factor, label) in zip(axes, present, strict=True):
+    for axis, (found, unit, label) in zip(axes, present, strict=True):
+        factor, name = axis_scale(float(np.nanmax(np.abs(found.values))), unit)
         lines = axis.plot(found.t, factor * found.values, linewidth=0.6)
-        axis.set_ylabel(label)
+        axis.set_ylabel(f"{label}\n{name}")
         axis.margins(x=0.01)
         if len(lines) > 1:
             number_floors(axis, lines)

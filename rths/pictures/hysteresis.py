@@ -9,6 +9,7 @@ import numpy as np
 
 from common.recording.reader import Run
 from rths.figure import SMALL
+from rths.formats import axis_scale, fixed, scale
 from rths.pictures.curves import Values, moving, plan_of
 from rths.pictures.layout import panels
 
@@ -20,13 +21,11 @@ class Loop(NamedTuple):
     force: str
     x_label: str
     y_label: str
-    y_factor: float
 
 
-COLUMN = Loop("column_displacement", "column_force", "column deformation, mm", "column force, kN", 1e-3)
-DAMPER = Loop("damper_stroke", "damper_force", "damper stroke, mm", "damper force, N", 1.0)
+COLUMN = Loop("column_displacement", "column_force", "column deformation", "column force")
+DAMPER = Loop("damper_stroke", "damper_force", "damper stroke", "damper force")
 LOOPS = (COLUMN, DAMPER)
-MILLI = 1e3
 LEAST = 10  # ticks
 
 
@@ -41,9 +40,12 @@ def draw(recording: Run, canvas: Any) -> bool:
     if not present:
         return False
     for axis, (loop, x, y) in zip(panels(canvas, len(present), 2), present, strict=True):
-        axis.plot(MILLI * x, loop.y_factor * y, linewidth=0.5)
-        axis.set(xlabel=loop.x_label, ylabel=loop.y_label)
-        planned = planned_stiffness(axis, recording, loop, x, y) if loop is COLUMN else ""
+        (along, length), (up, force) = (
+            axis_scale(float(np.nanmax(np.abs(v))), u) for v, u in ((x, "m"), (y, "N"))
+        )
+        axis.plot(along * x, up * y, linewidth=0.5)
+        axis.set(xlabel=f"{loop.x_label}, {length}", ylabel=f"{loop.y_label}, {force}")
+        planned = planned_stiffness(axis, recording, (along, up), x, y) if loop is COLUMN else ""
         axis.set_title(work(x, y) + planned, loc="left", fontsize=SMALL)
     return True
 
@@ -51,9 +53,11 @@ def draw(recording: Run, canvas: Any) -> bool:
 def work(deformation: Values, force: Values) -> str:
     """The energy that a loop absorbs, to the place that noise leaves, of at most four."""
     energy, doubt = absorbed(deformation, force)
+    factor, unit = scale(max(abs(energy), doubt), "J")
+    energy, doubt = factor * energy, factor * doubt
     least = max(doubt, 1e-3 * abs(energy))
     places = max(0, -math.floor(math.log10(least))) if least > 0.0 else 0
-    return f"∫ F dx = {energy:.{places}f} ± {doubt:.{places}f} J".replace("-", "−")
+    return f"∫ F dx = {fixed(energy, places)} ± {fixed(doubt, places)} {unit}".replace("-", "−")
 
 
 def absorbed(deformation: Values, force: Values) -> tuple[float, float]:
@@ -81,7 +85,7 @@ def noise(values: Values) -> float:
     return float(np.std(np.diff(values, 2))) / math.sqrt(6.0) if values.size > LEAST else 0.0
 
 
-def planned_stiffness(axis: Any, recording: Run, loop: Loop, x: Values, y: Values) -> str:
+def planned_stiffness(axis: Any, recording: Run, factors: tuple[float, float], x: Values, y: Values) -> str:
     """The line of the plan's elastic stiffness, as far as forces were recorded, and what the title says of it."""
     plan = plan_of(recording)
     if plan is None or not plan.column.stiffness:
@@ -89,6 +93,6 @@ def planned_stiffness(axis: Any, recording: Run, loop: Loop, x: Values, y: Value
     stiffness, reach = plan.column.stiffness, float(np.nanmax(np.abs(y)))
     ends = np.clip(np.array([np.nanmin(x), np.nanmax(x)]), -reach / stiffness, reach / stiffness)
     axis.plot(
-        MILLI * ends, loop.y_factor * stiffness * ends, linestyle=(0, (4, 3)), color="black", linewidth=0.8
+        factors[0] * ends, factors[1] * stiffness * ends, linestyle=(0, (4, 3)), color="black", linewidth=0.8
     )
-    return f"; dashed: planned {1e-6 * stiffness:.3g} kN/mm"
+    return f"\ndashed: planned {1e-6 * stiffness:.3g} kN/mm"

@@ -20,6 +20,7 @@ SEGMENT = 10.0  # s: lines 0.1 Hz apart, half the width of a peak at 2 Hz with 5
 LEAST = 64  # ticks
 HOLES = 4  # ticks that may be missing for one that is there
 RANGE = 1e6  # of the ordinate: below lies rounding
+BANDS = 24  # a decade: 10 % wide, as wide as a peak with 5 % of damping
 MODES = 3
 DASHED = (0, (4, 2))
 DOTTED = (0, (1, 1))
@@ -98,7 +99,7 @@ def densities(axis: Any, lines: list[Line]) -> None:
     """The spectra of an axis, over as many decades as mean something."""
     top = 0.0
     for line in lines:
-        frequency, density = amplitude_density(line.found)
+        frequency, density = averaged(*amplitude_density(line.found))
         axis.loglog(
             frequency,
             line.factor * density,
@@ -132,6 +133,19 @@ def amplitude_density(item: Curve) -> tuple[Values, Values]:
     length = min(even.size, round(SEGMENT / step))
     frequency, power = signal.welch(even, 1.0 / step, "hann", length, detrend="constant")
     return frequency[1:], np.sqrt(power[1:])
+
+
+def averaged(frequency: Values, density: Values) -> tuple[Values, Values]:
+    """Mean square densities over bands of equal width on a logarithmic axis, at the mean frequency of each.
+
+    Lines stand ever closer together there: each alone scatters by as much as its value, and all of them are a solid
+    area. Where a band holds one line only, it stays as it is.
+    """
+    band = np.floor(BANDS * np.log10(frequency)).astype(int)
+    starts = np.flatnonzero(np.diff(band, prepend=band[0] - 1))
+    count = np.diff(starts, append=frequency.size)
+    power = np.add.reduceat(density**2, starts) / count
+    return np.add.reduceat(frequency, starts) / count, np.sqrt(power)
 
 
 def natural_frequencies(recording: Run) -> list[float]:

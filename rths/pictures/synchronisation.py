@@ -13,10 +13,10 @@ import numpy as np
 
 from common.recording.reader import Run
 from rths.figure import COLOURS, REFERENCE
+from rths.formats import axis_scale
 from rths.pictures.curves import Pair, pairs, quality
 from rths.pictures.layout import legend_above, note, panels
 
-MILLI = 1e3
 ROOM = 0.05  # at the ends of an axis, of the range
 
 
@@ -32,7 +32,8 @@ def draw(recording: Run, canvas: Any) -> bool:
 
 def subspace(axis: Any, pair: Pair) -> None:
     """The whole test, its strongest seconds in front, and what `inspect` says of them all."""
-    x, y, strong = MILLI * pair.wanted, MILLI * pair.got, pair.strongest()
+    factor, unit = axis_scale(float(np.nanmax(np.abs([pair.wanted, pair.got]))), "m")
+    x, y, strong = factor * pair.wanted, factor * pair.got, pair.strongest()
     low, high = float(np.nanmin([x, y])), float(np.nanmax([x, y]))
     ends = (low - ROOM * (high - low), high + ROOM * (high - low))
     axis.plot(x, y, color=COLOURS[5], linewidth=0.8, label="whole test")
@@ -42,8 +43,8 @@ def subspace(axis: Any, pair: Pair) -> None:
     axis.set(
         xlim=ends,
         ylim=ends,
-        xlabel=f"{pair.word} of {pair.label}, mm",
-        ylabel=f"measured {pair.label}, mm",
+        xlabel=f"{pair.word} of {pair.label}, {unit}",
+        ylabel=f"measured {pair.label}, {unit}",
     )
     axis.set_box_aspect(1)
     axis.locator_params(nbins=6)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from common.recording.reader import Run
+from rths.formats import axis_scale
 from rths.pictures.curves import Pair, pairs
 from rths.pictures.layout import legend_above, shrink, wide
-
-MILLI = 1e3
 
 
 def draw(recording: Run, canvas: Any) -> bool:
@@ -35,12 +36,14 @@ def double_rows(canvas: Any, count: int) -> list[tuple[Any, Any]]:
 def follow(upper: Any, lower: Any, pair: Pair) -> None:
     """The seconds around the largest target."""
     part = pair.strongest()
-    t, wanted, got = pair.t[part], MILLI * pair.wanted[part], MILLI * pair.got[part]
+    factor, unit = axis_scale(float(np.nanmax(np.abs([pair.wanted[part], pair.got[part]]))), "m")
+    t, wanted, got = pair.t[part], factor * pair.wanted[part], factor * pair.got[part]
     upper.plot(t, wanted, label=pair.word)
     upper.plot(t, got, linestyle=(0, (4, 2)), label="measured")
-    upper.set_ylabel(pair.label.replace(" ", "\n") + ", mm")
+    upper.set_ylabel(pair.label.replace(" ", "\n") + f", {unit}")
     legend_above(upper)
     lower.sharex(upper)
-    lower.plot(t, got - wanted, linewidth=0.8)
-    lower.set(xlabel="time, s", ylabel=f"measured\n− {pair.word}, mm")
+    of_error, unit = axis_scale(float(np.nanmax(np.abs(pair.error[part]))), "m")
+    lower.plot(t, of_error * pair.error[part], linewidth=0.8)
+    lower.set(xlabel="time, s", ylabel=f"measured\n− {pair.word}, {unit}")
     upper.tick_params(labelbottom=False)

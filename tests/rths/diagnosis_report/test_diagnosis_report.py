@@ -14,8 +14,9 @@ from rths.diagnosis_report import pictures, which, wording
 from rths.diagnosis_report.page import page
 from rths.diagnosis_report.schema import schema
 from rths.diagnosis_report.terminal import summary
-from rths.formats import percent, percent_interval, probability, quantity, span, times
+from rths.formats import nats, percent, percent_interval, probability, quantity, reading, span, times
 from tests.rths.diagnosis_report.reports import REPORTS, Report, bare, fresh
+from tests.rths.pictures.axes import check_axes
 from tests.rths.report.pages import check_alone
 
 VOID = {"meta", "br", "img"}
@@ -262,7 +263,7 @@ def test_quantities_read_as_in_the_field() -> None:
     assert quantity(1.011, "–", [1.009, 1.013]) == "1.0110 (1.0090 … 1.0130)"
     assert quantity(4.7e-9, "m/N") == "4.70 nm/N"
     assert quantity(0.0, "s") == "0 s"
-    assert quantity(3.0, "kg", [2.0, None]) == "3.00 kg (2.00 … ?)"
+    assert quantity(3.0, "kg", [2.0, None]) == "3.00 kg (from 2.00)"
     assert quantity(None, "m") == "–"
     assert [percent(value) for value in (0.91, 0.034, 0.0012, 0.0, None)] == [
         "91 %",
@@ -316,3 +317,58 @@ def test_a_report_without_a_verdict_gets_one(status: str) -> None:
     report = fresh("explained") | {"status": status, "verdict": ""}
     assert wording.verdict(report).endswith(".")
     assert "–" not in wording.verdict(report)
+
+
+def seen(monkeypatch: Any) -> list[Any]:
+    """The canvases of a page, as they are when they are saved."""
+    from matplotlib.figure import Figure
+
+    found: list[Any] = []
+    save = Figure.savefig
+
+    def saved(self: Any, *args: Any, **options: Any) -> None:
+        found.append(self)
+        save(self, *args, **options)
+
+    monkeypatch.setattr(Figure, "savefig", saved)
+    return found
+
+
+def test_no_label_of_a_picture_is_cut_off_and_no_factor_stands_above_an_axis(monkeypatch: Any) -> None:
+    canvases = seen(monkeypatch)
+    report = fresh("explained")
+    long = {f"a_long_table.a_rather_long_parameter_{place}": {"z": 2.0} for place in range(3)}
+    assert pictures.tolerance_moves(list(long.items()))
+    relation = report["details"]["curves"][0]
+    for axis in ("x", "y"):
+        relation[axis]["label"] = "stroke, m"
+    for key in ("measured", "before", "after"):
+        relation[key] = [1e-5 * item for item in relation[key]]
+    assert pictures.curve(relation)
+    assert page(report)
+    for canvas in canvases:
+        canvas.draw_without_rendering()
+        check_axes(canvas, str([axis.get_ylabel() for axis in canvas.axes]))
+    assert "µm" in str([axis.get_ylabel() for axis in canvases[1].axes])
+
+
+def test_numbers_that_say_nothing_are_not_written_out() -> None:
+    assert quantity(-1e-15, "s") == "0 s"
+    assert quantity(3.0, "N", [None, None]) == "3.00 N"
+    assert quantity(3.0, "N", [None, 4.0]) == "3.00 N (up to 4.00)"
+    assert times(0.004) == "< 0.1×"
+    assert span([0.0, 0.0], "Hz") == ""
+    assert nats(134000.0) == "more than 1,000 nats"
+    assert reading(-1e-9, "m") == "0.000 mm"
+
+
+def test_an_effect_that_is_listed_twice_is_said_once() -> None:
+    report = fresh("explained")
+    first = report["details"]["candidates"][0]
+    report["details"]["candidates"].append(first | {"probability": 0.001})
+    report["not_exercised"] = ["damper.stroke_stop", "damper.stroke_stop"]
+    report["equivalent"] = [["damper.friction", "table.friction"], ["table.friction", "damper.friction"]]
+    assert len(which.candidates(report)) == len(report["details"]["candidates"]) - 1
+    assert wording.sets(report) == [["damper.friction", "table.friction"]]
+    html = page(report)
+    assert html.count("<li>damper stroke stop ") == 1

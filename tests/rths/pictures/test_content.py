@@ -120,8 +120,9 @@ def test_without_targets_a_command_stands_in_with_its_own_tick() -> None:
 @pytest.mark.parametrize("frequency", [0.7, 2.0, 13.3])
 def test_a_spectrum_has_its_peak_and_its_mean_square_where_the_sinusoid_has(frequency: float) -> None:
     run = sinusoid(frequency, 5e-3, 0.01)
-    lines = {line.get_label(): line for line in drawn(run, "spectra").axes[0].lines}
-    assert lines.keys() == {"column", "table", "error of column", "error of table"}
+    shown = {line.get_label(): line for line in drawn(run, "spectra").axes[0].lines}
+    lines = {line.label: line for line in spectra.displacements(run)}
+    assert shown.keys() == lines.keys() == {"column", "table", "error of column", "error of table"}
     error = 2.0 * math.sin(math.pi * frequency * 0.01) * 5.0
     for label, amplitude in (
         ("column", 5.0),
@@ -129,12 +130,28 @@ def test_a_spectrum_has_its_peak_and_its_mean_square_where_the_sinusoid_has(freq
         ("error of column", error),
         ("error of table", error),
     ):
-        f, density = lines[label].get_xdata(), lines[label].get_ydata()
+        f, density = spectra.amplitude_density(lines[label].found)
+        density *= 1e3
         step = f[1] - f[0]
         assert step == pytest.approx(0.1)
         assert f[np.argmax(density)] == pytest.approx(frequency, abs=0.5 * step)
         mean_square = float(np.sum(density**2) * step)
         assert math.sqrt(2.0 * mean_square) == pytest.approx(amplitude, rel=5e-3)
+        place = int(np.argmax(shown[label].get_ydata()))
+        assert shown[label].get_xdata()[place] == pytest.approx(frequency, rel=0.06)  # half a band and a line
+
+
+def test_the_lines_of_a_band_are_averaged_and_keep_their_mean_square() -> None:
+    f = np.arange(0.1, 250.0, 0.1)
+    density = np.abs(np.random.default_rng(1).normal(size=f.size))
+    at, level = spectra.averaged(f, density)
+    assert at[:9] == pytest.approx(f[:9])  # single lines at low frequencies
+    assert level[:9] == pytest.approx(density[:9])
+    assert at.size < 90
+    assert np.ptp(level[-20:]) < 0.2  # no solid noise
+    widths = np.diff(np.floor(24 * np.log10(f)), prepend=-99.0)
+    counts = np.diff(np.flatnonzero(widths), append=f.size)
+    assert np.sum(counts * level**2) == pytest.approx(np.sum(density**2))
 
 
 def test_the_natural_frequency_is_that_of_the_plan(virtual_recording: Any) -> None:
