@@ -88,11 +88,12 @@ def piece(link: str, poor: Simulation, perfect: Array) -> Piece:
     return Piece(link, plan.test.seed, seconds, int(tripped), len(judge(poor)), holds, lost, *gaps)
 
 
-def gap_figure(name: str, values: list[float]) -> Figure:
+def gap_figure(which: str, link: str, values: list[float]) -> Figure:
     """Smallest and median of the pieces; the worst stands in the name."""
     worst = f", worst {max(values):.3g}" if values else ""
     middle = statistics.median(values) if values else None
-    return Figure(f"{name}{worst}", "of the drift", min(values, default=None), middle)
+    name = f"added gap in the storey drift, {which}, {link}{worst}"
+    return Figure(name, "of the drift", min(values, default=None), middle)
 
 
 def figures(pieces: list[Piece]) -> list[Figure]:
@@ -114,12 +115,8 @@ def figures(pieces: list[Piece]) -> list[Figure]:
             points=points,
         ),
         Figure(f"holds of either laboratory, {link}", "per hour", holds, holds),
-        gap_figure(
-            "added gap in the storey drift, NRMSE", [one.nrmse for one in pieces if one.nrmse is not None]
-        ),
-        gap_figure(
-            "added gap in the storey drift, largest", [one.peak for one in pieces if one.peak is not None]
-        ),
+        gap_figure("NRMSE", link, [one.nrmse for one in pieces if one.nrmse is not None]),
+        gap_figure("largest", link, [one.peak for one in pieces if one.peak is not None]),
     ]
 
 

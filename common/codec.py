@@ -1,15 +1,17 @@
 """Messages to bytes and back: msgpack arrays of fixed fields behind a keyed 64-bit check.
 
-A frame is `msgpack([kind, field, …]) + check`. What does not have exactly the fields, types and ranges
-of a known message, or whose check fails, is rejected with a reason and reaches nobody. A frame's size is
-bounded before anything else is done with it; what msgpack makes of hostile content within that size takes
-at most some sixty bytes of memory per byte of the frame, until it is thrown away.
+A frame is `msgpack([kind, field, …]) + check`. Messages of numbers alone, those of a tick among them, have each number
+in its widest form (int 64, float 64), so that all frames of such a kind have one layout. What does not have exactly the
+fields, types and ranges of a known message, or whose check fails, is rejected with a reason and reaches nobody. A
+frame's size is bounded before anything else is done with it; what msgpack makes of hostile content within that size
+takes at most some sixty bytes of memory per byte of the frame, until it is thrown away.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Container
+import struct
+from collections.abc import Callable, Container, Sequence
 from enum import Enum
 from math import isfinite
 from operator import itemgetter
@@ -53,6 +55,53 @@ class RejectedFrame(ValueError):  # noqa: N818 - it is a finding about a frame, 
         self.reason = reason
 
 
+NUMBERS = {
+    int: (0xD3, "q"),
+    float: (0xCB, "d"),
+}  # msgpack's int 64 and float 64: their marks, and struct's letters
+ARRAY = 0x90  # msgpack's mark of an array of up to 15 items, plus their count
+
+
+def checker(message: type[Any]) -> Callable[..., bool]:
+    """What tells whether the items of a message of numbers alone, its kind first, have values that it may have.
+
+    It is written out as one expression: after a wake-up the caches hold other things, and each further call costs
+    more than the comparisons do.
+    """
+    hints = get_type_hints(message)
+    names = message._fields
+    whole = [f"{LEAST.get(name, 0)} <= {name} <= {MOST}" for name in names if hints[name] is int]
+    floats = [name for name in names if hints[name] is float]
+    finite = [f"isfinite({' + '.join(floats)})"] if floats else []
+    source = f"lambda _kind, {', '.join(names)}: {' and '.join(whole + finite)}"
+    admits: Callable[..., bool] = eval(source, {"isfinite": isfinite})  # noqa: S307 - of the fields' names alone
+    return admits
+
+
+class _Layout:
+    """The payload of a message that holds numbers only: two bytes for array and kind, then a mark and eight bytes each.
+
+    It is msgpack like any other, read and written by `struct`, which takes a third of the time.
+    """
+
+    def __init__(self, message: type[Any], types: Sequence[type]) -> None:
+        fields = [NUMBERS[kind] for kind in types[1:]]
+        self.marks = bytes(mark for mark, _ in fields)
+        self.size = 2 + 9 * len(fields)
+        self.admits = checker(message)
+        self._write = struct.Struct(">BB" + "".join(f"B{letter}" for _, letter in fields)).pack
+        self.read = struct.Struct(">xB" + "".join(f"x{letter}" for _, letter in fields)).unpack
+        # the loop's thread alone encodes; the numbers of a message take their places among the marks
+        self._slots: list[Any] = [ARRAY + len(types), 0, *(item for mark in self.marks for item in (mark, 0))]
+
+    def pack(self, kind: int, message: Message) -> bytes:
+        """The payload of a message of this kind."""
+        slots = self._slots
+        slots[1] = kind
+        slots[3::2] = message
+        return self._write(*slots)
+
+
 class _Shape:
     """What the items of one frame must be: exact types, whole numbers and texts in range, floats finite.
 
@@ -70,10 +119,11 @@ class _Shape:
             (place, LEAST[name]) for place, name in enumerate(message._fields, start=1) if name in LEAST
         ]
         self.texts = [place for place, kind in enumerate(self.types) if kind is str]
+        self.layout = _Layout(message, self.types) if set(self.types) <= NUMBERS.keys() else None
 
     def _items(
         self, message: type[Any], kind: type, *, but: Container[str] = ()
-    ) -> Callable[[list[Any]], tuple[Any, ...]]:
+    ) -> Callable[[Sequence[Any]], tuple[Any, ...]]:
         """What takes the items of a type out of a frame's, but for those of these names."""
         places = [
             place
@@ -84,7 +134,7 @@ class _Shape:
         # the getter of a single place gives no tuple; the kind, a small count, is a harmless second
         return itemgetter(*places, *[first] * (2 - len(places)))
 
-    def admits(self, items: list[Any]) -> bool:
+    def admits(self, items: Sequence[Any]) -> bool:
         """Whether items of the right types have values that a message may have."""
         if min(self._counts(items)) < 0 or max(self._numbers(items)) > MOST:
             return False
@@ -112,6 +162,11 @@ PACKER = msgpack.Packer()
 REPACKER = msgpack.Packer()  # the link's threads', which hold the interpreter's lock while they pack
 
 SHAPES = tuple(_Shape(message) for message in MESSAGES)
+LAYOUTS = {
+    bytes((ARRAY + len(shape.types), kind)): (shape, shape.layout)
+    for kind, shape in enumerate(SHAPES)
+    if shape.layout is not None
+}  # by the first two bytes
 
 
 class Key(Protocol):
@@ -142,7 +197,9 @@ def _check(key: Key, payload: bytes) -> bytes:
 
 def encode(message: Message, key: Key) -> bytes:
     """The frame of a message."""
-    payload: bytes = PACKER.pack((KINDS[type(message)], *message))
+    kind = KINDS[type(message)]
+    layout = SHAPES[kind].layout
+    payload: bytes = layout.pack(kind, message) if layout else PACKER.pack((kind, *message))
     return payload + _check(key, payload)
 
 
@@ -174,6 +231,24 @@ def decode(frame: bytes, key: Key, *, allowed: Container[type] = KINDS, largest:
     payload = frame[:-CHECK_SIZE]
     if _check(key, payload) != frame[-CHECK_SIZE:]:
         raise RejectedFrame(Reject.CHECK)
+    shape, layout = LAYOUTS.get(payload[:2], NO_LAYOUT)
+    if layout and shape and len(payload) == layout.size and payload[2::9] == layout.marks:
+        items: Sequence[Any] = layout.read(payload)
+        if shape.message not in allowed:
+            raise RejectedFrame(Reject.KIND_NOT_ALLOWED)
+        if not layout.admits(*items):
+            raise RejectedFrame(Reject.VALUE)
+    else:
+        shape, items = _unpacked(payload, allowed)
+    message: Message = tuple.__new__(shape.message, items[1:])
+    return message
+
+
+NO_LAYOUT: tuple[_Shape | None, _Layout | None] = (None, None)
+
+
+def _unpacked(payload: bytes, allowed: Container[type]) -> tuple[_Shape, list[Any]]:
+    """Shape and items of a payload that has no layout of its own; raises RejectedFrame where it is no message's."""
     try:
         items = msgpack.unpackb(payload)
     except (ValueError, msgpack.UnpackException):
@@ -181,10 +256,9 @@ def decode(frame: bytes, key: Key, *, allowed: Container[type] = KINDS, largest:
     if type(items) is not list or not items:
         raise RejectedFrame(Reject.FORMAT)
     shape = _shape(items, allowed)
-    if REPACKER.pack(items) != payload:
+    if shape.layout or REPACKER.pack(items) != payload:
         raise RejectedFrame(Reject.FORMAT)
-    message: Message = tuple.__new__(shape.message, items[1:])
-    return message
+    return shape, items
 
 
 def _shape(items: list[Any], allowed: Container[type]) -> _Shape:

@@ -59,6 +59,9 @@ class SlaveLoop:
         self._step = SlaveStep(setting.plan.of(role))
         self._command = NO_COMMAND
         self._shift_ns = 0
+        self._leap_ns = (
+            setting.plan.window * self.lab.interval_ns
+        )  # clocks drift slowly: beyond it is no drift
         self._said_ns = -REPEAT_NS
         begin = partial(TableRamp, setting.plan)
         self._descent = Descent(self.lab, rig, begin, TableCommand(0.0, 0.0), len(TableMeasurement._fields))
@@ -111,8 +114,8 @@ class SlaveLoop:
             return
         self.lab.heard_ns = received_ns
         self._heard = (command.seq, received_ns)
-        if abs(command.shift_ns - self._shift_ns) <= self.lab.plan.window * self.lab.interval_ns:
-            self._shift_ns = command.shift_ns  # clocks drift slowly: a leap is none of theirs
+        if abs(command.shift_ns - self._shift_ns) <= self._leap_ns:
+            self._shift_ns = command.shift_ns
         extra = self._commands.put(command.seq, command)
         if extra is None:
             self._tally.lose(command.seq)

@@ -150,7 +150,9 @@ CONTENTS: dict[str, tuple[bytes, str]] = {
         BODY.replace(struct.pack(">Bd", 0xCB, 12.5), struct.pack(">Bf", 0xCA, 12.5)),
         "format",
     ),
-    "a number in more bytes than it needs": (BODY.replace(b"\x07\x03", b"\x07\xcc\x03"), "format"),
+    "a number in fewer bytes than others": (BODY.replace(b"\xd3" + bytes(7) + b"\x03", b"\x03"), "format"),
+    "numbers in as few bytes as they need": (bare(command()), "format"),
+    "a number without a sign": (BODY.replace(b"\xd3", b"\xcf", 1), "format"),
 }
 
 
