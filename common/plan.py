@@ -38,7 +38,7 @@ from common.tables import (
     Tolerances,
 )
 
-PROTOCOL_VERSION = 4
+PROTOCOL_VERSION = 5
 MOST_SLAVES = 16
 FOLLOWS_IN = "table.compensator"
 SLAVE_NAME = re.compile(r"[a-z][a-z0-9_]*")
