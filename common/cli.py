@@ -133,7 +133,7 @@ def load_reality(path: Path | None, plan: Plan) -> Reality:
 
 def json_report(kind: str, data: Mapping[str, Any]) -> None:
     """One JSON object per line on standard output, as long as anybody reads it: a test goes on without."""
-    with contextlib.suppress(BrokenPipeError):
+    with contextlib.suppress(OSError):
         sys.stdout.write(json.dumps({"kind": kind, **data}) + "\n")
         sys.stdout.flush()
 
@@ -207,7 +207,8 @@ def answered(main: Callable[[], int]) -> int:
 def complained(text: str, code: int) -> int:
     """Say an error after all that was printed before it; its exit code."""
     drain()
-    sys.stderr.write(f"rths: {shown(text)}\n")
+    with contextlib.suppress(OSError):  # a terminal that was closed
+        sys.stderr.write(f"rths: {shown(text)}\n")
     return code
 
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Callable, Mapping
-from types import FrameType
 from typing import Protocol
 
 from common.endpoint import Received
@@ -12,6 +10,7 @@ from common.exchange import State
 from common.laboratory import Laboratory
 from common.plan import Plan
 from common.realtime import freeze
+from common.safety.descent import Resting
 from common.safety.modes import Mode
 from common.surroundings import Surroundings
 from common.waited import Waited
@@ -19,6 +18,9 @@ from common.waited import Waited
 IDLE_NS = 5_000_000  # how often the handshake looks after itself
 LEAVE_NS = 5_000_000_000  # how long the last words may take where the recorder is not waited for
 PROGRESS_NS = 200_000_000
+RESTING_NS = (
+    500_000_000  # between two reports of the way to rest: the user is not kept waiting for the next one
+)
 
 
 class Loop(Protocol):
@@ -89,6 +91,10 @@ class Loop(Protocol):
     def progress(self) -> Mapping[str, float]:
         """What a user watches."""
 
+    @property
+    def resting(self) -> Resting:
+        """How far the rig is on its way to rest."""
+
 
 def drive(loop: Loop, stopping: Callable[[], str], surroundings: Surroundings) -> None:
     """Run a test to its end; `stopping` gives the reason to end it early, empty while there is none."""
@@ -150,6 +156,7 @@ def come_to_rest(loop: Loop, tick: int) -> None:
     """
     lab = loop.lab
     late = lab.interval_ns // 4
+    reported = -RESTING_NS
     while lab.safety.mode is Mode.RAMPING:
         tick += max(-((loop.nominal(tick) + late - lab.clock.now()) // lab.interval_ns), 0)
         lab.clock.sleep_until(loop.nominal(tick))
@@ -159,6 +166,9 @@ def come_to_rest(loop: Loop, tick: int) -> None:
             loop.ease(tick)
         loop.tell()
         lab.send_samples()
+        if lab.safety.mode is Mode.RAMPING and lab.clock.now() - reported >= RESTING_NS:
+            reported = lab.clock.now()
+            lab.report("resting", {"lab": lab.name, **loop.resting._asdict()})
         tick += 1
 
 
@@ -215,25 +225,3 @@ def depart(loop: Loop) -> None:
 def longest_leave(plan: Plan) -> float:
     """How long the last words of a laboratory may take at most, s."""
     return LEAVE_NS * 1e-9 + plan.recording.patience
-
-
-class Stopper:
-    """Turns SIGINT and SIGTERM into a reason to stop."""
-
-    def __init__(self) -> None:
-        self._reason = ""
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, self._caught)
-
-    def _caught(self, number: int, _frame: FrameType | None) -> None:
-        self._reason = f"stopped by the user ({signal.Signals(number).name})."
-
-    def __call__(self) -> str:
-        """The reason, empty while there is none."""
-        return self._reason
-
-    @staticmethod
-    def ignore() -> None:
-        """From now on: a process that has done its work ends with its own exit code, not with a late signal's."""
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, signal.SIG_IGN)

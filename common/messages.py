@@ -178,7 +178,7 @@ class Recorder(NamedTuple):
     """Recorder to the laboratories, ten times a second: its state, and how far it has each stream."""
 
     session: int
-    state: str  # ready, recording, failed, done
+    state: str  # ready, recording, stopping, failed, done
     plan: str
     reason: str
     nexts: bytes  # by role, the item that comes next

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Protocol
 
 from common import cli, realtime
 from common.address import loopback
 from common.clock import MonotonicClock
-from common.drive import Loop, Stopper, drive
+from common.drive import Loop, drive
 from common.endpoint import FrameEndpoint
 from common.errors import InterlockError, RthsError
 from common.laboratory import Report, Setting
@@ -18,6 +19,8 @@ from common.plan import Plan
 from common.preflight import Check, Gate
 from common.reality import Reality
 from common.roles import MASTER, RECORDER, SLAVE, title
+from common.safety.modes import Mode
+from common.stopping import Stopper
 from common.surroundings import Surroundings
 from common.waited import Waited
 
@@ -69,6 +72,7 @@ def conduct(
         loop = assembly.build_loop(setting, reality, gate=gate)
         loop.lab.heard_ns = setting.clock.now()
         timed = role == "master"
+        stopping.answer = partial(answer, loop)
         drive(loop, stopping, Surroundings(loop.lab, granted, endpoint.rejected, timed=timed, gate=gate))
     finally:
         link.close()
@@ -102,6 +106,14 @@ class Search:
         if text := self._waited.news(f"the {MASTER}", self._patience, self._clock.now()):
             self._report("waiting", {"lab": self._role, "text": text})
         return self._stopping()
+
+
+def answer(loop: Loop) -> str:
+    """What a laboratory says to a second wish to stop: what it is at, since that wish changes nothing."""
+    lab = loop.lab
+    if lab.safety.mode is not Mode.RAMPING:
+        return f"{lab.name}: is {lab.safety.mode.value.replace('_', ' ')}, and leaves as soon as it may."
+    return f"{lab.name}: {loop.resting.text}; a way to rest is never cut short."
 
 
 def join(

@@ -26,6 +26,18 @@ class ColumnRamp:
         return self._motion.done
 
     @property
+    def left(self) -> float:
+        """How long it takes at most from here on, s."""
+        return self._motion.left
+
+    def doing(self, measured: ColumnMeasurement | None) -> str:
+        """What it does, in words, with the force that the specimen still carries."""
+        force = "unknown force" if measured is None else f"{abs(measured.column_force) * 1e-3:.1f} kN"
+        if self._motion.unloading:
+            return f"unloading the column: {force} left"
+        return f"bringing the actuator to a halt: {force} on the column"
+
+    @property
     def travel(self) -> float:
         """How far apart they have been, m."""
         return self._motion.travel

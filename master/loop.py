@@ -31,7 +31,7 @@ from common.plan import PROTOCOL_VERSION
 from common.preflight import Gate
 from common.rig import ColumnCommand, ColumnMeasurement, GuardedRig
 from common.roles import MASTER, RECORDER
-from common.safety.descent import Descent
+from common.safety.descent import Descent, Resting
 from common.safety.modes import Turn
 from common.safety.watchdog import Finding
 from master.descent import ColumnRamp
@@ -241,6 +241,8 @@ class MasterLoop:
         if recording.required and lab.recorder is not None and lab.recorder.state == "failed":
             error = InterlockError(f"The recording is lost: {lab.recorder.reason}")
             lab.fail(Event.TRIP, error, code="recording_lost", tick=tick)
+        elif recording.required and lab.recorder is not None and lab.recorder.state == "stopping":
+            self.stop(f"The recorder was {lab.recorder.reason}")
         elif recording.required and now - lab.recorder_heard_ns > recording.patience * 1e9:
             lab.lost("The recorder", recording.patience, tick)
 
@@ -358,6 +360,11 @@ class MasterLoop:
             "round_trip": max(account.round_trip for account in accounts),
             "missed": float(max(account.missed for account in accounts)),
         }
+
+    @property
+    def resting(self) -> Resting:
+        """How far the rig is on its way to rest."""
+        return self._descent.resting
 
     # -- pacing -----------------------------------------------------------------------------------
 

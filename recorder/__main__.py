@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 from common import cli, process
 from common.clock import MonotonicClock, unix_ns
-from common.drive import Stopper
 from common.endpoint import Endpoint, FrameEndpoint
 from common.laboratory import Setting
 from common.preflight import Gate
+from common.stopping import Stopper
 
 if TYPE_CHECKING:
     from common.plan import Plan

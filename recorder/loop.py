@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from common import signals
 from common.clock import Clock
 from common.endpoint import Endpoint
-from common.errors import IncompleteError, InputError, LostError
+from common.errors import IncompleteError, InputError, InterlockError, LostError
 from common.laboratory import REPEAT_NS, Report, Setting
 from common.messages import Finished, Message, Recorder, Register, Resend, Samples
 from common.outlet import BURST, PIECE, Inlet, pack_nexts
@@ -21,6 +21,10 @@ from recorder.sink import Item, Sink
 SILENCE_NS = 5_000_000_000  # a test from which nothing is heard for so long is over
 ITEMS_PER_TICK, SPARE_TICKS = 4, 100_000  # bounds a stream's items: its topics of every tick, and events
 ASK_NS = 20_000_000  # from asking a laboratory to asking it again, where the answer has come
+ASKED_SILENCE_NS = (
+    2_000_000_000  # the same once it was asked to stop: laboratories that move are heard every interval
+)
+ASKED_NS = 20_000_000_000  # how long it records on at most, once asked: longer than a way to rest at the default limits
 STALL_NS = 1_000_000_000  # a recorder that did nothing for so long was held up itself
 ROWS_LOST = "rows_lost"  # code of the event that says what a laboratory did not send again
 CONSEQUENCE = "remote_trip"  # the other laboratory's cause counts
@@ -66,7 +70,9 @@ class RecorderLoop:
         self._unended: list[str] = []  # laboratories the end of whose stream never came
         self._settled = False  # the test had ended when somebody stopped the recorder
         self._newest: list[Any] = ["", 0, 0, 0]  # item of the newest tick
-        self.error: IncompleteError | InputError | LostError | None = None
+        self._wish = ""  # why it was asked to stop
+        self._asked_ns = 0
+        self.error: IncompleteError | InputError | InterlockError | LostError | None = None
         self.done = False
 
     # -- messages ---------------------------------------------------------------------------------
@@ -164,14 +170,16 @@ class RecorderLoop:
 
     def _say(self) -> None:
         failure = self._sink.failure or (str(self.error) if self.error else "")
-        state = "failed" if failure else "recording" if self._session else "ready"
+        state = (
+            "failed" if failure else "stopping" if self._wish else "recording" if self._session else "ready"
+        )
         if failure and not self._said_failure:
             self._said_failure = True
             self._report(
                 "event", {"lab": "recorder", "level": "error", "code": "recording_lost", "text": failure}
             )
         nexts = pack_nexts({lab: inlet.next for lab, inlet in self._inlets.items()})
-        self._endpoint.send(Recorder(self._session, state, self._digest, failure, nexts))
+        self._endpoint.send(Recorder(self._session, state, self._digest, failure or self._wish, nexts))
 
     def _fill_holes(self, now: int) -> None:
         patience_ns = self._plan.recording.patience * 1e9
@@ -230,22 +238,52 @@ class RecorderLoop:
 
     def _end(self, now: int) -> None:
         silent = now - self._heard_ns
+        patience = ASKED_SILENCE_NS if self._wish else SILENCE_NS
         if all(inlet.complete for inlet in self._inlets.values()):
+            self.error = InterlockError(self._wish) if self._wish else self.error
             self.done = True
+        elif self._wish and now - self._asked_ns > ASKED_NS:
+            self._leave(self._wish)
         elif not self._session and silent > self._plan.link.connect_timeout * 1e9:
             seconds = self._plan.link.connect_timeout
             self.error = LostError(
                 f"No master was heard within {seconds:g} s: check the address after --connect."
             )
             self.done = True
-        elif self._session and silent > SILENCE_NS:
-            if not self._outcome[0]:
-                self._outcome = ("lost", "The laboratories fell silent.")
-                self.error = LostError("The laboratories fell silent; what came until then is recorded.")
+        elif self._session and silent > patience:
+            self._fell_silent()
             self.done = True
 
+    def _fell_silent(self) -> None:
+        """Nobody is heard any more; a test that was ended in order has not come to its end where one never said so."""
+        code, text = self._outcome
+        missing = [title(lab) for lab, inlet in self._inlets.items() if inlet.total is None]
+        if code == "stop" and missing:
+            who = " and ".join(missing)
+            self._outcome = (
+                "lost",
+                f"The {who} fell silent before the rig was known to be at rest, after: {text}",
+            )
+        elif not code:
+            self._outcome = ("lost", "The laboratories fell silent.")
+        if self._outcome[0] == "lost" and self._outcome[0] != code:
+            self.error = LostError(f"{self._outcome[1].removesuffix('.')}; what came until then is recorded.")
+
     def stop(self, reason: str) -> None:
-        """End the recording because somebody wants it so; why the test ended before stays the outcome."""
+        """End the recording because somebody wants it so; why the test ended before stays the outcome.
+
+        A test that needs its recording is asked to end, and its way to rest is recorded.
+        """
+        if self._wish or self.done:
+            return
+        if self._session and self._plan.recording.required and not self._sink.failure:
+            self._wish, self._asked_ns = reason, self._clock.now()
+            self._say()
+        else:
+            self._leave(reason)
+
+    def _leave(self, reason: str) -> None:
+        """Stop recording although the test may go on."""
         self.error = LostError(reason)
         self._settled = bool(self._outcome[0])
         if not self._settled:

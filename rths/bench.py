@@ -59,7 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Play the bench test of a part; its exit code."""
     from common import plan as plans
-    from common.drive import Stopper
+    from common.stopping import Stopper
 
     plan = plans.load(cli.plan_path(args.plan)).with_test(seed=args.seed)
     # in real time nothing may run beside the loop

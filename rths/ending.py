@@ -10,6 +10,7 @@ from common.drive import LEAVE_NS, longest_leave
 from common.errors import IncompleteError, InputError, InterlockError, LostError, RthsError
 from common.plan import Plan
 from common.roles import MASTER, RECORDER, title
+from common.safety.speed_change import SpeedChange
 from recorder.loop import CONSEQUENCE, ROWS_LOST, SILENCE_NS
 
 MARGIN_S = 1.0  # on what a process allows itself, for it to leave
@@ -18,7 +19,7 @@ SILENCE_S = SILENCE_NS * 1e-9 + MARGIN_S
 KILL_S = 3.0  # from asking to killing
 WRITE_S = 30.0  # for the recorder to bring to a slow disk what it holds: the file is what the test was for
 
-USED, OWN, CRASHED, LOST, WISHED, LED, ASKED, LACKING = range(8)
+USED, OWN, CRASHED, LOST, KILLED, WISHED, LED, ASKED, LACKING = range(9)
 STOP = "stop"
 ERRORS = {2: InputError, 3: InterlockError, 4: LostError}
 
@@ -34,7 +35,8 @@ class Ending:
     - A process ended during ticks: master and slaves after what they need to notice it and to leave.
     - The recorder after all laboratories: before there are rows after a moment, then when it does not end by itself.
 
-    What was asked and is still there is killed; all at once where somebody insists.
+    What was asked and is still there is killed. A laboratory on its way to rest says again and again how long that
+    takes at most, and is not killed before, whatever the user presses.
     """
 
     def __init__(self, plan: Plan) -> None:
@@ -45,11 +47,14 @@ class Ending:
         self._notice = plan.link.loss_timeout + leave + resting(plan)
         self._miss_recorder = plan.recording.patience + leave if plan.recording.required else math.inf
         self._wished = self._ask = self._alone = math.inf  # since when, from when, since when
+        self._patience = KILL_S  # from asking to killing
+        self._rest, self._leave = resting(plan), leave
+        self._due: dict[str, float] = {}  # by when a laboratory has left that has said how long it takes
         self.agreed = False  # the start: from now on there are ticks
-        self.insisted = False
 
     def look(self, now: float, wish: str, names: Sequence[str], ended: Mapping[str, int]) -> None:
         """Take note of who has ended and whether somebody wants to stop; `now` in s."""
+        asked_before = self._ask < math.inf
         if wish:
             self._wished = min(self._wished, now)
             self._ask = min(self._ask, now + (self._notice if self.agreed else 0.0))
@@ -59,6 +64,13 @@ class Ending:
             self._ask = min(self._ask, now + (self._miss_recorder if self.agreed else MARGIN_S))
         if all(name in ended for name in names if name != RECORDER):
             self._alone = min(self._alone, now)
+        if self._ask < math.inf and not asked_before:
+            self._patience = KILL_S if self.agreed else LEAVE_S + KILL_S
+
+    def rests(self, name: str, now: float, left: float | None = None) -> None:
+        """Take note that a laboratory is on its way to rest, for at most `left` s: it leaves after that."""
+        left = self._rest if left is None else left
+        self._due[name] = now + left + MARGIN_S + self._leave + KILL_S
 
     def ask_at(self, name: str) -> float:
         """When a process is asked, s."""
@@ -68,17 +80,24 @@ class Ending:
 
     def kill_at(self, name: str) -> float:
         """When a process is killed that has not ended by then, s."""
-        if self.insisted:
-            return -math.inf
         if name == RECORDER:
             return self._alone + (WRITE_S if self.agreed else MARGIN_S + KILL_S)
-        return self._ask + (KILL_S if self.agreed else LEAVE_S + KILL_S)
+        return max(self._ask + self._patience, self._due.get(name, -math.inf))
 
 
 def resting(plan: Plan) -> float:
-    """The longest way to rest, s: from the actuator's limit, at the speed of the unloading."""
-    safety = plan.safety
-    return plan.limits.actuator_command / safety.velocity + safety.settle + safety.release + MARGIN_S
+    """The longest way to rest, s: from the limits of speed to a halt, then from the actuator's limit to no load."""
+    safety, limits, interval = plan.safety, plan.limits, plan.test.interval
+
+    def change(speed: float) -> SpeedChange:
+        return SpeedChange(speed, 0.0, safety.acceleration, safety.jerk)
+
+    actuator = change(min(limits.actuator_velocity, limits.actuator_step / interval))
+    table = change(min(limits.table_velocity, limits.table_step / interval))
+    way = limits.actuator_command + actuator.travel(actuator.duration)
+    unloading = way / safety.velocity + 2.0 * change(safety.velocity).duration
+    longest = max(actuator.duration + unloading, table.duration, safety.release)
+    return longest + safety.settle + MARGIN_S
 
 
 class Ended(Protocol):
@@ -105,9 +124,10 @@ def verdict(processes: Ended, wish: str) -> RthsError | None:
     - OWN: it reported an error of its own: a limit, a rig, the disk, a stop that did not come from here.
     - CRASHED: it failed without a word, or was killed by a signal that did not come from here.
     - LOST: it reported that another fell silent or never came (exit 4).
+    - KILLED: it is a laboratory that did not end in time, and was killed from here.
     - WISHED: no process, but the user, who wanted to stop.
     - LED: it followed another, as the report of a code "remote_trip" says.
-    - ASKED: it was asked to stop, or killed, from here.
+    - ASKED: it was asked to stop from here; of the recorder also: killed.
     - LACKING: it is the recorder, and its recording is not whole: the test itself is done (exit 1).
     """
     ranks = {name: rank(processes, name, code) for name, code in processes.ended().items() if code}
@@ -127,8 +147,15 @@ def rank(processes: Ended, name: str, code: int) -> int:
         return USED
     if name == RECORDER and reported == ROWS_LOST:
         return LACKING
+    if name in processes.killed and name != RECORDER:
+        return KILLED
     if from_here and (name == RECORDER or reported in ("", STOP)):  # the recorder is asked when all is over
         return ASKED
+    return reported_rank(reported, code)
+
+
+def reported_rank(reported: str, code: int) -> int:
+    """The same of a process that ended by itself, by the error that it reported and its exit code."""
     if code not in ERRORS and not reported:
         return CRASHED
     if reported in ("", CONSEQUENCE):
@@ -136,10 +163,20 @@ def rank(processes: Ended, name: str, code: int) -> int:
     return LOST if code == 4 else OWN
 
 
+def killed(name: str) -> str:
+    """What is to be said of a process that was killed from here."""
+    if name == RECORDER:
+        return "The recorder did not end in time and was killed; the recording holds what came until then."
+    return (
+        f"The {title(name)} did not come to rest and leave in time and was killed: its rig may be loaded and armed, "
+        "so make it safe by its own controls before anybody comes near."
+    )
+
+
 def complaint(processes: Ended, name: str, code: int) -> RthsError:
     """A process's own last sentence as an error, or what is known of its end."""
     if name in processes.killed:
-        return LostError(f"The {title(name)} did not stop and was killed.")
+        return LostError(killed(name))
     if code < 0:
         return LostError(
             f"The {title(name)} was killed (signal {-code}); the recording holds what came until then."

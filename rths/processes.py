@@ -28,6 +28,7 @@ REPORTS = {  # what a process of ours says, and what belongs to it
     "mode": {"lab", "mode"},
     "progress": {"tick", "t"},
     "waiting": {"lab", "text"},
+    "resting": {"lab", "left", "text"},
     "recording": {"file", "summary"},
 }
 

@@ -6,20 +6,21 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from common import cli
-from common.drive import Stopper
 from common.errors import InputError, RthsError
 from common.exchange import State
 from common.plan import Plan
 from common.preflight import PASSED, Check, Gate
 from common.reality import Reality
 from common.realtime import assign, freeze
-from common.roles import MASTER, RECORDER
+from common.roles import MASTER, RECORDER, title
+from common.safety.modes import Mode
+from common.stopping import Stopper, Stopping
 from rths.progress import Progress as Working
 from rths.running import announced
 from rths.terminal import Progress
@@ -152,12 +153,14 @@ def in_real_time(
     progress.say(before_the_start(plan, output, gate))
     progress.say(f"{plan.test.name}: {plan.test.duration:g} s, starting master, {crew(plan)} and recorder")
     view = None
+    ending = Ending(plan)
     try:
         with announced(plan, endpoint):
             start_all(processes, args, plan.roles, endpoint, output)
             view = shown(output, args.live_port) if args.live else None
-            follow(processes, Ending(plan), progress, stopping, view)
+            follow(processes, ending, progress, stopping, view)
     finally:
+        wind_up(processes, ending)
         processes.close()
         progress.end()
         if view is not None:
@@ -237,22 +240,65 @@ def follow(
     processes: Processes,
     ending: Ending,
     progress: Progress,
-    stopping: Callable[[], str],
+    stopping: Stopping,
     view: View | None = None,
 ) -> None:
-    """Show what the processes say, and stop them where it is time, until all have ended."""
-    again: Stopper | None = None
+    """Show what the processes say, and stop them where it is time, until all have ended.
+
+    A second wish to stop changes nothing, and is answered by what they are at.
+    """
+    from rths.ending import killed
+
+    answered = 1
+    doing: dict[str, str] = {}
     while not processes.all_ended():
         said = processes.said(POLL_S)
         if said is not None:
             tell(said, progress)
-            ending.agreed = ending.agreed or (said.process == MASTER and said.data.get("state") == AGREED)
+            note(said, ending, doing)
         if view is not None and (news := view.news()):
             progress.say(news)
-        if stopping() and again is None:
-            again = Stopper()  # from now on a second wish is told from the first
-        ending.insisted = again is not None and bool(again())
-        stop(processes, ending, stopping())
+        for name in stop(processes, ending, stopping()):
+            progress.say(killed(name))
+        if stopping.presses > answered:
+            answered = stopping.presses
+            progress.say(answer(processes, doing))
+
+
+def note(said: Said, ending: Ending, doing: dict[str, str]) -> None:
+    """Take note of what a report says about the end of a test; `doing` are the laboratories on their way to rest."""
+    match said.data:
+        case {"kind": "state", "state": state} if said.process == MASTER and state == AGREED:
+            ending.agreed = True
+        case {"kind": "mode", "mode": mode}:
+            doing.pop(said.process, None)
+            if mode == Mode.RAMPING.value:
+                doing[said.process] = "coming to rest"
+                ending.rests(said.process, time.monotonic())
+        case {"kind": "resting", "left": float(left), "text": text}:
+            doing[said.process] = str(text)
+            ending.rests(said.process, time.monotonic(), left)
+        case _:
+            pass
+
+
+def answer(processes: Processes, doing: Mapping[str, str]) -> str:
+    """What is said to who wants to stop again: what the processes are at, which nobody cuts short."""
+    there = [name for name in processes.names if name not in processes.ended()]
+    if resting := [f"{title(name)}: {text}" for name, text in doing.items() if name in there]:
+        return f"already stopping, no laboratory is killed on its way to rest ({'; '.join(resting)})"
+    return (
+        f"already stopping, and waiting for {' and '.join(map(title, there)) or 'nobody'} to leave in order"
+    )
+
+
+def wind_up(processes: Processes, ending: Ending) -> None:
+    """Bring what runs on to its end in order, where this program has failed: a rig is not left in mid-motion."""
+    doing: dict[str, str] = {}
+    while not processes.all_ended():
+        if (said := processes.said(POLL_S)) is not None:
+            note(said, ending, doing)
+        stop(processes, ending, "this program failed.")
 
 
 def tell(said: Said, progress: Progress) -> None:
@@ -270,8 +316,9 @@ def tell(said: Said, progress: Progress) -> None:
             pass
 
 
-def stop(processes: Processes, ending: Ending, wish: str) -> None:
-    """Ask and kill those whose time has come."""
+def stop(processes: Processes, ending: Ending, wish: str) -> list[str]:
+    """Ask and kill those whose time has come; who was killed."""
+    gone = []
     now, ended = time.monotonic(), processes.ended()
     ending.look(now, wish, processes.names, ended)
     for name in processes.names:
@@ -279,6 +326,8 @@ def stop(processes: Processes, ending: Ending, wish: str) -> None:
             processes.ask(name)
         if name not in ended and now >= ending.kill_at(name):
             processes.kill(name)
+            gone.append(name)
+    return gone
 
 
 def show(path: Path, as_json: bool) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import sys
@@ -26,7 +27,10 @@ def table(rows: Sequence[Sequence[str]], stream: TextIO | None = None) -> None:
 
 
 class Progress:
-    """Progress of a test: a bar and sparklines on a terminal, plain lines now and then elsewhere (default: stderr)."""
+    """Progress of a test: a bar and sparklines on a terminal, plain lines now and then elsewhere (default: stderr).
+
+    A terminal that is closed, or a pipe that nobody reads, ends no test.
+    """
 
     def __init__(self, duration: float, stream: TextIO | None = None) -> None:
         self._duration = duration
@@ -44,8 +48,7 @@ class Progress:
             self._draw()
         elif t >= self._next:
             self._next = t + LINE_EVERY
-            self._stream.write(facts(data, self._duration) + "\n")
-            self._stream.flush()
+            self._put(facts(data, self._duration) + "\n")
 
     def mode(self, lab: str, mode: str) -> None:
         """Show a laboratory's safety mode."""
@@ -57,10 +60,9 @@ class Progress:
         """A line of its own, above the board."""
         drawn = self._drawn
         self._clear()
-        self._stream.write(shown(text) + "\n")
+        self._put(shown(text) + "\n")
         if drawn:
             self._draw()
-        self._stream.flush()
 
     def end(self) -> None:
         """Leave the board as it stands: what follows comes below."""
@@ -70,15 +72,19 @@ class Progress:
         columns, rows = size_of(self._stream)
         lines = self._board.lines(columns - 1)[: max(rows - 1, 1)]  # a full last column or row would scroll
         self._clear()
-        self._stream.write("".join(coloured(line) + "\n" for line in lines))
-        self._stream.flush()
+        self._put("".join(coloured(line) + "\n" for line in lines))
         self._drawn = len(lines)
 
     def _clear(self) -> None:
         """Take the board off the terminal."""
         if self._drawn:
-            self._stream.write(f"\x1b[{self._drawn}A\r\x1b[J")
+            self._put(f"\x1b[{self._drawn}A\r\x1b[J")
             self._drawn = 0
+
+    def _put(self, text: str) -> None:
+        with contextlib.suppress(OSError):
+            self._stream.write(text)
+            self._stream.flush()
 
 
 def size_of(stream: TextIO) -> tuple[int, int]:

@@ -27,6 +27,15 @@ class TableRamp:
         return self._table.done and self._motor.done
 
     @property
+    def left(self) -> float:
+        """How long it takes at most from here on, s."""
+        return max(self._table.left, self._motor.left)
+
+    def doing(self, measured: TableMeasurement | None) -> str:
+        """What it does, in words, with the force that the motor still has, whatever is measured."""
+        return f"bringing the table to a halt: {abs(self._motor.command):.0f} N of motor force left"
+
+    @property
     def travel(self) -> float:
         """How far apart the table's commands have been, m."""
         return self._table.travel

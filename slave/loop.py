@@ -29,7 +29,7 @@ from common.messages import (
 from common.operation import obey
 from common.rig import GuardedRig, TableCommand, TableMeasurement
 from common.roles import MASTER, SLAVE
-from common.safety.descent import Descent
+from common.safety.descent import Descent, Resting
 from common.safety.modes import Turn
 from common.safety.watchdog import Finding, Watchdog
 from common.tally import Tally
@@ -349,6 +349,11 @@ class SlaveLoop:
     def progress(self) -> dict[str, float]:
         """What a user watches while it runs."""
         return {}
+
+    @property
+    def resting(self) -> Resting:
+        """How far the rig is on its way to rest."""
+        return self._descent.resting
 
     # -- pacing -----------------------------------------------------------------------------------
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 from common.errors import EmergencyStopError, RigError
 from common.exchange import Event
@@ -14,6 +14,13 @@ from common.roles import ramp_topic
 
 Command = TypeVar("Command", bound=tuple[float, ...])
 Command_co = TypeVar("Command_co", bound=tuple[float, ...], covariant=True)
+
+
+class Resting(NamedTuple):
+    """How far a rig is on its way to rest."""
+
+    left: float  # s at most, where no interval is left out
+    text: str  # what it does, and how long at most
 
 
 class Ramp(Protocol[Command_co]):
@@ -29,6 +36,13 @@ class Ramp(Protocol[Command_co]):
     @property
     def travel(self) -> float:
         """How far apart the displacement commands have been, m."""
+
+    @property
+    def left(self) -> float:
+        """How long it takes at most from here on, s."""
+
+    def doing(self, measured: Any | None) -> str:
+        """What it does, in words, with what is left by a measurement."""
 
 
 class Descent(Generic[Command]):
@@ -50,10 +64,26 @@ class Descent(Generic[Command]):
         self._ramp: Ramp[Command] | None = None
         self._begun = 0
         self._settling = 0  # intervals at rest
+        self._measured: tuple[float, ...] | None = None
 
     def wrote(self, command: Command) -> None:
         """A command went to the rig."""
         self._before, self._last = self._last, command
+
+    @property
+    def resting(self) -> Resting:
+        """How far the rig is on its way to rest."""
+        safety, interval = self._lab.plan.safety, self._lab.plan.test.interval
+        left = max(safety.settle - self._settling * interval, 0.0) + interval
+        doing = "beginning the way to rest"
+        if self._ramp is not None:
+            doing = (
+                "waiting for the transfer system to settle"
+                if self._ramp.done
+                else self._ramp.doing(self._measured)
+            )
+            left += self._ramp.left
+        return Resting(left, f"{doing}, at most {left:.1f} s more")
 
     @property
     def last(self) -> Command:
@@ -75,6 +105,7 @@ class Descent(Generic[Command]):
         """One interval of which the measurement is known, None where the rig gives none."""
         ramp = self._ramp or self._begin(tick)
         command = ramp.step(measured)
+        self._measured = measured
         over = self._written(command, tick)
         self._settling += ramp.done
         if over or self._settling > self._lab.plan.safety.settle / self._lab.plan.test.interval:

@@ -9,6 +9,7 @@ from common.safety.speed_change import SpeedChange
 from common.tables import Safety
 
 UNLOADED = 0.01  # of the force at the hold: below it the specimen counts as unloaded
+STEPS = 4  # intervals at most in which a phase ends beside its profile: one each, and the last command
 SLOWEST = 1 / 64  # of the ramp's velocity: a shorter way is not worth a movement
 
 
@@ -56,12 +57,34 @@ class MotionRamp:
         """How far apart the commands have been since the ramp began, m."""
         return self._high - self._low
 
+    @property
+    def unloading(self) -> bool:
+        """Whether the specimen is being unloaded."""
+        return self._phase is _Phase.UNLOADING
+
+    @property
+    def left(self) -> float:
+        """How long it takes at most from here on, s, where no interval is left out."""
+        if self.done:
+            return 0.0
+        seconds = max(self._profile.duration - self._t, 0.0) + STEPS * self._interval
+        if self._phase is _Phase.STOPPING and self._unload:
+            seconds += self._unloading_time(self._from + self._profile.travel(math.inf))
+        elif self._phase is _Phase.UNLOADING:
+            seconds += abs(self.command / self._slow) + self._change_time(self._slow)
+        return seconds
+
+    def _unloading_time(self, position: float) -> float:
+        """Time from a hold to zero without load, s."""
+        speed = abs(self._unloading_speed(position))
+        return abs(position) / speed + 2.0 * self._change_time(speed) if speed else 0.0
+
     def _next(self, force: float | None) -> None:
         """At a constant speed: unload after the hold, end the unloading in time, be done at the end."""
         if self._phase is _Phase.STOPPING and self._unload and force is not None:
             self._held_force = force
             loaded = force * self.command > 0.0  # where not, the way to zero does not take the force away
-            self._slow = self._unloading_speed() if loaded else 0.0
+            self._slow = self._unloading_speed(self.command) if loaded else 0.0
             self._change(_Phase.UNLOADING if self._slow else _Phase.ENDING, 0.0, self._slow)
         elif self._phase is _Phase.UNLOADING:
             most = self._distance(self._slow) + abs(self._slow) * self._interval
@@ -74,18 +97,22 @@ class MotionRamp:
         self._phase, self._from, self._t = phase, self.command, 0.0
         self._profile = SpeedChange(before, after, self._safety.acceleration, self._safety.jerk)
 
-    def _unloading_speed(self) -> float:
+    def _unloading_speed(self, position: float) -> float:
         """Speed towards zero that can be reached and left on the way there, m/s; 0 where the way is too short."""
-        speed, way = self._safety.velocity, abs(self.command)
+        speed, way = self._safety.velocity, abs(position)
         while 2.0 * (self._distance(speed) + speed * self._interval) > way:
             speed /= 2.0
             if speed < SLOWEST * self._safety.velocity:
                 return 0.0
-        return math.copysign(speed, -self.command)
+        return math.copysign(speed, -position)
 
     def _distance(self, speed: float) -> float:
         """Way from that speed to a halt, m."""
         return abs(SpeedChange(speed, 0.0, self._safety.acceleration, self._safety.jerk).travel(math.inf))
+
+    def _change_time(self, speed: float) -> float:
+        """Time from that speed to a halt, s."""
+        return SpeedChange(speed, 0.0, self._safety.acceleration, self._safety.jerk).duration
 
     def _free(self, force: float) -> bool:
         return force * self._held_force <= UNLOADED * self._held_force**2
@@ -95,6 +122,7 @@ class ForceRelease:
     """The damper's motor force from its last command (N) to zero, in equal parts."""
 
     def __init__(self, safety: Safety, interval: float, force: float) -> None:
+        self._interval = interval
         self._left = max(math.ceil(safety.release / interval - 1e-9), 1)
         self._part = force / self._left
         self.command = force
@@ -105,6 +133,11 @@ class ForceRelease:
             self._left -= 1
             self.command = self._part * self._left + 0.0  # not minus zero
         return self.command
+
+    @property
+    def left(self) -> float:
+        """How long it takes from here on, s."""
+        return self._left * self._interval
 
     @property
     def done(self) -> bool:

@@ -9,12 +9,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple, cast
 
-from common.drive import Loop, Stopper, drive, longest_leave
+from common.drive import Loop, drive, longest_leave
 from common.laboratory import Report, Setting
 from common.plan import Plan
 from common.reality import Reality
 from common.realtime import NOTHING
 from common.roles import MASTER, RECORDER
+from common.stopping import Stopper
 from common.surroundings import Surroundings
 from common.tables import Rig
 from master import assembly as master_assembly

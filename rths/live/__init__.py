@@ -65,8 +65,8 @@ def check(args: argparse.Namespace) -> None:
 def serve(args: argparse.Namespace, since_ns: int) -> None:
     """Read the recording and serve its page."""
     from common.clock import MonotonicClock
-    from common.drive import Stopper
     from common.recording.tail import Tail, length
+    from common.stopping import Stopper
     from rths.live.feed import Feed
     from rths.live.server import Server
 

@@ -270,7 +270,7 @@ def test_one_processor_of_each_core_comes_first_and_processor_0_last(monkeypatch
 def test_a_process_that_has_done_its_work_keeps_its_exit_code_under_late_signals() -> None:
     late = child("""
 import signal
-from common.drive import Stopper
+from common.stopping import Stopper
 class Late:
     def __del__(self): os.kill(os.getpid(), signal.SIGTERM)
 stopping = Stopper()

@@ -8,6 +8,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -20,12 +21,13 @@ from common.errors import IncompleteError, InputError, InterlockError, LostError
 from common.laboratory import Setting
 from common.memory_link import MemoryHub
 from common.plan import Plan
+from common.safety.ramp import MotionRamp
 from common.tables import Rig
 from recorder.loop import RecorderLoop
 from rths import virtual
-from rths.ending import KILL_S, MARGIN_S, SILENCE_S, WRITE_S, Ending, resting, verdict
-from rths.processes import Leash, Processes, understood
-from rths.run import follow
+from rths.ending import KILL_S, LEAVE_S, MARGIN_S, SILENCE_S, WRITE_S, Ending, resting, verdict
+from rths.processes import Leash, Processes, Said, understood
+from rths.run import answer, follow, note
 from rths.terminal import Progress
 
 NAMES = ("master", "slave", "recorder")
@@ -111,7 +113,7 @@ def test_a_wish_during_ticks_reaches_the_master_alone_and_who_hangs_is_killed(sh
     assert times.asked["master"] == near(1.0)
     assert times.asked["slave"] == near(1.0 + notice)
     assert times.killed == {"slave": near(1.0 + notice + KILL_S)}
-    assert notice + KILL_S == pytest.approx(26.0, abs=1.0)
+    assert notice + KILL_S == pytest.approx(27.5, abs=1.0)
 
 
 def test_a_lost_slave_is_the_masters_to_notice_and_the_recorder_ends_by_itself(short_plan: Plan) -> None:
@@ -131,10 +133,42 @@ def test_a_recorder_that_is_not_required_may_leave_a_running_test(short_plan: Pl
         assert Times(ending(plan, agreed=True), {"recorder": 1.0}).asked.keys() == asked
 
 
-def test_who_insists_has_all_killed(short_plan: Plan) -> None:
-    insisted = ending(short_plan, agreed=True)
-    insisted.insisted = True
-    assert set(Times(insisted, {}).killed) == set(NAMES)
+def test_a_laboratory_on_its_way_to_rest_is_killed_when_what_it_said_last_is_over(short_plan: Plan) -> None:
+    slow = ending(short_plan, agreed=True)
+    slow.rests("master", 20.0, 15.0)
+    times = Times(slow, {}, wish=1.0)
+    assert times.killed["master"] == near(35.0 + MARGIN_S + longest_leave(short_plan) + MARGIN_S + KILL_S)
+    assert times.killed["slave"] < 30.0
+
+
+def test_a_wish_just_before_the_start_leaves_the_time_to_come_to_rest(short_plan: Plan) -> None:
+    early = ending(short_plan, agreed=False)
+    early.look(1.0, "stopped.", NAMES, {})
+    early.agreed = True
+    early.look(1.1, "stopped.", NAMES, {})
+    early.rests("master", 1.2)
+    assert early.kill_at("slave") == near(1.0 + LEAVE_S + KILL_S)
+    assert early.kill_at("master") == near(
+        1.2 + resting(short_plan) + MARGIN_S + longest_leave(short_plan) + MARGIN_S + KILL_S
+    )
+
+
+def test_the_longest_way_to_rest_is_as_long_as_that_of_the_ramp(short_plan: Plan) -> None:
+    usual, limits = short_plan.safety, short_plan.limits
+    for safety in (
+        usual,
+        dataclasses.replace(usual, acceleration=0.2),
+        dataclasses.replace(usual, jerk=5.0),
+        dataclasses.replace(usual, velocity=0.002),
+    ):
+        plan = dataclasses.replace(short_plan, safety=safety)
+        interval = plan.test.interval
+        ramp = MotionRamp(safety, interval, limits.actuator_command, limits.actuator_velocity, unload=True)
+        steps = 0
+        while not ramp.done:
+            ramp.step(1e6 * ramp.command)
+            steps += 1
+        assert steps * interval < resting(plan), safety
 
 
 class Over:
@@ -212,7 +246,18 @@ NONE: tuple[tuple[str, int, str], ...] = (("master", 0, ""), ("slave", 0, ""), (
             "of the slave",
         ),
         (Over(("master", 4, "lost"), ("slave", -9, ""), killed="slave"), "", LostError, "of the master"),
-        (Over(("master", 0, ""), ("slave", -9, ""), killed="slave"), "", LostError, "did not stop"),
+        (
+            Over(("master", 0, ""), ("slave", -9, ""), killed="slave"),
+            "",
+            LostError,
+            "slave did not come to rest",
+        ),
+        (
+            Over(("master", -9, "stop"), ("slave", 3, "remote_trip"), asked="master", killed="master"),
+            WISH,
+            LostError,
+            "master did not come to rest",
+        ),
         (Over(("master", 3, ""), ("slave", 3, ""), asked="master"), WISH, InterlockError, WISH),
         (
             Over(
@@ -325,8 +370,14 @@ def processes(tmp_path: Path, monkeypatch: Any) -> Any:
     running.close()
 
 
-def never() -> str:
-    return ""
+class Presses:
+    """A wish to stop that was expressed so often."""
+
+    def __init__(self, reason: str = "", presses: int = 0) -> None:
+        self.reason, self.presses = reason, presses
+
+    def __call__(self) -> str:
+        return self.reason
 
 
 def test_a_flood_of_lines_that_are_no_reports_is_read_to_its_end(
@@ -335,7 +386,7 @@ def test_a_flood_of_lines_that_are_no_reports_is_read_to_its_end(
     text = "import json, os\nos.write(1, b'\\xff\\xfe\\n' + b'valve open\\n' * 20_000)\n"
     program(tmp_path, "slave", text + f"print('...' + json.dumps({EVENT!r}))\nraise SystemExit(4)\n")
     processes.start("slave", [])
-    follow(processes, Ending(short_plan), Progress(1.0), never)
+    follow(processes, Ending(short_plan), Progress(1.0), Presses())
     assert processes.ended() == {"slave": 4}
     assert processes.errors == {"slave": "lost"}
     err = capsys.readouterr().err
@@ -356,20 +407,46 @@ def test_a_pipe_that_a_grandchild_holds_keeps_nobody(
     processes.start("slave", [])
     said = processes.said(5.0)
     assert said is not None
-    follow(processes, Ending(short_plan), Progress(1.0), never)
+    follow(processes, Ending(short_plan), Progress(1.0), Presses())
     os.kill(int(said.data["text"]), signal.SIGKILL)
     assert processes.ended() == {"slave": 0}
 
 
-def test_a_second_wish_kills_who_does_not_hear_the_first(
-    processes: Processes, tmp_path: Path, short_plan: Plan, monkeypatch: Any
+RAMPING = {"kind": "mode", "lab": "master", "mode": "ramping"}
+LEFT = {"kind": "resting", "lab": "master", "left": 0.5, "text": "unloading the column: 12.0 kN left"}
+
+
+def test_who_hangs_on_its_way_to_rest_is_killed_after_it_and_not_by_further_presses(
+    processes: Processes, tmp_path: Path, short_plan: Plan, monkeypatch: Any, capsys: Any
 ) -> None:
-    monkeypatch.setattr("rths.run.Stopper", lambda: lambda: "again.")
-    for name in ("master", "slave"):
-        program(tmp_path, name, DEAF)
-        processes.start(name, [])
-    follow(processes, Ending(short_plan), Progress(1.0), lambda: WISH)
-    assert processes.killed == {"master", "slave"}
+    for name in ("LEAVE_S", "MARGIN_S", "KILL_S"):
+        monkeypatch.setattr(f"rths.ending.{name}", 0.1)
+    monkeypatch.setattr("rths.ending.longest_leave", lambda _plan: 0.1)
+    lines = "".join(f"print({json.dumps(one)!r}, flush=True)\n" for one in (RAMPING, LEFT))
+    program(tmp_path, "master", lines + DEAF)
+    processes.start("master", [])
+    begun = time.monotonic()
+    follow(processes, Ending(short_plan), Progress(1.0), Presses(WISH, 2))
+    err = capsys.readouterr().err
+    assert time.monotonic() - begun > 0.5
+    assert "already stopping" in err
+    assert "did not come to rest" in err
+    assert isinstance(verdict(processes, WISH), LostError)
+    assert processes.killed == {"master"}
+
+
+def test_the_answer_to_a_second_wish_says_what_a_laboratory_is_at(
+    processes: Processes, tmp_path: Path, short_plan: Plan
+) -> None:
+    program(tmp_path, "master", DEAF)
+    processes.start("master", [])
+    doing: dict[str, str] = {}
+    assert "waiting for master" in answer(processes, doing)
+    note(Said("master", RAMPING), Ending(short_plan), doing)
+    note(Said("master", LEFT), Ending(short_plan), doing)
+    assert "master: unloading the column: 12.0 kN left" in answer(processes, doing)
+    note(Said("master", RAMPING | {"mode": "idle"}), Ending(short_plan), doing)
+    assert "waiting for master" in answer(processes, doing)
 
 
 def test_who_hangs_after_anothers_end_is_killed_without_a_wish(
@@ -382,7 +459,7 @@ def test_who_hangs_after_anothers_end_is_killed_without_a_wish(
     program(tmp_path, "recorder", DEAF)
     for name in NAMES:
         processes.start(name, [])
-    follow(processes, Ending(short_plan), Progress(1.0), never)
+    follow(processes, Ending(short_plan), Progress(1.0), Presses())
     assert processes.killed == {"slave", "recorder"}
     assert processes.ended()["master"] == 4
     assert isinstance(verdict(processes, ""), LostError)

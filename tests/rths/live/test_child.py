@@ -93,6 +93,15 @@ class Test:
     kill = ask
 
 
+class Unwished:
+    """Nobody wants to stop."""
+
+    presses = 0
+
+    def __call__(self) -> str:
+        return ""
+
+
 class Crashed:
     """A view that has ended."""
 
@@ -104,6 +113,6 @@ def test_a_view_that_has_crashed_does_not_end_the_test(
 ) -> None:
     processes: Any = Test()
     view: Any = Crashed()
-    follow(processes, Ending(short_plan), Progress(1.0), lambda: "", view)
+    follow(processes, Ending(short_plan), Progress(1.0), Unwished(), view)
     assert processes.looks == 4
     assert capsys.readouterr().err == "live view: it has ended (exit code 1)\n"

@@ -1,0 +1,61 @@
+"""Signals of the user and of the system as a wish to stop: counted and answered, they end nothing by themselves."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+from collections.abc import Callable
+from types import FrameType
+from typing import Protocol
+
+STOPPING = ("SIGINT", "SIGTERM", "SIGHUP")  # Ctrl-C; kill, `docker stop`; a terminal that is closed
+STDERR = 2
+
+
+class Stopping(Protocol):
+    """A wish to stop as a loop sees it."""
+
+    presses: int  # how often it was expressed
+
+    def __call__(self) -> str:
+        """The reason, empty while there is none."""
+
+
+class Stopper:
+    """Turns the signals of a user who wants to stop into a reason; from the second one on `answer` is said.
+
+    A loop asks for the reason when it may stop, so that a signal never cuts a rig's motion short. The answer is written
+    by the handler itself, past Python's buffers, so that it comes where the loop hangs in a rig as well.
+    """
+
+    def __init__(self, answer: Callable[[], str] | None = None) -> None:
+        self.answer = answer
+        self.presses = 0
+        self._reason = ""
+        for number in taken():
+            signal.signal(number, self._caught)
+
+    def _caught(self, number: int, _frame: FrameType | None) -> None:
+        self.presses += 1
+        self._reason = self._reason or f"stopped by the user ({signal.Signals(number).name})."
+        if self.presses > 1 and self.answer is not None:
+            with contextlib.suppress(Exception):  # nothing that is said here may reach the loop as an error
+                os.write(STDERR, f"{self.answer()}\n".encode())
+
+    def __call__(self) -> str:
+        """The reason, empty while there is none."""
+        return self._reason
+
+    @staticmethod
+    def ignore() -> None:
+        """From now on: a process that has done its work ends with its own exit code, not with a late signal's."""
+        for number in taken():
+            signal.signal(number, signal.SIG_IGN)
+
+
+def taken() -> list[signal.Signals]:
+    """The signals that mean a wish; a hang-up that was ignored from the start (`nohup`) is none."""
+    numbers = [getattr(signal, name) for name in STOPPING if hasattr(signal, name)]
+    hang_up = getattr(signal, "SIGHUP", None)
+    return [one for one in numbers if one != hang_up or signal.getsignal(one) is not signal.SIG_IGN]
