@@ -27,9 +27,16 @@ class PlanError(InputError):
 
 
 class RigError(RthsError):
-    """A laboratory is not ready, failed, or returned what is no measurement (exit 3)."""
+    """A laboratory is not ready, failed, or returned what is no measurement (exit 3).
+
+    `details` is the traceback of the rig's own exception, for the recording; empty where there is none to show.
+    """
 
     exit_code = 3
+
+    def __init__(self, text: str, details: str = "") -> None:
+        super().__init__(text)
+        self.details = details
 
 
 class EmergencyStopError(RigError):

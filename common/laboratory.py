@@ -101,6 +101,13 @@ class Laboratory:
             "event", {"t": t, "lab": self.name, "level": level, "code": code, "text": text} | dict(values)
         )
 
+    def explain(self, error: Exception | None, *, tick: int = 0) -> None:
+        """Record the traceback of a rig's own exception, where there is one to show; it is not reported."""
+        if details := getattr(error, "details", ""):
+            at = self.epoch_ns + self.plan.tick_ns(tick)
+            t = tick * self.plan.test.interval
+            self.outlet.add("event", at, at, (t, self.name, "info", "traceback", details, {}))
+
     def _turned(self, before: Mode, turn: Turn, after: Mode) -> None:
         """Record and report a change of the safety mode; before the start is agreed there is no time of it."""
         self.report("mode", {"lab": self.name, "mode": after.value})
@@ -152,6 +159,7 @@ class Laboratory:
         self.exchange.happen(event, remote=remote, cause=str(error))
         self.error = error
         self.note(code, str(error), level="error", tick=tick, values=values)
+        self.explain(error, tick=tick)
         if event is not Event.REFUSE:
             turn = Turn.EMERGENCY if isinstance(error, EmergencyStopError) else Turn.TRIP
             self.tick = tick

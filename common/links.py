@@ -9,6 +9,7 @@ from common.mailbox import LinkModel, PerfectLink
 from common.plugins import construct, find
 from common.reality import Reality
 
+METHODS = {"fate": ("direction", "seq", "t")}
 IMPAIRED = "models.link.impaired:ImpairedLink"
 OPTIONS = {  # option of the emulated network behind each parameter of an effect
     ("link.delay", "delay"): "delay",
@@ -32,7 +33,8 @@ def link_model(reality: Reality) -> LinkModel:
     if not rig.class_ and not options:
         return PerfectLink()
     kind = find(rig.class_ or IMPAIRED, reality.base, "[link]")
-    model: LinkModel = construct(kind, {"seed": seed_of(reality)} | (options or rig.options), "[link]")
+    arguments = {"seed": seed_of(reality)} | (options or rig.options)
+    model: LinkModel = construct(kind, arguments, "[link]", METHODS)
     return model
 
 

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import inspect
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import ModuleType
+from types import MappingProxyType, ModuleType
 from typing import Any
 
+from common import blame
 from common.errors import InputError
+
+NO_METHODS: Mapping[str, Sequence[str]] = MappingProxyType({})
 
 
 def find(reference: str, base: Path, where: str) -> type[Any]:
@@ -29,8 +33,9 @@ def find(reference: str, base: Path, where: str) -> type[Any]:
     except InputError:
         raise
     except Exception as error:  # a user's file may raise anything on import
+        source = str(base / place) if place.endswith(".py") else ""
         raise InputError(
-            f"Cannot load '{place}' named in {where}: {type(error).__name__}: {error}."
+            f"Cannot load '{place}' named in {where}: {blame.described(error, source)}."
         ) from error
     found = getattr(module, name, None)
     if not isinstance(found, type):
@@ -53,11 +58,47 @@ def _from_file(path: Path) -> ModuleType:
     return module
 
 
-def construct(kind: type[Any], arguments: Mapping[str, Any], where: str) -> Any:
-    """An instance; raises InputError with the class's own complaint where the options do not fit."""
+def construct(
+    kind: type[Any],
+    arguments: Mapping[str, Any],
+    where: str,
+    methods: Mapping[str, Sequence[str]] = NO_METHODS,
+) -> Any:
+    """An instance that has `methods`, by name with their parameters.
+
+    Raises:
+        InputError: with the class's own complaint where the options do not fit, or for a method that it lacks.
+    """
     try:
-        return kind(**arguments)
+        built = kind(**arguments)
     except InputError:
         raise
-    except Exception as error:  # a user's class may raise anything
-        raise InputError(f"Cannot construct {kind.__name__} named in {where}: {error}.") from error
+    except (Exception, SystemExit) as error:  # a user's class may raise anything
+        text = blame.described(error, blame.source_of(kind))
+        raise InputError(f"Cannot construct {kind.__name__} named in {where}: {text}.") from error
+    for name, parameters in methods.items():
+        if complaint := unfit(getattr(built, name, None), parameters):
+            called = f"{name}({', '.join(parameters)})"
+            file = Path(blame.source_of(kind)).name or "no file"
+            raise InputError(
+                f"{kind.__name__} ({file}) named in {where} {complaint}, but must have {called}: "
+                f"it takes the methods {', '.join(methods)}."
+            )
+    return built
+
+
+def unfit(method: object, parameters: Sequence[str]) -> str:
+    """What is wrong with a method that is called with so many parameters, empty where it serves."""
+    if method is None:
+        return "lacks a method"
+    if not callable(method):
+        return f"has {method!r} for a method"
+    if inspect.iscoroutinefunction(method):
+        return "has an async method, which nobody awaits"
+    try:
+        inspect.signature(method).bind(*parameters)
+    except TypeError as error:
+        return f"has a method with other parameters ({error})"
+    except ValueError:  # written in C, without a signature to look at
+        pass
+    return ""

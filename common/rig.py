@@ -8,10 +8,18 @@ read any number of times while nothing moves, and is, before the first command, 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
+from types import MappingProxyType
 from typing import Any, NamedTuple, Protocol
 
+from common import blame
 from common.errors import EmergencyStopError, RigError
+
+ANYTHING = (Exception, SystemExit)  # a plug-in may raise anything, and ends nothing by `sys.exit`
+
+METHODS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {"arm": (), "read": (), "write": ("command",), "disarm": ()}
+)  # of a rig, with the parameters of each
 
 
 class ColumnCommand(NamedTuple):
@@ -100,7 +108,7 @@ class GuardedRig:
         """Arm; raises RigError with the rig's own reason, or with what its sensors read at rest."""
         try:
             self._rig.arm()
-        except Exception as error:  # a plug-in may raise anything; the user gets a sentence
+        except ANYTHING as error:  # the user gets a sentence
             raise self._failure("arm", error) from error
         if self._at_rest is not None:
             self._judge(self._at_rest)
@@ -120,7 +128,7 @@ class GuardedRig:
         try:
             given = self._rig.read()
             values = tuple(given) if isinstance(given, Iterable) else given
-        except Exception as error:  # a plug-in may raise anything; the user gets a sentence
+        except ANYTHING as error:  # the user gets a sentence
             raise self._failure("read", error) from error
         try:
             reading = self._measurement(*map(float, values))
@@ -134,24 +142,25 @@ class GuardedRig:
         """Apply a command; raises RigError where the rig fails."""
         try:
             self._rig.write(command)
-        except Exception as error:  # a plug-in may raise anything; the user gets a sentence
+        except ANYTHING as error:  # the user gets a sentence
             raise self._failure("write", error) from error
 
-    def disarm(self) -> str:
-        """Disarm; a rig that raises all the same is reported in the text returned, empty where all is well."""
+    def disarm(self) -> RigError | None:
+        """Disarm; a rig that raises all the same gives the error returned, None where all is well."""
         try:
             self._rig.disarm()
-        except Exception as error:  # a plug-in may raise anything; the stop must go on
-            return str(self._failure("disarm", error))
-        return ""
+        except ANYTHING as error:  # the stop must go on
+            return self._failure("disarm", error)
+        return None
 
-    def _failure(self, what: str, error: Exception) -> RigError:
+    def _failure(self, what: str, error: BaseException) -> RigError:
         kind = EmergencyStopError if isinstance(error, EmergencyStopError) else RigError
         if self._hidden:
             return kind(f"{self._name}: {what}() failed: {type(error).__name__}.")
         if isinstance(error, RigError):
             return kind(f"{self._name}: {error}")
-        return RigError(f"{self._name}: {what}() failed: {type(error).__name__}: {error}")
+        text = blame.described(error, blame.source_of(type(self._rig)))
+        return RigError(f"{self._name}: {what}() failed: {text}", blame.whole(error))
 
     def _complaint(self, values: Any) -> str:
         fields: tuple[str, ...] = self._measurement._fields  # type: ignore[attr-defined]

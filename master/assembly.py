@@ -14,7 +14,7 @@ from common.plan import Plan
 from common.plugins import construct, find
 from common.preflight import Check, Gate, SensorsAtRest
 from common.reality import Reality
-from common.rig import AtRest, ColumnMeasurement, GuardedRig
+from common.rig import METHODS, AtRest, ColumnMeasurement, GuardedRig
 from master.limits import MasterLimits
 from master.loop import MasterLoop
 from master.rig import ColumnLab
@@ -53,7 +53,7 @@ def build_rig(reality: Reality, at_rest: AtRest | None = None) -> GuardedRig:
         return GuardedRig(twin(), "laboratory A", ColumnMeasurement, at_rest=at_rest, twin=twin)
     kind = find(rig.class_, reality.base, "[master.rig]")
     name = "laboratory A" if "master" in reality.hidden else f"laboratory A ({kind.__name__})"
-    built = construct(kind, arguments | rig.options, "[master.rig]")
+    built = construct(kind, arguments | rig.options, "[master.rig]", METHODS)
     return GuardedRig(built, name, ColumnMeasurement, hidden="master" in reality.hidden, at_rest=at_rest)
 
 

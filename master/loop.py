@@ -316,8 +316,9 @@ class MasterLoop:
         """Disarm the rig, once."""
         if not self._disarmed:
             self._disarmed = True
-            if complaint := self._rig.disarm():
-                self.lab.note("disarm", complaint, level="warning", tick=self.ticks)
+            if failure := self._rig.disarm():
+                self.lab.note("disarm", str(failure), level="warning", tick=self.ticks)
+                self.lab.explain(failure, tick=self.ticks)
 
     @property
     def left(self) -> bool:

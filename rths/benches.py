@@ -131,7 +131,7 @@ def armed(rig: GuardedRig, sink: Sink, at_ns: int) -> Iterator[None]:
         yield
     finally:
         if complaint := rig.disarm():
-            sink.put([["event", at_ns, at_ns, 0.0, "bench", "warning", "disarm", complaint, {}]])
+            sink.put([["event", at_ns, at_ns, 0.0, "bench", "warning", "disarm", str(complaint), {}]])
 
 
 class ColumnBench:

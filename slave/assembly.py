@@ -13,7 +13,7 @@ from common.plan import Plan
 from common.plugins import construct, find
 from common.preflight import Check, Gate, SensorsAtRest
 from common.reality import Reality
-from common.rig import AtRest, GuardedRig, TableMeasurement
+from common.rig import METHODS, AtRest, GuardedRig, TableMeasurement
 from common.roles import name_of, title
 from models.closed_loop import build_b
 from models.labs import noise, readings, table_lab
@@ -49,7 +49,7 @@ def build_rig(reality: Reality, at_rest: AtRest | None = None) -> GuardedRig:
         return GuardedRig(twin(), lab, TableMeasurement, at_rest=at_rest, twin=twin)
     kind = find(rig.class_, reality.base, where)
     name = lab if reality.role in reality.hidden else f"{lab} ({kind.__name__})"
-    built = construct(kind, arguments | rig.options, where)
+    built = construct(kind, arguments | rig.options, where, METHODS)
     hidden = reality.role in reality.hidden
     return GuardedRig(built, name, TableMeasurement, hidden=hidden, at_rest=at_rest)
 

@@ -122,6 +122,7 @@ class Descent(Generic[Command]):
             raise
         except RigError as error:
             self._lab.note("ramp", str(error), level="warning", tick=tick)
+            self._lab.explain(error, tick=tick)
             self._failed(error, tick)
             return True
         return False

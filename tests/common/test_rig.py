@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,8 +10,11 @@ import pytest
 from common import tables
 from common.errors import InputError, RigError
 from common.limits import Guard
+from common.links import link_model
+from common.plan import Plan
 from common.plugins import construct, find
-from common.rig import ColumnCommand, ColumnMeasurement, GuardedRig
+from common.reality import as_planned
+from common.rig import METHODS, ColumnCommand, ColumnMeasurement, GuardedRig
 
 
 class Fake:
@@ -74,9 +78,98 @@ def test_whatever_a_rig_raises_is_a_sentence_that_names_it() -> None:
     ):
         with pytest.raises(RigError, match=rf"laboratory A \(Fake\): {word}\(\) failed: ZeroDivisionError"):
             call()
-    assert rig.disarm() == "laboratory A (Fake): disarm() failed: ZeroDivisionError: division by zero"
+    assert "laboratory A (Fake): disarm() failed: ZeroDivisionError: division by zero" in str(rig.disarm())
     with pytest.raises(RigError, match=r"laboratory A \(Fake\): the pump is off"):
         guarded(error=RigError("the pump is off")).arm()
+
+
+FAULTY = """
+class Lab:
+    def __init__(self, interval=0.1, seed=1, setting=None):
+        self.setting = {"gain": 1.0} if setting is None else setting
+        self.gain = self.setting["gain"]
+    def arm(self): self.scale("a")
+    def read(self): self.scale("r")
+    def write(self, command): raise SystemExit(1)
+    def disarm(self): self.scale("d")
+    def scale(self, name):
+        return self.setting[name]  # line 11
+"""
+
+
+def test_an_exception_of_a_rig_is_located_in_its_own_file(tmp_path: Path) -> None:
+    (tmp_path / "lab.py").write_text(FAULTY)
+    kind = find("lab.py:Lab", tmp_path, "[master.rig]")
+    rig = GuardedRig(construct(kind, {}, "[master.rig]", METHODS), "laboratory A (Lab)", ColumnMeasurement)
+    for call, sentence in (
+        (rig.arm, "arm() failed: KeyError: 'a'"),
+        (rig.read, "read() failed: KeyError: 'r'"),
+    ):
+        with pytest.raises(RigError) as error:
+            call()
+        assert str(error.value) == f"laboratory A (Lab): {sentence} (lab.py, line 11)"
+        assert 'lab.py", line 11, in scale' in error.value.details
+    assert str(rig.disarm()).endswith("disarm() failed: KeyError: 'd' (lab.py, line 11)")
+    with pytest.raises(RigError, match=r"write\(\) failed: SystemExit: 1 \(lab.py, line 8\)"):
+        rig.write(ColumnCommand(0.0))
+    with pytest.raises(InputError, match=r"Cannot construct Lab .*: KeyError: 'gain' \(lab.py, line 5\)"):
+        construct(kind, {"setting": {}}, "[master.rig]", METHODS)
+    hidden = GuardedRig(kind(), "laboratory A", ColumnMeasurement, hidden=True)
+    with pytest.raises(RigError, match=r"^laboratory A: read\(\) failed: KeyError\.$") as error:
+        hidden.read()
+    assert not error.value.details
+
+
+@pytest.mark.parametrize(
+    ("methods", "sentence"),
+    [
+        ("arm read write", "Lab (lab.py) named in [master.rig] lacks a method, but must have disarm()"),
+        ("arm read disarm", "lacks a method, but must have write(command)"),
+        ("arm read write=3 disarm", "has 3 for a method, but must have write(command)"),
+        ("arm read write() disarm", "has a method with other parameters (too many positional arguments)"),
+        ("arm read(channel) write disarm", "(missing a required argument: 'channel'), but must have read()"),
+        ("arm async_read write disarm", "has an async method, which nobody awaits, but must have read()"),
+    ],
+)
+def test_a_rig_without_its_methods_is_refused_as_it_is_loaded(
+    tmp_path: Path, methods: str, sentence: str
+) -> None:
+    lines = ["class Lab:"]
+    for word in methods.split():
+        name, equals, value = word.partition("=")
+        plain = name.partition("(")[0]
+        given = name.partition("(")[2].rstrip(")") if "(" in name else "command" if plain == "write" else ""
+        kind, plain = ("async def", plain[6:]) if plain.startswith("async_") else ("def", plain)
+        own = f"self, {given}" if given else "self"
+        lines.append(f"    {plain} = {value}" if equals else f"    {kind} {plain}({own}): pass")
+    (tmp_path / "lab.py").write_text("\n".join(lines))
+    kind_of_lab = find("lab.py:Lab", tmp_path, "[master.rig]")
+    with pytest.raises(InputError) as error:
+        construct(kind_of_lab, {}, "[master.rig]", METHODS)
+    assert sentence in str(error.value)
+
+
+def test_methods_that_a_rig_gets_from_elsewhere_serve() -> None:
+    class Wrapped:
+        def __init__(self) -> None:
+            self.inner = Fake()
+            self.write = self.inner.write
+
+        def __getattr__(self, name: str) -> Any:
+            return getattr(self.inner, name)
+
+    assert construct(Wrapped, {}, "[master.rig]", METHODS).read() == (0.0, 0.0)
+
+
+def test_a_link_without_fate_is_refused(short_plan: Plan, tmp_path: Path) -> None:
+    (tmp_path / "net.py").write_text(
+        "class Net:\n    def __init__(self, seed): pass\n    def fate(self, seq): pass\n"
+    )
+    real = replace(as_planned(short_plan), link=tables.Rig("net.py:Net"), base=tmp_path)
+    with pytest.raises(
+        InputError, match=r"Net \(net.py\) named in \[link\] .* must have fate\(direction, seq, t\)"
+    ):
+        link_model(real)
 
 
 def test_a_class_is_found_in_a_file_and_in_a_module(tmp_path: Path) -> None:

@@ -124,9 +124,8 @@ def test_an_emergency_stop_of_a_rig_stops_it_at_once_and_the_other_by_its_ramp(
     def button() -> Any:
         raise EmergencyStopError("mushroom button")
 
-    def disarm() -> str:
+    def disarm() -> None:
         disarmed.append(TRIP)
-        return ""
 
     bench, run = played(short_plan, tmp_path / "a.mcap", press)
     assert bench.slave.lab.safety.mode is Mode.EMERGENCY_STOP

@@ -425,8 +425,13 @@ def test_who_hangs_on_its_way_to_rest_is_killed_after_it_and_not_by_further_pres
     lines = "".join(f"print({json.dumps(one)!r}, flush=True)\n" for one in (RAMPING, LEFT))
     program(tmp_path, "master", lines + DEAF)
     processes.start("master", [])
+    ending = Ending(short_plan)
     begun = time.monotonic()
-    follow(processes, Ending(short_plan), Progress(1.0), Presses(WISH, 2))
+    for _ in (RAMPING, LEFT):
+        heard = processes.said(30.0)
+        assert heard is not None
+        note(heard, ending, {})
+    follow(processes, ending, Progress(1.0), Presses(WISH, 2))
     err = capsys.readouterr().err
     assert time.monotonic() - begun > 0.5
     assert "already stopping" in err
