@@ -82,7 +82,7 @@ MISTAKES = {
     "unwritable page": (["{file}", "--html", "{tmp}/no/a.html"], "There is no folder"),
     "one file for both": (
         ["{file}", "--json", "{tmp}/a", "--html", "{tmp}/a"],
-        "--html and --json both name {tmp}/a",
+        "--html and --json both name ",
     ),
     "a head alone": (["{tmp}/head.mcap"], "holds no topic"),
 }
