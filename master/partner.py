@@ -170,6 +170,8 @@ class Partner:
 
     def exchanged(self) -> tuple[str, dict[str, float]]:
         """What became of the messages of both directions as far as this end knows: a sentence and its numbers."""
+        if (last := self._feedback.take(self.commands)) is not None:  # came for the tick after the last one
+            self.tally.use(last.seq)
         values = {f"{self.role}.commands_sent": float(self.commands)}
         values |= self.tally.values(f"{self.role}.feedbacks")
         text = f"{self.commands} commands sent to the {self.title}, {self.tally.used} of its feedbacks used."

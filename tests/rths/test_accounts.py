@@ -88,3 +88,11 @@ def test_what_cannot_have_been_sent_yet_has_no_fate() -> None:
     tally = Tally(TICKS, WINDOW)
     assert not tally.admit(50, 5)
     assert (tally.used, tally.rejected, tally.reasons[AHEAD]) == (0, 0, 1)
+
+
+def test_a_perfect_virtual_link_rejects_nothing(virtual_recording: Path) -> None:
+    found = accounts(read(virtual_recording))
+    assert {name: (counts["rejected"], counts["lost"]) for name, counts in found.items()} == {
+        "slave/commands": (0, 0),
+        "slave/feedbacks": (0, 0),
+    }
