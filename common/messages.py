@@ -14,7 +14,7 @@ class Register(NamedTuple):
 
     session: int
     protocol: int
-    plan: str  # digest
+    plan: str  # digest, and the keys that are not at their defaults: common/plan_difference.py
 
 
 class Waiting(NamedTuple):
@@ -179,7 +179,7 @@ class Recorder(NamedTuple):
 
     session: int
     state: str  # ready, recording, stopping, failed, done
-    plan: str
+    plan: str  # as in Register
     reason: str
     nexts: bytes  # by role, the item that comes next
 

@@ -9,6 +9,7 @@ from common.exchange import Event, State
 from common.laboratory import REPEAT_NS, Laboratory
 from common.messages import Armed, Message, Refused, Register, Registered, Scheduled, SyncReply
 from common.plan import PROTOCOL_VERSION
+from common.plan_difference import differences, digest_of, said
 from common.preflight import LINK, Gate, RefusedError, link_check
 from common.rig import GuardedRig
 from common.safety.modes import STILL_LATCHED
@@ -36,7 +37,7 @@ class Handshake:
         self._rig = rig
         self._wall_ns = wall_ns
         self._gate = gate
-        self._digest = lab.plan.digest()
+        self._digest, self._said = lab.plan.digest(), said(lab.plan)
         self._asked_ns = -REPEAT_NS
         for partner in partners if gate else ():
             partner.pass_gate(lab.plan.preflight.exchanges)
@@ -109,12 +110,10 @@ class Handshake:
 
     def _recorder_is_here(self) -> bool:
         recorder = self._lab.recorder
-        if recorder is not None and recorder.plan != self._digest:
-            self._lab.fail(
-                Event.REFUSE,
-                InputError("The recorder was started with another plan: give all the same."),
-                code="refused",
-            )
+        if recorder is not None and digest_of(recorder.plan) != self._digest:
+            difference = differences(self._lab.plan, recorder.plan, "master", "recorder")
+            error = InputError(f"The plans differ {difference}: give all the same file and options.")
+            self._lab.fail(Event.REFUSE, error, code="refused")
             return False
         here = recorder is not None and recorder.session == self._lab.exchange.session
         return here or not self._lab.plan.recording.required
@@ -158,7 +157,7 @@ class Handshake:
         elif lab.exchange.state is State.IDLE:
             if now - self._asked_ns >= REPEAT_NS:
                 self._asked_ns = now
-                lab.endpoint.send(Register(lab.exchange.session, PROTOCOL_VERSION, self._digest))
+                lab.endpoint.send(Register(lab.exchange.session, PROTOCOL_VERSION, self._said))
         else:
             for partner in self._partners:
                 if partner.due(now):

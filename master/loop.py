@@ -28,6 +28,7 @@ from common.messages import (
 )
 from common.operation import obey
 from common.plan import PROTOCOL_VERSION
+from common.plan_difference import digest_of, said
 from common.preflight import Gate
 from common.rig import ColumnCommand, ColumnMeasurement, GuardedRig
 from common.roles import MASTER, RECORDER
@@ -112,8 +113,13 @@ class MasterLoop:
     def _welcome(self, recorder: Recorder) -> None:
         """A recorder that comes while the test runs without one may record the rest."""
         lab = self.lab
-        if lab.running and not lab.recorded and recorder.session == 0 and recorder.plan == self._digest:
-            lab.endpoint.send(Register(lab.exchange.session, PROTOCOL_VERSION, self._digest))
+        if (
+            lab.running
+            and not lab.recorded
+            and recorder.session == 0
+            and digest_of(recorder.plan) == self._digest
+        ):
+            lab.endpoint.send(Register(lab.exchange.session, PROTOCOL_VERSION, said(lab.plan)))
 
     def poll(self) -> None:
         """Before the first tick: move the handshake on."""

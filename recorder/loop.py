@@ -12,7 +12,8 @@ from common.errors import IncompleteError, InputError, InterlockError, LostError
 from common.laboratory import REPEAT_NS, Report, Setting
 from common.messages import Finished, Message, Recorder, Register, Resend, Samples
 from common.outlet import BURST, PIECE, Inlet, pack_nexts
-from common.plan import Plan
+from common.plan import PROTOCOL_VERSION, Plan
+from common.plan_difference import differences, digest_of, said
 from common.roles import LATENCY, MASTER, RECORDER, kind_of, title
 from common.surroundings import CODES, described
 from recorder.items import Items
@@ -48,7 +49,7 @@ class RecorderLoop:
         self._clock: Clock = setting.clock
         self._report: Report = setting.report
         self._sink = sink
-        self._digest = setting.plan.digest()
+        self._digest, self._said = setting.plan.digest(), said(setting.plan)
         labs = (MASTER, *setting.plan.roles)
         most = ITEMS_PER_TICK * len(labs) * (setting.plan.ticks + SPARE_TICKS)
         self._inlets = {lab: Inlet(Items(setting.plan, lab).unpack, most) for lab in labs}
@@ -95,17 +96,24 @@ class RecorderLoop:
     def _register(self, request: Register) -> None:
         if self._session:
             return
-        if request.plan != self._digest:
-            self.error = InputError(
-                f"The plans differ (master {request.plan}, recorder {self._digest}): "
-                "give all the same file and options."
-            )
+        if complaint := self._complaint(request):
+            self.error = InputError(complaint)
             self._say()
             self.done = True
             return
         self._session = request.session
         self._endpoint.enter(request.session)
         self._said_ns = -REPEAT_NS
+
+    def _complaint(self, request: Register) -> str:
+        """Why the recorder cannot take part, empty where it can."""
+        if request.protocol != PROTOCOL_VERSION:
+            versions = f"{request.protocol}, the recorder {PROTOCOL_VERSION}"
+            return f"The master speaks protocol {versions}: install one version."
+        if digest_of(request.plan) != self._digest:
+            difference = differences(self._plan, request.plan, "recorder", "master")
+            return f"The plans differ {difference}: give all the same file and options."
+        return ""
 
     def _write(self, items: list[Item]) -> None:
         for item in items:
@@ -179,7 +187,7 @@ class RecorderLoop:
                 "event", {"lab": "recorder", "level": "error", "code": "recording_lost", "text": failure}
             )
         nexts = pack_nexts({lab: inlet.next for lab, inlet in self._inlets.items()})
-        self._endpoint.send(Recorder(self._session, state, self._digest, failure or self._wish, nexts))
+        self._endpoint.send(Recorder(self._session, state, self._said, failure or self._wish, nexts))
 
     def _fill_holes(self, now: int) -> None:
         patience_ns = self._plan.recording.patience * 1e9

@@ -19,6 +19,7 @@ from common.messages import (
     Waiting,
 )
 from common.plan import PROTOCOL_VERSION
+from common.plan_difference import differences, digest_of
 from common.rig import GuardedRig
 from common.roles import name_of, title
 from common.safety.modes import STILL_LATCHED
@@ -84,11 +85,9 @@ class Handshake:
     def _complaint(self, request: Register) -> str:
         if request.protocol != PROTOCOL_VERSION:
             return f"the master speaks protocol {request.protocol}, the slave {PROTOCOL_VERSION}: install one version."
-        if request.plan != self._digest:
-            return (
-                f"the plans differ (master {request.plan}, slave {self._digest}): "
-                "give both laboratories the same file and options."
-            )
+        if digest_of(request.plan) != self._digest:
+            difference = differences(self._lab.plan, request.plan, "slave", "master")
+            return f"the plans differ {difference}: give both laboratories the same file and options."
         return ""
 
     def _arm(self) -> None:

@@ -1,0 +1,90 @@
+"""What plans that differ are told to differ in."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as some
+
+from common import cli, codec
+from common import plan as plans
+from common import plan_difference as difference
+from common.messages import Recorder, Register
+from common.plan import PROTOCOL_VERSION, Plan, parse
+
+ONE = parse("[test]\nduration = 5.0\n", Path())
+OTHER = parse(
+    "[test]\nduration = 5.0\nseed = 3\n[structure]\nmass = [1e5, 1e5]\nstiffness = 25e6\n".replace(
+        "stiffness = 25e6", "stiffness = [25e6, 25e6]\ndamping = [2e5, 2e5]"
+    ),
+    Path(),
+)
+
+
+def told(mine: Plan, theirs: Plan) -> str:
+    return difference.differences(mine, difference.said(theirs), "slave", "master")
+
+
+def test_the_keys_that_differ_are_named_with_both_values() -> None:
+    assert told(ONE, Plan()) == "in test.duration (master 40.0, slave 5.0)"
+    text = told(ONE, OTHER)
+    assert "structure.mass (master [100000.0, 100000.0], slave 160000.0)" in text
+    assert "test.seed (master 3, slave 1)" in text
+    assert "duration" not in text
+
+
+def test_another_version_of_the_package_is_named_first(monkeypatch: Any) -> None:
+    heard = difference.said(OTHER)
+    monkeypatch.setattr(difference.metadata, "version", lambda _name: "9.9")
+    assert difference.differences(ONE, heard, "slave", "master").startswith("in rths (master ")
+
+
+def test_many_differences_are_counted_not_listed() -> None:
+    limits = "".join(
+        f"{name} = 0.01\n" for name in ("displacement", "velocity", "column_force", "table_step")
+    )
+    many = parse(
+        f"[limits]\n{limits}[sensors]\ncolumn_force = 1\ndamper_force = 1\ndamper_stroke = 1\n[test]\nseed = 9\n",
+        Path(),
+    )
+    assert told(ONE, many).endswith(" and 2 more")
+
+
+@pytest.mark.parametrize("name", cli.SHIPPED)
+def test_what_is_said_goes_over_the_wire(name: str) -> None:
+    plan = plans.load(cli.plan_path(name))
+    text = difference.said(plan)
+    assert difference.digest_of(text) == plan.digest()
+    assert json.loads(text.partition(" ")[2])
+    for message in (Register(0, PROTOCOL_VERSION, text), Recorder(0, "ready", text, "", b"")):
+        frame = codec.encode(message, codec.session_key(0, ""))
+        assert codec.decode(frame, codec.session_key(0, "")) == message
+
+
+def test_what_does_not_fit_is_said_by_digits(monkeypatch: Any) -> None:
+    monkeypatch.setattr(difference, "MOST_TEXT", len(difference.said(OTHER)) - 1)
+    assert told(ONE, OTHER).startswith("in structure.damping (master #")
+    assert "duration" not in told(ONE, OTHER)
+    monkeypatch.setattr(difference, "MOST_TEXT", 20)
+    assert told(ONE, OTHER) == f"(master {OTHER.digest()}, slave {ONE.digest()})"
+
+
+@settings(max_examples=200, deadline=None, derandomize=True)
+@given(
+    some.one_of(
+        some.text(max_size=300),
+        some.dictionaries(some.text(max_size=90), some.text(max_size=90), max_size=9).map(
+            lambda found: f"0123456789abcdef {json.dumps(found, ensure_ascii=False)}"
+        ),
+        some.just("0123456789abcdef " + "[" * 3000),
+        some.just('0123456789abcdef {"a": 1}'),
+    )
+)
+def test_a_strangers_words_are_only_shown_and_short(heard: str) -> None:
+    text = difference.differences(ONE, heard, "slave", "master")
+    assert text.isprintable()
+    assert len(text) < 1000
