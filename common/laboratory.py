@@ -9,15 +9,18 @@ from typing import Any, NamedTuple
 
 from common.clock import Clock
 from common.endpoint import Endpoint
-from common.errors import EmergencyStopError, InterlockError, LostError, RthsError
+from common.errors import EmergencyStopError, InterlockError, LostError, RigError, RthsError
 from common.exchange import Event, Exchange, State
 from common.limits import Standstill, Violation
 from common.messages import Message, Recorder, Resend, Trip
 from common.outlet import Outlet, kept_items, next_of
 from common.plan import Plan
+from common.rig import GuardedRig
+from common.rig_time import RigTime
 from common.roles import title
 from common.safety.modes import Cause, Mode, Safety, Turn
 
+SLOW_RIG = "slow_rig"  # code of the event of a rig whose calls take too long, and of the message that says so
 REPEAT_NS = 100_000_000  # an unanswered request is sent again after this long
 
 NO_VALUES: Mapping[str, float] = MappingProxyType({})
@@ -59,6 +62,9 @@ class Laboratory:
         self.epoch_ns = 0  # Unix time of tick 0 on the master's base
         self.outlet = Outlet(0, name, kept_items(self.plan, name))
         self.error: RthsError | None = None
+        self.rig_time = RigTime(self.interval_ns)
+        self._rig_name = ""
+        self._trip_code = ""
         self.heard_ns = setting.clock.now()
         self.recorder: Recorder | None = None
         self.recorder_heard_ns = setting.clock.now()
@@ -158,6 +164,7 @@ class Laboratory:
             return
         self.exchange.happen(event, remote=remote, cause=str(error))
         self.error = error
+        self._trip_code = code if code == SLOW_RIG else self.exchange.state.value
         self.note(code, str(error), level="error", tick=tick, values=values)
         self.explain(error, tick=tick)
         if event is not Event.REFUSE:
@@ -178,9 +185,7 @@ class Laboratory:
     def say_why(self) -> None:
         """Tell the other laboratory that this one has stopped, and why."""
         if self.exchange.session:
-            self.endpoint.send(
-                Trip(self.exchange.session, self.name, self.exchange.state.value, self.exchange.cause)
-            )
+            self.endpoint.send(Trip(self.exchange.session, self.name, self._trip_code, self.exchange.cause))
 
     def lost(self, who: str, seconds: float, tick: int = 0) -> None:
         """End the test because someone has been silent for too long."""
@@ -200,6 +205,9 @@ class Laboratory:
         most = self.plan.safety.overrun
         if late_ns <= most * self.interval_ns:
             return False
+        if 2 * self.rig_time.behind >= late_ns:
+            self.slow_rig(tick)
+            return True
         error = InterlockError(
             f"The {title(self.name)} was held up for {late_ns * 1e-6:.1f} ms, more than {most} intervals: free its "
             "processor or give it real-time priority (`rths doctor`), or raise overrun in [safety]."
@@ -207,22 +215,45 @@ class Laboratory:
         self.fail(Event.TRIP, error, code="overrun", tick=tick, values={"late": late_ns * 1e-9})
         return True
 
+    def watch(self, rig: GuardedRig) -> None:
+        """Take account of how long a rig's calls take."""
+        self._rig_name = rig.name
+        rig.measure(self.clock.now, self.rig_time)
+
+    def slow_rig(self, tick: int) -> None:
+        """End the test because this laboratory's own rig has put it behind."""
+        error = RigError(f"{self._rig_name}: {self.rig_time.sentence()}.")
+        self.fail(Event.TRIP, error, code=SLOW_RIG, tick=tick, values={"behind": self.rig_time.behind * 1e-9})
+
+    @property
+    def kept_by_rig(self) -> bool:
+        """Whether the rig alone has put this laboratory behind by an interval: it then sends nothing."""
+        return self.rig_time.behind >= self.interval_ns
+
     def silent(self, who: str, tick: int) -> None:
         """End the test because nothing fresh has come from someone for too many intervals."""
+        if self.kept_by_rig:
+            self.slow_rig(tick)
+            return
         most = self.plan.safety.ramp_after
         milliseconds = most * self.plan.test.interval * 1e3
         error = LostError(f"Nothing fresh came from the {who} for {most} intervals ({milliseconds:g} ms).")
         self.fail(Event.LOSE, error, code="watchdog", tick=tick, values={"intervals": float(most)})
 
-    def tripped(self, lab: str, text: str, tick: int) -> None:
-        """End the test because the other laboratory has stopped its rig."""
-        self.fail(
-            Event.TRIP,
-            InterlockError(f"The {title(lab)} stopped the test: {text}"),
-            code="remote_trip",
-            tick=tick,
-            remote=True,
-        )
+    def tripped(self, lab: str, trip: Trip, tick: int) -> None:
+        """End the test because the other laboratory has stopped its rig.
+
+        Where it has missed this one, whose own rig was too slow, that is the cause. Where this one has missed it, and
+        it says that its rig was too slow, that is the cause as well, although it comes to be known afterwards.
+        """
+        error = InterlockError(f"The {title(lab)} stopped the test: {trip.text}")
+        if not self.exchange.ended and trip.code == State.LOST.value and self.kept_by_rig:
+            self.slow_rig(tick)
+        elif not self.exchange.ended:
+            self.fail(Event.TRIP, error, code="remote_trip", tick=tick, remote=True)
+        elif trip.code == SLOW_RIG and isinstance(self.error, LostError):
+            self.error = error
+            self.note("remote_trip", str(error), level="error", tick=tick)
 
     def listen_to_recorder(self, message: Message) -> None:
         """Take note of the recorder's state, and send again what it has missed.

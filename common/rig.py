@@ -14,6 +14,7 @@ from typing import Any, NamedTuple, Protocol
 
 from common import blame
 from common.errors import EmergencyStopError, RigError
+from common.rig_time import RigTime
 
 ANYTHING = (Exception, SystemExit)  # a plug-in may raise anything, and ends nothing by `sys.exit`
 
@@ -103,6 +104,18 @@ class GuardedRig:
         self._hidden = hidden
         self._name = name
         self._measurement = measurement
+        self._now: Callable[[], int] = int  # a clock that stands still: nothing is measured
+        self._time = RigTime(0)
+
+    def measure(self, now: Callable[[], int], time: RigTime) -> None:
+        """Measure how long `read` and `write` of a rig that is not emulated take, by a clock in ns, into an account."""
+        if self._twin is None:
+            self._now, self._time = now, time
+
+    @property
+    def name(self) -> str:
+        """What errors call it."""
+        return self._name
 
     def arm(self) -> None:
         """Arm; raises RigError with the rig's own reason, or with what its sensors read at rest."""
@@ -125,11 +138,14 @@ class GuardedRig:
 
     def read(self) -> Any:
         """The measurements as the NamedTuple; raises RigError where they are no finite numbers of the right count."""
+        self._time.tick()
+        begun = self._now()
         try:
             given = self._rig.read()
             values = tuple(given) if isinstance(given, Iterable) else given
         except ANYTHING as error:  # the user gets a sentence
             raise self._failure("read", error) from error
+        self._time.took("read", self._now() - begun)
         try:
             reading = self._measurement(*map(float, values))
         except (TypeError, ValueError, OverflowError):
@@ -140,10 +156,12 @@ class GuardedRig:
 
     def write(self, command: Any) -> None:
         """Apply a command; raises RigError where the rig fails."""
+        begun = self._now()
         try:
             self._rig.write(command)
         except ANYTHING as error:  # the user gets a sentence
             raise self._failure("write", error) from error
+        self._time.took("write", self._now() - begun)
 
     def disarm(self) -> RigError | None:
         """Disarm; a rig that raises all the same gives the error returned, None where all is well."""

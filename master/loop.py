@@ -63,6 +63,7 @@ class MasterLoop:
         self._handshake = Handshake(self.lab, self._partners, rig, epoch_ns - setting.clock.now(), gate)
         self._alone = len(self._partners) == 1
         self._rig = rig
+        self.lab.watch(rig)
         self._step = step
         self._limits = MasterLimits(plan)
         begin = partial(ColumnRamp, plan)
@@ -103,8 +104,8 @@ class MasterLoop:
         if isinstance(message, Trip):
             partner.tripped_ns = received_ns
         match message:
-            case Trip() if not self.lab.exchange.ended:
-                self.lab.tripped(partner.role, message.text, self.ticks)
+            case Trip():
+                self.lab.tripped(partner.role, message, self.ticks)
             case Stopped():
                 partner.stopped = True
             case _:
@@ -201,6 +202,7 @@ class MasterLoop:
         """The first tick."""
         self.lab.exchange.happen(Event.RUN)
         self.lab.safety.take(Turn.RUN)
+        self.lab.rig_time.begin()
         for partner in self._partners:
             partner.heard_ns = now
 

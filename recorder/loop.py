@@ -9,7 +9,7 @@ from common import signals
 from common.clock import Clock
 from common.endpoint import Endpoint
 from common.errors import IncompleteError, InputError, InterlockError, LostError
-from common.laboratory import REPEAT_NS, Report, Setting
+from common.laboratory import REPEAT_NS, SLOW_RIG, Report, Setting
 from common.messages import Finished, Message, Recorder, Register, Resend, Samples
 from common.outlet import BURST, PIECE, Inlet, pack_nexts
 from common.plan import PROTOCOL_VERSION, Plan
@@ -28,6 +28,7 @@ ASKED_SILENCE_NS = (
 ASKED_NS = 20_000_000_000  # how long it records on at most, once asked: longer than a way to rest at the default limits
 STALL_NS = 1_000_000_000  # a recorder that did nothing for so long was held up itself
 ROWS_LOST = "rows_lost"  # code of the event that says what a laboratory did not send again
+MISSED = ("watchdog", "lost")  # a laboratory has missed another
 CONSEQUENCE = "remote_trip"  # the other laboratory's cause counts
 MISSED_AT = [row.name for row in signals.LATENCY].index("deadline_missed")
 
@@ -144,6 +145,8 @@ class RecorderLoop:
         if code in CODES:
             self._machines |= described(lab, code, numbers)
         settled = self._outcome[0] not in ("", CONSEQUENCE)
+        if code == SLOW_RIG and self._outcome[0] in MISSED:  # the silence was its doing
+            settled = False
         if (
             (level == "error" or code == "stop")
             and not settled

@@ -52,6 +52,7 @@ class SlaveLoop:
         self._instance = instance
         self._handshake = Handshake(self.lab, rig, instance)
         self._rig = rig
+        self.lab.watch(rig)
         self._limits = SlaveLimits(setting.plan)
         self._commands: Mailbox[Command] = Mailbox(link, "command", setting.plan.test.interval, nominal=0)
         self._received_ns: dict[int, int] = {}
@@ -103,8 +104,8 @@ class SlaveLoop:
         match message:
             case Stop():
                 self._stop(message)
-            case Trip() if not lab.exchange.ended:
-                lab.tripped(message.lab, message.text, self.ticks)
+            case Trip():
+                lab.tripped(message.lab, message, self.ticks)
             case _:
                 self._handshake.follow(message, received_ns)
 
@@ -178,6 +179,7 @@ class SlaveLoop:
         """The first tick."""
         self.lab.exchange.happen(Event.RUN)
         self.lab.safety.take(Turn.RUN)
+        self.lab.rig_time.begin()
         self.lab.heard_ns = now
 
     def _alarmed(self, tick: int, now: int, *, held: bool) -> bool:
