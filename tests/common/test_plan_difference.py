@@ -39,7 +39,7 @@ def test_the_keys_that_differ_are_named_with_both_values() -> None:
 
 def test_another_version_of_the_package_is_named_first(monkeypatch: Any) -> None:
     heard = difference.said(OTHER)
-    monkeypatch.setattr(difference.metadata, "version", lambda _name: "9.9")
+    monkeypatch.setattr("common.plan_difference.metadata.version", lambda _name: "9.9")
     assert difference.differences(ONE, heard, "slave", "master").startswith("in rths (master ")
 
 
