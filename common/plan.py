@@ -12,7 +12,7 @@ from typing import Any
 
 import tomli_w
 
-from common import building
+from common import building, patience
 from common.errors import InputError, PlanError
 from common.roles import name_of, slave_role
 from common.schema import fill, nearest, plain
@@ -50,6 +50,8 @@ class Plan:
 
     `slaves` holds the slaves by name in the order of the file; it is empty where there is one without a name.
     `follows_in` is the table of the file that the table's compensator comes from, for sentences about it.
+    `eased` names the figures that the file does not write out and that are patient because all laboratories are
+    emulated (common/patience.py).
     """
 
     test: Test = Test()
@@ -73,6 +75,18 @@ class Plan:
     slaves: dict[str, SlaveLaboratory] = field(default_factory=dict)
     base: Path = Path()
     follows_in: str = field(default=FOLLOWS_IN, compare=False)
+    eased: tuple[str, ...] = field(default=(), compare=False)
+
+    @property
+    def emulated(self) -> bool:
+        """Whether no laboratory of the plan has a rig of the user's."""
+        rigs = [self.master.rig, self.slave.rig, *(lab.rig for lab in self.slaves.values())]
+        return not any(rig.class_ for rig in rigs)
+
+    @property
+    def makes_good(self) -> bool:
+        """Whether a tick that comes late is made good: an emulated rig knows no time but its ticks."""
+        return patience.OVERRUN in self.eased
 
     @property
     def storeys(self) -> int:
@@ -145,9 +159,17 @@ class Plan:
             tables["slave"] = {name: plain(lab) for name, lab in self.slaves.items()}
         return tables
 
+    def written(self) -> dict[str, Any]:
+        """As `tables`, without the figures that were eased: beside a rig they are strict again."""
+        tables = self.tables()
+        for name in self.eased:
+            table, _, key = name.partition(".")
+            del tables[table][key]
+        return tables
+
     def toml(self) -> str:
-        """The plan as TOML text, all defaults written out."""
-        return tomli_w.dumps(self.tables())
+        """The plan as TOML text, all defaults written out but those that hold for emulated laboratories alone."""
+        return tomli_w.dumps(self.written())
 
     def digest(self) -> str:
         """Sixteen hex digits that agree where two plans describe the same test; the recording's folder is free."""
@@ -161,7 +183,7 @@ class Plan:
         self, *, duration: float | None = None, scale: float | None = None, seed: int | None = None
     ) -> Plan:
         """The plan with command-line values in place of its own, checked like those of a file."""
-        tables = self.tables()
+        tables = self.written()
         for table, name, value in (
             ("test", "duration", duration),
             ("ground_motion", "scale", scale),
@@ -172,7 +194,7 @@ class Plan:
         return replace(from_tables(tables, self.base), follows_in=self.follows_in)
 
 
-BESIDE = ("slaves", "base", "follows_in")  # no tables of a file
+BESIDE = ("slaves", "base", "follows_in", "eased")  # no tables of a file
 TABLES = tuple(name for name in Plan.__dataclass_fields__ if name not in BESIDE)
 INTERFACE = ("table", "damper", "control")  # what a named slave may have of its own
 
@@ -221,6 +243,7 @@ def from_tables(tables: dict[str, Any], base: Path) -> Plan:
     if plan.ticks < 1:
         raise PlanError(f"duration in [test] is {plan.test.duration} s, shorter than one interval.")
     check_tolerances(plan)
+    plan = patience.eased(plan, tables)
     check_safety(plan)
     return plan
 

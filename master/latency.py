@@ -85,7 +85,8 @@ class Account:
         row = self._rows.get(tick)
         if row is not None and not row.used_ns:
             row.used_ns = used_ns
-            row.missed = row.sent_ns == 0 or not self._in_time(row)
+            late = row.wake_ns >= self._lab.tick_ns(tick + 1)
+            row.missed = late or row.sent_ns == 0 or not self._in_time(row)
             self.missed += row.missed
         self._write(used_ns, everything=False)
 

@@ -29,14 +29,22 @@ def fingerprint(root: Path) -> str:
 def folder() -> Path:
     """Folder for compiled kernels: in the user's cache, or in a temporary folder where that is not writable."""
     name = fingerprint(Path(__file__).parent)
-    base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    chosen = base / "rths" / "kernels" / name
-    try:
-        chosen.mkdir(parents=True, exist_ok=True)
-    except OSError:
+    chosen = of_user(name)
+    if chosen is None:
         chosen = Path(tempfile.gettempdir()) / f"rths-kernels-{os.getuid()}-{name}"
         chosen.mkdir(mode=0o700, exist_ok=True)
     return chosen
+
+
+def of_user(name: str) -> Path | None:
+    """The folder of that name in the user's cache, None where the user has no home or may not write there."""
+    try:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+        chosen = base / "rths" / "kernels" / name
+        chosen.mkdir(parents=True, exist_ok=True)
+    except (OSError, RuntimeError):  # the latter: neither HOME nor an entry of the user says where home is
+        return None
+    return chosen if os.access(chosen, os.W_OK | os.X_OK) else None
 
 
 def warm() -> bool:

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from common import patience
 from common.plan import Plan
 from common.preflight import Check, Risk
 from common.tables import Limits
@@ -35,7 +36,11 @@ class Findings(NamedTuple):
 
 
 def findings(plan: Plan) -> Findings:
-    """What nominal models say of a plan; raises InputError where a model or parameter cannot be."""
+    """What nominal models say of a plan; raises InputError where a model or parameter cannot be.
+
+    Peaks are judged by the limits that hold beside a rig, also where those of emulated laboratories are larger.
+    """
+    plan = patience.strict(plan)
     found = assess(plan)
     top, unstable, check = simulated_peaks(plan, known_unstable=found.unstable)
     return Findings(found, top, unstable, [partition_check(plan, found), check])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from common import signals
+from common import patience, signals
 from common.clock import Clock
 from common.endpoint import Endpoint
 from common.errors import IncompleteError, InputError, InterlockError, LostError
@@ -340,5 +340,7 @@ class RecorderLoop:
         result["items_waiting_most"] = self._sink.most_waiting
         result["recorder_stalled_s"] = f"{self._stalled_ns * 1e-9:.3f}"
         result["deadline_misses"] = self._missed
+        if self._plan.eased:
+            result["patience"] = patience.sentence(self._plan)
         result["outcome"], result["cause"] = self._outcome[0] or "unknown", self._outcome[1]
         return {name: str(value) for name, value in result.items()}

@@ -142,16 +142,20 @@ class SlaveLoop:
         return self.lab.tick_ns(tick) + self._shift_ns
 
     def tick(self, tick: int) -> None:
-        """One control interval (contract, section 3); a tick that comes a whole interval late keeps its command."""
+        """One control interval (contract, section 3); a tick that comes a whole interval late keeps its command.
+
+        Where all laboratories are emulated it is made good with its own command.
+        """
         lab, now = self.lab, self.lab.clock.now()
         lab.tick = tick
         if lab.exchange.state is State.SCHEDULED:
             self._begin(now)
-        held = now >= self.tick_ns(tick + 1)
+        late = now >= self.tick_ns(tick + 1)
+        held = late and not lab.plan.makes_good
         if not held and (command := self._commands.take(tick)) is not None:
             self._command = command
             self._tally.use(command.seq)
-        if self._alarmed(tick, now, held=held):
+        if self._alarmed(tick, now, late=late):
             self.ease(tick)
             return
         command = self._command
@@ -182,12 +186,12 @@ class SlaveLoop:
         self.lab.rig_time.begin()
         self.lab.heard_ns = now
 
-    def _alarmed(self, tick: int, now: int, *, held: bool) -> bool:
+    def _alarmed(self, tick: int, now: int, *, late: bool) -> bool:
         """Trip where this loop came far too late, or the master has been silent for too long; hold before that."""
         lab = self.lab
         if lab.overrun(now - self.tick_ns(tick), tick):
             return True
-        if held:  # the silence may be this loop's own
+        if late:  # the silence may be this loop's own
             return False
         judged = self._commands.judged(self._command)
         finding = self._watchdog.look(tick, judged.seq, judged.heard_seq)

@@ -13,6 +13,7 @@ import pytest
 from hypothesis import settings
 
 from common import cli, plan, reality
+from common.patience import strict
 from common.plan import Plan
 from rths import virtual
 from tests.limited import Left, adopt, children, descendants, end, look
@@ -94,8 +95,8 @@ def unhurried(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="session")
 def default_plan() -> Plan:
-    """The default test as it ships."""
-    return plan.load(cli.plan_path(None))
+    """The default test with the strict figures of rigs."""
+    return strict(plan.load(cli.plan_path(None)))
 
 
 @pytest.fixture(scope="session")

@@ -10,6 +10,7 @@ import numpy as np
 
 from common import cli
 from common import plan as plans
+from common.patience import strict
 from common.plan import Plan
 from common.reality import as_planned
 from common.transport import TICK
@@ -24,8 +25,9 @@ STATES = {"outage": DROPS, "backlog": QUEUES}
 
 
 def plan_of(schedule: Schedule) -> Plan:
-    """The plan of a scheduled test, which waits for a recorder where it is recorded."""
-    tables = plans.load(cli.plan_path(schedule.plan)).with_test(duration=schedule.duration).tables()
+    """The plan of a scheduled test, which waits for a recorder where it is recorded; its figures are those of rigs."""
+    plan = strict(plans.load(cli.plan_path(schedule.plan)).with_test(duration=schedule.duration))
+    tables = plan.tables()
     tables["recording"]["required"] = schedule.recorded
     return plans.from_tables(tables, Path())
 
