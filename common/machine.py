@@ -16,6 +16,7 @@ from pathlib import Path
 PROC, SYS = Path("/proc"), Path("/sys")
 CGROUPS = SYS / "fs/cgroup"
 POLICIES = {0: "other", 1: "fifo", 2: "rr", 3: "batch", 5: "idle", 6: "deadline"}
+STARTED = 19  # place in /proc/PID/stat behind the name
 RESET_ON_FORK = 0x40000000
 USER, NICE, SYSTEM, _IDLE, _IOWAIT, IRQ, SOFTIRQ, STEAL = range(8)  # columns of /proc/stat
 BUSY = (USER, NICE, SYSTEM, IRQ, SOFTIRQ)  # guests are counted in `user` already
@@ -144,6 +145,22 @@ def spare_memory() -> int | None:
     except (OSError, ValueError, KeyError):
         pass
     return min(spare, default=None)
+
+
+def began(pid: int) -> float | None:
+    """When a process was started, Unix time in s, 0 where the system does not say; None where there is none."""
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return None
+    except PermissionError:
+        pass  # another user's
+    try:
+        ticks = int((PROC / str(pid) / "stat").read_text().rsplit(")", 1)[1].split()[STARTED])
+        since = next(line for line in (PROC / "stat").read_text().splitlines() if line.startswith("btime"))
+    except (OSError, StopIteration, IndexError, ValueError):
+        return 0.0
+    return float(since.split()[1]) + ticks / os.sysconf("SC_CLK_TCK")
 
 
 def scheduler_name(pid: int = 0) -> str:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from typing import TYPE_CHECKING, Protocol
 
-from common import cli, realtime
+from common import cli, lacking, realtime, running
 from common.address import loopback
 from common.clock import MonotonicClock
 from common.drive import Loop, drive
@@ -65,6 +66,15 @@ def conduct(
     assembly.warm_up(reality)  # at ordinary priority: it computes for a second
     gate.judge(assembly.preflight(plan))
     granted = realtime.prepare(args.rt, args.processor)
+    for text in lacking.lacks(plan, granted):
+        warning = {
+            "t": 0.0,
+            "lab": role,
+            "level": "warning",
+            "code": "lacking",
+            "text": f"pre-flight: {text}",
+        }
+        report("event", warning)
     link = join(plan, role, stopping, report, listen=listen, connect=connect)
     try:
         endpoint = FrameEndpoint(link, plan.digest())
@@ -73,7 +83,8 @@ def conduct(
         loop.lab.heard_ns = setting.clock.now()
         timed = role == "master"
         stopping.answer = partial(answer, loop)
-        drive(loop, stopping, Surroundings(loop.lab, granted, endpoint.rejected, timed=timed, gate=gate))
+        with announcement(plan, role, listen or connect):
+            drive(loop, stopping, Surroundings(loop.lab, granted, endpoint.rejected, timed=timed, gate=gate))
     finally:
         link.close()
         stopping.ignore()
@@ -114,6 +125,11 @@ def answer(loop: Loop) -> str:
     if lab.safety.mode is not Mode.RAMPING:
         return f"{lab.name}: is {lab.safety.mode.value.replace('_', ' ')}, and leaves as soon as it may."
     return f"{lab.name}: {loop.resting.text}; a way to rest is never cut short."
+
+
+def announcement(plan: Plan, role: str, endpoint: str) -> AbstractContextManager[None]:
+    """Lets `rths run` find a laboratory that was started by itself; one that `rths run` has started it announces."""
+    return nullcontext() if running.announced_already() else running.announced(plan, endpoint, role)
 
 
 def join(

@@ -44,7 +44,7 @@ class Surroundings:
 
     def begin(self) -> None:
         """The ticks are about to begin."""
-        level = "warning" if self._granted.missing else "info"
+        level = "warning" if self._granted.missing and not self._lab.plan.emulated else "info"
         self._lab.note("real_time", sentence(self._granted), level=level, values=self._granted.values())
         self._gate.note(self._lab)
         if self._timed:

@@ -52,6 +52,7 @@ class Account:
         )  # commands that the slave has not heard: tick, sent_ns
         self._named = -1  # newest command that a feedback has named
         self.missed = 0
+        self.missed_last = False  # whether the tick that was judged last was one of them
         self.round_trip = NAN
 
     def open(self, tick: int, wake_ns: int, ready_ns: int, sent_ns: int, used: Feedback) -> None:
@@ -88,6 +89,7 @@ class Account:
             late = row.wake_ns >= self._lab.tick_ns(tick + 1)
             row.missed = late or row.sent_ns == 0 or not self._in_time(row)
             self.missed += row.missed
+            self.missed_last = row.missed
         self._write(used_ns, everything=False)
 
     def finish(self, tick: int, used_ns: int) -> None:

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
-from common import patience
+from common import lateness, patience
 from common.endpoint import Received
 from common.errors import EmergencyStopError, InterlockError, RigError
 from common.exchange import Event, State
@@ -76,6 +76,7 @@ class MasterLoop:
         self._said_ns = -REPEAT_NS
         self._sent_ns = 0  # when the newest command went out
         self._digest = plan.digest()
+        self._late = lateness.LateTicks()
         self.ticks = 0
         self.lab.enter(session)
 
@@ -142,6 +143,7 @@ class MasterLoop:
         late = wake >= lab.tick_ns(tick + 1)
         held = late and not lab.plan.makes_good
         forces = [partner.begin(tick, wake) for partner in self._partners]
+        self._tell_late(tick - 1)
         if self._alarmed(tick, wake, late=late):
             self.ease(tick)
             return
@@ -202,6 +204,14 @@ class MasterLoop:
             self.emergency(error)
         else:
             self._trip(error, "rig", tick)
+
+    def _tell_late(self, tick: int) -> None:
+        """Warn where too many ticks up to this one, which has just been judged, came late in any exchange."""
+        late = any(partner.account.missed_last for partner in self._partners)
+        if tick >= 0 and (count := self._late.take(tick, late=late)):
+            self.lab.note(
+                "late", lateness.sentence(count), level="warning", tick=tick, values={"late": float(count)}
+            )
 
     def _begin(self, now: int) -> None:
         """The first tick."""

@@ -41,6 +41,8 @@ def write_report(summary: dict[str, Any]) -> None:
     summary = all_shown(summary)
     say = sys.stdout.write
     say(f"\n{summary['file']}: test '{summary['test']}'{ending(summary)}\n")
+    for text in summary["warnings"]:
+        say(f"WARNING: {text}\n")
     if summary["circumstances"]:
         say(f"{summary['circumstances']}\n")
     motion = summary["ground_motion"]
@@ -56,6 +58,8 @@ def write_report(summary: dict[str, Any]) -> None:
             f"hybrid simulation error energy at the column: {summary['error_energy'] * 100.0:+.2f} % of the energy in\n"
         )
     write_latency(summary)
+    if summary["patience"]:
+        say(f"patience: {summary['patience']}\n")
     for event in summary["events"]:
         if (event["level"] != "info" and event["code"] != "rejected") or event["code"] == "safe":
             say(f"{event['level']} at t {event['t']:.3f} s ({event['lab']}): {event['text']}\n")

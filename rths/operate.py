@@ -10,14 +10,13 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from common import cli
+from common import cli, running
 from common.endpoint import Endpoint
 from common.errors import LostError
 from common.messages import Answer, Operator
 from common.plan import Plan, parse
 from common.printable import shown
 from common.roles import MASTER, OPERATOR, title
-from rths import running
 
 REPEAT_S = 0.1
 PATIENCE_S = 3.0

@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from common import cli
+from common import cli, running
 from common.errors import InputError, RthsError
 from common.exchange import State
 from common.plan import Plan
@@ -22,7 +22,6 @@ from common.roles import MASTER, RECORDER, title
 from common.safety.modes import Mode
 from common.stopping import Stopper, Stopping
 from rths.progress import Progress as Working
-from rths.running import announced
 from rths.terminal import Progress
 
 if TYPE_CHECKING:
@@ -33,12 +32,13 @@ if TYPE_CHECKING:
 POLL_S = 0.1
 AGREED = State.SCHEDULED.value  # with which the master reports that all know the start
 UNSAID = (
+    "real_time",
     "machine",
     "bare_loop",
     "mode",
     "exchange",
     PASSED,
-)  # for the recording; what was passed is said before
+)  # for the recording; what was passed, and what a machine lacks, is said before
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -59,6 +59,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--live", action="store_true", help="show it in a browser page while it runs")
     parser.add_argument(
         "--live-port", type=int, default=0, metavar="N", help="of that page (default: a free one)"
+    )
+    parser.add_argument(
+        "--beside", action="store_true", help="run although another test runs on this machine"
     )
     cli.json_argument(parser, "write the summary as JSON on standard output")
 
@@ -149,13 +152,17 @@ def in_real_time(
     processes = Processes()
     progress = Progress(plan.test.duration)
     endpoint = listenable()
-    warm_up(progress)
-    progress.say(before_the_start(plan, output, gate))
-    progress.say(f"{plan.test.name}: {plan.test.duration:g} s, starting master, {crew(plan)} and recorder")
     view = None
     ending = Ending(plan)
     try:
-        with announced(plan, endpoint):
+        with running.announced(plan, endpoint):
+            if not args.beside:
+                running.alone()
+            warm_up(progress)
+            progress.say(before_the_start(plan, output, gate))
+            progress.say(
+                f"{plan.test.name}: {plan.test.duration:g} s, starting master, {crew(plan)} and recorder"
+            )
             start_all(processes, args, plan.roles, endpoint, output)
             view = shown(output, args.live_port) if args.live else None
             follow(processes, ending, progress, stopping, view)

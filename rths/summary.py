@@ -17,6 +17,7 @@ from models import indicators
 from models.labs.force_path import force_path as force_path_of
 from models.structures.partition import storey_stiffness
 from rths import circumstances, storeys
+from rths import late as lateness
 from rths.accounts import accounts
 
 Result = TypeVar("Result")
@@ -50,7 +51,7 @@ def plan_of(run: Run) -> Plan | None:
 
 def summarize(run: Run) -> dict[str, Any]:
     """Everything that `inspect` reports, as plain values."""
-    plan = plan_of(run)
+    plan, real_time = plan_of(run), lateness.late_ticks(run)
     return {
         "file": str(run.path),
         "test": run.test,
@@ -75,6 +76,9 @@ def summarize(run: Run) -> dict[str, Any]:
         "error_energy": error_energy(run, plan) if plan else None,
         "latency": latencies(run),
         "late_ticks": late_ticks(run),
+        "real_time": real_time,
+        "warnings": [text for text in (lateness.warning(real_time),) if text],
+        "patience": patience(run),
         "missed_ticks": missed_ticks(run),
         "rejected": rejected(run),
         "exchange": accounts(run),
@@ -206,6 +210,11 @@ def known(indicator: Callable[..., Result], *signals: Any) -> Result | None:
 def late_ticks(run: Run) -> int | None:
     """Ticks in which a deadline was missed in the exchange with any slave, None where latency is not recorded."""
     return ticks_where(run, lambda columns: columns["deadline_missed"].astype(bool))
+
+
+def patience(run: Run) -> str:
+    """Which figures of the plan were larger because all laboratories were emulated, and why; empty where none was."""
+    return next((event["text"] for event in run.events if event["code"] == "patience"), "")
 
 
 def missed_ticks(run: Run) -> int | None:

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from common import cli, plan, reality
+from common import cli, plan, reality, running
 from common.patience import strict
 from common.plan import Plan
 from rths import virtual
@@ -91,6 +91,14 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 def unhurried(monkeypatch: pytest.MonkeyPatch) -> None:
     """No command says how far it is because this machine is slow today."""
     monkeypatch.setattr("rths.progress.UNSAID", math.inf)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def apart(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Tests announce what they run in a place of their own: nobody else's test on this machine refuses it."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(running.FOLDER, str(tmp_path_factory.mktemp("running")))
+        yield
 
 
 @pytest.fixture(scope="session")

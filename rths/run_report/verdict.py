@@ -69,10 +69,12 @@ def sentences(run: Run, summary: Summary) -> list[str]:
     """The verdict, one sentence for each thing that a test is judged by, of those that the recording knows."""
     found = [
         outcome(summary),
+        *summary["warnings"],
         completeness(summary),
         *exchange(summary),
         rejected(summary),
         lateness(run, summary),
+        summary["patience"],
         *tracking(summary),
         force_path(summary),
         energy(summary),
