@@ -9,8 +9,9 @@ import dataclasses
 from pathlib import Path
 from typing import Any
 
+from common import patience
 from common.messages import Command
-from common.plan import Plan
+from common.plan import Plan, parse
 from common.rig import ColumnMeasurement, TableCommand, TableMeasurement
 from common.safety.modes import MEANING, TURNS, mermaid
 from common.signals import TOPICS
@@ -44,6 +45,7 @@ def parts() -> dict[str, dict[str, str]]:
         "explanation/safety.md": {
             "modes": f"```mermaid\n{mermaid()}\n```\n",
             "turns": turns(),
+            "patience": patient(parse("", Path())),
             "watchdog and ramp": keys(Safety),
             "motion": motion(Plan()),
             "limits": limits(),
@@ -79,6 +81,16 @@ def keys(cls: type[Any]) -> str:
     fields = ((field, field.metadata["rule"]) for field in dataclasses.fields(cls))
     rows = ((f"`{field.name}`", quantity(field.default), rule.unit, rule.text) for field, rule in fields)
     return table(("key", "default", "unit", "meaning"), rows)
+
+
+def patient(plan: Plan) -> str:
+    """The figures that are larger where all laboratories are emulated."""
+    rows = (
+        (f"`[{name.partition('.')[0]}] {name.partition('.')[2]}`", *map(quantity, pair))
+        for name in plan.eased
+        for pair in [(patience.standard(name), patience.figure(plan, name))]
+    )
+    return table(("figure", "beside a rig", "emulated, at an interval of 2 ms"), rows)
 
 
 def limits() -> str:

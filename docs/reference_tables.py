@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any, get_type_hints
 
 from common import errors
+from common.patience import FIGURES
 from common.plan import TABLES, Plan
 from common.schema import Rule, required, table_fields
 from docs.markdown import quantity, table
@@ -22,6 +23,7 @@ from models.integrators import INTEGRATORS
 from models.specimens import SPECIMENS
 from rths.__main__ import EXAMPLES, VERBS, parser_for
 
+EASED = "; larger with [emulated laboratories](../explanation/safety.md#emulated-laboratories)"
 KEY_HEAD = ("key", "default", "unit", "allowed", "meaning")
 SITES = ("ground", "structure", "actuator", "column", "link", "table", "damper")
 TYPES = {
@@ -45,6 +47,7 @@ def plan_table(name: str, values: Any) -> list[str]:
     """A table of the plan and the tables within it."""
     fields = table_fields(values)
     rows = [key_row(field, getattr(values, field.name)) for field in fields if "rule" in field.metadata]
+    rows = [(*row[:-1], row[-1] + EASED * (f"{name}.{row[0].strip('`')}" in FIGURES)) for row in rows]
     text = f"## `[{name}]`\n\n{inspect.getdoc(type(values))}\n\n{table(KEY_HEAD, rows)}"
     inner = {
         field.name: getattr(values, field.name) or blank(field.metadata["table"])

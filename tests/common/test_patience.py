@@ -1,0 +1,125 @@
+"""Figures of a test whose laboratories are all emulated: derived from the plan alone, strict again beside a rig."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from common import cli, lacking, patience, reality
+from common import plan as plans
+from common.bare_loop import BareLoop
+from common.errors import PlanError
+from common.plan import Plan, from_tables, parse
+from common.realtime import NOTHING
+
+RIGS = {
+    "the master's": '[master.rig]\nclass = "lab.py:Lab"\n',
+    "the slave's": '[slave.rig]\nclass = "lab.py:Lab"\n',
+    "that of one of several slaves": '[slave.roof.rig]\n[slave.middle.rig]\nclass = "lab.py:Lab"\n',
+}
+HERE = Path()
+
+
+@pytest.mark.parametrize("name", cli.SHIPPED)
+def test_shipped_plans_bear_pauses_and_are_strict_beside_a_rig(name: str) -> None:
+    shipped = plans.load(cli.plan_path(name))
+    assert {patience.OVERRUN, "safety.ramp_after", "safety.hold_after"} <= set(shipped.eased)
+    interval, safety = shipped.test.interval, shipped.safety
+    assert min(safety.overrun, safety.ramp_after) * interval >= 10 * 0.05  # pauses of 50 ms
+    assert shipped.link.loss_timeout > (safety.overrun + safety.ramp_after) * interval
+    assert patience.strict(shipped).safety == Plan().safety
+    assert patience.strict(shipped).preflight.lost == 0
+
+
+@pytest.mark.parametrize("whose", RIGS)
+def test_beside_a_rig_of_the_users_every_figure_is_strict(whose: str) -> None:
+    planned = parse(RIGS[whose], HERE)
+    assert planned.eased == ()
+    assert (planned.safety, planned.limits, planned.link) == (Plan().safety, Plan().limits, Plan().link)
+    assert not planned.makes_good
+
+
+def test_a_reality_changes_no_figure(tmp_path: Path) -> None:
+    planned = parse("", HERE)
+    hidden = reality.from_reality({"master": {"rig": {"class": "lab.py:Lab"}}}, planned, tmp_path)
+    assert hidden.plan.safety == planned.safety
+    assert hidden.plan.limits == planned.limits
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "value"),
+    [
+        ("[safety]\noverrun = 5", "safety.overrun", 5),
+        ("[safety]\noverrun = 7000", "safety.overrun", 7000),
+        ("[safety]\nmessage_age = 0.1", "safety.message_age", 0.1),
+        ("[safety]\nramp_after = 5", "safety.hold_after", 3),
+        ("[link]\nloss_timeout = 1.0", "link.loss_timeout", 1.0),
+        ("[preflight]\nlost = 0", "preflight.lost", 0),
+        ("[limits]\ntable_step = 0.01", "limits.table_step", 0.01),
+    ],
+)
+def test_what_is_written_out_holds_as_written(text: str, name: str, value: float) -> None:
+    planned = parse(text, HERE)
+    assert patience.figure(planned, name) == value
+    assert name not in planned.eased
+    assert planned.eased  # the others are patient all the same
+
+
+def test_late_ticks_are_made_good_unless_overrun_is_written_out() -> None:
+    assert parse("", HERE).makes_good
+    assert not parse("[safety]\noverrun = 5", HERE).makes_good
+    assert not Plan().makes_good
+
+
+@pytest.mark.parametrize("interval", [1e-4, 0.002, 0.1])
+def test_figures_in_intervals_follow_the_interval(interval: float) -> None:
+    planned = parse(f"[test]\ninterval = {interval}", HERE)
+    assert planned.safety.overrun == math.ceil(patience.PATIENCE / interval - 1e-9)
+    assert Plan().safety.hold_after <= planned.safety.hold_after < planned.safety.ramp_after
+
+
+def test_hold_after_written_beyond_the_strict_ramp_after_is_refused() -> None:
+    with pytest.raises(PlanError, match="hold_after in .safety. is 10"):
+        parse("[safety]\nhold_after = 10", HERE)
+
+
+def test_every_process_derives_the_same_and_the_recordings_plan_too() -> None:
+    planned = parse("[test]\nduration = 4.0\n[preflight]\nexchanges = 500\n", HERE)
+    again = parse(planned.toml(), HERE)
+    assert (again, again.eased, again.digest()) == (planned, planned.eased, planned.digest())
+    assert planned.with_test(seed=planned.test.seed).digest() == planned.digest()
+    assert planned.with_ticks(20).eased == planned.eased
+    assert planned.digest() != patience.strict(planned).digest()
+    written = planned.written()
+    written["master"]["rig"]["class"] = "lab.py:Lab"
+    assert from_tables(written, HERE).safety == Plan().safety
+
+
+def test_the_sentence_names_every_figure_beside_the_strict_one() -> None:
+    planned = parse("", HERE)
+    said = patience.sentence(planned)
+    assert "overrun 1000 (5)" in said
+    assert "late_share 1 (0.05)" in said
+    assert all(name.partition(".")[2] in said for name in planned.eased)
+
+
+def test_of_an_emulation_nothing_lacks() -> None:
+    assert lacking.lacks(parse("", HERE), NOTHING._replace(missing=("No real-time priority.",))) == []
+
+
+def test_beside_a_rig_it_is_said_what_the_machine_lacks(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = {"ticks": 470.0, "late": 30.0, "max": 0.019}
+    monkeypatch.setattr(BareLoop, "start", lambda *_: None)
+    monkeypatch.setattr(BareLoop, "stop", lambda _: found)
+    monkeypatch.setattr(lacking, "MEASURED_S", 0.0)
+    planned = parse(RIGS["the slave's"] + "[safety]\nramp_after = 50\n", HERE)
+    priority, lateness, lax = lacking.lacks(planned, NOTHING._replace(missing=("No real-time priority.",)))
+    assert priority == "No real-time priority."
+    assert (
+        "30 of 500 by a whole interval of 2 ms or more, the worst by 19.0 ms; at 10 ms (overrun" in lateness
+    )
+    assert "ramp_after in [safety] is written out as 50, which is laxer than 5" in lax
+    found["late"] = 0.0
+    assert len(lacking.lacks(planned, NOTHING)) == 1

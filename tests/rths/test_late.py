@@ -1,0 +1,56 @@
+"""What a recording's late ticks mean for its result, in its summary and its verdict."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from common.recording.reader import Run, read
+from rths import inspect, late
+from rths.run_report import verdict
+from rths.summary import summarize
+
+
+def with_late(path: Path, *spans: tuple[int, int]) -> Run:
+    """A recording in which some ticks came late."""
+    run = read(path)
+    latency = dict(run.columns["latency"])
+    missed = np.zeros(len(latency["seq"]), dtype=bool)
+    for begin, end in spans:
+        missed[begin:end] = True
+    return replace(run, columns=run.columns | {"latency": latency | {"deadline_missed": missed}})
+
+
+def test_a_run_that_lost_real_time_says_so_first(virtual_recording: Path, capsys: Any) -> None:
+    run = with_late(virtual_recording, (0, 1800))
+    summary = summarize(run)
+    assert summary["real_time"] == {"late": 1800, "ticks": 2000, "worst": 1000, "window": 1000}
+    inspect.write_report(summary)
+    assert (
+        capsys.readouterr()
+        .out.splitlines()[2]
+        .startswith(
+            "WARNING: The test did not keep real time: 1800 of 2000 ticks (90%) were late, up to 1000 of 1000 in a row"
+        )
+    )
+    assert verdict.sentences(run, summary)[1] == summary["warnings"][0]
+
+
+@pytest.mark.parametrize("spans", [[], [(100, 150)], [(0, 25), (1200, 1225)]])
+def test_single_pauses_are_counted_without_a_warning(
+    spans: list[tuple[int, int]], virtual_recording: Path
+) -> None:
+    summary = summarize(with_late(virtual_recording, *spans))
+    assert summary["real_time"]["late"] == sum(end - begin for begin, end in spans)
+    assert summary["warnings"] == []
+
+
+def test_where_no_latency_is_recorded_nothing_is_said(virtual_recording: Path) -> None:
+    run = read(virtual_recording)
+    columns = {topic: values for topic, values in run.columns.items() if topic != "latency"}
+    assert late.late_ticks(replace(run, columns=columns)) is None
+    assert late.warning(None) == ""

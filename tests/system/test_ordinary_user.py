@@ -1,0 +1,75 @@
+"""`rths run` for a user without any real-time right, beside a process that takes the processors away now and then."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.processes import environment, finished, tied
+
+# real-time priority above everything of the test: for 30 ms every half second nothing else runs on the processor
+BURNER = """
+import os, time
+os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(99))
+print("ready", flush=True)
+while True:
+    time.sleep(0.5)
+    begun = time.monotonic()
+    while time.monotonic() - begun < 0.030:
+        pass
+"""
+# root without its capabilities has no right that another user has not, and can read every Python that runs tests
+WITHOUT_RIGHTS = ["setpriv", "--bounding-set=-all", "--inh-caps=-all", "--no-new-privs", "--"]
+WITHOUT_LIMITS = ["prlimit", "--rtprio=0", "--memlock=0", "--nice=0", "--"]
+MAY_TAKE_PROCESSORS = [sys.executable, "-c", "import os; os.sched_setscheduler(0, 1, os.sched_param(99))"]
+
+
+@contextlib.contextmanager
+def burners() -> Iterator[None]:
+    """One on each processor that this process may use."""
+    with contextlib.ExitStack() as stack:
+        for processor in os.sched_getaffinity(0):
+            command = tied("taskset", "-c", str(processor), sys.executable, "-c", BURNER)
+            burner = stack.enter_context(subprocess.Popen(command, stdout=subprocess.PIPE))
+            stack.callback(burner.kill)
+            assert burner.stdout is not None
+            assert burner.stdout.readline() == b"ready\n"
+        yield
+
+
+def test_a_user_without_rights_completes_the_test_on_a_machine_that_pauses_it(tmp_path: Path) -> None:
+    if os.geteuid() != 0 or subprocess.run(MAY_TAKE_PROCESSORS, check=False, timeout=30).returncode:
+        pytest.skip("only root may take the processors away with FIFO 99")
+    if not all(map(shutil.which, ("setpriv", "prlimit", "taskset"))):
+        pytest.skip("setpriv, prlimit and taskset of util-linux are needed")
+    command = [
+        sys.executable,
+        "-m",
+        "rths",
+        "run",
+        "--duration",
+        "5",
+        "-o",
+        str(tmp_path / "a.mcap"),
+        "--json",
+    ]
+    words = [*WITHOUT_RIGHTS, *WITHOUT_LIMITS, *command]
+    with burners():
+        done = finished(*words, seconds=200.0, cwd=tmp_path, env=environment())
+    assert done.returncode == 0, done.stderr
+    summary = json.loads(done.stdout)
+    assert summary["recorder"]["outcome"] == "stop"
+    assert summary["recorder"]["cause"] == "completed"
+    assert summary["topics"]["master"]["missing"] == summary["topics"]["slave"]["missing"] == 0
+    assert "overrun 1000 (5)" in summary["patience"]
+    assert summary["late_ticks"] >= 10  # it was disturbed indeed, and says so
+    shape = next(event for event in summary["events"] if event["code"] == "real_time")
+    assert shape["values"]["priority"] == shape["values"]["memory_locked"] == 0.0
