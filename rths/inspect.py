@@ -41,13 +41,7 @@ def write_report(summary: dict[str, Any]) -> None:
     summary = all_shown(summary)
     say = sys.stdout.write
     say(f"\n{summary['file']}: test '{summary['test']}'{ending(summary)}\n")
-    for text in summary["warnings"]:
-        say(f"WARNING: {text}\n")
-    if summary["circumstances"]:
-        say(f"{summary['circumstances']}\n")
-    motion = summary["ground_motion"]
-    if motion:
-        say(f"ground motion: {motion['record']}, scaled by {motion['scale']}\n")
+    write_head(summary)
     write_completeness(summary)
     write_peaks(summary["peaks"])
     write_storeys(summary)
@@ -75,6 +69,18 @@ def write_report(summary: dict[str, Any]) -> None:
     say(
         f"open it: rths plot {summary['file']}, or any MCAP viewer (Foxglove, Lichtblick, PlotJuggler, Rerun)\n"
     )
+
+
+def write_head(summary: dict[str, Any]) -> None:
+    """What a reader must know first: warnings, under what circumstances, by which motion."""
+    say = sys.stdout.write
+    for text in summary["warnings"]:
+        say(f"WARNING: {text}\n")
+    if summary["circumstances"]:
+        say(f"{summary['circumstances']}\n")
+    motion = summary["ground_motion"]
+    if motion:
+        say(f"ground motion: {motion['record']}, scaled by {motion['scale']}\n")
 
 
 def ending(summary: dict[str, Any]) -> str:
