@@ -32,13 +32,13 @@ if TYPE_CHECKING:
 POLL_S = 0.1
 AGREED = State.SCHEDULED.value  # with which the master reports that all know the start
 UNSAID = (
-    "real_time",
+    "patience",
     "machine",
     "bare_loop",
     "mode",
     "exchange",
     PASSED,
-)  # for the recording; what was passed, and what a machine lacks, is said before
+)  # for the recording; what was passed, and what a machine lacks, is said before, patience in the summary
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -315,6 +315,8 @@ def tell(said: Said, progress: Progress) -> None:
             progress.show(said.data)
         case {"kind": "mode", "lab": lab, "mode": mode}:
             progress.mode(lab, mode)
+        case {"kind": "event", "code": "real_time", "missing": missing} if missing:
+            pass  # beside a rig it was said before; an emulation can do without
         case {"kind": "event", "code": code, "lab": lab, "text": text} if code not in UNSAID:
             progress.say(f"{lab}: {text}")
         case {"kind": "text", "text": text}:

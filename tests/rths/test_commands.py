@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from common.cli import plan_path
+from common.plan import load
 from common.recording.reader import read
 from rths.__main__ import EXAMPLES, MODULES, VERBS, main, parser_for
 from tests.helpers import ROOT
@@ -309,15 +311,13 @@ def test_the_users_own_laboratory_runs(call: Any, capsys: Any, tmp_path: Path) -
     assert "matches to the last bit" in capsys.readouterr().out
 
 
-def test_a_reality_leaves_no_trace_in_the_recording(
-    call: Any, tmp_path: Path, virtual_recording: Path
-) -> None:
+def test_a_reality_leaves_no_trace_in_the_recording(call: Any, tmp_path: Path) -> None:
     secret = tmp_path / "secret_reality.toml"
     secret.write_text("[column]\nstiffness = 13.1e6\n")
     path = tmp_path / "real.mcap"
     assert call("run", "--virtual", "--duration", "4", "--reality", secret, "-o", path) == 0
-    real, nominal = read(path), read(virtual_recording)
-    assert real.metadata["plan"] == nominal.metadata["plan"]
+    real, plan = read(path), load(plan_path(None)).with_test(duration=4.0)
+    assert real.metadata["plan"] == {"toml": plan.toml(), "digest": plan.digest()}
     ratio = real.columns["master"]["column_force"] / real.columns["master"]["column_displacement"]
     strong = np.abs(real.columns["master"]["column_displacement"]) > 1e-3
     assert np.median(ratio[strong]) == pytest.approx(13.1e6, rel=0.01)
