@@ -79,7 +79,7 @@ def fit_labels(canvas: Any) -> None:
             if begin < 0.0 or end > size:
                 middle = 0.5 * (begin + end)
                 room = 2.0 * min(middle, size - middle)
-                letters = max(int(len(words) * room / (end - begin)), 8)
+                letters = max(int(0.85 * len(words) * room / (end - begin)), 8)
                 label.set_text("\n".join(textwrap.wrap(words, letters)))
 
 
