@@ -27,7 +27,14 @@ from tests.helpers import ROOT
 
 NAMES = [field.name for field in dataclasses.fields(Limits)]
 SHOWN_ONLY = {"lacking", "open_link", "stranger"}  # before anything is recorded
-BY_CONSTANT = {preflight.PASSED, preflight.SENSORS, preflight.LINK, preflight.ACCEPTED}
+BY_CONSTANT = {
+    "slow_rig",
+    "traceback",
+    preflight.PASSED,
+    preflight.SENSORS,
+    preflight.LINK,
+    preflight.ACCEPTED,
+}
 
 
 @pytest.mark.parametrize("name", generate.parts())
