@@ -22,6 +22,7 @@ from master.step import MasterStep
 from models import preflight as nominal
 from models import substructure
 from models.closed_loop import build_a
+from models.compiled import plain
 from models.labs import column_lab, noise, readings
 from models.realised import true_system
 from models.registry import Array
@@ -104,5 +105,5 @@ def warm_up(reality: Reality) -> None:
     """Compile the kernels on arrays that are thrown away."""
     outputs = master_step(reality)(0, 0.0, 0.0, [0.0] * len(reality.plan.roles))
     MasterLimits(reality.plan).violation(ColumnMeasurement(0.0, 0.0), outputs)
-    column_lab.advance(*build_a(true_system(reality)), 0.0)
-    readings.step(*readings.build(reality.plan.test.interval, ("any",), {}), 0, 0.0, 0.0, 0.0)
+    column_lab.enter(plain(build_a(true_system(reality))), 0.0)
+    readings.step(readings.build(reality.plan.test.interval, ("any",), {}), 0, 0.0, 0.0, 0.0)

@@ -11,6 +11,7 @@ from common.plan import Plan
 from common.rig import ColumnMeasurement
 from master.step import Outputs
 from models import energy_balance
+from models.compiled import plain
 from models.energy_balance import ACCELERATION, DISPLACEMENT, DRIFT_SHARE, ERROR_SHARE, VELOCITY
 from models.structures.partition import felt, storey_stiffness
 
@@ -30,7 +31,7 @@ class EnergyMonitor:
             floor(plan),
             np.array(plan.structure.mass),
         )
-        self._step = energy_balance.step
+        self._enter, self._sums = energy_balance.enter, plain(self._balance)
 
     @property
     def error_energy(self) -> float:
@@ -52,7 +53,7 @@ class EnergyMonitor:
             motion[ACCELERATION, 0] = outputs.acceleration
         else:
             motion[: ACCELERATION + 1] = outputs[8:11]
-        self._step(*balance, outputs.ground_acceleration, outputs.column_target, *measured)
+        self._enter(self._sums, outputs.ground_acceleration, outputs.column_target, *measured)
         error, drift = self.error_energy, self.numerical_drift
         if abs(error) <= self._limits.error_energy and abs(drift) <= self._limits.numerical_drift:
             return None

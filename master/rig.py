@@ -10,6 +10,7 @@ from common import schema
 from common.rig import ColumnCommand, ColumnMeasurement
 from common.tables import Actuator, Column, Sensors
 from models.closed_loop import MEASURED_A
+from models.compiled import plain
 from models.labs import column_lab, noise, readings
 from models.system import Effects
 
@@ -28,19 +29,20 @@ class ColumnLab:
     ) -> None:
         more = effects or Effects()
         levels = noise.levels_a(schema.fill(Sensors, sensors or {}, "sensors"))
-        self._arrays = column_lab.build(
+        lab = column_lab.build(
             interval,
             schema.fill(Actuator, actuator or {}, "actuator"),
             schema.fill(Column, column or {}, "column"),
             more.actuator,
             more.column,
         )
+        self._lab = plain(lab)
         self._readings = readings.build(interval, MEASURED_A, more.sensors)
         self._noise = noise.Noise(seed, readings.levels(MEASURED_A, levels, more.sensors))
         self._plain = not more.sensors  # a reading is value plus noise
         self._interval, self._tick = interval, 0
         self._true = (0.0, 0.0)
-        self._advance = column_lab.advance
+        self._advance = column_lab.enter
 
     def arm(self) -> None:
         """Nothing can hinder an emulated laboratory."""
@@ -53,12 +55,12 @@ class ColumnLab:
         t = self._tick * self._interval
         self._tick += 1
         return ColumnMeasurement(
-            readings.step(*sensors, 0, true[0], error[0], t), readings.step(*sensors, 1, true[1], error[1], t)
+            readings.step(sensors, 0, true[0], error[0], t), readings.step(sensors, 1, true[1], error[1], t)
         )
 
     def write(self, command: ColumnCommand) -> None:
         """Move on by one interval, ramping to the command."""
-        self._true = self._advance(*self._arrays, command.actuator_command)
+        self._true = self._advance(self._lab, command.actuator_command)
 
     def disarm(self) -> None:
         """An emulated actuator stays where it is."""

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 from common.plan import Plan
 from models import substructure
+from models.compiled import plain
 from models.registry import Array
 
 Values = float | list[float]
@@ -43,21 +44,21 @@ class MasterStep:
     """The numerical substructure, the compensator and the dampers' control, moving on tick by tick."""
 
     def __init__(self, plan: Plan, ground: Array, p_delta: float = 0.0) -> None:
-        self._arrays = substructure.build(plan, ground, p_delta)
-        self._forces = self._arrays.dampers[substructure.FORCE_USED]
+        building = substructure.build(plan, ground, p_delta)
+        self._building, self._output = plain(building), building.output
+        self._forces = building.dampers[substructure.FORCE_USED]
         self._plain = plan.storeys == len(plan.roles) == 1
         self._slaves, self._storeys = len(plan.roles), plan.storeys
-        self._advance = substructure.advance
+        self._advance = substructure.enter
 
     def __call__(
         self, tick: int, column_displacement: float, column_force: float, damper_forces: Sequence[float]
     ) -> Outputs:
         """One tick; displacement m, forces N, all as measured, each slave's damper force at its own scale."""
-        arrays = self._arrays
         for place, force in enumerate(damper_forces):
             self._forces[place] = force
-        self._advance(*arrays, tick, column_displacement, column_force)
-        row = arrays.output.tolist()
+        self._advance(self._building, tick, column_displacement, column_force)
+        row = self._output.tolist()
         return Outputs(*row) if self._plain else self._grouped(row)
 
     def _grouped(self, row: list[float]) -> Outputs:

@@ -14,8 +14,11 @@ from numpy.typing import NDArray
 from common import signals as table
 from common.plan import Plan
 from models import compensators, substructure
+from models.compensators import Built as Compensator
+from models.compensators import Wanted
 from models.compiled import jit
 from models.labs import column_lab, noise, readings, table_lab
+from models.labs.readings import Readings
 from models.registry import Array
 from models.substructure import (
     ACTUATOR_COMMAND,
@@ -26,6 +29,7 @@ from models.substructure import (
     TABLE_JERK,
     TABLE_TARGET,
     TABLE_VELOCITY,
+    Substructure,
 )
 from models.system import Effects, System
 
@@ -35,10 +39,20 @@ MEASURED_A = ("column_displacement", "column_force")
 MEASURED_B = ("table_displacement", "table_acceleration", "damper_stroke", "damper_force")
 
 
+class Rows(NamedTuple):
+    """What a rollout fills: one row per tick."""
+
+    outputs: Array  # (ticks, 8 + 5·storeys): the master's, in the order of `substructure`
+    measured_a: Array  # (ticks, 2)
+    measured_b: Array  # (ticks, 4)
+    damper_force_used: Array  # (ticks,)
+    table_command: Array  # (ticks,)
+
+
 class Rollout(NamedTuple):
     """What a rollout gives: one row per tick."""
 
-    outputs: Array  # (ticks, 5 + 5·storeys): the master's, in the order of `substructure`
+    outputs: Array  # (ticks, 8 + 5·storeys): the master's, in the order of `substructure`
     measured_a: Array  # (ticks, 2)
     measured_b: Array  # (ticks, 4)
     damper_force_used: Array  # (ticks,)
@@ -52,6 +66,18 @@ class Exchange(NamedTuple):
 
     command: Index  # (ticks,): command in force at the slave's tick, −1 for none yet
     feedback: Index  # (ticks,): feedback used at the master's tick, −1 for none yet
+
+
+class Loop(NamedTuple):
+    """Everything that moves in a closed loop, at rest, and the messages that its ticks use."""
+
+    building: Substructure
+    lab_a: column_lab.ColumnLab
+    lab_b: table_lab.TableLab
+    compensator_b: Compensator
+    sensors_a: Readings
+    sensors_b: Readings
+    exchange: Exchange
 
 
 def on_time(ticks: int) -> Exchange:
@@ -73,30 +99,33 @@ def simulate(
     one they read what the emulated laboratories read under that seed of the plan. Of the link's effects
     only the `exchange` counts: which message was used at which tick.
     """
-    ticks, more = plan.ticks, effects or Effects()
-    master = substructure.build(plan, ground, more.p_delta)
-    outputs = np.zeros((ticks, master.output.size))
-    measured_a, measured_b, used = np.zeros((ticks, 2)), np.zeros((ticks, 4)), np.zeros(ticks)
-    follow = plan.table.compensator
-    compensator_b = compensators.build(follow.kind, follow.parameters, plan.test.interval, plan.follows_in)
-    written = np.zeros(ticks)
-    filled = roll(
-        *master,
-        *build_a(System(plan, more)),
-        *build_b(System(plan, more)),
-        *compensator_b,
-        *(exchange or on_time(ticks)),
-        *readings.build(plan.test.interval, MEASURED_A, more.sensors),
-        *readings.build(plan.test.interval, MEASURED_B, more.sensors),
-        *noises(System(plan, more), seed),
-        np.zeros(master.output.size),
-        outputs,
-        measured_a,
-        measured_b,
-        used,
-        written,
+    ticks, system = plan.ticks, System(plan, effects or Effects())
+    loop = at_rest(system, ground, exchange or on_time(ticks))
+    width = loop.building.output.size
+    rows = Rows(
+        np.zeros((ticks, width)),
+        np.zeros((ticks, len(MEASURED_A))),
+        np.zeros((ticks, len(MEASURED_B))),
+        np.zeros(ticks),
+        np.zeros(ticks),
     )
-    return Rollout(outputs, measured_a, measured_b, used, written, filled == ticks, filled)
+    filled = roll(loop, *noises(system, seed), np.zeros(width), rows)
+    return Rollout(*rows, filled == ticks, filled)
+
+
+def at_rest(system: System, ground: Array, exchange: Exchange) -> Loop:
+    """The closed loop of a system with one slave before its first tick."""
+    plan, effects = system.plan, system.effects
+    interval, follow = plan.test.interval, plan.table.compensator
+    return Loop(
+        substructure.build(plan, ground, effects.p_delta),
+        build_a(system),
+        build_b(system),
+        compensators.build(follow.kind, follow.parameters, interval, plan.follows_in),
+        readings.build(interval, MEASURED_A, effects.sensors),
+        readings.build(interval, MEASURED_B, effects.sensors),
+        exchange,
+    )
 
 
 def build_a(system: System) -> column_lab.ColumnLab:
@@ -130,146 +159,50 @@ def noise_a(system: System, seed: int | None) -> Array:
 
 
 @jit
-def roll(
-    codes: Index,
-    scalars: Array,
-    dampers: Array,
-    mass: Array,
-    coefficients: Array,
-    column_params: Array,
-    compensator_params: Array,
-    ground: Array,
-    state: Array,
-    column_memory: Array,
-    compensator_memory: Array,
-    recent: Array,
-    filtered: Array,
-    target: Array,
-    balance: Array,
-    output: Array,
-    taps_a: Array,
-    rows_a: Array,
-    lengths_a: Array,
-    limits_a: Array,
-    history_a: Array,
-    state_a: Array,
-    specimen: int,
-    specimen_params: Array,
-    specimen_memory: Array,
-    specimen_effects: Array,
-    yielding: Array,
-    yielded: Array,
-    cell: Array,
-    taps_b: Array,
-    matrices: Array,
-    spring: Array,
-    limits_b: Array,
-    history_b: Array,
-    state_b: Array,
-    scratch: Array,
-    code_c: int,
-    params_c: Array,
-    memory_c: Array,
-    command: Index,
-    feedback: Index,
-    sensors_a: Array,
-    sensed_a: Array,
-    sensors_b: Array,
-    sensed_b: Array,
-    noise_a: Array,
-    noise_b: Array,
-    nothing: Array,
-    outputs: Array,
-    measured_a: Array,
-    measured_b: Array,
-    used: Array,
-    written: Array,
-) -> int:
-    """Fill the last five arrays tick by tick; return how many ticks stayed finite.
+def roll(loop: Loop, noise_a: Array, noise_b: Array, nothing: Array, rows: Rows) -> int:
+    """Fill the rows tick by tick; return how many ticks stayed finite.
 
-    `nothing` is a row of zeros: what the slave follows before its first command.
+    `noise_a` (ticks, 2) and `noise_b` (ticks, 4) are what errs in the readings; `nothing` is a row of zeros: what the
+    slave follows before its first command.
     """
+    building = loop.building
     displacement, force = 0.0, 0.0
     y, y_acceleration, stroke, damper_force, present = 0.0, 0.0, 0.0, 0.0, 0.0
-    interval = scalars[substructure.INTERVAL]
-    for tick in range(outputs.shape[0]):
+    interval = building.scalars[substructure.INTERVAL]
+    measured_a, measured_b = rows.measured_a, rows.measured_b
+    for tick in range(rows.outputs.shape[0]):
         t = tick * interval
-        measured_a[tick, 0] = readings.step(sensors_a, sensed_a, 0, displacement, noise_a[tick, 0], t)
-        measured_a[tick, 1] = readings.step(sensors_a, sensed_a, 1, force, noise_a[tick, 1], t)
-        used[tick] = measured_b[feedback[tick], 3] if feedback[tick] >= 0 else 0.0
-        dampers[substructure.FORCE_USED, 0] = used[tick]
-        substructure.advance(
-            codes,
-            scalars,
-            dampers,
-            mass,
-            coefficients,
-            column_params,
-            compensator_params,
-            ground,
-            state,
-            column_memory,
-            compensator_memory,
-            recent,
-            filtered,
-            target,
-            balance,
-            output,
-            tick,
-            measured_a[tick, 0],
-            measured_a[tick, 1],
-        )
-        if not np.isfinite(output[ACTUATOR_COMMAND]):
+        measured_a[tick, 0] = readings.step(loop.sensors_a, 0, displacement, noise_a[tick, 0], t)
+        measured_a[tick, 1] = readings.step(loop.sensors_a, 1, force, noise_a[tick, 1], t)
+        answered = loop.exchange.feedback[tick]
+        rows.damper_force_used[tick] = measured_b[answered, 3] if answered >= 0 else 0.0
+        building.dampers[substructure.FORCE_USED, 0] = rows.damper_force_used[tick]
+        substructure.advance(building, tick, measured_a[tick, 0], measured_a[tick, 1])
+        if not np.isfinite(building.output[ACTUATOR_COMMAND]):
             return tick
-        for place in range(output.size):
-            outputs[tick, place] = output[place]
-        displacement, force = column_lab.advance(
-            taps_a,
-            rows_a,
-            lengths_a,
-            limits_a,
-            history_a,
-            state_a,
-            specimen,
-            specimen_params,
-            specimen_memory,
-            specimen_effects,
-            yielding,
-            yielded,
-            cell,
-            output[ACTUATOR_COMMAND],
-        )
-        measured_b[tick, 0] = readings.step(sensors_b, sensed_b, 0, y, noise_b[tick, 0], t)
-        measured_b[tick, 1] = readings.step(sensors_b, sensed_b, 1, y_acceleration, noise_b[tick, 1], t)
-        measured_b[tick, 2] = readings.step(sensors_b, sensed_b, 2, stroke, noise_b[tick, 2], t)
-        measured_b[tick, 3] = readings.step(sensors_b, sensed_b, 3, damper_force, noise_b[tick, 3], t)
-        sent = command[tick]
-        row = outputs[sent] if sent >= 0 else nothing
-        written[tick] = compensators.step(
-            code_c,
-            params_c,
-            memory_c,
+        for place in range(building.output.size):
+            rows.outputs[tick, place] = building.output[place]
+        displacement, force = column_lab.advance(loop.lab_a, building.output[ACTUATOR_COMMAND])
+        measured_b[tick, 0] = readings.step(loop.sensors_b, 0, y, noise_b[tick, 0], t)
+        measured_b[tick, 1] = readings.step(loop.sensors_b, 1, y_acceleration, noise_b[tick, 1], t)
+        measured_b[tick, 2] = readings.step(loop.sensors_b, 2, stroke, noise_b[tick, 2], t)
+        measured_b[tick, 3] = readings.step(loop.sensors_b, 3, damper_force, noise_b[tick, 3], t)
+        sent = loop.exchange.command[tick]
+        row = rows.outputs[sent] if sent >= 0 else nothing
+        wanted = Wanted(
             row[TABLE_TARGET],
             row[TABLE_VELOCITY],
             row[TABLE_ACCELERATION],
             row[TABLE_JERK],
             present,
             measured_b[tick, 0],
-            interval,
         )
+        rows.table_command[tick] = compensators.step(loop.compensator_b, wanted, interval)
         present = row[TABLE_TARGET]
         y, y_acceleration, stroke, damper_force = table_lab.advance(
-            taps_b,
-            matrices,
-            spring,
-            limits_b,
-            history_b,
-            state_b,
-            scratch,
-            written[tick],
-            row[DAMPER_COMMAND],
+            loop.lab_b, rows.table_command[tick], row[DAMPER_COMMAND]
         )
-    return outputs.shape[0]
+    return rows.outputs.shape[0]
 
 
 def signals(plan: Plan, rollout: Rollout) -> dict[str, Array]:

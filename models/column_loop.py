@@ -16,11 +16,21 @@ from models import substructure
 from models.closed_loop import MEASURED_A, build_a, noise_a
 from models.compiled import jit
 from models.labs import column_lab, readings
+from models.labs.column_lab import ColumnLab
+from models.labs.readings import Readings
 from models.registry import Array
-from models.substructure import ACTUATOR_COMMAND, COLUMN_TARGET, TABLE_TARGET
+from models.substructure import ACTUATOR_COMMAND, COLUMN_TARGET, TABLE_TARGET, Substructure
 from models.system import Effects, System
 
 FARTHEST = 1e6  # m, command from which on the loop has diverged
+
+
+class Loop(NamedTuple):
+    """Everything that moves in the loop, at rest."""
+
+    building: Substructure
+    lab: ColumnLab
+    sensors: Readings
 
 
 class ColumnRollout(NamedTuple):
@@ -58,18 +68,14 @@ def simulate(
         raise InputError("The loop of laboratory A alone knows no damper: set amd in [control] to false.")
     system = System(plan, effects or Effects())
     errors = rows(system, seed, noise)
-    master = substructure.build(plan, ground, system.effects.p_delta, slaves=False)
+    loop = Loop(
+        substructure.build(plan, ground, system.effects.p_delta, slaves=False),
+        build_a(system),
+        readings.build(plan.test.interval, MEASURED_A, system.effects.sensors),
+    )
     ticks = plan.ticks
     motion, floors = np.zeros((ticks, 4)), np.zeros((ticks, plan.storeys))
-    filled = roll(
-        *master,
-        *build_a(system),
-        *readings.build(plan.test.interval, MEASURED_A, system.effects.sensors),
-        errors,
-        farthest,
-        motion,
-        floors,
-    )
+    filled = roll(loop, errors, farthest, motion, floors)
     target, command, displacement, force = np.ascontiguousarray(motion.T)
     return ColumnRollout(target, command, displacement, force, floors, filled == ticks, filled)
 
@@ -89,94 +95,24 @@ def rows(system: System, seed: int | None, noise: Array | None) -> Array:
 
 
 @jit
-def roll(
-    codes: substructure.Codes,
-    scalars: Array,
-    dampers: Array,
-    mass: Array,
-    coefficients: Array,
-    column_params: Array,
-    compensator_params: Array,
-    ground: Array,
-    state: Array,
-    column_memory: Array,
-    compensator_memory: Array,
-    recent: Array,
-    filtered: Array,
-    target: Array,
-    balance: Array,
-    output: Array,
-    taps: Array,
-    propagation: Array,
-    lengths: Array,
-    limits: Array,
-    history: Array,
-    lab: Array,
-    specimen: int,
-    specimen_params: Array,
-    specimen_memory: Array,
-    specimen_effects: Array,
-    yielding: Array,
-    yielded: Array,
-    cell: Array,
-    sensors: Array,
-    sensed: Array,
-    noise: Array,
-    farthest: float,
-    motion: Array,
-    floors: Array,
-) -> int:
+def roll(loop: Loop, noise: Array, farthest: float, motion: Array, floors: Array) -> int:
     """Fill `motion` (ticks, 4) and `floors` (ticks, n) tick by tick; return how many ticks stayed finite."""
+    building, sensors = loop.building, loop.sensors
     displacement, force = 0.0, 0.0
-    interval = scalars[substructure.INTERVAL]
+    interval = building.scalars[substructure.INTERVAL]
     for tick in range(motion.shape[0]):
         t = tick * interval
-        measured = readings.step(sensors, sensed, 0, displacement, noise[tick, 0], t)
-        felt = readings.step(sensors, sensed, 1, force, noise[tick, 1], t)
-        substructure.advance(
-            codes,
-            scalars,
-            dampers,
-            mass,
-            coefficients,
-            column_params,
-            compensator_params,
-            ground,
-            state,
-            column_memory,
-            compensator_memory,
-            recent,
-            filtered,
-            target,
-            balance,
-            output,
-            tick,
-            measured,
-            felt,
-        )
-        command = output[ACTUATOR_COMMAND]
+        measured = readings.step(sensors, 0, displacement, noise[tick, 0], t)
+        felt = readings.step(sensors, 1, force, noise[tick, 1], t)
+        substructure.advance(building, tick, measured, felt)
+        command = building.output[ACTUATOR_COMMAND]
         if not abs(command) <= farthest:
             return tick
-        motion[tick, 0] = output[COLUMN_TARGET]
+        motion[tick, 0] = building.output[COLUMN_TARGET]
         motion[tick, 1] = command
         motion[tick, 2] = measured
         motion[tick, 3] = felt
         for floor in range(floors.shape[1]):
-            floors[tick, floor] = output[TABLE_TARGET + floor]
-        displacement, force = column_lab.advance(
-            taps,
-            propagation,
-            lengths,
-            limits,
-            history,
-            lab,
-            specimen,
-            specimen_params,
-            specimen_memory,
-            specimen_effects,
-            yielding,
-            yielded,
-            cell,
-            command,
-        )
+            floors[tick, floor] = building.output[TABLE_TARGET + floor]
+        displacement, force = column_lab.advance(loop.lab, command)
     return motion.shape[0]

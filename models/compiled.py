@@ -36,6 +36,15 @@ def jit(function: Function) -> Function:
     return cast(Function, compiled(function))
 
 
+def plain(record: tuple[Any, ...]) -> tuple[Any, ...]:
+    """A record of arrays as plain tuples, records within it likewise.
+
+    A loop that calls one compiled step a tick hands these to the step's `enter`: Numba looks up the types of a
+    plain tuple in 1 µs, those of a named one in 3 to 8 µs.
+    """
+    return tuple(plain(part) if isinstance(part, tuple) else part for part in record)
+
+
 def jit_apart(function: Function) -> Function:
     """Compile a kernel that is seldom needed by those that call it: it stays out of them, and they stay lean."""
     compiled = numba.njit(cache=True, error_model="numpy", nogil=True, **UNCOUNTED)

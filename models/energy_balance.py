@@ -26,7 +26,7 @@ Both are compared with the largest energy that the ground has put in so far, `Σ
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -44,7 +44,7 @@ DISPLACEMENT, VELOCITY, ACCELERATION, LAST_DISPLACEMENT, LAST_ACCELERATION = ran
 
 
 class EnergyBalance(NamedTuple):
-    """Arrays of the balance, in the order `step` takes them."""
+    """The balance with its sums, which `step` moves on."""
 
     fixed: Array
     sums: Array
@@ -58,19 +58,22 @@ def build(interval: float, ratio: float, represents: float, floor: float, mass: 
 
 
 @jit
+def enter(
+    balance: tuple[Any, ...], ground_acceleration: float, target: float, measured: float, force: float
+) -> None:
+    """`step` for a caller outside compiled code, which holds the balance as `compiled.plain` gives it."""
+    step(EnergyBalance(*balance), ground_acceleration, target, measured, force)
+
+
+@jit
 def step(
-    fixed: Array,
-    sums: Array,
-    motion: Array,
-    ground_acceleration: float,
-    target: float,
-    measured: float,
-    force: float,
+    balance: EnergyBalance, ground_acceleration: float, target: float, measured: float, force: float
 ) -> None:
     """One tick, with the building's motion in `motion`: the shares come into `sums`.
 
     `ground_acceleration` m/s², the specimen's `target` and `measured` deformation m and `force` N are of that tick.
     """
+    fixed, sums, motion = balance.fixed, balance.sums, balance.motion
     momentum, kinetic = 0.0, 0.0
     for i in range(motion.shape[1]):
         mass, v, x, a = fixed[MASS + i], motion[VELOCITY, i], motion[DISPLACEMENT, i], motion[ACCELERATION, i]

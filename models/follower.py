@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from common.tables import Compensator, TableCompensator
 from models import compensators
+from models.compiled import plain
 from models.excitation import ACCELERATION, JERK, POSITION, RATE, Programme
 
 
@@ -20,9 +21,9 @@ class Follower:
         self._motion = programme.motion
         self._interval = interval
         still, self._built = (
-            compensators.build(chosen.kind, chosen.parameters, interval, table) for _ in range(2)
+            plain(compensators.build(chosen.kind, chosen.parameters, interval, table)) for _ in range(2)
         )
-        compensators.step(*still, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, interval)  # compiled before a rig is armed
+        compensators.enter(still, *compensators.STILL, interval)  # compiled before a rig is armed
 
     def wanted(self, tick: int) -> float:
         """The programme's value at a tick."""
@@ -31,14 +32,6 @@ class Follower:
     def __call__(self, tick: int, measured: float) -> tuple[float, float]:
         """The target at t_k, and the command for the interval's end."""
         ahead, present = self._motion[:, tick + 1], self.wanted(tick)
-        command = compensators.step(
-            *self._built,
-            float(ahead[POSITION]),
-            float(ahead[RATE]),
-            float(ahead[ACCELERATION]),
-            float(ahead[JERK]),
-            present,
-            measured,
-            self._interval,
-        )
-        return present, float(command)
+        rates = float(ahead[RATE]), float(ahead[ACCELERATION]), float(ahead[JERK])
+        wanted = float(ahead[POSITION]), *rates, present, measured
+        return present, float(compensators.enter(self._built, *wanted, self._interval))

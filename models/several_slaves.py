@@ -11,6 +11,7 @@ import numpy as np
 from common.plan import MOST_SLAVES, Plan
 from models import compensators, substructure
 from models.closed_loop import MEASURED_A, MEASURED_B, build_a, build_b
+from models.compiled import plain
 from models.labs import column_lab, noise, table_lab
 from models.registry import Array
 from models.substructure import ACTUATOR_COMMAND, SENT, TABLE_TARGET
@@ -32,8 +33,8 @@ class Slave:
 
     def __init__(self, plan: Plan, place: int, seed: int) -> None:
         chosen, self._interval = plan.table.compensator, plan.test.interval
-        self._follow = compensators.build(chosen.kind, chosen.parameters, self._interval, plan.follows_in)
-        self._lab = build_b(System(plan))
+        follow = compensators.build(chosen.kind, chosen.parameters, self._interval, plan.follows_in)
+        self._follow, self._lab = plain(follow), plain(build_b(System(plan)))
         levels = noise.levels_b(plan.sensors)
         self._noise = noise.Noise(noise.lab_seed(seed, noise.LAB_B + place), levels)
         self._target, self._true = 0.0, (0.0,) * len(MEASURED_B)
@@ -42,11 +43,10 @@ class Slave:
         """Readings at a tick and the table's command for its end; `sent` in its message's order."""
         measured = list(map(add, self._true, self._noise.row()))
         target, motor, velocity, acceleration, jerk = sent
-        written = compensators.step(
-            *self._follow, target, velocity, acceleration, jerk, self._target, measured[0], self._interval
-        )
+        wanted = target, velocity, acceleration, jerk, self._target, measured[0]
+        written = compensators.enter(self._follow, *wanted, self._interval)
         self._target = target
-        self._true = table_lab.advance(*self._lab, written, motor)
+        self._true = table_lab.enter(self._lab, written, motor)
         return [*measured, written]
 
 
@@ -56,18 +56,19 @@ def simulate(plan: Plan, ground: Array, seed: int) -> dict[str, Array]:
     `ground` as `substructure.ground_rows` gives it; sensors read what the emulated laboratories read under the seed.
     Where the loop diverges the signals end before the first command that is not finite.
     """
-    master, lab = substructure.build(plan, ground), build_a(System(plan))
+    master, lab = substructure.build(plan, ground), plain(build_a(System(plan)))
+    building = plain(master)
     slaves = [Slave(plan.of(role), place, seed) for place, role in enumerate(plan.roles)]
     errors = noise.Noise(noise.lab_seed(seed, noise.LAB_A), noise.levels_a(plan.sensors))
     true, used = (0.0,) * len(MEASURED_A), master.dampers[substructure.FORCE_USED]
     outputs, read_a, rows_b = [], [], []
     for tick in range(plan.ticks):
         measured = list(map(add, true, errors.row()))
-        substructure.advance(*master, tick, *measured)
+        substructure.enter(building, tick, *measured)
         output = master.output.tolist()
         if not math.isfinite(output[ACTUATOR_COMMAND]):
             break
-        true = column_lab.advance(*lab, output[ACTUATOR_COMMAND])
+        true = column_lab.enter(lab, output[ACTUATOR_COMMAND])
         rows = [
             slave.tick(output[place : place + SENT]) for place, slave in zip(PLACES, slaves, strict=False)
         ]

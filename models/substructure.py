@@ -10,7 +10,7 @@ interval's end follow (contract, sections 2 and 3).
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 from common.building import is_matrix
 from common.plan import Plan, resolve
 from models import compensators, force_correction, integrators, specimens, trend
+from models.compensators import Built as Compensator
+from models.compensators import Wanted
 from models.compiled import jit
 from models.ground_motion import GroundMotion, ground, load
 from models.integrators.state import ACCELERATION, DISPLACEMENT, NEXT_DISPLACEMENT, NEXT_VELOCITY, VELOCITY
@@ -27,7 +29,7 @@ from models.structures import partition, shear_building
 Codes = NDArray[np.int64]
 
 # places in `codes`, with one floor per damper from FLOORS on, in `scalars`, and of the rows of `dampers`
-INTEGRATOR, SPECIMEN, COMPENSATOR, STOREY, FLOORS = range(5)
+INTEGRATOR, SPECIMEN, STOREY, FLOORS = range(4)
 INTERVAL, RATIO, REPRESENTS, HIGH_PASS, HIGH_PASS_GAIN, P_DELTA, UNIT_DELAY = range(7)
 FORCE_SCALE, MOTOR_GAIN, FORCE_USED = range(3)
 MATRIX = -1  # in place of a specimen's code: the numerical part is linear and coupled by a stiffness matrix
@@ -43,7 +45,7 @@ STOREY_VALUES = len(STOREY_ROWS)
 
 
 class Substructure(NamedTuple):
-    """Arrays of the numerical side, in the order `advance` takes them."""
+    """The numerical side with its memories, which `advance` moves on."""
 
     codes: Codes
     scalars: Array
@@ -51,11 +53,10 @@ class Substructure(NamedTuple):
     mass: Array  # (n,) kg
     coefficients: Array  # of the integrator
     column_params: Array  # (n, parameters) of the numerical columns, or (n, n) their stiffness matrix N/m
-    compensator_params: Array
+    compensator: Compensator
     ground: Array  # (2, ticks + 1): acceleration m/s², displacement m
     state: Array  # (rows, n) of the integrator
     column_memory: Array  # (n, memory)
-    compensator_memory: Array
     recent: Array  # (1 + slaves, RECENT): accelerations of specimen and floors, newest first, m/s²
     filtered: Array  # (3,): the column force of the tick before, measured, corrected and to be used next, N
     target: Array  # (1,): the specimen's target of the present tick, m
@@ -89,17 +90,16 @@ def build(plan: Plan, rows: Array, p_delta: float = 0.0, *, slaves: bool = True)
     n = plan.storeys
     floors = [lab.damper.floor - 1 for lab in labs]
     return Substructure(
-        np.array([method.code, columns.code, compensator.code, column.storey - 1, *floors]),
+        np.array([method.code, columns.code, column.storey - 1, *floors]),
         np.array(scalars),
         np.array([damper(lab) for lab in labs]).reshape(-1, FORCE_USED + 1).T.copy(),
         mass,
         method.coefficients,
         columns.params,
-        compensator.params,
+        compensator,
         rows,
         method.start(np.zeros(n), np.zeros(n), -mass * rows[0, 0]),
         columns.memory,
-        compensator.state,
         np.zeros((1 + len(labs), trend.RECENT)),
         np.zeros(DELAYED + 1),
         np.zeros(1),
@@ -180,18 +180,11 @@ def couple(K: Array, state: Array, first: int, output: Array) -> None:
 
 
 @jit
-def control(
-    scalars: Array,
-    dampers: Array,
-    codes: Codes,
-    ground: Array,
-    state: Array,
-    recent: Array,
-    output: Array,
-    tick: int,
-) -> None:
-    """Targets of the tables and forces of the dampers' motors for the interval's end, into `output`."""
-    interval = scalars[INTERVAL]
+def control(building: Substructure, tick: int) -> None:
+    """Targets of the tables and forces of the dampers' motors for the interval's end, into its `output`."""
+    codes, dampers, ground = building.codes, building.dampers, building.ground
+    state, recent, output = building.state, building.recent, building.output
+    interval = building.scalars[INTERVAL]
     here, ahead = ground[1, tick], ground[1, tick + 1]
     for slave in range(dampers.shape[1]):
         floor, more, past = codes[FLOORS + slave], SENT * slave, recent[1 + slave]
@@ -208,81 +201,99 @@ def control(
 
 
 @jit
-def advance(
-    codes: Codes,
-    scalars: Array,
-    dampers: Array,
-    mass: Array,
-    coefficients: Array,
-    column_params: Array,
-    compensator_params: Array,
-    ground: Array,
-    state: Array,
-    column_memory: Array,
-    compensator_memory: Array,
-    recent: Array,
-    filtered: Array,
-    target: Array,
-    balance: Array,
-    output: Array,
-    tick: int,
-    column_displacement: float,
-    column_force: float,
-) -> None:
-    """One tick: from the measurements at t_k to the commands for the interval's end, into `output`.
+def enter(building: tuple[Any, ...], tick: int, column_displacement: float, column_force: float) -> None:
+    """`advance` for a caller outside compiled code, which holds the building as `compiled.plain` gives it."""
+    codes, scalars, dampers, mass, coefficients, columns, compensator, ground = building[:8]
+    state, column_memory, recent, filtered, target, balance, output = building[8:]
+    whole = Substructure(
+        codes,
+        scalars,
+        dampers,
+        mass,
+        coefficients,
+        columns,
+        Compensator(*compensator),
+        ground,
+        state,
+        column_memory,
+        recent,
+        filtered,
+        target,
+        balance,
+        output,
+    )
+    advance(whole, tick, column_displacement, column_force)
+
+
+@jit
+def advance(building: Substructure, tick: int, column_displacement: float, column_force: float) -> None:
+    """One tick: from the measurements at t_k to the commands for the interval's end, into the `output`.
 
     `column_displacement` m and `column_force` N as measured at t_k; the dampers' forces, each at its own scale, stand
-    in their row of `dampers`. The arrays are those of `Substructure`; the states move on by one interval.
+    in their row of `dampers`. The memories move on by one interval.
     """
-    n, slaves = mass.size, dampers.shape[1]
-    storeys = TABLE_TARGET + SENT * slaves
+    codes, scalars, state, output = building.codes, building.scalars, building.state, building.output
+    ground, filtered = building.ground, building.filtered
     corrected = force_correction.step(scalars[HIGH_PASS], scalars[HIGH_PASS_GAIN], filtered, column_force)
     if scalars[UNIT_DELAY] != 0.0:
         corrected, filtered[DELAYED] = filtered[DELAYED], corrected
-    storey = codes[STOREY]
-    interval, ratio = scalars[INTERVAL], scalars[RATIO]
-    for i in range(n):
-        balance[i] = -mass[i] * ground[0, tick]
-    for slave in range(slaves):
-        balance[codes[FLOORS + slave]] += dampers[FORCE_SCALE, slave] * dampers[FORCE_USED, slave]
-    forces = storeys + 4 * n
-    if codes[SPECIMEN] == MATRIX:
-        couple(column_params, state, forces, output)
-    for i in range(n):
-        drift = shear_building.storey_drift(state[NEXT_DISPLACEMENT], i)
-        if codes[SPECIMEN] == MATRIX:
-            force = output[forces + i]
-        else:
-            force = specimens.step(codes[SPECIMEN], column_params[i], column_memory[i], drift)
-        if scalars[P_DELTA] != 0.0:
-            force += scalars[P_DELTA] * drift
-        output[forces + i] = force
-        if i == storey:
-            force += scalars[REPRESENTS] * corrected
-        shear_building.add_nodal(-force, i, balance)
-    integrators.step(codes[INTEGRATOR], coefficients, state, balance, interval)
-
-    previous_target = target[0]
-    target[0] = ratio * shear_building.storey_drift(state[NEXT_DISPLACEMENT], storey)
-    rate = ratio * shear_building.storey_drift(state[NEXT_VELOCITY], storey)
-    trend.remember(recent[0], ratio * shear_building.storey_drift(state[ACCELERATION], storey))
+    equilibrate(building, tick, scalars[REPRESENTS] * corrected)
+    interval = scalars[INTERVAL]
+    integrators.step(codes[INTEGRATOR], building.coefficients, state, building.balance, interval)
     output[GROUND_ACCELERATION] = ground[0, tick]
-    output[COLUMN_TARGET] = previous_target
-    output[ACTUATOR_COMMAND] = compensators.step(
-        codes[COMPENSATOR],
-        compensator_params,
-        compensator_memory,
-        target[0],
-        rate,
-        trend.ahead(recent[0]),
-        trend.slope(recent[0], interval),
-        previous_target,
-        column_displacement,
-        interval,
-    )
-    control(scalars, dampers, codes, ground, state, recent, output, tick)
+    output[COLUMN_TARGET] = building.target[0]
+    output[ACTUATOR_COMMAND] = actuate(building, column_displacement)
+    control(building, tick)
+    n = building.mass.size
+    storeys = output.size - STOREY_VALUES * n
     for i in range(n):
         output[storeys + i] = state[DISPLACEMENT, i]
         output[storeys + n + i] = state[VELOCITY, i]
         output[storeys + 2 * n + i] = state[ACCELERATION, i]
         output[storeys + 3 * n + i] = state[ACCELERATION, i] + ground[0, tick]
+
+
+@jit
+def equilibrate(building: Substructure, tick: int, specimen_force: float) -> None:
+    """External minus restoring force (N) of every floor at t_k into `balance`; numerical forces into `output`.
+
+    `specimen_force` N is what the specimen's storey feels of it.
+    """
+    codes, mass, dampers, state = building.codes, building.mass, building.dampers, building.state
+    balance, output = building.balance, building.output
+    n = mass.size
+    for i in range(n):
+        balance[i] = -mass[i] * building.ground[0, tick]
+    for slave in range(dampers.shape[1]):
+        balance[codes[FLOORS + slave]] += dampers[FORCE_SCALE, slave] * dampers[FORCE_USED, slave]
+    forces = output.size - n
+    if codes[SPECIMEN] == MATRIX:
+        couple(building.column_params, state, forces, output)
+    for i in range(n):
+        drift = shear_building.storey_drift(state[NEXT_DISPLACEMENT], i)
+        if codes[SPECIMEN] == MATRIX:
+            force = output[forces + i]
+        else:
+            params, memory = building.column_params[i], building.column_memory[i]
+            force = specimens.step(codes[SPECIMEN], params, memory, drift)
+        if building.scalars[P_DELTA] != 0.0:
+            force += building.scalars[P_DELTA] * drift
+        output[forces + i] = force
+        if i == codes[STOREY]:
+            force += specimen_force
+        shear_building.add_nodal(-force, i, balance)
+
+
+@jit
+def actuate(building: Substructure, measured: float) -> float:
+    """Command (m) of the actuator for the interval's end, from the displacement `measured` (m) at t_k."""
+    scalars, state, recent = building.scalars, building.state, building.recent[0]
+    storey, interval, ratio = building.codes[STOREY], scalars[INTERVAL], scalars[RATIO]
+    present = building.target[0]
+    building.target[0] = ratio * shear_building.storey_drift(state[NEXT_DISPLACEMENT], storey)
+    rate = ratio * shear_building.storey_drift(state[NEXT_VELOCITY], storey)
+    trend.remember(recent, ratio * shear_building.storey_drift(state[ACCELERATION], storey))
+    wanted = Wanted(
+        building.target[0], rate, trend.ahead(recent), trend.slope(recent, interval), present, measured
+    )
+    return compensators.step(building.compensator, wanted, interval)

@@ -10,6 +10,7 @@ import numpy as np
 from common.plan import Plan
 from models import cache, column_loop, compensators, energy_balance, substructure
 from models.closed_loop import simulate
+from models.compiled import plain
 from models.labs import column_lab, readings, replay, table_lab
 from models.structures.response import response
 from models.system import System
@@ -28,15 +29,14 @@ def compile_all() -> None:
     replay.laboratory_b(System(plan), still, still)
     replay.column(System(plan), still)
     replay.building(System(plan), ground, still, still, still)
-    substructure.advance(*substructure.build(plan, ground), 0, 0.0, 0.0)
-    energy_balance.step(
-        *energy_balance.build(plan.test.interval, 0.5, 1.0, 1.0, np.ones(1)), 0.0, 0.0, 0.0, 0.0
-    )
-    column_lab.advance(*column_lab.build(plan.test.interval, plan.actuator, plan.column), 0.0)
-    table_lab.advance(*table_lab.build(plan.test.interval, plan.table, plan.damper), 0.0, 0.0)
-    readings.step(*readings.build(plan.test.interval, ("any",), {}), 0, 0.0, 0.0, 0.0)
+    substructure.enter(plain(substructure.build(plan, ground)), 0, 0.0, 0.0)
+    balance = energy_balance.build(plan.test.interval, 0.5, 1.0, 1.0, np.ones(1))
+    energy_balance.enter(plain(balance), 0.0, 0.0, 0.0, 0.0)
+    column_lab.enter(plain(column_lab.build(plan.test.interval, plan.actuator, plan.column)), 0.0)
+    table_lab.enter(plain(table_lab.build(plan.test.interval, plan.table, plan.damper)), 0.0, 0.0)
+    readings.step(readings.build(plan.test.interval, ("any",), {}), 0, 0.0, 0.0, 0.0)
     none = compensators.build("none", {}, plan.test.interval)
-    compensators.step(*none, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, plan.test.interval)
+    compensators.enter(plain(none), *compensators.STILL, plan.test.interval)
     (cache.folder() / cache.READY).touch()
 
 

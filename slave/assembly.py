@@ -16,6 +16,7 @@ from common.reality import Reality
 from common.rig import METHODS, AtRest, GuardedRig, TableMeasurement
 from common.roles import name_of, title
 from models.closed_loop import build_b
+from models.compiled import plain
 from models.labs import noise, readings, table_lab
 from models.realised import true_system
 from slave.loop import NO_COMMAND, SlaveLoop
@@ -82,6 +83,6 @@ def build_loop(
 
 def warm_up(reality: Reality) -> None:
     """Compile the kernels on arrays that are thrown away."""
-    table_lab.advance(*build_b(true_system(reality)), 0.0, 0.0)
-    readings.step(*readings.build(reality.plan.test.interval, ("any",), {}), 0, 0.0, 0.0, 0.0)
+    table_lab.enter(plain(build_b(true_system(reality))), 0.0, 0.0)
+    readings.step(readings.build(reality.plan.test.interval, ("any",), {}), 0, 0.0, 0.0, 0.0)
     SlaveStep(reality.plan)(NO_COMMAND, TableMeasurement(0.0, 0.0, 0.0, 0.0))

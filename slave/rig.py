@@ -10,6 +10,7 @@ from common import schema
 from common.rig import TableCommand, TableMeasurement
 from common.tables import Damper, Sensors, Table
 from models.closed_loop import MEASURED_B
+from models.compiled import plain
 from models.labs import noise, readings, table_lab
 from models.system import Effects
 
@@ -28,19 +29,20 @@ class TableLab:
     ) -> None:
         more = effects or Effects()
         levels = noise.levels_b(schema.fill(Sensors, sensors or {}, "sensors"))
-        self._arrays = table_lab.build(
+        lab = table_lab.build(
             interval,
             schema.fill(Table, table or {}, "table"),
             schema.fill(Damper, damper or {}, "damper"),
             more.table,
             more.damper,
         )
+        self._lab = plain(lab)
         self._readings = readings.build(interval, MEASURED_B, more.sensors)
         self._noise = noise.Noise(seed, readings.levels(MEASURED_B, levels, more.sensors))
         self._plain = not more.sensors  # a reading is value plus noise
         self._interval, self._tick = interval, 0
         self._true = (0.0, 0.0, 0.0, 0.0)
-        self._advance = table_lab.advance
+        self._advance = table_lab.enter
 
     def arm(self) -> None:
         """Nothing can hinder an emulated laboratory."""
@@ -53,12 +55,12 @@ class TableLab:
         t = self._tick * self._interval
         self._tick += 1
         return TableMeasurement(
-            *(readings.step(*sensors, place, true[place], error[place], t) for place in range(len(true)))
+            *(readings.step(sensors, place, true[place], error[place], t) for place in range(len(true)))
         )
 
     def write(self, command: TableCommand) -> None:
         """Move on by one interval: the table ramps to its command, the motor holds its own."""
-        self._true = self._advance(*self._arrays, command.table_command, command.damper_command)
+        self._true = self._advance(self._lab, command.table_command, command.damper_command)
 
     def disarm(self) -> None:
         """An emulated table stays where it is; the motor's force is its command's."""

@@ -6,6 +6,7 @@ from common.messages import Command
 from common.plan import Plan
 from common.rig import TableMeasurement
 from models import compensators
+from models.compiled import plain
 
 
 class SlaveStep:
@@ -13,15 +14,15 @@ class SlaveStep:
 
     def __init__(self, plan: Plan) -> None:
         chosen = plan.table.compensator
-        self._built = compensators.build(chosen.kind, chosen.parameters, plan.test.interval, plan.follows_in)
-        self._interval = plan.test.interval
+        interval = self._interval = plan.test.interval
+        self._built = plain(compensators.build(chosen.kind, chosen.parameters, interval, plan.follows_in))
         self._target = 0.0  # of t_k
 
     def __call__(self, command: Command, measured: TableMeasurement) -> float:
         """Command (m) for the interval's end, from the target in force and the measurement at t_k."""
         present, self._target = self._target, command.table_target
-        result: float = compensators.step(
-            *self._built,
+        result: float = compensators.enter(
+            self._built,
             command.table_target,
             command.table_target_velocity,
             command.table_target_acceleration,

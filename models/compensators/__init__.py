@@ -73,11 +73,25 @@ COMPENSATORS = {
 
 
 class Built(NamedTuple):
-    """A compensator at rest, in the order `step` takes its parts."""
+    """A compensator with its memory, which `step` moves on."""
 
     code: int
     params: Array
     state: Array
+
+
+class Wanted(NamedTuple):
+    """What a compensator is asked for at t_k: the target at t_{k+1} with its rates, and where the system is."""
+
+    target: float  # m, at t_{k+1}, as its rates
+    rate: float  # m/s
+    acceleration: float  # m/s²
+    jerk: float  # m/s³
+    present: float  # m, target at t_k
+    measured: float  # m, displacement at t_k
+
+
+STILL = Wanted(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def build(kind: str, parameters: Mapping[str, float], interval: float, table: str = "compensator") -> Built:
@@ -102,22 +116,15 @@ def build(kind: str, parameters: Mapping[str, float], interval: float, table: st
 
 
 @jit
-def fed_forward(
-    code: int,
-    p: Array,
-    s: Array,
-    target: float,
-    rate: float,
-    acceleration: float,
-    jerk: float,
-    present: float,
-) -> float:
+def fed_forward(compensator: Built, wanted: Wanted) -> float:
     """Command (m) of a method that does without the measurement; the target where the code is of none."""
+    code, p, s = compensator.code, compensator.params, compensator.state
+    target, rate, acceleration, jerk = wanted.target, wanted.rate, wanted.acceleration, wanted.jerk
     command = target
     if code == 2:
         command = taylor.step(p, target, rate, acceleration, jerk)
     elif code == 4:
-        command = horiuchi.step(p, s, target, present)
+        command = horiuchi.step(p, s, target, wanted.present)
     elif code == 5:
         command = inverse.step(p, target, rate, acceleration, jerk)
     elif code == 9:
@@ -126,19 +133,11 @@ def fed_forward(
 
 
 @jit
-def fed_back(
-    code: int,
-    p: Array,
-    s: Array,
-    target: float,
-    rate: float,
-    acceleration: float,
-    jerk: float,
-    present: float,
-    measured: float,
-    interval: float,
-) -> float:
+def fed_back(compensator: Built, wanted: Wanted, interval: float) -> float:
     """Command (m) of a method that takes the measurement."""
+    code, p, s = compensator.code, compensator.params, compensator.state
+    target, rate, acceleration, jerk = wanted.target, wanted.rate, wanted.acceleration, wanted.jerk
+    present, measured = wanted.present, wanted.measured
     command = target
     if code == 1:
         command = pid.step(p, s, target, present - measured, interval)
@@ -156,10 +155,8 @@ def fed_back(
 
 
 @jit
-def step(
-    code: int,
-    p: Array,
-    s: Array,
+def enter(
+    compensator: tuple[Any, ...],
     target: float,
     rate: float,
     acceleration: float,
@@ -168,11 +165,14 @@ def step(
     measured: float,
     interval: float,
 ) -> float:
-    """Command (m) to be reached at t_{k+1}, the end of the interval (s); the memory `s` moves on.
+    """`step` for a caller outside compiled code, which holds the compensator as `compiled.plain` gives it."""
+    wanted = Wanted(target, rate, acceleration, jerk, present, measured)
+    return step(Built(*compensator), wanted, interval)
 
-    `target` (m), `rate` (m/s), `acceleration` (m/s²) and `jerk` (m/s³) are the target's at t_{k+1};
-    `present` (m) is the target and `measured` (m) the displacement at t_k.
-    """
-    if code in FEEDBACK:
-        return fed_back(code, p, s, target, rate, acceleration, jerk, present, measured, interval)
-    return fed_forward(code, p, s, target, rate, acceleration, jerk, present)
+
+@jit
+def step(compensator: Built, wanted: Wanted, interval: float) -> float:
+    """Command (m) to be reached at t_{k+1}, the end of the interval (s); the compensator's memory moves on."""
+    if compensator.code in FEEDBACK:
+        return fed_back(compensator, wanted, interval)
+    return fed_forward(compensator, wanted)

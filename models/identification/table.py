@@ -53,29 +53,18 @@ class Bandwidth(NamedTuple):
 
 
 @jit
-def respond(
-    taps: Array,
-    matrices: Array,
-    spring: Array,
-    limits: Array,
-    history: Array,
-    state: Array,
-    scratch: Array,
-    command: Array,
-    result: Array,
-) -> None:
+def respond(lab: table_lab.TableLab, command: Array, result: Array) -> None:
     """Table displacement at each tick from rest; the command written at tick k acts from there on."""
     result[0] = 0.0
     for k in range(command.size - 1):
-        moved = table_lab.advance(taps, matrices, spring, limits, history, state, scratch, command[k], 0.0)
-        result[k + 1] = moved[0]
+        result[k + 1] = table_lab.advance(lab, command[k], 0.0)[0]
 
 
 def response(command: Array, interval: float, table: Table) -> Array:
     """Exact displacement (n,) of the table model to a ramped command that was zero before."""
     lab = table_lab.build(interval, table, Damper())
     result = np.empty(command.size)
-    respond(*lab, command, result)
+    respond(lab, command, result)
     return result
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from common.errors import InputError
 from common.tables import Actuator, Column
 from models.compiled import jit
 from models.labs import specimen
-from models.labs.specimen import REACTION
+from models.labs.specimen import REACTION, Specimen
 from models.registry import Array
 from models.system import ActuatorEffects, ColumnEffects
 from models.transfer_systems import delay, first_order, servo_hydraulic
@@ -35,7 +35,7 @@ PRESENT, VELOCITY_LIMIT, BACKLASH, COMPLIANCE, DEADBAND, GAIN, STIFFNESS, HELD, 
 
 
 class ColumnLab(NamedTuple):
-    """Arrays of the laboratory, in the order `advance` takes them."""
+    """The laboratory with its memories, which `advance` moves on."""
 
     taps: Array  # of the delayed command
     rows: Array  # of the actuator's propagation
@@ -43,13 +43,7 @@ class ColumnLab(NamedTuple):
     limits: Array  # effects on the actuator
     history: Array  # commands written, newest first
     state: Array
-    code: int  # of the specimen; then its arrays
-    params: Array
-    memory: Array
-    effects: Array
-    yielding: Array
-    yielded: Array
-    cell: Array
+    specimen: Specimen
 
 
 def build(
@@ -83,7 +77,7 @@ def build(
         np.array([*limits, 0.0, 0.0]),
         np.zeros(segments.memory),
         np.zeros(STATES),
-        *specimen.build(column, on_column),
+        specimen.build(column, on_column),
     )
 
 
@@ -119,7 +113,7 @@ def hydraulic(
         np.array(limits),
         np.zeros(segments.memory),
         np.zeros(STATES + servo_hydraulic.STATES),
-        *specimen.build(bare, on_column),
+        specimen.build(bare, on_column),
     )
 
 
@@ -133,34 +127,35 @@ def begin(lab: ColumnLab, command: float, interval: float) -> None:
     if lab.limits[HYDRAULIC] != 0.0:
         ticks = math.ceil(SETTLING / interval)
         for tick in range(2 * ticks):
-            advance(*lab, command * min(tick / ticks, 1.0))
+            advance(lab, command * min(tick / ticks, 1.0))
         return
     lab.history[:] = command
     there = lab.limits[GAIN] * command
     lab.state[:FORCE] = there
-    parts = (lab.code, lab.params, lab.memory, lab.effects, lab.yielding, lab.yielded, lab.cell)
-    lab.state[FORCE] = specimen.force(*parts, there, interval)
-    lab.cell[specimen.RATE] = lab.cell[specimen.LAST_STEP] = 0.0
+    lab.state[FORCE] = specimen.force(lab.specimen, there, interval)
+    lab.specimen.cell[specimen.RATE] = lab.specimen.cell[specimen.LAST_STEP] = 0.0
 
 
 @jit
-def advance(
-    taps: Array,
-    rows: Array,
-    lengths: Array,
-    limits: Array,
-    history: Array,
-    state: Array,
-    code: int,
-    params: Array,
-    memory: Array,
-    effects: Array,
-    yielding: Array,
-    yielded: Array,
-    cell: Array,
-    command: float,
-) -> tuple[float, float]:
+def enter(lab: tuple[Any, ...], command: float) -> tuple[float, float]:
+    """`advance` for a caller outside compiled code, which holds the laboratory as `compiled.plain` gives it."""
+    taps, rows, lengths, limits, history, state, tested = lab
+    return advance(ColumnLab(taps, rows, lengths, limits, history, state, Specimen(*tested)), command)
+
+
+@jit
+def advance(lab: ColumnLab, command: float) -> tuple[float, float]:
     """Displacement (m) and force (N) one interval later, the command ramped to `command` (m) by then or held."""
+    taps, rows, lengths, limits, history, state = (
+        lab.taps,
+        lab.rows,
+        lab.lengths,
+        lab.limits,
+        lab.history,
+        lab.state,
+    )
+    tested = lab.specimen
+    cell = tested.cell
     delay.remember(history, command)
     servo, displacement, force = state[SERVO], state[DISPLACEMENT], state[FORCE]
     before = delay.delayed(history, taps, 0)
@@ -176,9 +171,7 @@ def advance(
             displacement = state[STATES + servo_hydraulic.POSITION]
             force = state[STATES + servo_hydraulic.FORCE]
             if limits[BEYOND] != 0.0:
-                specimen.force(
-                    code, params, memory, effects, yielding, yielded, cell, displacement, lengths[i]
-                )
+                specimen.force(tested, displacement, lengths[i])
         else:
             ahead = first_order.step(rows[i], servo, before, after)
             if limits[PRESENT] != 0.0:
@@ -187,9 +180,7 @@ def advance(
             else:
                 servo = ahead
                 displacement = ahead
-            force = specimen.force(
-                code, params, memory, effects, yielding, yielded, cell, displacement, lengths[i]
-            )
+            force = specimen.force(tested, displacement, lengths[i])
         before = after
     state[SERVO] = servo
     state[DISPLACEMENT] = displacement

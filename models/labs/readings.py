@@ -22,7 +22,7 @@ LAGGED, PREVIOUS, NEWEST, KEPT = range(4)  # the newest of the values kept for a
 
 
 class Readings(NamedTuple):
-    """Arrays of one laboratory's sensors, in the order `step` takes them."""
+    """One laboratory's sensors with their memory, which `step` moves on."""
 
     params: Array  # (signals, 9)
     state: Array  # (signals, 3 and as many as the longest delay needs)
@@ -47,8 +47,9 @@ def levels(names: Sequence[str], nominal: Array, sensors: Mapping[str, SensorEff
 
 
 @jit
-def delayed(params: Array, state: Array, place: int, value: float) -> float:
+def delayed(sensors: Readings, place: int, value: float) -> float:
     """The value of signal `place` by its delay ago; the ring moves on by one tick."""
+    params, state = sensors.params, sensors.state
     ticks = params[place, DELAY]
     if ticks == 0.0:
         return value
@@ -64,8 +65,9 @@ def delayed(params: Array, state: Array, place: int, value: float) -> float:
 
 
 @jit
-def step(params: Array, state: Array, place: int, value: float, noise: float, t: float) -> float:
+def step(sensors: Readings, place: int, value: float, noise: float, t: float) -> float:
     """Reading of signal `place` at time `t` s; its state moves on by one tick."""
+    params, state = sensors.params, sensors.state
     if params[place, PRESENT] == 0.0:
         return value + noise
     lagged = (
@@ -76,7 +78,7 @@ def step(params: Array, state: Array, place: int, value: float, noise: float, t:
     state[place, LAGGED] = lagged
     state[place, PREVIOUS] = value
     result = (
-        params[place, GAIN] * delayed(params, state, place, lagged)
+        params[place, GAIN] * delayed(sensors, place, lagged)
         + params[place, BIAS]
         + params[place, DRIFT] * t
         + noise

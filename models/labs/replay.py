@@ -13,7 +13,12 @@ from models import substructure
 from models.closed_loop import MEASURED_A, MEASURED_B, build_a, build_b
 from models.compiled import jit
 from models.labs import column_lab, readings, specimen, table_lab
+from models.labs.column_lab import ColumnLab
+from models.labs.readings import Readings
+from models.labs.specimen import Specimen
+from models.labs.table_lab import TableLab
 from models.registry import Array
+from models.substructure import Substructure
 from models.system import System
 
 
@@ -28,7 +33,7 @@ def laboratory_a(system: System, command: Array, start: float = 0.0) -> Array:
     lab = build_a(system)
     if start != 0.0:
         column_lab.begin(lab, start, interval)
-    play_a(*lab, *sensors, command, interval, result)
+    play_a(lab, sensors, command, interval, result)
     return result
 
 
@@ -41,7 +46,7 @@ def laboratory_b(system: System, command: Array, motor: Array, anew: Array | Non
     interval = system.plan.test.interval
     sensors = readings.build(interval, MEASURED_B, system.effects.sensors)
     begun = np.zeros((0, 3)) if anew is None else anew
-    play_b(*build_b(system), *sensors, command, motor, begun, interval, result)
+    play_b(build_b(system), sensors, command, motor, begun, interval, result)
     return result
 
 
@@ -55,8 +60,8 @@ def column(system: System, deformation: Array) -> Array:
     sensors = readings.build(interval, ("column_force",), effects.sensors)
     steps = column_lab.substeps(interval) if specimen.needs_substeps(effects.column) else 1
     parts = specimen.build(replace(column, mass=0.0, damping=0.0), effects.column)
-    play_column(*parts, deformation, interval, steps, force)
-    play_reading(*sensors, specimen.with_rates(column, force, deformation, interval), interval, result)
+    play_column(parts, deformation, interval, steps, force)
+    play_reading(sensors, specimen.with_rates(column, force, deformation, interval), interval, result)
     return result
 
 
@@ -64,66 +69,25 @@ def building(system: System, ground: Array, displacement: Array, force: Array, d
     """Rows of `substructure` (ticks, 8 + 5·storeys) of a plan with one slave, for the measurements (ticks,) used."""
     arrays = substructure.build(system.plan, ground, system.effects.p_delta)
     result = np.zeros((force.size, arrays.output.size))
-    play_building(*arrays, displacement, force, damper, result)
+    play_building(arrays, displacement, force, damper, result)
     return result
 
 
 @jit
-def play_a(
-    taps: Array,
-    rows: Array,
-    lengths: Array,
-    limits: Array,
-    history: Array,
-    state: Array,
-    code: int,
-    params: Array,
-    memory: Array,
-    effects: Array,
-    yielding: Array,
-    yielded: Array,
-    cell: Array,
-    sensors: Array,
-    sensed: Array,
-    command: Array,
-    interval: float,
-    result: Array,
-) -> None:
+def play_a(lab: ColumnLab, sensors: Readings, command: Array, interval: float, result: Array) -> None:
     """Fill `result` (ticks, 2) from the commands."""
-    displacement, force = state[column_lab.DISPLACEMENT], state[column_lab.FORCE]
+    displacement, force = lab.state[column_lab.DISPLACEMENT], lab.state[column_lab.FORCE]
     for tick in range(command.size):
         t = tick * interval
-        result[tick, 0] = readings.step(sensors, sensed, 0, displacement, 0.0, t)
-        result[tick, 1] = readings.step(sensors, sensed, 1, force, 0.0, t)
-        displacement, force = column_lab.advance(
-            taps,
-            rows,
-            lengths,
-            limits,
-            history,
-            state,
-            code,
-            params,
-            memory,
-            effects,
-            yielding,
-            yielded,
-            cell,
-            command[tick],
-        )
+        result[tick, 0] = readings.step(sensors, 0, displacement, 0.0, t)
+        result[tick, 1] = readings.step(sensors, 1, force, 0.0, t)
+        displacement, force = column_lab.advance(lab, command[tick])
 
 
 @jit
 def play_b(
-    taps: Array,
-    matrices: Array,
-    spring: Array,
-    limits: Array,
-    history: Array,
-    state: Array,
-    scratch: Array,
-    sensors: Array,
-    sensed: Array,
+    lab: TableLab,
+    sensors: Readings,
     command: Array,
     motor: Array,
     anew: Array,
@@ -137,32 +101,18 @@ def play_b(
         t = tick * interval
         if next_one < anew.shape[0] and tick == int(anew[next_one, 0]):
             stroke = anew[next_one, 1]
-            state[table_lab.STROKE] = stroke
-            state[table_lab.STROKE_RATE] = anew[next_one, 2]
+            lab.state[table_lab.STROKE] = stroke
+            lab.state[table_lab.STROKE_RATE] = anew[next_one, 2]
             next_one += 1
-        result[tick, 0] = readings.step(sensors, sensed, 0, y, 0.0, t)
-        result[tick, 1] = readings.step(sensors, sensed, 1, acceleration, 0.0, t)
-        result[tick, 2] = readings.step(sensors, sensed, 2, stroke, 0.0, t)
-        result[tick, 3] = readings.step(sensors, sensed, 3, force, 0.0, t)
-        y, acceleration, stroke, force = table_lab.advance(
-            taps, matrices, spring, limits, history, state, scratch, command[tick], motor[tick]
-        )
+        result[tick, 0] = readings.step(sensors, 0, y, 0.0, t)
+        result[tick, 1] = readings.step(sensors, 1, acceleration, 0.0, t)
+        result[tick, 2] = readings.step(sensors, 2, stroke, 0.0, t)
+        result[tick, 3] = readings.step(sensors, 3, force, 0.0, t)
+        y, acceleration, stroke, force = table_lab.advance(lab, command[tick], motor[tick])
 
 
 @jit
-def play_column(
-    code: int,
-    params: Array,
-    memory: Array,
-    effects: Array,
-    yielding: Array,
-    yielded: Array,
-    cell: Array,
-    deformation: Array,
-    interval: float,
-    steps: int,
-    result: Array,
-) -> None:
+def play_column(tested: Specimen, deformation: Array, interval: float, steps: int, result: Array) -> None:
     """Fill the forces `result` (ticks,) from the deformations, which move on straight lines between the ticks."""
     before = deformation[0]
     for tick in range(deformation.size):
@@ -170,66 +120,25 @@ def play_column(
         for i in range(steps):
             share = (i + 1) / steps
             reached = (1.0 - share) * before + share * deformation[tick]
-            force = specimen.force(
-                code, params, memory, effects, yielding, yielded, cell, reached, interval / steps
-            )
+            force = specimen.force(tested, reached, interval / steps)
         before = deformation[tick]
         result[tick] = force
 
 
 @jit
-def play_reading(sensors: Array, sensed: Array, values: Array, interval: float, result: Array) -> None:
+def play_reading(sensors: Readings, values: Array, interval: float, result: Array) -> None:
     """Fill `result` (ticks,) with what the first sensor makes of the values (ticks,)."""
     for tick in range(values.size):
-        result[tick] = readings.step(sensors, sensed, 0, values[tick], 0.0, tick * interval)
+        result[tick] = readings.step(sensors, 0, values[tick], 0.0, tick * interval)
 
 
 @jit
 def play_building(
-    codes: substructure.Codes,
-    scalars: Array,
-    dampers: Array,
-    mass: Array,
-    coefficients: Array,
-    column_params: Array,
-    compensator_params: Array,
-    ground: Array,
-    state: Array,
-    column_memory: Array,
-    compensator_memory: Array,
-    recent: Array,
-    filtered: Array,
-    target: Array,
-    balance: Array,
-    output: Array,
-    displacement: Array,
-    force: Array,
-    damper: Array,
-    result: Array,
+    building: Substructure, displacement: Array, force: Array, damper: Array, result: Array
 ) -> None:
     """Fill `result` (ticks, 8 + 5·storeys) from the measurements."""
     for tick in range(force.size):
-        dampers[substructure.FORCE_USED, 0] = damper[tick]
-        substructure.advance(
-            codes,
-            scalars,
-            dampers,
-            mass,
-            coefficients,
-            column_params,
-            compensator_params,
-            ground,
-            state,
-            column_memory,
-            compensator_memory,
-            recent,
-            filtered,
-            target,
-            balance,
-            output,
-            tick,
-            displacement[tick],
-            force[tick],
-        )
-        for place in range(output.size):
-            result[tick, place] = output[place]
+        building.dampers[substructure.FORCE_USED, 0] = damper[tick]
+        substructure.advance(building, tick, displacement[tick], force[tick])
+        for place in range(building.output.size):
+            result[tick, place] = building.output[place]

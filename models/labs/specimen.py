@@ -30,7 +30,7 @@ DEGRADED_AT = 2e-3  # m, deformation at which most of the loss of a degrading co
 
 
 class Specimen(NamedTuple):
-    """Arrays of the specimen, in the order `force` takes them."""
+    """The specimen with its memories, which `force` moves on."""
 
     code: int  # of the plan's model
     params: Array
@@ -88,47 +88,28 @@ def needs_substeps(effects: ColumnEffects | None) -> bool:
 
 
 @jit
-def force(
-    code: int,
-    params: Array,
-    memory: Array,
-    effects: Array,
-    yielding: Array,
-    yielded: Array,
-    cell: Array,
-    deformation: float,
-    step: float,
-) -> float:
+def force(specimen: Specimen, deformation: float, step: float) -> float:
     """Reading (N) at a deformation (m) reached from the last one within `step` s; the memories move on.
 
     `cell[REACTION]` keeps the part that loads the piston: without the fixture's inertia and the viscous force.
     """
-    if effects[PRESENT] == 0.0:
-        plain = specimens.step(code, params, memory, deformation)
-        cell[REACTION] = plain
+    if specimen.effects[PRESENT] == 0.0:
+        plain = specimens.step(specimen.code, specimen.params, specimen.memory, deformation)
+        specimen.cell[REACTION] = plain
         return plain
-    return felt(code, params, memory, effects, yielding, yielded, cell, deformation, step)
+    return felt(specimen, deformation, step)
 
 
 @jit_apart
-def felt(
-    code: int,
-    params: Array,
-    memory: Array,
-    effects: Array,
-    yielding: Array,
-    yielded: Array,
-    cell: Array,
-    deformation: float,
-    step: float,
-) -> float:
+def felt(specimen: Specimen, deformation: float, step: float) -> float:
     """The same with effects."""
+    effects, cell = specimen.effects, specimen.cell
     half = 0.5 * effects[SLIP]
     inside = min(max(deformation, -half), half)
     within = deformation - inside
-    result = specimens.step(code, params, memory, within)
+    result = specimens.step(specimen.code, specimen.params, specimen.memory, within)
     if effects[YIELDS] != 0.0:
-        result += bouc_wen.step(yielding, yielded, within) - effects[STIFFNESS] * within
+        result += bouc_wen.step(specimen.yielding, specimen.yielded, within) - effects[STIFFNESS] * within
     cell[LARGEST] = max(cell[LARGEST], abs(within))
     if effects[DEGRADATION] != 0.0:
         result *= 1.0 - effects[DEGRADATION] * (1.0 - np.exp(-cell[LARGEST] / DEGRADED_AT))

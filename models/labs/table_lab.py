@@ -11,7 +11,7 @@ neither chatters nor creeps (the budget of Duclusaud et al., arXiv 2410.08650).
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -36,7 +36,7 @@ IDEAL = 11  # interval (s) of a table that follows at once, 0 for any other
 
 
 class TableLab(NamedTuple):
-    """Arrays of the laboratory, in the order `advance` takes them."""
+    """The laboratory with its memories, which `advance` moves on."""
 
     taps: Array  # of the delayed command
     matrices: (
@@ -97,21 +97,19 @@ def propagation(length: float, table: Table, damper: Damper, effects: TableEffec
 
 
 @jit
-def advance(
-    taps: Array,
-    matrices: Array,
-    spring: Array,
-    limits: Array,
-    history: Array,
-    state: Array,
-    scratch: Array,
-    command: float,
-    motor_command: float,
-) -> tuple[float, float, float, float]:
+def enter(lab: tuple[Any, ...], command: float, motor_command: float) -> tuple[float, float, float, float]:
+    """`advance` for a caller outside compiled code, which holds the laboratory as `compiled.plain` gives it."""
+    return advance(TableLab(*lab), command, motor_command)
+
+
+@jit
+def advance(lab: TableLab, command: float, motor_command: float) -> tuple[float, float, float, float]:
     """Table displacement (m) and acceleration (m/s²), stroke (m) and force (N) one interval later.
 
     The table's command is ramped to `command` (m) by then, the motor's (N) is held.
     """
+    taps, matrices, spring, limits = lab.taps, lab.matrices, lab.spring, lab.limits
+    history, state, scratch = lab.history, lab.state, lab.scratch
     size = state.size
     before, after, motor, rail, drag, played = size, size + 1, size + 2, size + 3, size + 4, size + 5
     start = state[TABLE]

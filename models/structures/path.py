@@ -9,6 +9,7 @@ import numpy as np
 
 from common.plan import Plan
 from models import excitation, indicators
+from models.compiled import plain
 from models.excitation import Programme, join
 from models.excitation.pieces import Piece, sine
 from models.follower import Follower
@@ -92,12 +93,12 @@ def phase_delay(target: Array, achieved: Array, interval: float, frequency: floa
 def follow(plan: Plan, programme: Programme) -> tuple[Array, Array]:
     """Target and achieved displacement of the compensated nominal actuator, m; the latter ends where it diverges."""
     follower = Follower(plan.compensator, programme, plan.test.interval)
-    lab = column_lab.build(plan.test.interval, plan.actuator, plan.column)
+    lab = plain(column_lab.build(plan.test.interval, plan.actuator, plan.column))
     target = programme.motion[excitation.POSITION]
     achieved = np.zeros(target.size)
     for tick in range(target.size - 1):
         _, command = follower(tick, float(achieved[tick]))
         if not abs(command) <= FARTHEST:
             return target, achieved[: tick + 1]
-        achieved[tick + 1] = column_lab.advance(*lab, command)[0]
+        achieved[tick + 1] = column_lab.enter(lab, command)[0]
     return target, achieved

@@ -11,11 +11,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from scipy import linalg
 
 from models import compensators, trend
+from models.compensators import Built, Wanted
 from models.compiled import jit
 from models.ground_motion import load
 from models.registry import Array
@@ -157,20 +159,20 @@ def run(
     states = np.zeros((4, 6))  # numerical part, reference, plant and a row of work
     forces = np.zeros(force_delay + 1)
     advance(
-        *part,
-        *whole[:3],
-        *plant.discrete(),
-        ground,
-        noise,
-        built.code,
-        built.params,
-        built.state,
-        forces,
-        np.zeros(trend.RECENT),
-        states,
-        out,
+        Loop(part, whole, plant.discrete(), built, forces, np.zeros(trend.RECENT)), ground, noise, states, out
     )
     return Run(*out)
+
+
+class Loop(NamedTuple):
+    """What a test consists of: steps of `runge_kutta` for two buildings, the plant's, and what they remember."""
+
+    numerical: tuple[Array, Array, Array, Array]
+    reference: tuple[Array, Array, Array, Array]
+    plant: tuple[Array, Array]
+    compensator: Built
+    forces: Array  # N, measured, newest first
+    recent: Array  # accelerations of the first floor, newest first, m/s²
 
 
 @jit
@@ -186,27 +188,12 @@ def move(transition: Array, s: Array, work: Array) -> None:
 
 
 @jit
-def advance(
-    transition: Array,
-    pushed: Array,
-    sides: Array,
-    slope: Array,
-    transition_0: Array,
-    _pushed_0: Array,
-    sides_0: Array,
-    plant: Array,
-    held: Array,
-    ground: Array,
-    noise: Array,
-    code: int,
-    params: Array,
-    memory: Array,
-    forces: Array,
-    recent: Array,
-    states: Array,
-    out: Array,
-) -> None:
+def advance(loop: Loop, ground: Array, noise: Array, states: Array, out: Array) -> None:
     """The whole test into the rows of `out`: target, measured, measured force, reference."""
+    transition, pushed, sides, slope = loop.numerical
+    transition_0, _pushed_0, sides_0, _slope_0 = loop.reference
+    plant, held = loop.plant
+    forces, recent = loop.forces, loop.recent
     y, whole, x, work = states[0], states[1], states[2], states[3]
     for k in range(ground.size):
         early = ground[k]
@@ -227,18 +214,8 @@ def advance(
         for i in range(6):
             y[i] += pushed[i] * force + sides[i, 0] * early + sides[i, 1] * late
             whole[i] += sides_0[i, 0] * early + sides_0[i, 1] * late
-        command = compensators.step(
-            code,
-            params,
-            memory,
-            y[0],
-            y[3],
-            trend.ahead(recent),
-            trend.slope(recent, DT),
-            out[0, k],
-            out[1, k],
-            DT,
-        )
+        wanted = Wanted(y[0], y[3], trend.ahead(recent), trend.slope(recent, DT), out[0, k], out[1, k])
+        command = compensators.step(loop.compensator, wanted, DT)
         move(plant, x, work)
         for i in range(5):
             x[i] += held[i] * command

@@ -11,7 +11,7 @@ import numpy as np
 
 from common.tables import Actuator, Column
 from models import compensators
-from models.compensators import Built
+from models.compensators import Built, Wanted
 from models.labs import column_lab
 from models.registry import Array
 
@@ -75,7 +75,7 @@ def drive(
         told = measured + (0.0 if noise is None else float(noise[k]))
         run.command[k] = ask(built, r[k + 1], rate[k + 1], bend[k + 1], jerk[k + 1], r[k], told)
         run.coefficients[k] = built.state[:adaptive]
-        measured, _ = column_lab.advance(*lab, run.command[k])
+        measured, _ = column_lab.advance(lab, run.command[k])
     return run
 
 
@@ -89,7 +89,8 @@ def ask(
     measured: float = 0.0,
 ) -> float:
     """One command; all numbers zero unless given."""
-    return compensators.step(*built, target, rate, acceleration, jerk, present, measured, DT)
+    wanted = Wanted(target, rate, acceleration, jerk, present, measured)
+    return compensators.step(built, wanted, DT)
 
 
 def response(run: Run, frequency: float, seconds: float = 4.0) -> complex:

@@ -7,6 +7,7 @@ import pytest
 from scipy import signal
 
 from models import compensators
+from models.compensators import Wanted
 from models.registry import Array
 from tests.models.compensators.benchmark import DT
 from tests.models.compensators.rig import DT as SLOW
@@ -29,7 +30,7 @@ def test_the_command_is_that_of_the_transfer_functions(interval: float, numbers:
     built = compensators.build("pi_lead", dict(zip(names, numbers, strict=True)), interval)
     target, measured, other = np.random.default_rng(2).normal(size=(3, 600))
     got = [
-        compensators.step(*built, o, o, o, o, r, y, interval)
+        compensators.step(built, Wanted(o, o, o, o, r, y), interval)
         for r, y, o in zip(target.tolist(), measured.tolist(), other.tolist(), strict=True)
     ]
     assert got == pytest.approx(expected(target, measured, interval, numbers), rel=1e-10, abs=1e-10)

@@ -30,7 +30,7 @@ def emulated(command: Array, device: Actuator | None = None) -> Array:
     lab = column_lab.build(DT, device or Actuator(), Column())
     result = np.zeros(command.size)
     for k in range(command.size - 1):
-        result[k + 1] = column_lab.advance(*lab, float(command[k]))[0]
+        result[k + 1] = column_lab.advance(lab, float(command[k]))[0]
     return result
 
 

@@ -27,7 +27,7 @@ def emulated(command: Array, motor: Array, device: Table | None = None) -> Array
     lab = table_lab.build(DT, device or Table(), Damper())
     result = np.zeros((4, command.size))
     for k in range(command.size - 1):
-        result[:, k + 1] = table_lab.advance(*lab, float(command[k]), float(motor[k]))
+        result[:, k + 1] = table_lab.advance(lab, float(command[k]), float(motor[k]))
     return result
 
 

@@ -171,7 +171,7 @@ def specimen_under(
 ) -> Array:
     """Force at each deformation of a path, from rest at its first point."""
     parts = specimen.build(column or Column(stiffness=K), effects)
-    return np.array([specimen.force(*parts, float(deformation), step) for deformation in path])
+    return np.array([specimen.force(parts, float(deformation), step) for deformation in path])
 
 
 def cycles(amplitude: float, frequency: float, count: int = 3) -> tuple[Array, Array]:
@@ -362,7 +362,7 @@ def run_a(
     lab = column_lab.build(
         DT, actuator or Actuator(), column or Column(stiffness=K), actuator_effects, column_effects
     )
-    return np.array([column_lab.advance(*lab, float(value)) for value in command])
+    return np.array([column_lab.advance(lab, float(value)) for value in command])
 
 
 def tones(ticks: int, seed: int = 1, size: float = 1.0) -> Array:
@@ -520,7 +520,7 @@ def run_b(
     pushes = np.zeros(command.size) if motor is None else motor
     rows = []
     for value, push in zip(command.tolist(), pushes.tolist(), strict=True):
-        result = table_lab.advance(*lab, value, push)
+        result = table_lab.advance(lab, value, push)
         rows.append((*result, lab.state[table_lab.TABLE_RATE], lab.state[table_lab.STROKE_RATE]))
     return np.array(rows)
 
@@ -652,7 +652,7 @@ def test_table_friction_loses_its_force_times_the_way(oil: float) -> None:
     )
     states = []
     for value in command.tolist():
-        table_lab.advance(*lab, value, 0.0)
+        table_lab.advance(lab, value, 0.0)
         states.append((lab.state[place], lab.state[rate]))
     y, v = np.array(states).T
     last = slice(-round(1.0 / (frequency * SHORT)) - 1, None)
@@ -704,7 +704,7 @@ def released(
     lab.state[table_lab.STROKE], lab.state[table_lab.STROKE_RATE] = stroke, rate
     rows = []
     for _ in range(round(seconds / DT)):
-        _, _, s, force = table_lab.advance(*lab, 0.0, 0.0)
+        _, _, s, force = table_lab.advance(lab, 0.0, 0.0)
         rows.append((s, lab.state[table_lab.STROKE_RATE], force))
     return np.array(rows)
 

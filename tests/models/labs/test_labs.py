@@ -77,7 +77,7 @@ def test_a_held_command_acts_as_steps_on_the_lag(lag: float) -> None:
     lab = column_lab.build(
         DT, Actuator(gain=0.98, delay=lag, time_constant=constant, command="held"), Column()
     )
-    got = [column_lab.advance(*lab, value)[0] for value in values]
+    got = [column_lab.advance(lab, value)[0] for value in values]
     t = DT * np.arange(1, values.size + 1)
     exact = np.zeros(values.size)
     for tick, jump in enumerate(np.diff(values, prepend=0.0)):
@@ -93,7 +93,7 @@ def test_the_actuator_solves_its_equation(lag: float, time_constant: float) -> N
     lab = column_lab.build(
         DT, Actuator(gain=0.98, delay=lag, time_constant=time_constant), Column(stiffness=1e7)
     )
-    got = np.array([column_lab.advance(*lab, value) for value in values])
+    got = np.array([column_lab.advance(lab, value) for value in values])
     command = delayed_ramp(values, lag)
     times = DT * np.arange(1, values.size + 1)
     exact = solve_ivp(
@@ -112,10 +112,10 @@ def test_the_actuator_solves_its_equation(lag: float, time_constant: float) -> N
 def test_the_actuators_step_response_is_the_closed_form() -> None:
     lab = column_lab.build(DT, Actuator(gain=1.0, delay=0.014, time_constant=0.030), Column())
     for _ in range(200):
-        displacement, _ = column_lab.advance(*lab, 1.0)
+        displacement, _ = column_lab.advance(lab, 1.0)
     assert displacement == pytest.approx(1.0, abs=1e-5)
     lab = column_lab.build(DT, Actuator(gain=1.0, delay=0.014, time_constant=0.030), Column())
-    got = [column_lab.advance(*lab, 1.0)[0] for _ in range(30)]
+    got = [column_lab.advance(lab, 1.0)[0] for _ in range(30)]
     t = DT * np.arange(1, 31) - 0.014
     # the response to a ramp of one interval is the step response averaged over that interval
     late = np.clip(t, 0.0, None), np.clip(t - DT, 0.0, None)
@@ -126,7 +126,7 @@ def test_the_actuators_step_response_is_the_closed_form() -> None:
 def test_an_ideal_actuator_reaches_its_command_at_the_intervals_end() -> None:
     lab = column_lab.build(DT, Actuator(gain=1.0, delay=0.0, time_constant=0.0), Column(stiffness=2.0))
     for value in (0.3, -0.1, 7.0):
-        assert column_lab.advance(*lab, value) == (value, 2.0 * value)
+        assert column_lab.advance(lab, value) == (value, 2.0 * value)
 
 
 @pytest.mark.parametrize("lag", [0.0, 0.004, 0.0047])
@@ -136,7 +136,7 @@ def test_table_and_damper_solve_their_equations(lag: float, motor: float) -> Non
     table, damper = Table(frequency=15.0, damping_ratio=0.7, delay=lag), Damper(motor_time_constant=motor)
     wanted, force = commands(ticks), 40.0 * commands(ticks, seed=2) / 0.003
     lab = table_lab.build(DT, table, damper)
-    got = np.array([table_lab.advance(*lab, u, f) for u, f in zip(wanted, force, strict=True)])
+    got = np.array([table_lab.advance(lab, u, f) for u, f in zip(wanted, force, strict=True)])
     command, omega = delayed_ramp(wanted, lag), 2.0 * math.pi * 15.0
 
     def acceleration(t: float, y: float, rate: float) -> float:
@@ -170,7 +170,7 @@ def test_an_ideal_table_follows_at_once_and_carries_the_damper_along() -> None:
     table, damper = Table(frequency=math.inf, delay=0.0), Damper(stiffness=0.0, damping=0.0)
     wanted = commands(500)
     lab = table_lab.build(DT, table, damper)
-    got = np.array([table_lab.advance(*lab, u, 0.0) for u in wanted])
+    got = np.array([table_lab.advance(lab, u, 0.0) for u in wanted])
     assert np.allclose(got[:, 0], wanted, atol=1e-15)
     # a mass without spring and dashpot stays where it is in space
     assert np.allclose(got[:, 2], -wanted, atol=1e-12)
@@ -181,7 +181,7 @@ def test_an_ideal_table_follows_at_once_and_carries_the_damper_along() -> None:
 def test_the_dampers_force_balances_its_motion() -> None:
     lab = table_lab.build(DT, Table(), Damper())
     wanted = commands(1000)
-    got = np.array([table_lab.advance(*lab, u, 20.0 * u / 0.003) for u in wanted])
+    got = np.array([table_lab.advance(lab, u, 20.0 * u / 0.003) for u in wanted])
     absolute = np.diff(got[:, 0] + got[:, 2], 2) / DT**2
     # force on the table = −mass × absolute acceleration, to the accuracy of a second difference
     error = got[1:-1, 3] + 16.0 * absolute

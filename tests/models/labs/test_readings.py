@@ -35,7 +35,7 @@ def read(values: Array, effects: SensorEffects, noises: Array | None = None, int
     sensors = readings.build(interval, (NAME,), {NAME: effects})
     added = np.zeros(values.size) if noises is None else noises
     pairs = zip(values.tolist(), added.tolist(), strict=True)
-    return np.array([readings.step(*sensors, 0, v, n, k * interval) for k, (v, n) in enumerate(pairs)])
+    return np.array([readings.step(sensors, 0, v, n, k * interval) for k, (v, n) in enumerate(pairs)])
 
 
 @given(st.lists(st.tuples(WIDE, WIDE), min_size=1, max_size=20))
@@ -121,7 +121,7 @@ def test_each_reading_has_its_own_delay() -> None:
     delays = {"column_displacement": SensorEffects(delay=2 * DT), "column_force": SensorEffects(delay=5 * DT)}
     sensors = readings.build(DT, names, delays)
     rows = np.array(
-        [[readings.step(*sensors, i, float(k + 1), 0.0, k * DT) for i in range(2)] for k in range(12)]
+        [[readings.step(sensors, i, float(k + 1), 0.0, k * DT) for i in range(2)] for k in range(12)]
     )
     ramp = np.arange(12.0)
     assert np.allclose(rows.T, [np.maximum(ramp - 1.0, 0.0), np.maximum(ramp - 4.0, 0.0)])

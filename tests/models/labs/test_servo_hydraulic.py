@@ -44,7 +44,7 @@ def commands(ticks: int, interval: float = DT) -> Array:
 
 def run(lab: column_lab.ColumnLab, command: Array) -> Array:
     """Displacement and force at the ends of the intervals."""
-    return np.array([column_lab.advance(*lab, float(value)) for value in command])
+    return np.array([column_lab.advance(lab, float(value)) for value in command])
 
 
 def arriving(values: Array, actuator: Actuator, interval: float) -> Callable[[float], float]:
@@ -186,7 +186,7 @@ def test_the_flow_ends_where_the_valve_is_open() -> None:
     fast = 5e-3 * np.sin(2.0 * np.pi * 5.0 * np.arange(2000) * DT)
     flows = []
     for value in fast:
-        column_lab.advance(*lab, float(value))
+        column_lab.advance(lab, float(value))
         flows.append(abs(lab.state[column_lab.STATES + servo_hydraulic.FLOW]))
     assert max(flows) == limit * SERVO.piston
     free = run(column_lab.build(DT, servo(), COLUMN), fast)
