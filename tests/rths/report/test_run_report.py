@@ -77,7 +77,8 @@ def test_the_page_has_the_figures_of_inspect(
     for segment, facts in summary["latency"].items():
         assert segment + "".join(f"{value * 1e6:.0f}" for value in facts.values()) in text
     for name, counts in summary["exchange"].items():
-        assert name.replace("/", ",") + "".join(map(str, counts.values())) in text
+        account = "".join(str(counts[key]) for key in ("sent", "used", "rejected", "lost"))
+        assert name.replace("/", ",") + account in text
     assert f"{abs(summary['error_energy']) * 100:.2f}%oftheenergy" in text
     for event in summary["events"]:
         assert event["text"].replace(" ", "") in text
