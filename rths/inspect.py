@@ -92,13 +92,20 @@ def ending(summary: dict[str, Any]) -> str:
     return ""
 
 
+def stopped(summary: dict[str, Any]) -> str:
+    """At which tick a test ended early, empty where it did not or nobody knows."""
+    expected, planned = summary["ticks_expected"], summary["ticks_planned"]
+    return f"stopped at tick {expected} of {planned}" if planned and expected < planned else ""
+
+
 def write_completeness(summary: dict[str, Any]) -> None:
     """Ticks expected, recorded and missing."""
-    expected = summary["ticks_expected"]
+    if text := stopped(summary):
+        sys.stdout.write(f"{text}\n")
     rows = [["topic", "expected", "recorded", "missing", "holes"]]
     for topic, facts in summary["topics"].items():
         holes = " ".join(f"{first}–{last}" for first, last in facts["holes"]) or "none"
-        rows.append([topic, str(expected or "?"), str(facts["recorded"]), str(facts["missing"]), holes])
+        rows.append([topic, str(facts["expected"]), str(facts["recorded"]), str(facts["missing"]), holes])
     sys.stdout.write("\n")
     table(rows)
 

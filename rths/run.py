@@ -107,7 +107,8 @@ def in_virtual_time(
         started = time.monotonic()
         error = virtual.run(bench, stopping, working.tell)
     seconds = time.monotonic() - started
-    sys.stderr.write(f"{plan.test.duration:g} s of test in {seconds:.1f} s of computing\n")
+    played = bench.master.ticks * plan.test.interval
+    sys.stderr.write(f"{played:g} s of test in {seconds:.1f} s of computing\n")
     return error
 
 

@@ -19,6 +19,7 @@ from models.structures.partition import storey_stiffness
 from rths import circumstances, storeys
 from rths import late as lateness
 from rths.accounts import accounts
+from rths.due import due
 
 Result = TypeVar("Result")
 PERCENTILES = (50, 90, 99, 99.9)
@@ -52,6 +53,7 @@ def plan_of(run: Run) -> Plan | None:
 def summarize(run: Run) -> dict[str, Any]:
     """Everything that `inspect` reports, as plain values."""
     plan, real_time = plan_of(run), lateness.late_ticks(run)
+    expected = due(run, plan)
     return {
         "file": str(run.path),
         "test": run.test,
@@ -61,12 +63,9 @@ def summarize(run: Run) -> dict[str, Any]:
         "clock": circumstances.clock_of(run),
         "circumstances": circumstances.sentence(run, plan),
         "ground_motion": run.metadata.get("ground_motion", {}),
-        "ticks_expected": plan.ticks if plan else None,
-        "topics": {
-            topic: completeness(run, topic, plan)
-            for topic in run.columns
-            if kind_of(topic) in signals.TICK_TOPICS
-        },
+        "ticks_planned": plan.ticks if plan else None,
+        "ticks_expected": max(expected.values(), default=0) if plan else None,
+        "topics": {topic: completeness(run, topic, ticks) for topic, ticks in expected.items()},
         "recorder": dict(run.metadata.get("summary", {})),
         "peaks": peaks(run),
         "storeys": (floors := storeys.storeys(run, plan) if plan else []),
@@ -86,14 +85,14 @@ def summarize(run: Run) -> dict[str, Any]:
     }
 
 
-def completeness(run: Run, topic: str, plan: Plan | None) -> dict[str, Any]:
-    """How many messages of a topic there are, how many are missing, and the first holes."""
+def completeness(run: Run, topic: str, expected: int) -> dict[str, Any]:
+    """How many messages of a topic there are, how many of the ticks that were due are missing, and the first holes."""
     sequence = run.sequences[topic]
-    last = plan.ticks if plan else int(sequence.max(initial=-1)) + 1
-    missing = np.setdiff1d(np.arange(last), sequence)
+    missing = np.setdiff1d(np.arange(expected), sequence)
     breaks = np.flatnonzero(np.diff(missing) > 1) + 1
     holes = [[int(part[0]), int(part[-1])] for part in np.split(missing, breaks) if part.size]
     return {
+        "expected": expected,
         "recorded": int(sequence.size),
         "missing": int(missing.size),
         "holes": holes[:10],

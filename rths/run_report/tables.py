@@ -63,14 +63,16 @@ def date(run: Run) -> str:
     return f"{at:%Y-%m-%d %H:%M:%S} UTC"
 
 
+COUNTS = ("expected", "recorded", "missing", "repeated")
+
+
 def completeness(summary: Summary) -> Table:
     """Ticks expected, recorded, missing."""
-    expected = str(summary["ticks_expected"] or "?")
     rows = [
-        [topic, expected, str(found["recorded"]), str(found["missing"]), str(found["repeated"]), holes(found)]
+        [topic, *(str(found[name]) for name in COUNTS), holes(found)]
         for topic, found in summary["topics"].items()
     ]
-    return Table("", ("topic", "expected", "recorded", "missing", "repeated", "holes (ticks)"), rows)
+    return Table("", ("topic", *COUNTS, "holes (ticks)"), rows)
 
 
 def holes(found: Mapping[str, Any]) -> str:

@@ -58,11 +58,11 @@ def lost(summary: Summary) -> str:
 
 def amount(summary: Summary) -> str:
     """How many ticks of how many are there."""
-    expected, topics = summary["ticks_expected"], summary["topics"]
-    if not expected or not topics:
+    planned, topics = summary["ticks_planned"], summary["topics"]
+    if not planned or not topics:
         return "It does not say how many ticks there should be."
     counts = ", ".join(f"{facts['recorded']} of the {topic}" for topic, facts in topics.items())
-    return f"Of {expected} ticks there are {counts}."
+    return f"Of {planned} ticks there are {counts}."
 
 
 def sentences(run: Run, summary: Summary) -> list[str]:
@@ -94,15 +94,19 @@ def outcome(summary: Summary) -> str:
 
 def completeness(summary: Summary) -> str:
     """Ticks recorded and missing."""
-    expected, topics = summary["ticks_expected"], summary["topics"]
-    if not expected or not topics:
+    expected, planned, topics = summary["ticks_expected"], summary["ticks_planned"], summary["topics"]
+    if not planned or not topics:
         return ""
     gaps = {topic: facts["missing"] for topic, facts in topics.items() if facts["missing"]}
     names = ", ".join(topics)
     if not gaps:
+        if expected < planned:
+            return f"The test stopped at tick {expected} of {planned}; all until then are recorded ({names})."
         return f"All {expected} ticks are recorded ({names})."
-    counts = ", ".join(f"{count} of the {topic}" for topic, count in gaps.items())
-    return f"Of {expected} ticks are missing: {counts}."
+    counts = " and ".join(f"{topic} lacks {count}" for topic, count in gaps.items())
+    if expected < planned:
+        return f"The test stopped at tick {expected} of {planned}; until then the recording of {counts}."
+    return f"Of {planned} ticks the recording of {counts}."
 
 
 def exchange(summary: Summary) -> list[str]:
