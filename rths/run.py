@@ -318,6 +318,8 @@ def tell(said: Said, progress: Progress) -> None:
             progress.mode(lab, mode)
         case {"kind": "event", "code": "real_time", "missing": missing} if missing:
             pass  # beside a rig it was said before; an emulation can do without
+        case {"kind": "event", "level": "error", "code": code, "lab": lab}:
+            progress.say(f"{lab}: ends the test ({code})")  # the sentence is this command's last word
         case {"kind": "event", "code": code, "lab": lab, "text": text} if code not in UNSAID:
             progress.say(f"{lab}: {text}")
         case {"kind": "text", "text": text}:

@@ -391,7 +391,7 @@ def test_a_flood_of_lines_that_are_no_reports_is_read_to_its_end(
     assert processes.errors == {"slave": "lost"}
     err = capsys.readouterr().err
     assert err.count("slave: valve open\n") == 20_000
-    assert "slave: gone\n" in err
+    assert "slave: ends the test (lost)\n" in err
 
 
 def test_a_pipe_that_a_grandchild_holds_keeps_nobody(

@@ -210,7 +210,7 @@ def test_a_test_that_was_stopped_says_why(virtual_recording: Path) -> None:
     run.columns["slave"] = {name: values[kept] for name, values in run.columns["slave"].items()}
     run = replace(run, sequences=run.sequences | {"slave": kept})
     text = check_alone(undrawn(run)).text
-    assert "Of 2000 ticks are missing: 3 of the slave." in text
+    assert "Of 2000 ticks the recording of slave lacks 3." in text
     assert "100…102" in text
 
 
