@@ -11,6 +11,7 @@ from common.laboratory import Laboratory
 from common.plan import Plan
 from common.realtime import freeze
 from common.safety.descent import Resting
+from common.safety.longest import resting
 from common.safety.modes import Mode
 from common.surroundings import Surroundings
 from common.waited import Waited
@@ -81,7 +82,7 @@ class Loop(Protocol):
 
     @property
     def needed(self) -> bool:
-        """Whether other laboratories that are latched are reached through this one alone."""
+        """Whether other laboratories that have not left yet are reached through this one alone."""
 
     @property
     def awaited(self) -> str:
@@ -104,6 +105,7 @@ def drive(loop: Loop, stopping: Callable[[], str], surroundings: Surroundings) -
             surroundings.begin()
         freeze()
         following = run(loop, stopping)
+        over = loop.lab.clock.now()
         if loop.lab.running:
             loop.finish()
         come_to_rest(loop, following)
@@ -115,7 +117,7 @@ def drive(loop: Loop, stopping: Callable[[], str], surroundings: Surroundings) -
         raise
     loop.disarm()
     surroundings.end(loop.ticks)
-    depart(loop)
+    depart(loop, over)
 
 
 def handshake(loop: Loop, stopping: Callable[[], str]) -> None:
@@ -205,21 +207,34 @@ def fetch(loop: Loop, deadline: int) -> bool:
     return True
 
 
-def depart(loop: Loop) -> None:
+def depart(loop: Loop, over: int) -> None:
     """Last words until they are heard, for a bounded time: what the recorder lacks it may still ask for.
 
     A recorder that is held up is waited for as long as during the test, counted from when it was last heard, and then
-    has as long as any other to come back to the link and to ask.
+    has as long as any other to come back to the link and to ask. Who routes for others stays while they come to rest,
+    for at most the longest way to rest since the ticks were `over`; what the recorder may take counts from then.
     """
     lab = loop.lab
     begun, patience = lab.clock.now(), round(lab.plan.recording.patience * 1e9)
-    while not loop.left:
+    rest = over + round(resting(lab.plan) * 1e9) if lab.start_ns else begun
+    while (routes := coming_to_rest(loop, rest)) or not loop.left:
+        if routes:
+            begun = lab.clock.now()
         heard = lab.recorder_heard_ns if lab.recorded else begun - patience
         if lab.clock.now() >= max(begun, min(heard, begun) + patience) + LEAVE_NS:
             break
         loop.leave()
         fetch(loop, lab.clock.now() + IDLE_NS)
     loop.leave()
+
+
+def coming_to_rest(loop: Loop, rest: int) -> bool:
+    """Whether others may still be on their way to rest, which takes until `rest` at most (ns).
+
+    After a trip they say again and again why they have stopped, in an orderly end nothing before they are at rest.
+    """
+    lab = loop.lab
+    return (loop.needed or lab.exchange.state is State.STOPPING) and lab.clock.now() < rest
 
 
 def longest_leave(plan: Plan) -> float:

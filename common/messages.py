@@ -123,7 +123,7 @@ class Stop(NamedTuple):
 
 
 class Stopped(NamedTuple):
-    """Slave to master: the rig is disarmed."""
+    """Slave to master: the rig is disarmed; after a trip also that the recorder has all, as the last word."""
 
     session: int
     ticks: int

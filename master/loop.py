@@ -39,7 +39,7 @@ from common.safety.watchdog import Finding
 from master.descent import ColumnRamp
 from master.handshake import Handshake
 from master.limits import MasterLimits
-from master.partner import GIVEN_UP_NS, Partner
+from master.partner import Partner
 from master.step import MasterStep, Outputs
 
 
@@ -103,10 +103,9 @@ class MasterLoop:
             self._take_answer(self.partners[role], message, received.received_ns)
 
     def _take_answer(self, partner: Partner, message: Message, received_ns: int) -> None:
-        if isinstance(message, Trip):
-            partner.tripped_ns = received_ns
         match message:
             case Trip():
+                partner.heard_ns = received_ns
                 self.lab.tripped(partner.role, message, self.ticks)
             case Stopped():
                 partner.stopped = True
@@ -359,9 +358,9 @@ class MasterLoop:
 
     @property
     def needed(self) -> bool:
-        """Whether a slave that has tripped still says so: an operator reaches it through this session."""
+        """Whether recorder and operator still reach a slave through this session: it is heard until it leaves."""
         now = self.lab.clock.now()
-        return any(now - partner.tripped_ns < GIVEN_UP_NS for partner in self._partners)
+        return any(partner.there(now) for partner in self._partners)
 
     @property
     def awaited(self) -> str:

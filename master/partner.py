@@ -41,6 +41,7 @@ class Partner:
         self._asked = self._answered = 0  # how often for an exchange, how often it came back
         self._asked_ns = -REPEAT_NS
         self._watchdog = Watchdog(lab.plan.safety, interval)
+        self._silence_ns = max(round(lab.plan.link.loss_timeout * 1e9), GIVEN_UP_NS)
         self.tally = Tally(lab.plan.ticks, lab.plan.window)
         self.account = Account(lab, self._offset, latency_topic(role))
         self.instance = 0  # the process that takes part under this role, 0 for none yet
@@ -48,7 +49,6 @@ class Partner:
         self.scheduled = False
         self.stopped = False
         self.heard_ns = 0
-        self.tripped_ns = -GIVEN_UP_NS  # when it said last that it has stopped its rig
         self.latched = False  # since a test before, so that it refuses this one
         self.commands = 0  # sent
         self.used = NO_FEEDBACK
@@ -72,6 +72,10 @@ class Partner:
     def synchronised(self) -> bool:
         """Whether enough is known of its clock."""
         return self._syncs >= self._exchanges
+
+    def there(self, now: int) -> bool:
+        """Whether it takes part and has not left: its last word has not come, and it was not silent for too long."""
+        return self.registered and not self.stopped and now - self.heard_ns < self._silence_ns
 
     def pass_gate(self, exchanges: int) -> None:
         """So many exchanges must be made before the start."""

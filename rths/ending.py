@@ -10,7 +10,7 @@ from common.drive import LEAVE_NS, longest_leave
 from common.errors import IncompleteError, InputError, InterlockError, LostError, RthsError
 from common.plan import Plan
 from common.roles import MASTER, RECORDER, title
-from common.safety.speed_change import SpeedChange
+from common.safety.longest import resting
 from recorder.loop import CONSEQUENCE, ROWS_LOST, SILENCE_NS
 
 MARGIN_S = 1.0  # on what a process allows itself, for it to leave
@@ -83,21 +83,6 @@ class Ending:
         if name == RECORDER:
             return self._alone + (WRITE_S if self.agreed else MARGIN_S + KILL_S)
         return max(self._ask + self._patience, self._due.get(name, -math.inf))
-
-
-def resting(plan: Plan) -> float:
-    """The longest way to rest, s: from the limits of speed to a halt, then from the actuator's limit to no load."""
-    safety, limits, interval = plan.safety, plan.limits, plan.test.interval
-
-    def change(speed: float) -> SpeedChange:
-        return SpeedChange(speed, 0.0, safety.acceleration, safety.jerk)
-
-    actuator = change(min(limits.actuator_velocity, limits.actuator_step / interval))
-    table = change(min(limits.table_velocity, limits.table_step / interval))
-    way = limits.actuator_command + actuator.travel(actuator.duration)
-    unloading = way / safety.velocity + 2.0 * change(safety.velocity).duration
-    longest = max(actuator.duration + unloading, table.duration, safety.release)
-    return longest + safety.settle + MARGIN_S
 
 
 class Ended(Protocol):

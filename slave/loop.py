@@ -314,19 +314,19 @@ class SlaveLoop:
             self.lab.say_why()
 
     def leave(self) -> None:
-        """Tell the master and give the recorder the rest; may be called again until `left`."""
-        lab = self.lab
+        """Tell the master and give the recorder the rest; may be called again until `left`, and once more."""
+        lab, left = self.lab, self.left
         now = lab.clock.now()
-        if now - self._said_ns < REPEAT_NS // 2:
+        if not left and now - self._said_ns < REPEAT_NS // 2:
             return
         self._said_ns = now
         session = lab.exchange.session
         if lab.exchange.state is State.STOPPING:
             lab.exchange.happen(Event.FINISH)
-        if lab.exchange.state is State.DONE:
-            lab.endpoint.send(Stopped(session, self.ticks))
-        elif lab.error is not None:
+        if lab.error is not None:
             lab.say_why()
+        if session and (left or lab.exchange.state is State.DONE):
+            lab.endpoint.send(Stopped(session, self.ticks))
         lab.send_samples(everything=True)
         lab.endpoint.send(lab.outlet.finished())
 

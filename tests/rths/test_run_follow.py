@@ -21,11 +21,12 @@ from common.errors import IncompleteError, InputError, InterlockError, LostError
 from common.laboratory import Setting
 from common.memory_link import MemoryHub
 from common.plan import Plan
+from common.safety.longest import resting
 from common.safety.ramp import MotionRamp
 from common.tables import Rig
 from recorder.loop import RecorderLoop
 from rths import virtual
-from rths.ending import KILL_S, LEAVE_S, MARGIN_S, SILENCE_S, WRITE_S, Ending, resting, verdict
+from rths.ending import KILL_S, LEAVE_S, MARGIN_S, SILENCE_S, WRITE_S, Ending, verdict
 from rths.processes import Leash, Processes, Said, understood
 from rths.run import answer, follow, note
 from rths.terminal import Progress
