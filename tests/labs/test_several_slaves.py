@@ -15,6 +15,7 @@ from common.errors import InputError, InterlockError, LostError, RigError
 from common.exchange import State
 from common.laboratory import Setting
 from common.messages import Arm, Feedback, Recorder, Register, Start, Sync, Waiting
+from common.patience import strict
 from common.plan import PROTOCOL_VERSION, Plan, from_tables
 from common.reality import Reality
 from common.recording.reader import Run, read
@@ -233,7 +234,7 @@ def running(chosen: Plan, ticks: int) -> Bench:
 
 
 def test_a_slave_that_falls_silent_is_named_and_all_others_are_told() -> None:
-    bench = running(without_recorder(TWO), 100)
+    bench = running(without_recorder(strict(TWO)), 100)
     bench.slaves["slave.middle"].tick = lambda tick: None  # type: ignore[method-assign]
     for tick in range(100, 700):
         virtual._tick(bench, tick)

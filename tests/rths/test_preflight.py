@@ -100,7 +100,7 @@ def test_a_sensor_off_zero_refuses_as_its_laboratory_arms(
     run = read(path)
     assert not run.ticks("master")
     assert not run.ticks("slave")
-    assert call(*words, "--accept-risk", "sensors") == 0
+    assert call(*words, "--force", "--accept-risk", "sensors") == 0
     ((who, _, text),) = noted(read(path), "accepted_risk")
     assert who == {"A": "master", "B": "slave"}[lab]
     assert f"risk 'sensors' accepted: {signal} of laboratory {lab} is off zero" in text
@@ -130,7 +130,7 @@ def test_the_users_own_laboratory_is_not_disturbed_unless_it_says_so(
             lab.replace('fixture."""\n\n    def __init__', f'fixture."""\n\n{more}    def __init__')
         )
         path = tmp_path / "a.mcap"
-        code = call("run", tmp_path / "my_test.toml", "--virtual", "--duration", "1", "-o", path)
+        code = call("run", tmp_path / "my_test.toml", "--virtual", "--duration", "1", "-o", path, "--force")
         said.append((code, capsys.readouterr().err))
     assert said[0][0] == 0
     assert "sensors of laboratory A (ColumnLab) not read at rest" in said[0][1]
