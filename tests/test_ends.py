@@ -66,6 +66,7 @@ def test_the_exit_code_is_the_commands(command: str, code: int) -> None:
     assert (done.returncode, done.stderr) == (code, "")
 
 
+@pytest.mark.slow
 @LINUX
 def test_a_command_that_takes_too_long_is_ended_with_all_that_it_started(tmp_path: Path) -> None:
     script = (
@@ -107,6 +108,7 @@ def session(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
     return finished(*command, seconds=120.0, cwd=folder, env=own)
 
 
+@pytest.mark.slow
 @LINUX
 def test_a_test_that_hangs_fails_with_its_stacks_and_the_others_go_on(tmp_path: Path) -> None:
     (tmp_path / "conftest.py").write_text(GUARDS)

@@ -29,6 +29,7 @@ sys.modules[__name__] = Silent()
 """
 
 
+@pytest.mark.slow
 def test_plain_python_computes_the_same_building() -> None:
     plan = closed_loop.bare(Plan()).with_ticks(500)
     ground = substructure.ground_rows(plan, substructure.motion(plan))

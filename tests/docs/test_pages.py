@@ -22,7 +22,6 @@ NAMES = [str(path.relative_to(ROOT)) for path in PAGES]
 # is held up for long enough ends a test, as it should
 REAL_TIME = re.compile(r"\brths (?:run(?!.* --virtual)|master|record|doctor)\b")
 TRIES = 3
-LONG = {"docs/how-to/try-compensators.md"}  # whole tests of a benchmark: a minute
 
 COMMAND = re.compile(
     r"(?:\$ |[A-Z_]+=\S+ )?(?:\S*/)?(?:rths|make|python3?|pip|pytest|git|docker|ssh|scp|for|until)\b(?!:)"
@@ -95,11 +94,9 @@ def in_real_time(name: str) -> bool:
     return any(REAL_TIME.search(command.text) for block in shown for command in console.commands(block.text))
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(900)
-@pytest.mark.parametrize(
-    "name",
-    [pytest.param(name, marks=[pytest.mark.slow] * (name in LONG or in_real_time(name))) for name in RUN],
-)
+@pytest.mark.parametrize("name", RUN)
 def test_a_page_shows_what_its_commands_print(name: str, tmp_path: Path) -> None:
     complaints = ["not run"]
     for attempt in range(TRIES if in_real_time(name) else 1):

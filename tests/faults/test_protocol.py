@@ -195,6 +195,7 @@ def of_kind(kind: type[Any], role: str) -> Message:
     return message
 
 
+@pytest.mark.slow
 def test_f36_every_control_message_in_every_state() -> None:
     tried, changed = 0, set()
     for role, build, other in ((SLAVE, slave_in, MASTER), (MASTER, master_in, SLAVE)):

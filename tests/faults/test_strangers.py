@@ -97,6 +97,7 @@ def test_f26_replay_within_the_session(tmp_path: Path, undisturbed: Course) -> N
     )
 
 
+@pytest.mark.slow
 def test_f27_a_jump_of_the_numbers(tmp_path: Path) -> None:
     scene = Scene(tmp_path, 6.0)
     key = codec.session_key(SESSION, scene.plan.digest())
@@ -131,6 +132,7 @@ def test_f27_a_jump_of_the_numbers(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_f28_stamps_in_the_future_and_clocks_apart(tmp_path: Path, undisturbed: Course) -> None:
     second = 10**9
     for step in (second, -second):

@@ -87,6 +87,7 @@ def errors(interval: float) -> tuple[float, float]:
     )
 
 
+@pytest.mark.slow
 def test_building_and_dampers_move_as_in_continuous_time_and_the_finer_the_nearer() -> None:
     coarse, fine = errors(0.002), errors(0.0005)
     assert fine == pytest.approx((0.0, 0.0), abs=0.01)

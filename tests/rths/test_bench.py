@@ -27,6 +27,7 @@ NOMINAL: dict[str, dict[str, tuple[float, float]]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", NOMINAL)
 def test_what_the_plan_says_is_identified_from_the_bench_recording(
     part: str,
@@ -119,6 +120,7 @@ def test_wrong_wishes_get_a_sentence(
     assert all(part in out for part in NOMINAL)
 
 
+@pytest.mark.slow
 def test_a_plug_in_laboratory_goes_through_the_same_bench_test(
     call: Any,  # noqa: F811
     capsys: Any,
@@ -128,6 +130,7 @@ def test_a_plug_in_laboratory_goes_through_the_same_bench_test(
     assert "rths identify" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_hysteretic_model_is_fitted_to_the_realistic_column(
     call: Any,  # noqa: F811
     capsys: Any,

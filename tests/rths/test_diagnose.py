@@ -62,6 +62,7 @@ def test_report_page_and_summary(call: Any, capsys: Any, cases: Cases, tmp_path:
     assert json.loads(capsys.readouterr().out) == report
 
 
+@pytest.mark.slow
 def test_the_ideal_test_as_yardstick(call: Any, cases: Cases, tmp_path: Path) -> None:
     out, plain = tmp_path / "a.json", tmp_path / "b.json"
     assert call("diagnose", cases.file(duration=8.0), "--ideal", "--json", out) == 0
@@ -120,6 +121,7 @@ def test_a_few_ticks_are_not_enough(call: Any, capsys: Any, cases: Cases, tmp_pa
     assert "not enough data" in capsys.readouterr().out.lower()
 
 
+@pytest.mark.slow
 def test_a_recording_that_was_cut_off(call: Any, cases: Cases, tmp_path: Path) -> None:
     content = cases.file(FRICTION, duration=10.0).read_bytes()
     cut, out = tmp_path / "cut.mcap", tmp_path / "cut.json"
@@ -131,6 +133,7 @@ def test_a_recording_that_was_cut_off(call: Any, cases: Cases, tmp_path: Path) -
     assert 1500 < report["details"]["test"]["ticks"] < 5000
 
 
+@pytest.mark.slow
 def test_a_test_that_a_limit_stopped(call: Any, tmp_path: Path) -> None:
     path, out = tmp_path / "a.mcap", tmp_path / "a.json"
     base = with_table(short(10.0), "limits", damper_stroke=0.03)
@@ -142,6 +145,7 @@ def test_a_test_that_a_limit_stopped(call: Any, tmp_path: Path) -> None:
     assert report["which"][0]["effects"] == ["damper.viscous"]
 
 
+@pytest.mark.slow
 def test_several_storeys(call: Any, tmp_path: Path) -> None:
     path, out = tmp_path / "a.mcap", tmp_path / "a.json"
     base = with_table(
@@ -181,6 +185,7 @@ def test_a_bench_test_of_one_part(call: Any, capsys: Any, tmp_path: Path, part: 
     capsys.readouterr()
 
 
+@pytest.mark.slow
 def test_the_gap_of_a_bench_test_closes_to_its_floor(call: Any, tmp_path: Path) -> None:
     path, out, secret = tmp_path / "bench.mcap", tmp_path / "a.json", tmp_path / "r.toml"
     secret.write_text("[[effect]]\nname = 'table.gain'\nfactor = 0.93\n")
@@ -190,6 +195,7 @@ def test_the_gap_of_a_bench_test_closes_to_its_floor(call: Any, tmp_path: Path) 
     assert far["after"] == pytest.approx(far["noise_floor"], rel=0.05)
 
 
+@pytest.mark.slow
 def test_missing_channels_are_said(call: Any, capsys: Any, cases: Cases, tmp_path: Path) -> None:
     table, again = tmp_path / "out.csv", tmp_path / "again.mcap"
     assert call("export", cases.file(FRICTION, duration=8.0), "-o", table) == 0

@@ -215,6 +215,7 @@ def test_the_independent_reader_in_python_has_every_field_of_every_message(
     assert theirs.attachments == ours.attachments
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_independent_reader_in_javascript_has_every_field_of_every_message(
     kind: str, recordings: dict[str, Path], javascript: Any
@@ -297,6 +298,7 @@ def test_a_layout_has_the_form_that_the_viewers_read(
     assert len(made["userNodes"]) == len(read(recordings[kind]).roles)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["one slave", "two slaves", "extremes"])
 def test_every_path_of_a_layout_finds_something_in_the_recording(
     kind: str, recordings: dict[str, Path], javascript: Any, tmp_path: Path
@@ -326,6 +328,7 @@ def test_every_path_of_a_layout_finds_something_in_the_recording(
     }
 
 
+@pytest.mark.slow
 def test_the_script_in_the_layout_counts_the_histogram(drawn: Path, javascript: Any, tmp_path: Path) -> None:
     subject = layout.of_recording(drawn)
     (tmp_path / "layout.json").write_text(json.dumps(layout.layout(subject)), encoding="utf-8")

@@ -207,6 +207,7 @@ def test_a_reader_that_has_gone_is_no_error(words: list[str], virtual_recording:
     assert process.returncode == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("line", ["simulate two_dampers", "faults --jobs 2 --schedules 400"])
 def test_ctrl_c_is_one_sentence_and_exit_code_3(line: str) -> None:
     with started(*line.split()) as process:

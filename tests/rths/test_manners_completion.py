@@ -99,6 +99,7 @@ zle -N zle-line-init
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", ["source ./.zsh", "fpath=($PWD/.found $fpath) && compinit -u -D"])
 def test_zsh_completes_verbs_options_choices_plans_and_files(way: str, folder: Path) -> None:
     need("zsh")

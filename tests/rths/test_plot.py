@@ -61,6 +61,7 @@ def test_named_pictures_are_drawn_and_no_others(call: Any, virtual_recording: Pa
     assert {path.name for path in (tmp_path / "some").iterdir()} == {"spectra.png", "tracking.png"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("ending", "head"), [("png", b"\x89PNG"), ("pdf", b"%PDF"), ("SVG", b"<?xml")])
 def test_one_picture_goes_into_a_file_of_its_format(
     ending: str, head: bytes, call: Any, virtual_recording: Path, tmp_path: Path

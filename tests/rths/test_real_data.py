@@ -43,6 +43,7 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]
     return path, diagnose_file(path)
 
 
+@pytest.mark.slow
 def test_the_force_rig_is_found_slower_than_planned_by_what_cross_correlation_says(
     rig: tuple[Path, dict[str, Any]],
 ) -> None:

@@ -106,6 +106,7 @@ def test_it_simulates_with_ideal_transfer_systems(call: Call, plan_file: Path, t
     assert np.std(columns["column_force"] - stiff) > 0.001 * np.std(stiff)  # mass and dashpot are felt
 
 
+@pytest.mark.slow
 def test_the_bench_finds_the_lag_that_comes_nearest(
     call: Call, plan_file: Path, capsys: Any, tmp_path: Path
 ) -> None:

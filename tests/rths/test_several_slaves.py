@@ -185,6 +185,7 @@ def test_an_unknown_compensator_is_named_with_the_table_that_holds_it(
     assert said == f"rths: Unknown compensator 'taylr' in [{place}]: did you mean taylor?"
 
 
+@pytest.mark.slow
 def test_bench_wants_a_slaves_name_for_its_parts_and_identify_finds_them_again(
     call: Any, capsys: Any, plan_file: Path, recording: Path, tmp_path: Path
 ) -> None:

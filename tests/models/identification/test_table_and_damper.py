@@ -75,6 +75,7 @@ def test_the_table_agrees_with_the_continuous_equation() -> None:
     assert fit["delay"].value == pytest.approx(0.0063, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_the_tables_intervals_cover() -> None:
     command = tones(1500, 0.5, 20.0, 0.002, seed=3)
     clean = emulated(command, np.zeros(1500))[0]
@@ -134,6 +135,7 @@ def shaken(seed: int, motor: Array, clean: Array) -> damper.DamperFit:
     return damper.least_squares(motor, stroke, force, None, DT, nominal=OFF)
 
 
+@pytest.mark.slow
 def test_the_damper_is_found_and_its_intervals_cover() -> None:
     motor = tones(1000, 0.2, 5.0, 40.0)
     clean = emulated(np.zeros(1000), motor)

@@ -224,6 +224,7 @@ def empty(report: Report, path: tuple[Any, ...]) -> None:
     place[path[-1]] = type(found)() if isinstance(found, list | dict) else None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["explained", "unknown_effect"])
 def test_every_piece_may_be_missing(name: str, monkeypatch: Any) -> None:
     monkeypatch.setattr(pictures, "svg", lambda _canvas: "<svg></svg>")

@@ -52,6 +52,7 @@ def test_a_clean_recording_is_within(call: Any, capsys: Any, virtual_recording: 
     assert "late ticks: 0 of 2000" in out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "options",
     [

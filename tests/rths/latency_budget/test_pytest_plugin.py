@@ -90,6 +90,7 @@ def test_not_judged_skips_with_the_figures(tmp_path: Path) -> None:
     assert "feedback_one_way p99  1200 µs" in out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [["--latency-budget", "own.toml"], []])
 def test_a_budget_comes_from_the_option_or_from_the_call(tmp_path: Path, words: list[str]) -> None:
     recording(tmp_path / "run.mcap", 1.2e-3, "0.0")
@@ -116,6 +117,7 @@ def test_where_rths_is_installed_the_fixture_is_there_by_itself(tmp_path: Path) 
     assert "1 passed" in out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "more"),
     [

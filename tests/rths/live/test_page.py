@@ -141,6 +141,7 @@ def test_a_window_bounds_what_a_page_holds(virtual_recording: Path, grow: Grow) 
     assert growing.source("slave")["t"][-1] == pytest.approx(4.1, abs=0.1)
 
 
+@pytest.mark.slow
 def test_the_whole_of_a_long_recording_is_shown_with_all_that_is_extreme(
     default_plan: Plan, tmp_path: Path, grow: Grow
 ) -> None:

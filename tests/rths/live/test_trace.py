@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -35,6 +36,7 @@ def test_the_worst_of_each_group_is_kept_however_it_comes(cuts: list[int], step:
     assert np.array_equal(trace.since(0)["a"], expected, equal_nan=True)
 
 
+@pytest.mark.slow
 @given(cuts=st.lists(st.integers(0, 1000), max_size=20), step=st.integers(1, 30), seed=st.integers(0, 99))
 def test_the_extremes_of_each_group_are_kept_with_their_times(cuts: list[int], step: int, seed: int) -> None:
     values = np.random.default_rng(seed).normal(size=(2, TICKS.size))

@@ -46,6 +46,7 @@ def canvases(recording: Run, width: str) -> dict[str, Any]:
     return made
 
 
+@pytest.mark.slow
 def test_every_axis_says_what_it_shows_and_in_which_unit(canvases: dict[str, Any]) -> None:
     for name, canvas in canvases.items():
         for axis in canvas.axes:
@@ -109,6 +110,7 @@ def test_lines_of_one_axis_differ_without_their_colour(canvases: dict[str, Any])
             )  # errors are dotted both, in their system's colours
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", plot.FORMATS)
 def test_the_same_recording_gives_the_same_file(ending: str, tmp_path: Path) -> None:
     run = with_latency(made_up(3))

@@ -94,10 +94,12 @@ def test_the_page_shows_every_picture_with_its_text(reported: Path) -> None:
     assert "[ground_motion]" in text  # the plan
 
 
+@pytest.mark.slow
 def test_in_a_browser(reported: Path, tmp_path: Path) -> None:
     check_in_browser(reported, tmp_path)
 
 
+@pytest.mark.slow
 def test_a_diagnosis_in_a_browser(tmp_path: Path) -> None:
     path = tmp_path / "gap.html"
     path.write_text(diagnosis_page(fresh("explained")), encoding="utf-8")

@@ -54,6 +54,7 @@ def test_a_plan_is_written_and_is_that_of_the_comparison(
     assert plans.load(place).digest() == wanted.digest()
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_page_pictures_and_results(
     call: Callable[..., int], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
