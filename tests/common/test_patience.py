@@ -13,6 +13,7 @@ from common.bare_loop import BareLoop
 from common.errors import PlanError
 from common.plan import Plan, from_tables, parse
 from common.realtime import NOTHING
+from common.safety.longest import resting
 
 RIGS = {
     "the master's": '[master.rig]\nclass = "lab.py:Lab"\n',
@@ -123,3 +124,9 @@ def test_beside_a_rig_it_is_said_what_the_machine_lacks(monkeypatch: pytest.Monk
     assert "ramp_after in [safety] is written out as 50, which is laxer than 5" in lax
     found["late"] = 0.0
     assert len(lacking.lacks(planned, NOTHING)) == 1
+
+
+def test_the_longest_way_to_rest_is_bounded_without_a_limit_on_speed() -> None:
+    assert resting(parse("", HERE)) == resting(Plan())
+    free = parse("[limits]\nactuator_velocity = inf\nactuator_step = inf", HERE)
+    assert resting(free) == resting(Plan())
