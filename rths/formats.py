@@ -81,12 +81,12 @@ def interval(bounds: Sequence[object] | None, factor: float, places: int) -> str
 
 
 def axis_unit(label: str, size: float) -> tuple[float, str]:
-    """Factor and label of an axis whose label ends in `, unit` or a line with the unit, in a prefix that reads well."""
-    for mark in (", ", "\n"):
-        head, found, unit = label.rpartition(mark)
-        if found and unit in RANGES and math.isfinite(size):
+    """Factor and label of an axis whose label ends in `, unit`, `(unit)` or a line with it, so that it reads well."""
+    for mark, end in ((", ", ""), ("\n", ""), (" (", ")")):
+        head, found, unit = label.removesuffix(end).rpartition(mark)
+        if found and label.endswith(end) and unit in RANGES and math.isfinite(size):
             factor, name = scale(size, unit)
-            return factor, f"{head}{mark}{name}"
+            return factor, f"{head}{mark}{name}{end}"
     return 1.0, label
 
 
@@ -110,10 +110,12 @@ def bare_percent(value: float) -> str:
     return f"{hundredth:.1f}" if abs(hundredth) >= 1.0 else f"{hundredth:.2g}"
 
 
-def percent(value: object) -> str:
-    """A share in percent."""
+def percent(value: object, places: int | None = None) -> str:
+    """A share in percent, with two digits, or with so many decimals where a limit stands beside it."""
     number = as_float(value)
-    return f"{bare_percent(number)} %" if math.isfinite(number) else MISSING
+    if not math.isfinite(number):
+        return MISSING
+    return f"{bare_percent(number) if places is None else fixed(100.0 * number, places)} %"
 
 
 def probability(value: object) -> str:
@@ -166,6 +168,12 @@ def reading(value: float, unit: str) -> str:
 def fixed(value: float, places: int) -> str:
     """A number with so many decimals, and no sign before a zero."""
     return f"{value:z.{places}f}"
+
+
+def signed(value: float, places: int) -> str:
+    """A change with its sign, and a plain zero where it rounds to none."""
+    text = f"{value:+z.{places}f}".replace("-", "−")
+    return text if value and text.strip("+−0.") else fixed(0.0, places)
 
 
 def milliseconds(value: float | None, places: int = 2) -> str:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from rths.diagnosis_report import pictures, wording
 from rths.diagnosis_report.blocks import absent, bar, esc, figure, gallery, paragraph, section, table
 from rths.diagnosis_report.wording import Report
-from rths.formats import MISSING, as_float, known, percent, percent_interval, quantity, times
+from rths.formats import MISSING, as_float, known, percent, quantity, signed, times
 
 PATHS = {"command": "command path", "force": "force path", "exchange": "exchange with the other lab"}
 MOST_HISTORIES = 4
@@ -43,17 +41,12 @@ def numbers(report: Report) -> str:
         ["parameters moved inside their tolerances (before)", esc(percent(far["before"]))],
         ["with the effects named (after)", f"<b>{esc(percent(far['after']))}</b>"],
         ["noise floor", esc(percent(far.get("noise_floor")))],
-        ["closed, of what noise leaves to close", bar(far.get("closed"), closed(far))],
     ]
+    closed = wording.closed(report)
+    rows += [["closed, of what noise leaves to close", bar(far.get("closed"), closed)]] if closed else []
     kept = rows if known(wording.nominal_gap(report)) else rows[1:]
     judged = f"Judged on {far['judged_on']}." if far.get("judged_on") else ""
     return table(("", "overall gap"), kept) + paragraph(judged, "note")
-
-
-def closed(far: Any) -> str:
-    """The closed share with its interval."""
-    interval = percent_interval(far.get("closed_interval"))
-    return percent(far.get("closed")) + (f" ({interval})" if interval else "")
 
 
 def remaining(report: Report) -> str:
@@ -106,7 +99,7 @@ def gain(value: object) -> str:
 
 def points(value: object) -> str:
     """Points of damping with their sign."""
-    return f"{as_float(value):+.2f}".replace("-", "−") if known(value) else MISSING
+    return signed(as_float(value), 2) if known(value) else MISSING
 
 
 def tolerances(report: Report) -> str:

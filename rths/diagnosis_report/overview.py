@@ -13,7 +13,6 @@ from rths.formats import (
     as_float,
     known,
     percent,
-    percent_interval,
     probability,
     quantity,
     times,
@@ -68,11 +67,10 @@ def cause(report: Report) -> tuple[str, str, str]:
 
 def closed(report: Report) -> str:
     """How much of the gap closes."""
-    far = report.get("how_far") or {}
-    if not known(far.get("closed")):
-        return "nothing to close" if report.get("status") == "no_gap" else "not determined"
-    interval = percent_interval(far.get("closed_interval"))
-    return f"closed {percent(far['closed'])}" + (f" ({interval})" if interval else "")
+    share = wording.closed(report)
+    if share:
+        return f"closed {share}"
+    return "nothing to close" if report.get("status") == "no_gap" else "not determined"
 
 
 def facts(report: Report) -> str:

@@ -135,9 +135,8 @@ def how_far(report: Report) -> list[str]:
     if not known(found.get("before")) or not known(found.get("after")):
         return row("how far", "not determined")
     text = f"{percent(found['before'])} → {percent(found['after'])}"
-    if known(found.get("closed")):
-        interval = percent_interval(found.get("closed_interval"))
-        text += f", closed {percent(found['closed'])}" + (f" ({interval})" if interval else "")
+    closed = wording.closed(report)
+    text += f", closed {closed}" if closed else ""
     text += f", noise floor {percent(found.get('noise_floor'))}"
     nominal = wording.nominal_gap(report)
     text += f"; {percent(nominal)} before tolerances" if known(nominal) else ""

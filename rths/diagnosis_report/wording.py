@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from models.effects import CATALOGUE
-from rths.formats import as_float, known, percent, quantity
+from rths.formats import as_float, known, percent, percent_interval, quantity
 
 Report = Mapping[str, Any]
 
@@ -166,9 +166,22 @@ def cause(report: Report) -> str:
     if not report.get("which"):
         return "no cause is named"
     share = (report.get("how_far") or {}).get("closed")
-    closes = f" closes {percent(share)} of it" if known(share) else " explains it"
+    closes = f" closes {percent(min(as_float(share), 1.0))} of it" if known(share) else " explains it"
     partly = " (only a part)" if report.get("status") == "partly_explained" else ""
     return effects(report["which"][0].get("effects") or []) + closes + partly
+
+
+def closed(report: Report) -> str:
+    """The closed share with its interval; empty where it is unknown or there was no gap to close.
+
+    What is left may by chance be below the noise floor: no more than all of the gap is said to be closed.
+    """
+    far = report.get("how_far") or {}
+    if not known(far.get("closed")) or report.get("status") == "no_gap":
+        return ""
+    ends = [min(as_float(end), 1.0) for end in far.get("closed_interval") or () if known(end)]
+    interval = percent_interval(ends)
+    return percent(min(as_float(far["closed"]), 1.0)) + (f" ({interval})" if interval else "")
 
 
 def force_path(report: Report) -> str:

@@ -115,6 +115,7 @@ class Figures:
     stolen: dict[str, float] = field(default_factory=dict)
     schedulers: dict[str, str] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
+    virtual: bool = False
 
 
 def figures(run: Run) -> Figures:
@@ -139,6 +140,7 @@ def figures(run: Run) -> Figures:
         {lab: share for lab, share in stolen.items() if share is not None},
         {lab: record[f"{lab}.scheduler"] for lab in labs(record, "scheduler")},
         warnings(run, ticks, exchanges),
+        clock_of(run) == VIRTUAL,
     )
 
 

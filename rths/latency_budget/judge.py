@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from common.errors import InputError
+from rths.formats import percent
 from rths.latency_budget.checks import DOUBT, LEAST_BEYOND, OK, OVER, SHORT, Check, checks_of, longest_run
 from rths.latency_budget.figures import Exchange, Figures, measured
 from rths.latency_budget.limits import PERCENTILES, Budget, Machine
@@ -103,15 +104,15 @@ def limited(budget: Budget) -> list[str]:
 def unfitness(found: Figures, machine: Machine) -> list[str]:
     """Why nothing over its limit is judged, a sentence each; none where the machine is fit."""
     said = [
-        f"The host took {share:.1%} of the processors' time of the {lab}: "
-        f"beyond {machine.stolen_share:.1%} nothing over its limit is judged."
+        f"The host took {percent(share, 1)} of the processors' time of the {lab}: "
+        f"beyond {percent(machine.stolen_share, 1)} nothing over its limit is judged."
         for lab, share in found.stolen.items()
         if share > machine.stolen_share
     ]
     if late_share(found) > machine.unfit_share:
         said.append(
-            f"The bare loop itself was late in {late_share(found):.2%} of its ticks: "
-            f"beyond {machine.unfit_share:.2%} nothing over its limit is judged."
+            f"The bare loop itself was late in {percent(late_share(found), 2)} of its ticks: "
+            f"beyond {percent(machine.unfit_share, 2)} nothing over its limit is judged."
         )
     return said
 
@@ -121,8 +122,8 @@ def unsteadiness(found: Figures, machine: Machine) -> list[str]:
     if late_share(found) <= machine.standstill_share:
         return []
     return [
-        f"The bare loop itself was late in {late_share(found):.2%} of its ticks: beyond "
-        f"{machine.standstill_share:.2%} late ticks and wake_lateness over their limits are not judged."
+        f"The bare loop itself was late in {percent(late_share(found), 2)} of its ticks: beyond "
+        f"{percent(machine.standstill_share, 2)} late ticks and wake_lateness over their limits are not judged."
     ]
 
 

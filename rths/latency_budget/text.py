@@ -5,6 +5,8 @@ from __future__ import annotations
 import io
 
 from common.printable import shown
+from rths.circumstances import NO_LATENCY
+from rths.formats import percent
 from rths.latency_budget.checks import DOUBT, OVER, Check
 from rths.latency_budget.judge import NOT_JUDGED, WITHIN, Report, counts, percentiles
 from rths.latency_budget.limits import PERCENTILES
@@ -18,7 +20,9 @@ ENDS = {
 
 
 def text(report: Report) -> str:
-    """Figures, checks, remarks and the verdict, for a terminal."""
+    """Figures, checks, remarks and the verdict, for a terminal; a sentence where nothing was measured and all fits."""
+    if report.figures.virtual and report.status == WITHIN:
+        return shown(unmeasured(report)) + "\n"
     stream = io.StringIO()
     found = report.figures
     stream.write(
@@ -31,12 +35,22 @@ def text(report: Report) -> str:
     for lab in sorted({*found.stolen, *found.schedulers}):
         stolen = found.stolen.get(lab)
         facts = [f"scheduler {found.schedulers[lab]}"] if lab in found.schedulers else []
-        facts += [f"{stolen:.2%} of the processors' time taken by the host"] if stolen is not None else []
+        facts += (
+            [f"{percent(stolen, 2)} of the processors' time taken by the host"] if stolen is not None else []
+        )
         stream.write(shown(f"{lab}: {', '.join(facts)}") + "\n")
     for line in [*report.warnings, *report.doubts]:
         stream.write(f"{shown(line)}\n")
     stream.write(f"{shown(verdict(report))}\n")
     return stream.getvalue()
+
+
+def unmeasured(report: Report) -> str:
+    """What a recording in virtual time says of its budget."""
+    return (
+        f"{NO_LATENCY}; by the interval and the link's model alone {report.figures.recording} "
+        f"({ticks(report)}) is {ENDS[WITHIN]} {report.budget.name}."
+    )
 
 
 def verdict(report: Report) -> str:
@@ -83,7 +97,7 @@ def amount(value: float, unit: str) -> str:
     if unit == "s":
         return f"{value * 1e6:.0f} µs"
     if unit == "share":
-        return f"{value * 100.0:.2f} %"
+        return percent(value, 2)
     return f"{value:g} tick{'s' * (value != 1)}"
 
 

@@ -12,6 +12,7 @@ from common.recording.reader import Run
 from models import indicators
 from models.registry import Array
 from models.structures.partition import damping_lost
+from rths.formats import quantity, signed
 from rths.identification import identify, segments
 from rths.partition import critical_delay_of
 from rths.reproduction.experiments import DELAYS, Evidence
@@ -78,9 +79,11 @@ def stiffness(evidence: Evidence) -> list[Row]:
     """Elastic stiffness of the specimen from the bench recording."""
     found = identify(evidence.benches["column"])["parameters"]["elastic_stiffness"]
     value = found["value"]
-    text = f"{value / 1e6:.3f}e6 N/m ({found['low'] / 1e6:.3f} to {found['high'] / 1e6:.3f})"
-    note = "half of a column of 25e6/4 N/m per storey drift has twice its stiffness"
-    return [Row("specimen stiffness", "12.5e6 N/m", text, "within 1 %", within(value, 12.5e6, 0.125e6), note)]
+    text = quantity(value, "N/m", (found["low"], found["high"]))
+    note = (
+        "half of a column of 6.25 MN/m, which is a quarter of the storey's 25 MN/m, has twice its stiffness"
+    )
+    return [Row("specimen stiffness", "12.5 MN/m", text, "within 1 %", within(value, 12.5e6, 0.125e6), note)]
 
 
 def step_response(evidence: Evidence) -> list[Row]:
@@ -173,9 +176,12 @@ def reduction(evidence: Evidence) -> list[Row]:
     interval = evidence.default.test.interval
     before = delays(evidence.benches["actuator"], "sine", interval)
     after = delays(evidence.benches["actuator-paper"], "sine", interval)
-    share = max(after[name] / before[name] for name in after)
+    share, worst = (
+        max(after[name] / before[name] for name in after),
+        "compensated over uncompensated, worst sine",
+    )
     return [
-        Row("reduced to", "less than a third", f"{share:.3f}", "≤ 0.33", share <= 0.33, "worst of the sines")
+        Row("share of the delay left", "less than a third", f"{share:.3f}", "≤ 0.33", share <= 0.33, worst)
     ]
 
 
@@ -256,21 +262,22 @@ def agreement(evidence: Evidence) -> list[Row]:
         run = evidence.tests[name]
         found = comparison(run, evidence.simulations["ideal"], interval)
         text = "; ".join(
-            f"{signal} {error:.3f} ({path.delay * 1e3:+.1f} ms, ×{path.amplitude:.3f})"
+            f"{signal} {error:.3f} ({signed(path.delay * 1e3, 1)} ms, ×{path.amplitude:.3f})"
             for signal, (error, path) in found.items()
         )
         if name == "beyond":
             passed = all(error <= 0.10 for error, _ in found.values())
-            note, wanted = "actuator and table compensated by their inverse", "NRMSE ≤ 0.10 each"
+            note = "NRMSE (delay, amplitude); actuator and table compensated by their inverse"
+            wanted = "NRMSE ≤ 0.10 each"
         else:
             left = indicators.nrmse(
                 evidence.simulations[f"{name}-equivalent"]["displacement"],
                 run.columns["master"]["displacement"],
             )
-            passed, wanted = left <= 0.10, "accounted: drift ≤ 0.10 left"
+            passed, wanted = left <= 0.10, "drift ≤ 0.10 where the damping lost is simulated too"
             note = (
-                "NRMSE against the pure simulation with the path's damping equivalent "
-                f"({cost(run, evidence.default)}): drift {left:.3f}"
+                f"NRMSE (delay, amplitude); the path's {cost(run, evidence.default)} of damping lost: with them in "
+                f"the pure simulation the drift's NRMSE is {left:.3f}"
             )
         result.append(Row(f"test against simulation, {label}", "good agreement", text, wanted, passed, note))
     return result
@@ -282,7 +289,7 @@ def cost(run: Run, plan: Plan) -> str:
     path = indicators.frequency_evaluation_index(
         columns["column_target"], columns["column_displacement"], plan.test.interval
     )
-    return f"{path.delay * 1e3:.1f} ms, {damping_lost(plan, path) * POINT:.2f} points"
+    return f"{path.delay * 1e3:.1f} ms of delay are {damping_lost(plan, path) * POINT:.2f} points"
 
 
 def amd_damping(evidence: Evidence) -> list[Row]:
@@ -291,30 +298,31 @@ def amd_damping(evidence: Evidence) -> list[Row]:
     test, pure = damping["paper-amd"] - damping["paper"], damping["ideal-amd"] - damping["ideal"]
     text = f"{test:.2f} points in the test, {pure:.2f} in the pure simulation"
     passed = within(test, 3.0, 0.2) and within(pure, 3.0, 0.2)
-    return [Row("AMD adds", "about 3 %", text, "3.0 ± 0.2 points", passed, "free vibration")]
+    return [Row("damping that the AMD adds", "about 3 %", text, "3.0 ± 0.2 points", passed, "free vibration")]
 
 
 def amd_effect(evidence: Evidence) -> list[Row]:
     """Peaks and rms with and without the AMD at 20 %."""
     parts, passed = [], True
-    for signal, factor, unit in (("displacement", 1e3, "mm"), ("absolute_acceleration", 1.0, "m/s²")):
+    for signal, word, factor, unit in (
+        ("displacement", "drift", 1e3, "mm"),
+        ("absolute_acceleration", "acceleration", 1.0, "m/s²"),
+    ):
         on, off = (
             evidence.tests[name].columns["master"][signal] * factor
             for name in ("with-amd-20", "without-amd-20")
         )
         peaks, rms = [float(np.max(np.abs(x))) for x in (on, off)], [float(np.std(x)) for x in (on, off)]
         passed &= peaks[0] < peaks[1] and rms[0] < rms[1]
-        parts.append(
-            f"{signal.split('_')[0]} peak {peaks[0]:.2f}/{peaks[1]:.2f}, rms {rms[0]:.2f}/{rms[1]:.2f} {unit}"
-        )
+        parts.append(f"{word} peak {peaks[0]:.2f}/{peaks[1]:.2f}, rms {rms[0]:.2f}/{rms[1]:.2f} {unit}")
     return [
         Row(
             "with/without AMD, El Centro 20 %",
             "effective",
             "; ".join(parts),
-            "all smaller with it",
+            "each smaller with it",
             passed,
-            "the building's drift and absolute floor acceleration",
+            "the building's drift and the absolute acceleration of its floor",
         )
     ]
 
@@ -328,7 +336,10 @@ def beyond(evidence: Evidence) -> list[Row]:
     )
     error = (evidence.damping["beyond"] - evidence.damping["ideal"]) * POINT
     passed = abs(path.delay) <= 1e-3 and within(path.amplitude, 1.0, 0.02) and abs(error) <= 0.2
-    text = f"{path.delay * 1e3:+.2f} ms, amplitude {path.amplitude:.4f}, damping error {error:+.2f} points"
+    text = (
+        f"{signed(path.delay * 1e3, 2)} ms, amplitude {path.amplitude:.4f}, "
+        f"damping error {signed(error, 2)} points"
+    )
     return [
         Row(
             "beyond the paper: pid_inverse",

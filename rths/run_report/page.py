@@ -5,7 +5,6 @@ from __future__ import annotations
 from common.preflight import ACCEPTED, LINK, PASSED, SENSORS
 from common.recording.reader import Run
 from rths import formats
-from rths.circumstances import NO_LATENCY, VIRTUAL
 from rths.page import frame, render
 from rths.run_report import tables, verdict
 from rths.run_report.drawing import Pictures
@@ -28,7 +27,6 @@ def page(run: Run, summary: Summary, drawn: Pictures, left_out: dict[str, str]) 
         peaks=tables.peaks(summary),
         storeys=tables.storeys(summary),
         modes=formats.modes(summary["modes"]),
-        no_latency=f"{NO_LATENCY}." if summary["clock"] == VIRTUAL else "",
         limits=tables.limits(verdict.margins(run, summary)),
         tracking=tables.tracking(summary),
         force_path=tables.force_path(summary),

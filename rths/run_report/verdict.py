@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from common.limits import UNITS
 from common.recording.reader import Run
 from common.roles import LATENCY, MASTER, SLAVE, kind_of, name_of, title
-from rths.formats import apart, milliseconds, reading
+from rths.formats import apart, milliseconds, quantity
 from rths.summary import plan_of
 
 Summary = Mapping[str, Any]
@@ -158,9 +158,14 @@ def force_path(summary: Summary) -> str:
         return ""
     low, high = found["interval"]
     return (
-        f"The column force came {milliseconds(found['delay'])} (95 %: {milliseconds(low)} to {milliseconds(high)}) "
-        f"after what the plan's specimen gives at the measured displacement, with {found['gain']:.4f} of its size."
+        f"The column force came {beside(found['delay'])} (95 %: {beside(low)} to {beside(high)}) what the plan's "
+        f"specimen gives at the measured displacement, with {found['gain']:.4f} of its size."
     )
+
+
+def beside(delay: float) -> str:
+    """A delay (s) in words: so long after, or before where it is negative."""
+    return f"{milliseconds(abs(delay))} {'before' if delay < 0.0 else 'after'}"
 
 
 def energy(summary: Summary) -> str:
@@ -199,6 +204,6 @@ def nearest(run: Run, summary: Summary) -> str:
     first = found[0]
     unit = UNITS[first.signal.partition("/")[2]]
     return (
-        f"Nearest to its limit came the {first.words}: {reading(first.peak, unit)} of {reading(first.limit, unit)} "
+        f"Nearest to its limit came the {first.words}: {quantity(first.peak, unit)} of {quantity(first.limit, unit)} "
         f"({100.0 * first.share:.0f} %)."
     )

@@ -12,6 +12,7 @@ import numpy as np
 
 from diagnosis.calibration import brier, clopper_pearson, expected_calibration_error, wilson
 from diagnosis.calibration import reliability as stated_and_observed
+from rths.formats import percent, quantity
 from rths.trial.scoring import NAMING, Estimate, Outcome
 
 ABSTAINING = ("unknown_effect", "not_enough_data", "ambiguous")
@@ -61,14 +62,14 @@ class Measure:
             return "–"
         if math.isinf(value):
             return "none"
-        return f"{100.0 * value:.1f} %" if self.rate else f"{value:.3g}{self.unit and ' ' + self.unit}"
+        return percent(value, 1) if self.rate else quantity(value, self.unit)
 
     @property
     def text(self) -> str:
         """The value with its interval."""
         if self.count == 0 or math.isnan(self.low):
             return self.shown(self.value)
-        return f"{self.shown(self.value)} [{self.shown(self.low)}, {self.shown(self.high)}]"
+        return f"{self.shown(self.value)} ({self.shown(self.low)} … {self.shown(self.high)})"
 
 
 def reached(hits: int, count: int, share: float) -> bool | None:

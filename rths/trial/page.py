@@ -6,7 +6,9 @@ import io
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+from rths.diagnosis_report.wording import STATUS
 from rths.figure import COLOURS, figure
+from rths.formats import MISSING, quantity
 from rths.page import data_uri, frame, render
 from rths.trial.measures import (
     Bin,
@@ -57,7 +59,7 @@ def case(item: Outcome) -> tuple[str, ...]:
         item.kind,
         hidden(item),
         number(item.size),
-        f"{' and '.join(item.verdict) or item.status}, site {item.verdict_site or '–'}",
+        f"{' and '.join(item.verdict) or STATUS.get(item.status, item.status)}, site {item.verdict_site or MISSING}",
         number(item.probability),
         item.why,
     )
@@ -74,7 +76,7 @@ def hidden(item: Outcome) -> str:
 
 def number(value: float) -> str:
     """A number, a dash where there is none."""
-    return "–" if value != value else f"{value:.3g}"  # noqa: PLR0124 - NaN is not itself
+    return quantity(value, "")
 
 
 def matrices(outcomes: Sequence[Outcome]) -> list[Image]:
@@ -136,6 +138,7 @@ def draw_sizes(bins: Sequence[Bin]) -> Any:
     shares(axis, bins)
     axis.axvline(VISIBLE, color="0.4", linestyle=":", label="size from which an effect counts")
     axis.set(xscale="symlog", xlabel="residual to noise", ylabel="right effect first", ylim=(-0.06, 1.05))
+    axis.xaxis.set_major_formatter("{x:g}")
     axis.set_xlim(left=-0.1)
     axis.legend(loc="center right")
     return canvas

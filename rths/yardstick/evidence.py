@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from common.tables import Compensator
 from common.telling import Tell
+from rths.formats import percent
 from rths.yardstick.critical import Critical, critical_delays
 from rths.yardstick.late_force import SETTING, Late, late_forces
 from rths.yardstick.problem import CASES, FORCE, MOTIONS, SETTINGS
@@ -131,7 +132,8 @@ def compensator_check(summaries: list[Summary]) -> Check:
     """One compensator at least reaches all goals; for all settings together, not for a choice of them."""
     best = [item.setting for item in summaries if item.meets]
     return Check(
-        f"a compensator with J4 ≤ {NOMINAL_GOAL:.0%} in all cases and motions, ≤ {PLANTS_GOAL:.0%} on every plant, "
+        f"a compensator with J4 ≤ {percent(NOMINAL_GOAL)} in all cases and motions, "
+        f"≤ {percent(PLANTS_GOAL)} on every plant, "
         f"none unstable, force ≤ {FORCE:g} N where the reference's is",
         ", ".join(best) or "none",
         "at least one",
@@ -159,8 +161,8 @@ def critical_check(found: list[Critical]) -> Check:
     )
     return Check(
         "critical delays of the force as published",
-        f"within {worst:.2%}",
-        f"within {CRITICAL_GOAL:.0%}",
+        f"within {percent(worst)}",
+        f"within {percent(CRITICAL_GOAL)}",
         worst <= CRITICAL_GOAL,
     )
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from rths.figure import COLOURS, REFERENCE, SINGLE, TEXT, figure, save
+from rths.formats import percent
 from rths.pictures.layout import legend_above
 from rths.yardstick.criteria import MEANINGS
 from rths.yardstick.evidence import (
@@ -89,6 +90,7 @@ def late_force(evidence: Evidence, canvas: Any) -> None:
             x, [one.j1 * 1e3 for one in found], "s:", color=colour, markersize=3, label=f"J1, case {case}"
         )
     upper.set(ylabel="J2, J4, %", yscale="log")
+    upper.yaxis.set_major_formatter("{x:g}")
     lower.set(xlabel="delay of the measured force, ms", ylabel="read, ms")
     legend_above(upper)
     legend_above(lower)
@@ -106,7 +108,8 @@ def table_3(evidence: Evidence, canvas: Any) -> None:
     for bound in (-1.0, 1.0):
         axis.axhline(bound, color=REFERENCE, linestyle="--", linewidth=0.8)
     axis.set(
-        xticks=range(width), ylabel=f"deviation over what is allowed\n({CELL:.0%}, {DELAY_CELL * 1e3:g} ms)"
+        xticks=range(width),
+        ylabel=f"deviation over what is allowed\n({percent(CELL)}, {DELAY_CELL * 1e3:g} ms)",
     )
     axis.set_xticklabels(list(MEANINGS))
     if any(not math.isfinite(difference) for difference, _ in found):

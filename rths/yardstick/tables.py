@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from rths.formats import signed
 from rths.yardstick.criteria import MEANINGS
 from rths.yardstick.evidence import SAMPLE, Evidence
 from rths.yardstick.published import CRITICAL_DELAYS, TABLE_3
@@ -45,7 +46,7 @@ def table_3(evidence: Evidence) -> Table:
         extra = [milliseconds(item.two_sided, 2), percent(item.noise_floor)]
         rows.append(["", "computed", *cells(item.found), *extra])
         apart = zip(item.found, TABLE_3[item.case], strict=True)
-        differences = [f"{(ours - old) * (1e2 if at else 1e3):+.2f}" for at, (ours, old) in enumerate(apart)]
+        differences = [signed((ours - old) * (1e2 if at else 1e3), 2) for at, (ours, old) in enumerate(apart)]
         rows.append(["", "deviation", *differences, MISSING, MISSING])
     head = [
         "",
@@ -78,6 +79,7 @@ def compensators(evidence: Evidence) -> Table:
         ]
         for item in sorted(evidence.summaries, key=lambda item: item.order)
     ]
+    drawn = f"{evidence.plants} plant{'s' * (evidence.plants != 1)}"
     head = [
         "setting",
         "compensator",
@@ -89,7 +91,7 @@ def compensators(evidence: Evidence) -> Table:
         "force, N",
     ]
     return Table(
-        f"Compensators: the worst of 4 cases × 3 motions, nominal and of {evidence.plants} plants drawn",
+        f"Compensators: the worst of 4 cases × 3 motions, nominal and of {drawn} drawn",
         head,
         rows,
     )

@@ -14,7 +14,18 @@ from rths.diagnosis_report import pictures, which, wording
 from rths.diagnosis_report.page import page
 from rths.diagnosis_report.schema import schema
 from rths.diagnosis_report.terminal import summary
-from rths.formats import nats, percent, percent_interval, probability, quantity, reading, span, times
+from rths.formats import (
+    axis_unit,
+    nats,
+    percent,
+    percent_interval,
+    probability,
+    quantity,
+    reading,
+    signed,
+    span,
+    times,
+)
 from tests.rths.diagnosis_report.reports import REPORTS, Report, bare, fresh
 from tests.rths.pictures.axes import check_axes
 from tests.rths.report.pages import check_alone
@@ -361,6 +372,18 @@ def test_numbers_that_say_nothing_are_not_written_out() -> None:
     assert span([0.0, 0.0], "Hz") == ""
     assert nats(134000.0) == "more than 1,000 nats"
     assert reading(-1e-9, "m") == "0.000 mm"
+    assert [signed(value, 2) for value in (-0.001, 0.001, -0.02, 0.02)] == ["0.00", "0.00", "−0.02", "+0.02"]
+    assert axis_unit("column displacement (m)", 2e-3) == (1e3, "column displacement (mm)")
+
+
+def test_no_more_than_the_whole_gap_is_said_to_close() -> None:
+    report = fresh("explained")
+    report["how_far"] |= {"closed": 1.01, "closed_interval": [0.93, 1.09]}
+    assert wording.closed(report) == "100 % (93 … 100 %)"
+    assert "closes 100 % of it" in wording.cause(report)
+    clean = fresh("no_gap")
+    clean["how_far"] |= {"closed": 0.0, "closed_interval": [0.0, 0.0]}
+    assert "closed" not in next(line for line in summary(clean).split("\n") if line.startswith("how far"))
 
 
 def test_an_effect_that_is_listed_twice_is_said_once() -> None:

@@ -111,8 +111,8 @@ def test_what_the_bare_loop_did_not_suffer_is_over() -> None:
 @pytest.mark.parametrize(
     ("changed", "reason"),
     [
-        ({"slave.stolen_share": "0.08"}, "The host took 8.0% of the processors' time of the slave"),
-        (record(late=150.0), "The bare loop itself was late in 2.91% of its ticks: beyond 2.00% nothing"),
+        ({"slave.stolen_share": "0.08"}, "The host took 8.0 % of the processors' time of the slave"),
+        (record(late=150.0), "The bare loop itself was late in 2.91 % of its ticks: beyond 2.00 % nothing"),
     ],
 )
 def test_an_unfit_machine_allows_no_verdict_on_what_is_over(changed: dict[str, str], reason: str) -> None:
@@ -127,7 +127,7 @@ def test_an_unsteady_machine_allows_no_verdict_on_late_ticks_but_one_on_messages
     unsteady = record(late=50.0)
     late = verdict(noisy.run(flags(100), unsteady), {"late": {"share": 0.01, "longest_gap": 2}})
     assert late.status == "not_judged"
-    assert "beyond 0.50% late ticks and wake_lateness over their limits are not judged" in late.doubts[0]
+    assert "beyond 0.50 % late ticks and wake_lateness over their limits are not judged" in late.doubts[0]
     assert verdict(noisy.run(late_in(0.08, 1.5e-3), unsteady), TAIL).status == "over"
 
 

@@ -86,7 +86,7 @@ def test_not_judged_skips_with_the_figures(tmp_path: Path) -> None:
     code, out = child(tmp_path)
     assert code == 0, out
     assert "1 skipped" in out
-    assert "The host took 20.0% of the processors' time of the master" in out
+    assert "The host took 20.0 % of the processors' time of the master" in out
     assert "feedback_one_way p99  1200 µs" in out
 
 
