@@ -249,7 +249,7 @@ class RecorderLoop:
 
     def _end(self, now: int) -> None:
         silent = now - self._heard_ns
-        patience = ASKED_SILENCE_NS if self._wish else SILENCE_NS
+        patience = ASKED_SILENCE_NS if self._wish else self._silence_ns
         if all(inlet.complete for inlet in self._inlets.values()):
             self.error = InterlockError(self._wish) if self._wish else self.error
             self.done = True
@@ -264,6 +264,12 @@ class RecorderLoop:
         elif self._session and silent > patience:
             self._fell_silent()
             self.done = True
+
+    @property
+    def _silence_ns(self) -> int:
+        """Silence after which a test is over; before its first tick a rig may be arming, and its laboratory waits."""
+        begun = bool(self._newest[0])
+        return SILENCE_NS if begun else max(SILENCE_NS, round(self._plan.link.connect_timeout * 1e9))
 
     def _fell_silent(self) -> None:
         """Nobody is heard any more; a test that was ended in order has not come to its end where one never said so."""

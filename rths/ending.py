@@ -36,7 +36,8 @@ class Ending:
     - The recorder after all laboratories: before there are rows after a moment, then when it does not end by itself.
 
     What was asked and is still there is killed. A laboratory on its way to rest says again and again how long that
-    takes at most, and is not killed before, whatever the user presses.
+    takes at most, and is not killed before, whatever the user presses; nor is one whose rig may be arming, for as long
+    as the others would wait for it.
     """
 
     def __init__(self, plan: Plan) -> None:
@@ -49,6 +50,7 @@ class Ending:
         self._wished = self._ask = self._alone = math.inf  # since when, from when, since when
         self._patience = KILL_S  # from asking to killing
         self._rest, self._leave = resting(plan), leave
+        self.arming = plan.link.connect_timeout  # s that a rig may take for it
         self._due: dict[str, float] = {}  # by when a laboratory has left that has said how long it takes
         self.agreed = False  # the start: from now on there are ticks
 
@@ -71,6 +73,14 @@ class Ending:
         """Take note that a laboratory is on its way to rest, for at most `left` s: it leaves after that."""
         left = self._rest if left is None else left
         self._due[name] = now + left + MARGIN_S + self._leave + KILL_S
+
+    def arms(self, name: str, now: float) -> None:
+        """Take note that a laboratory takes part, so that its rig may be arming: only then it sees a wish to stop."""
+        self._due[name] = now + self.arming + LEAVE_S + KILL_S
+
+    def armed(self, name: str, now: float) -> None:
+        """Take note that its rig is armed."""
+        self._due[name] = now + LEAVE_S + KILL_S
 
     def ask_at(self, name: str) -> float:
         """When a process is asked, s."""

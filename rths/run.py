@@ -274,10 +274,16 @@ def follow(
 
 
 def note(said: Said, ending: Ending, doing: dict[str, str]) -> None:
-    """Take note of what a report says about the end of a test; `doing` are the laboratories on their way to rest."""
+    """Take note of what a report says about the end of a test; `doing` are laboratories that arm or come to rest."""
     match said.data:
         case {"kind": "state", "state": state} if said.process == MASTER and state == AGREED:
             ending.agreed = True
+        case {"kind": "state", "state": State.REGISTERED.value}:
+            doing[said.process] = f"arming its rig, at most {ending.arming:g} s"
+            ending.arms(said.process, time.monotonic())
+        case {"kind": "state", "state": State.ARMED.value}:
+            doing.pop(said.process, None)
+            ending.armed(said.process, time.monotonic())
         case {"kind": "mode", "mode": mode}:
             doing.pop(said.process, None)
             if mode == Mode.RAMPING.value:
@@ -294,7 +300,7 @@ def answer(processes: Processes, doing: Mapping[str, str]) -> str:
     """What is said to who wants to stop again: what the processes are at, which nobody cuts short."""
     there = [name for name in processes.names if name not in processes.ended()]
     if resting := [f"{title(name)}: {text}" for name, text in doing.items() if name in there]:
-        return f"already stopping, no laboratory is killed on its way to rest ({'; '.join(resting)})"
+        return f"already stopping, no laboratory is killed on its way to rest or as it arms ({'; '.join(resting)})"
     return (
         f"already stopping, and waiting for {' and '.join(map(title, there)) or 'nobody'} to leave in order"
     )

@@ -18,6 +18,7 @@ from common import reality
 from common.clock import VirtualClock
 from common.drive import longest_leave
 from common.errors import IncompleteError, InputError, InterlockError, LostError, RigError
+from common.exchange import State
 from common.laboratory import Setting
 from common.memory_link import MemoryHub
 from common.plan import Plan
@@ -152,6 +153,30 @@ def test_a_wish_just_before_the_start_leaves_the_time_to_come_to_rest(short_plan
     assert early.kill_at("master") == near(
         1.2 + resting(short_plan) + MARGIN_S + longest_leave(short_plan) + MARGIN_S + KILL_S
     )
+
+
+def said(process: str, state: State) -> Said:
+    """What a laboratory reports as it goes on in the handshake."""
+    return Said(process, {"kind": "state", "lab": process, "state": state.value})
+
+
+def test_a_wish_while_a_rig_arms_leaves_it_the_time_that_the_others_would_wait_for_it(
+    processes: Processes, tmp_path: Path, short_plan: Plan, monkeypatch: Any
+) -> None:
+    monkeypatch.setattr("time.monotonic", lambda: 20.0)
+    doing: dict[str, str] = {}
+    arming, given = ending(short_plan, agreed=False), short_plan.link.connect_timeout
+    note(said("slave", State.REGISTERED), arming, doing)
+    program(tmp_path, "slave", DEAF)
+    processes.start("slave", [])
+    assert f"as it arms (slave: arming its rig, at most {given:g} s)" in answer(processes, doing)
+    times = Times(arming, {}, wish=21.0)
+    assert times.asked["slave"] == near(21.0)
+    assert times.killed["slave"] == near(20.0 + given + LEAVE_S + KILL_S)
+    assert times.killed["master"] == near(21.0 + LEAVE_S + KILL_S)
+    note(said("slave", State.ARMED), arming, doing)
+    assert doing == {}
+    assert arming.kill_at("slave") == near(21.0 + LEAVE_S + KILL_S)
 
 
 def test_the_longest_way_to_rest_is_as_long_as_that_of_the_ramp(short_plan: Plan) -> None:
