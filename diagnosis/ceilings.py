@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from common.errors import InputError
+from common.limits import UNITS
 from diagnosis import fitting, where
 from diagnosis.parts import LaboratoryA, LaboratoryB
 from diagnosis.search import Search, gaps
@@ -105,7 +106,7 @@ def unknown(found: Diagnosis) -> dict[str, Any]:
             "depends_on": [{"on": name, "share": share} for name, share in shares if share > 0.02],
             "frequency": float(spectrum.frequency[peak]),
             "amplitude": float(np.sqrt(2.0 * np.mean(residual**2))),
-            "unit": "",
+            "unit": UNITS.get(data.part.signals[place], ""),
         }
     return {}
 

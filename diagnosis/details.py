@@ -57,7 +57,11 @@ def details(found: Diagnosis, far: HowFar, which: list[dict[str, Any]]) -> dict[
             "duration": record.ticks * record.plan.test.interval,
             "interval": record.plan.test.interval,
             "ticks": record.ticks,
-            "motion": f"{motion.get('record', 'not recorded')}, scaled by {motion.get('scale', '?')}",
+            "motion": (
+                f"{motion['record']}, scaled by {motion.get('scale', '?')}"
+                if "record" in motion
+                else "no ground motion recorded"
+            ),
             "outcome": outcome(summary),
         },
         "parts": [part(found, trace) for trace in far.traces if trace.series.size],

@@ -138,23 +138,29 @@ def residual_frequency(part: Piece) -> str:
         return ""
     canvas = figure(WIDTH, 2.4)
     axis = canvas.subplots()
+    factor, unit = density_unit(part, float(np.max(residual)))
+    residual = factor * residual
     axis.plot(frequency, residual, color=ORANGE, label="residual")
     spots, noise = pair(bands, "frequency", "noise")
+    noise = factor * noise
     if spots.size:
         axis.plot(spots, noise, color=GREY, linestyle="--", label="noise floor")
         size = min(residual.size, noise.size)
         above = residual[:size] > noise[:size]
         axis.fill_between(spots[:size], noise[:size], residual[:size], where=above, color=ORANGE, alpha=0.2)
-    axis.set(xlabel="frequency, Hz", ylabel=f"amplitude density\n{density_unit(part)}")
+    axis.set(xlabel="frequency, Hz", ylabel=f"amplitude density\n{literal(unit)}")
     logarithmic(axis)
     legend(canvas, axis)
     return svg(canvas)
 
 
-def density_unit(part: Piece) -> str:
-    """The unit of a part's amplitude density, if its signals have one in common."""
+def density_unit(part: Piece, most: float) -> tuple[float, str]:
+    """Factor and unit in which a part's amplitude density reads well, if its signals have a unit in common."""
     units = {str(item.get("unit")) for item in part.get("signals") or []}
-    return literal(f"{units.pop()}/√Hz") if len(units) == 1 else "SI"
+    if len(units) != 1:
+        return 1.0, "SI"
+    factor, unit = scale(most, units.pop())
+    return factor, f"{unit or '1'}/√Hz"
 
 
 def residual_amplitude(parts: Sequence[Piece]) -> str:
