@@ -69,8 +69,8 @@ class Loop(Protocol):
     def disarm(self) -> None:
         """Bring the rig to a stop."""
 
-    def leave(self) -> None:
-        """Last words."""
+    def leave(self, *, last: bool = False) -> None:
+        """Last words, again after a while; `last` where nothing follows them."""
 
     @property
     def left(self) -> bool:
@@ -225,7 +225,7 @@ def depart(loop: Loop, over: int) -> None:
             break
         loop.leave()
         fetch(loop, lab.clock.now() + IDLE_NS)
-    loop.leave()
+    loop.leave(last=True)
 
 
 def coming_to_rest(loop: Loop, rest: int) -> bool:

@@ -123,7 +123,7 @@ class Stop(NamedTuple):
 
 
 class Stopped(NamedTuple):
-    """Slave to master: the rig is disarmed; after a trip also that the recorder has all, as the last word."""
+    """Slave to master: the rig is disarmed; after a trip it is the last word."""
 
     session: int
     ticks: int

@@ -300,14 +300,14 @@ class MasterLoop:
         except RigError as error:
             return str(error)
 
-    def leave(self) -> None:
-        """Tell the slaves and give the recorder the rest; may be called again until `left`."""
+    def leave(self, *, last: bool = False) -> None:
+        """Tell the slaves and give the recorder the rest; may be called again until `left`, and a `last` time."""
         lab = self.lab
         waited = [partner for partner in self._partners if partner.registered and not partner.stopped]
         if lab.exchange.state is State.STOPPING and not waited:
             lab.exchange.happen(Event.FINISH)
         now = lab.clock.now()
-        if now - self._said_ns < REPEAT_NS // 2:
+        if not last and now - self._said_ns < REPEAT_NS // 2:
             return
         self._said_ns = now
         self._say_end()

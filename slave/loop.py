@@ -313,11 +313,11 @@ class SlaveLoop:
             self._said_ns = now
             self.lab.say_why()
 
-    def leave(self) -> None:
-        """Tell the master and give the recorder the rest; may be called again until `left`, and once more."""
-        lab, left = self.lab, self.left
+    def leave(self, *, last: bool = False) -> None:
+        """Tell the master and give the recorder the rest; may be called again until `left`, and a `last` time."""
+        lab = self.lab
         now = lab.clock.now()
-        if not left and now - self._said_ns < REPEAT_NS // 2:
+        if not last and now - self._said_ns < REPEAT_NS // 2:
             return
         self._said_ns = now
         session = lab.exchange.session
@@ -325,7 +325,7 @@ class SlaveLoop:
             lab.exchange.happen(Event.FINISH)
         if lab.error is not None:
             lab.say_why()
-        if session and (left or lab.exchange.state is State.DONE):
+        if session and (last or lab.exchange.state is State.DONE):
             lab.endpoint.send(Stopped(session, self.ticks))
         lab.send_samples(everything=True)
         lab.endpoint.send(lab.outlet.finished())
