@@ -13,6 +13,7 @@ from common.plain_report import microseconds
 from common.roles import title
 from common.safety.modes import LATCHED, Mode
 from rths.figure import COLOURS
+from rths.formats import percent
 from rths.live.feed import SILENT_NS, Feed
 
 SHOWN = 40  # events
@@ -79,7 +80,7 @@ def banner(feed: Feed) -> str:
 def tiles(feed: Feed, role: str) -> str:
     """The facts as HTML."""
     timing = feed.timing(role)
-    share = f" ({100 * timing.late / timing.ticks:.2g} %)" if timing.ticks else ""
+    share = f" ({percent(timing.late / timing.ticks)})" if timing.ticks else ""
     duration = f" / {feed.plan.test.duration:g}" if feed.plan else ""
     facts = [(title(lab), *standing(feed, lab)) for lab in feed.labs]
     facts += [
@@ -89,11 +90,17 @@ def tiles(feed: Feed, role: str) -> str:
         ("longest round trip", f"{microseconds(timing.longest).strip()} µs", "", ""),
     ]
     return (
-        f"<div style='font-size:15px;margin-bottom:8px'><b>{escape(feed.state)}</b></div>"
+        f"<div style='font-size:15px;margin-bottom:8px'><b>{escape(heading(feed))}</b></div>"
         "<div style='display:flex;flex-wrap:wrap;gap:8px'>"
         + "".join(tile(*fact) for fact in facts)
         + "</div>"
     )
+
+
+def heading(feed: Feed) -> str:
+    """How the test stands; why it ended only where the banner does not say that already."""
+    told = {f"ended: {stop.text}" for stop in feed.standing.stops[:STOPS]}
+    return "ended" if feed.state in told else feed.state
 
 
 def standing(feed: Feed, lab: str) -> tuple[str, str, str]:
@@ -122,8 +129,8 @@ def tile(name: str, value: str, colour: str, below: str) -> str:
 
 
 def listing(feed: Feed) -> str:
-    """The newest events as HTML, the newest first."""
-    rows = "".join(row(event) for event in list(feed.events)[: -SHOWN - 1 : -1])
+    """The newest events as HTML, the newest first; those of several laboratories come in no order of time."""
+    rows = "".join(row(event) for event in sorted(feed.events, key=lambda item: item["t"])[: -SHOWN - 1 : -1])
     return (
         "<table style='border-collapse:collapse;font-size:13px;line-height:1.5'>"
         f"{rows or '<tr><td>nothing yet</td></tr>'}</table>"

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import re
 from collections.abc import Callable, Iterator
 from html import unescape
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -24,7 +26,7 @@ from rths import virtual
 from rths.live.feed import EDGES, POINTS, POINTS_WHOLE, SILENT_NS, Feed
 from rths.live.page import Page
 from rths.live.standing import Standing
-from rths.live.status import row
+from rths.live.status import heading, listing, row
 from rths.live.stream import FACTORS
 from tests.helpers import ROOT
 
@@ -249,6 +251,16 @@ def test_an_emergency_stop_is_there_at_the_next_look_though_nothing_follows_it(
     assert "EMERGENCY STOP" in banner
     assert "<b>master</b>, t = 1.00 s: smoke at the pump." in banner
     assert "emergency stop, t = 1.00 s" in text
+
+
+def test_a_cause_is_said_once_and_events_stand_in_the_order_of_time() -> None:
+    stops = [SimpleNamespace(text="The master was held up.")]
+    feed: Any = SimpleNamespace(standing=SimpleNamespace(stops=stops), state="ended: The master was held up.")
+    assert heading(feed) == "ended"
+    feed.state = "ended: completed"
+    assert heading(feed) == "ended: completed"
+    feed.events = [{"t": t, "lab": "master", "level": "info", "text": ""} for t in (2.67, 2.38, 2.5)]
+    assert re.findall(r"\d\.\d\d", listing(feed)) == ["2.67", "2.50", "2.38"]
 
 
 def test_the_banner_names_causes_and_not_what_followed_them() -> None:
