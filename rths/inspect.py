@@ -10,7 +10,7 @@ from typing import Any
 
 from common import cli
 from common.printable import all_shown
-from common.recording.outcome import outcome
+from common.recording.outcome import CUT_OFF, outcome
 from rths.formats import apart, fixed, milliseconds, modes, reading, storey_rows, tracked
 from rths.progress import Progress
 from rths.terminal import table
@@ -93,9 +93,13 @@ def ending(summary: dict[str, Any]) -> str:
 
 
 def stopped(summary: dict[str, Any]) -> str:
-    """At which tick a test ended early, empty where it did not or nobody knows."""
+    """At which tick a test ended early, empty where it did not; of a recording that was cut off, where that ends."""
     expected, planned = summary["ticks_expected"], summary["ticks_planned"]
-    return f"stopped at tick {expected} of {planned}" if planned and expected < planned else ""
+    if not planned or expected >= planned:
+        return ""
+    if outcome(summary["recorder"]) == CUT_OFF:
+        return f"recorded until tick {expected} of {planned}; what came after it is not known"
+    return f"stopped at tick {expected} of {planned}"
 
 
 def write_completeness(summary: dict[str, Any]) -> None:

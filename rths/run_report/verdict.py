@@ -97,15 +97,16 @@ def completeness(summary: Summary) -> str:
     expected, planned, topics = summary["ticks_expected"], summary["ticks_planned"], summary["topics"]
     if not planned or not topics:
         return ""
+    begin = "The recording ends" if outcome(summary) == NO_END else "The test stopped"
     gaps = {topic: facts["missing"] for topic, facts in topics.items() if facts["missing"]}
     names = ", ".join(topics)
     if not gaps:
         if expected < planned:
-            return f"The test stopped at tick {expected} of {planned}; all until then are recorded ({names})."
+            return f"{begin} at tick {expected} of {planned}; all until then are recorded ({names})."
         return f"All {expected} ticks are recorded ({names})."
     counts = " and ".join(f"{topic} lacks {count}" for topic, count in gaps.items())
     if expected < planned:
-        return f"The test stopped at tick {expected} of {planned}; until then the recording of {counts}."
+        return f"{begin} at tick {expected} of {planned}; until then the recording of {counts}."
     return f"Of {planned} ticks the recording of {counts}."
 
 

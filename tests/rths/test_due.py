@@ -14,6 +14,7 @@ from common.plan import Plan
 from common.recording.reader import Run
 from common.safety.modes import Mode
 from rths.due import due
+from rths.inspect import stopped
 from rths.run_report.verdict import completeness
 
 PLAN = Plan().with_test(duration=0.02)  # ten ticks
@@ -65,9 +66,24 @@ def test_without_a_plan_what_was_begun_was_due() -> None:
 
 def test_the_verdict_says_where_a_test_stopped_and_what_is_missing_until_then() -> None:
     facts = {"master": {"missing": 0}, "slave": {"missing": 204}}
-    summary = {"ticks_planned": 7000, "ticks_expected": 330, "topics": facts}
+    summary = {
+        "ticks_planned": 7000,
+        "ticks_expected": 330,
+        "topics": facts,
+        "recorder": {"cause": "a limit"},
+    }
     text = "The test stopped at tick 330 of 7000; until then the recording of slave lacks 204."
     assert completeness(summary) == text
+    assert stopped(summary) == "stopped at tick 330 of 7000"
+
+
+def test_of_a_recording_that_was_cut_off_nobody_says_when_the_test_stopped() -> None:
+    facts = {"master": {"missing": 0}}
+    summary = {"ticks_planned": 7000, "ticks_expected": 330, "topics": facts, "recorder": {}}
+    assert stopped(summary) == "recorded until tick 330 of 7000; what came after it is not known"
+    assert completeness(summary).startswith(
+        "The recording ends at tick 330 of 7000; all until then are recorded"
+    )
 
 
 def test_a_run_that_a_limit_stops_counts_what_it_played(call: Any, capsys: Any, tmp_path: Path) -> None:
