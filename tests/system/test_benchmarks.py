@@ -8,12 +8,14 @@ from benchmarks import BENCHMARKS, recorder
 from tests.benchmarks.test_quick import IN_REAL_TIME, plain
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(IN_REAL_TIME))
 def test_a_benchmark_runs(name: str) -> None:
     found = plain(BENCHMARKS[name](quick=True))
     assert all(figure["median"] is not None for figure in found if "cable" not in figure["name"])
 
 
+@pytest.mark.slow
 def test_a_small_burst_is_recorded_whole() -> None:
     (burst,) = recorder.bursts(recorder.BURSTS[:1], recorder.QUICK_BURST_S)
     assert burst.whole

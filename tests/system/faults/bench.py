@@ -94,7 +94,7 @@ class Process:
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
-            env=environment(OPENBLAS_NUM_THREADS="1"),
+            env=environment(),
         )
         self.pid = self._popen.pid
         self._readers = [
