@@ -15,6 +15,7 @@ from importlib import metadata
 from typing import Any
 
 from common.codec import MOST_TEXT
+from common.patience import strict
 from common.plan import Plan
 
 MOST_KEYS = 6  # named in a sentence
@@ -39,10 +40,13 @@ def digest_of(text: str) -> str:
 
 
 def changed(plan: Plan) -> dict[str, str]:
-    """Every key that is not at its default, by its dotted name, as JSON; and the version of the package."""
-    defaults = dict(leaves(Plan().tables()))
-    given = {name: text for name, text in leaves(plan.tables()) if defaults.get(name) != text}
-    given |= dict.fromkeys(defaults.keys() - dict(leaves(plan.tables())).keys(), "null")
+    """Every key that is not at its default, by its dotted name, as JSON; and the version of the package.
+
+    Figures that follow from whether a rig is named are left out: nobody wrote them.
+    """
+    defaults, own = (dict(leaves(strict(one).tables())) for one in (Plan(), plan))
+    given = {name: text for name, text in own.items() if defaults.get(name) != text}
+    given |= dict.fromkeys(defaults.keys() - own.keys(), "null")
     return {VERSION: metadata.version("rths")} | {
         name: text for name, text in given.items() if not name.startswith("recording.")
     }

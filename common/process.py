@@ -9,7 +9,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Protocol
 
 from common import cli, lacking, realtime, running
-from common.address import loopback
+from common.address import checked, loopback
 from common.clock import MonotonicClock
 from common.drive import Loop, drive
 from common.endpoint import FrameEndpoint
@@ -55,6 +55,8 @@ def conduct(
     Raises:
         RthsError: what ended the test before its last tick.
     """
+    for endpoint in (listen, connect):
+        checked(endpoint)
     stopping = Stopper()
     gate = Gate(cli.accepted_risks(args))
     plan = cli.load_plan(args)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import faulthandler
 import math
 import os
+import sys
 import threading
 from collections.abc import Generator, Iterator
 from pathlib import Path
@@ -47,6 +48,24 @@ def no_leaked_process() -> Iterator[None]:
     yield
     left = end(lambda: below(before))
     assert [str(process) for process in left] == []
+
+
+@pytest.fixture(autouse=True)
+def no_leaked_priority() -> Iterator[None]:
+    """A test that leaves its worker at real-time priority or bound to a processor fails, and both are taken back.
+
+    All processes of later tests would inherit them.
+    """
+    if sys.platform != "linux":
+        yield
+        return
+    processors = os.sched_getaffinity(0)
+    yield
+    policy, left = os.sched_getscheduler(0), os.sched_getaffinity(0)
+    if policy != os.SCHED_OTHER:
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+    os.sched_setaffinity(0, processors)
+    assert (policy, left) == (os.SCHED_OTHER, processors)
 
 
 def below(before: set[int]) -> list[Left]:

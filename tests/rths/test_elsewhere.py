@@ -373,7 +373,7 @@ def test_what_a_layout_cannot_be_made_of_is_said_in_one_sentence(
     wrong = {
         (tmp_path / "bare.mcap", tmp_path / "a.json"): "holds nothing of which a layout has a panel",
         (tmp_path / "none.mcap", tmp_path / "a.json"): "Cannot read the recording",
-        (recordings["one slave"], tmp_path): "give a writable place with -o",
+        (recordings["one slave"], tmp_path): "it is a folder; give the name of a file",
     }
     for (file, out), sentence in wrong.items():
         assert call("layout", file, "-o", out) == 2

@@ -143,7 +143,8 @@ def test_the_command_passes_where_every_goal_is_met(
     out = capsys.readouterr().out
     assert "clean laboratory: no gap" in out
     assert "2 of 2 cases right" in out
-    assert command(*words[:-1], f"{HERE}:broken", "-o", str(tmp_path)) == 1
+    many = ("--cases", "6", *words[2:-1], f"{HERE}:broken")
+    assert command(*many, "-o", str(tmp_path), "--force") == 1
     assert "ValueError: nothing works" in capsys.readouterr().out
 
 
