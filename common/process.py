@@ -55,8 +55,8 @@ def conduct(
     Raises:
         RthsError: what ended the test before its last tick.
     """
-    for endpoint in (listen, connect):
-        checked(endpoint)
+    for given in (listen, connect):
+        checked(given)
     stopping = Stopper()
     gate = Gate(cli.accepted_risks(args))
     plan = cli.load_plan(args)
