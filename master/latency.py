@@ -52,7 +52,8 @@ class Account:
         )  # commands that the slave has not heard: tick, sent_ns
         self._named = -1  # newest command that a feedback has named
         self.missed = 0
-        self.missed_last = False  # whether the tick that was judged last was one of them
+        self._prompt = -1  # newest feedback that came over the wire with its own tick's command heard
+        self.late_last = False  # whether the tick that was judged last kept no real time, plug-ins apart
         self.round_trip = NAN
 
     def open(self, tick: int, wake_ns: int, ready_ns: int, sent_ns: int, used: Feedback) -> None:
@@ -66,6 +67,8 @@ class Account:
         """A feedback came, delayed by a link plug-in where `extra` (s) is positive, lost by it where None."""
         self._compare_clocks(feedback, received_ns)
         self._named = max(self._named, feedback.command_seq)
+        if feedback.heard_seq >= feedback.seq:
+            self._prompt = max(self._prompt, feedback.seq)
         row = self._rows.get(feedback.command_seq)
         if row is None or not feedback.command_received_ns or extra is None:
             return
@@ -89,7 +92,7 @@ class Account:
             late = row.wake_ns >= self._lab.tick_ns(tick + 1)
             row.missed = late or row.sent_ns == 0 or not self._in_time(row)
             self.missed += row.missed
-            self.missed_last = row.missed
+            self.late_last = late or row.sent_ns == 0 or self._prompt < tick
         self._write(used_ns, everything=False)
 
     def finish(self, tick: int, used_ns: int) -> None:

@@ -205,8 +205,11 @@ class MasterLoop:
             self._trip(error, "rig", tick)
 
     def _tell_late(self, tick: int) -> None:
-        """Warn where too many ticks up to this one, which has just been judged, came late in any exchange."""
-        late = any(partner.account.missed_last for partner in self._partners)
+        """Warn where too many ticks up to this one, which has just been judged, came late in any exchange.
+
+        A delay or loss by a link plug-in is of the simulated network, and says nothing of real time.
+        """
+        late = any(partner.account.late_last for partner in self._partners)
         if tick >= 0 and (count := self._late.take(tick, late=late)):
             self.lab.note(
                 "late", lateness.sentence(count), level="warning", tick=tick, values={"late": float(count)}

@@ -12,9 +12,14 @@ from common.roles import LATENCY, kind_of
 
 
 def late_ticks(run: Run) -> dict[str, Any] | None:
-    """Ticks late in the exchange with any slave, of how many, and the most in any window; None where unknown."""
+    """Ticks late in the exchange with any slave, of how many, and the most in any window; None where unknown.
+
+    None on a virtual clock too: what an effect delays there is no sign of a machine that does not keep up.
+    """
     tables = [columns for topic, columns in run.columns.items() if kind_of(topic) == LATENCY]
     if not any(columns["seq"].size for columns in tables):
+        return None
+    if not any(np.any(np.nan_to_num(columns["wake_lateness"])) for columns in tables):
         return None
     ticks = int(max(columns["seq"].max(initial=-1) for columns in tables)) + 1
     late = np.zeros(ticks, dtype=np.int64)

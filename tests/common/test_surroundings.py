@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from pathlib import Path
 
 import pytest
 
@@ -8,14 +9,14 @@ from common.bare_loop import BareLoop
 from common.clock import VirtualClock
 from common.laboratory import Laboratory, Setting
 from common.memory_link import MemoryHub
-from common.plan import Plan
+from common.plan import Plan, parse
 from common.realtime import NOTHING, Granted
 from common.surroundings import Surroundings, described
 
 
-def laboratory() -> Laboratory:
+def laboratory(plan: Plan | None = None) -> Laboratory:
     clock = VirtualClock()
-    return Laboratory("slave", Setting(Plan(), MemoryHub(clock).join("slave"), clock))
+    return Laboratory("slave", Setting(plan or Plan(), MemoryHub(clock).join("slave"), clock))
 
 
 def events(lab: Laboratory) -> list[tuple[str, str, str]]:
@@ -23,11 +24,17 @@ def events(lab: Laboratory) -> list[tuple[str, str, str]]:
     return [tuple(item[5:8]) for item in lab.outlet._pending if item[0] == "event"]
 
 
-def test_what_is_missing_is_a_warning_and_in_the_text() -> None:
-    lab = laboratory()
+@pytest.mark.parametrize(
+    ("text_of_plan", "expected"), [("[slave.rig]\nclass = 'lab.py:Lab'\n", "warning"), ("", "info")]
+)
+def test_what_is_missing_is_in_the_text_and_a_warning_beside_a_rig(
+    text_of_plan: str, expected: str, tmp_path: Path
+) -> None:
+    (tmp_path / "lab.py").write_text("class Lab: ...\n")
+    lab = laboratory(parse(text_of_plan, tmp_path))
     Surroundings(lab, Granted(0, -1, False, ("No priority: ask for it.",)), {}, timed=False).begin()
     ((level, code, text),) = events(lab)
-    assert (level, code) == ("warning", "real_time")
+    assert (level, code) == (expected, "real_time")
     assert text.endswith("No priority: ask for it.")
 
 

@@ -20,9 +20,12 @@ def with_late(path: Path, *spans: tuple[int, int]) -> Run:
     run = read(path)
     latency = dict(run.columns["latency"])
     missed = np.zeros(len(latency["seq"]), dtype=bool)
+    woke = np.full(len(missed), 20e-6)  # s; it is 0 on a virtual clock only
     for begin, end in spans:
         missed[begin:end] = True
-    return replace(run, columns=run.columns | {"latency": latency | {"deadline_missed": missed}})
+    return replace(
+        run, columns=run.columns | {"latency": latency | {"deadline_missed": missed, "wake_lateness": woke}}
+    )
 
 
 def test_a_run_that_lost_real_time_says_so_first(virtual_recording: Path, capsys: Any) -> None:
@@ -46,6 +49,14 @@ def test_single_pauses_are_counted_without_a_warning(
 ) -> None:
     summary = summarize(with_late(virtual_recording, *spans))
     assert summary["real_time"]["late"] == sum(end - begin for begin, end in spans)
+    assert summary["warnings"] == []
+
+
+def test_on_a_virtual_clock_no_message_that_an_effect_delays_is_a_late_tick(virtual_recording: Path) -> None:
+    run = read(virtual_recording)
+    run.columns["latency"]["deadline_missed"] = np.ones(len(run.columns["latency"]["seq"]), dtype=bool)
+    summary = summarize(run)
+    assert summary["real_time"] is None
     assert summary["warnings"] == []
 
 

@@ -28,6 +28,8 @@ while True:
 """
 # root without its capabilities has no right that another user has not, and can read every Python that runs tests
 WITHOUT_RIGHTS = ["setpriv", "--bounding-set=-all", "--inh-caps=-all", "--no-new-privs", "--"]
+# a process may keep a real-time priority that it was started at, whatever its rights and limits are
+ORDINARY = ["chrt", "--other", "0"]
 WITHOUT_LIMITS = ["prlimit", "--rtprio=0", "--memlock=0", "--nice=0", "--"]
 MAY_TAKE_PROCESSORS = [sys.executable, "-c", "import os; os.sched_setscheduler(0, 1, os.sched_param(99))"]
 
@@ -48,8 +50,8 @@ def burners() -> Iterator[None]:
 def test_a_user_without_rights_completes_the_test_on_a_machine_that_pauses_it(tmp_path: Path) -> None:
     if os.geteuid() != 0 or subprocess.run(MAY_TAKE_PROCESSORS, check=False, timeout=30).returncode:
         pytest.skip("only root may take the processors away with FIFO 99")
-    if not all(map(shutil.which, ("setpriv", "prlimit", "taskset"))):
-        pytest.skip("setpriv, prlimit and taskset of util-linux are needed")
+    if not all(map(shutil.which, ("setpriv", "chrt", "prlimit", "taskset"))):
+        pytest.skip("setpriv, chrt, prlimit and taskset of util-linux are needed")
     command = [
         sys.executable,
         "-m",
@@ -61,7 +63,7 @@ def test_a_user_without_rights_completes_the_test_on_a_machine_that_pauses_it(tm
         str(tmp_path / "a.mcap"),
         "--json",
     ]
-    words = [*WITHOUT_RIGHTS, *WITHOUT_LIMITS, *command]
+    words = [*ORDINARY, *WITHOUT_RIGHTS, *WITHOUT_LIMITS, *command]
     with burners():
         done = finished(*words, seconds=200.0, cwd=tmp_path, env=environment())
     assert done.returncode == 0, done.stderr

@@ -239,8 +239,9 @@ def test_a_front_door_killed_in_the_first_moments_leaves_nobody(seconds: float, 
 
 @LINUX
 def test_a_killed_slave_is_noticed_by_the_master_and_named(tmp_path: Path) -> None:
-    path = tmp_path / "a.mcap"
-    process = start("run", patient(path.parent), "--duration", "60", "-o", path)
+    path, planned = tmp_path / "a.mcap", tmp_path / "plan.toml"
+    planned.write_text(PATIENT + "[link]\nloss_timeout = 1.0\n")
+    process = start("run", planned, "--duration", "60", "-o", path)
     numbers = crew(process)
     wait_for_ticks(path)
     os.kill(numbers["slave"], signal.SIGKILL)
