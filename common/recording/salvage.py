@@ -1,7 +1,8 @@
 """Finding what is whole in a damaged recording: every record judged by itself, resynchronised after damage.
 
 A chunk is whole where its CRC is right. Any other record is whole where, read and written again, it gives the same
-bytes; of an attachment these include its CRC. Behind damage only records count that noise does not give by chance.
+bytes; of an attachment these include its CRC. A record without a CRC is not whole where a whole chunk begins in it: it
+lost bytes and runs on into the chunk. Behind damage only records count that noise does not give by chance.
 """
 
 from __future__ import annotations
@@ -60,6 +61,7 @@ KINDS: dict[int, Any] = {
     Opcode.DATA_END: DataEnd,
 }
 ANCHORS = (Opcode.CHUNK, Opcode.ATTACHMENT, Opcode.METADATA, Opcode.SCHEMA, Opcode.CHANNEL)
+GUARDED = (Opcode.CHUNK, Opcode.ATTACHMENT)  # by a CRC of their own
 # an anchor's opcode, and a length below the limit in little-endian order
 ANCHOR = re.compile(b"[" + re.escape(bytes(ANCHORS)) + rb"][\s\S]{3}[\x00-\x04]\x00{4}")
 FOOTER_SIZE = HEAD.size + 20 + len(MCAP0_MAGIC)
@@ -78,7 +80,8 @@ class Piece(NamedTuple):
 class Hole(NamedTuple):
     """Bytes that are no whole record, how many chunks began in them, and whether content may have been lost with them.
 
-    Nothing is lost with the index of a chunk or with the summary at the end, which are made anew.
+    Nothing is lost with the index of a chunk or with the summary at the end, which are made anew. Where a chunk
+    begins in a hole that is as short as an index, the index is gone, and the chunk stands in its place.
     """
 
     offset: int
@@ -170,19 +173,39 @@ def judge(source: Source, offset: int, end: int) -> Piece | None:
         return None
     opcode, length = frame
     after = offset + HEAD.size + length
-    if opcode == Opcode.MESSAGE_INDEX:
-        counted = source.at(offset + HEAD.size + 2, 4)
-        fits = (
-            length >= 6 and struct.unpack("<I", counted)[0] == length - 6 and (length - 6) % INDEX_ENTRY == 0
-        )
-        return Piece(offset, after, opcode, None) if fits else None
+    record = None
     try:
-        record = parsed(opcode, source.at(offset + HEAD.size, length))
+        if opcode == Opcode.MESSAGE_INDEX:
+            check_index(length, source.at(offset + HEAD.size + 2, 4))
+        else:
+            record = parsed(opcode, source.at(offset + HEAD.size, length))
         if isinstance(record, Chunk):
             content(record, partial(source.admit, offset))
     except DAMAGE:
         return None
+    if opcode not in GUARDED and overruns(source, offset, after, end):
+        return None
     return Piece(offset, after, opcode, record)
+
+
+def check_index(length: int, counted: bytes) -> None:
+    """Raise ValueError where a message index is not as long as its entries, whose bytes it has counted."""
+    if length < 6 or struct.unpack("<I", counted)[0] != length - 6 or (length - 6) % INDEX_ENTRY:
+        raise ValueError("length of the index")
+
+
+def overruns(source: Source, offset: int, after: int, end: int) -> bool:
+    """Whether a whole chunk begins in a record without a CRC, which goes from `offset` to `after`."""
+    data = source.at(
+        offset, after - offset + HEAD.size - 1
+    )  # with the head of a chunk that begins at its very end
+    found = ANCHOR.search(data, HEAD.size)
+    while found:
+        place = offset + found.start()
+        if chunk_end(source, place) and judge(source, place, end):
+            return True
+        found = ANCHOR.search(data, found.start() + 1)
+    return False
 
 
 def framed(source: Source, offset: int, end: int) -> tuple[int, int] | None:
@@ -217,7 +240,7 @@ def pieces(source: Source, end: int) -> Iterator[Piece | Hole]:
         piece = judge(source, offset, end)
         if piece is None:
             resumed, chunks = resume(source, offset, end)
-            lossy = not (ended or resumed <= index_end)
+            lossy = chunks > 0 or not (ended or resumed <= index_end)
             yield Hole(offset, resumed, chunks, lossy)
             offset = resumed
             continue
