@@ -19,7 +19,7 @@ from common.plain_report import PlainReport
 from common.plan import Plan
 from common.preflight import Check, Gate
 from common.reality import Reality
-from common.roles import MASTER, RECORDER, SLAVE, title
+from common.roles import MASTER, OPERATOR, RECORDER, SLAVE, title
 from common.safety.modes import Mode
 from common.stopping import Stopper
 from common.surroundings import Surroundings
@@ -168,7 +168,8 @@ def join(
     text = (
         f"waits on {listen} for {' and '.join(others)}" if listen else f"looks for the {MASTER} at {connect}"
     )
-    report("waiting", {"lab": role, "text": f"{text}, {plan.link.connect_timeout:g} s at most."})
+    if role != OPERATOR:  # whose command waits for a few seconds only
+        report("waiting", {"lab": role, "text": f"{text}, {plan.link.connect_timeout:g} s at most."})
     return ZenohLink(
         role,
         plan.test.name,
