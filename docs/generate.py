@@ -64,6 +64,7 @@ def parts() -> dict[str, dict[str, str]]:
         },
         "reference/exit-codes.md": {"exits": reference_tables.exits()},
         "reference/budget.md": {"budget": reference_tables.budget()},
+        "reference/rooms.md": {"rooms": reference_tables.rooms()},
     }
 
 

@@ -1,7 +1,8 @@
 """The pictures of the documents: `python -m docs.pictures` makes them again, with names only those.
 
-Those of the tutorial are what its own commands draw, those of the benchmark what its command draws; that of the safety
-machine comes from its table.
+The tutorial's and the benchmark's pictures are drawn by the commands that their pages show; `gap.png` is the top of the
+tutorial's gap page in a headless Chromium. The picture of the safety machine comes from its table of states, that
+of the loop from docs/loop_picture.py.
 """
 
 from __future__ import annotations
@@ -13,10 +14,12 @@ from pathlib import Path
 from typing import Any
 
 from common.safety.modes import TURNS, Mode, Turn
-from docs import console
+from docs import console, loop_picture
+from tests.browser import open_page
 
 FOLDER = Path(__file__).resolve().parent
 TUTORIAL = ("hysteresis.png", "histories.png")
+GAP_WINDOW = 1100, 1060  # CSS pixels: as far down the gap page as its diagram of the sites
 BENCHMARK = ("compensators.png", "late_force.png")
 PLACES = {
     Mode.IDLE: (0, 2),
@@ -44,6 +47,8 @@ def tutorial() -> list[str]:
         complaints = console.play(FOLDER / "tutorial.md", Path(folder))
         for name in TUTORIAL:
             shutil.copy(Path(folder) / "second" / name, FOLDER / "pictures" / name)
+        with open_page((Path(folder) / "gap.html").as_uri(), *GAP_WINDOW) as page:
+            page.screenshot(FOLDER / "pictures" / "gap.png", whole=False)
     return complaints
 
 
@@ -56,6 +61,12 @@ def benchmark2020() -> list[str]:
         for name in BENCHMARK:
             shutil.copy(Path(folder) / name, FOLDER / "pictures" / name)
     return ["the benchmark misses a goal"] if code else []
+
+
+def loop() -> list[str]:
+    """Draw the closed loop of the default test."""
+    loop_picture.draw(FOLDER / "pictures" / "loop.svg")
+    return []
 
 
 def modes() -> list[str]:
@@ -102,7 +113,7 @@ def arrow(axes: Any, start: Mode, end: Mode, label: str) -> None:
     axes.text(*middle, label, ha="center", va="center", fontsize=7.5, bbox=white)
 
 
-MAKERS = {"modes": modes, "tutorial": tutorial, "benchmark2020": benchmark2020}
+MAKERS = {"loop": loop, "modes": modes, "tutorial": tutorial, "benchmark2020": benchmark2020}
 
 
 def main() -> int:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import ast
 import dataclasses
 import inspect
 import sys
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any, get_type_hints
 
 from common import errors
@@ -23,6 +25,8 @@ from models.integrators import INTEGRATORS
 from models.specimens import SPECIMENS
 from rths.__main__ import EXAMPLES, VERBS, parser_for
 
+ROOT = Path(__file__).resolve().parent.parent
+NO_ROOMS = frozenset({"tests", "docs"})
 EASED = "; larger with [emulated laboratories](../explanation/safety.md#emulated-laboratories)"
 KEY_HEAD = ("key", "default", "unit", "allowed", "meaning")
 SITES = ("ground", "structure", "actuator", "column", "link", "table", "damper")
@@ -88,8 +92,9 @@ def bounds(rule: Rule) -> str:
 
 
 def commands() -> str:
-    """Every command with its options and an example."""
-    return "\n".join(command(verb) for verb in VERBS)
+    """All commands in a table, then each with its options and an example."""
+    rows = ((f"[`rths {verb}`](#rths-{verb})", text) for verb, text in VERBS.items())
+    return "\n".join([table(("command", "does"), rows), *map(command, VERBS)])
 
 
 def command(verb: str) -> str:
@@ -240,3 +245,16 @@ def budget() -> str:
     from rths.latency_budget.limits import DEFAULT
 
     return f"```toml\n{DEFAULT.read_text(encoding='utf-8')}```\n"
+
+
+def rooms() -> str:
+    """Every package outside the tests with the first sentence of its own text."""
+    files = (path for top in ROOT.glob("[a-z]*/__init__.py") for path in top.parent.rglob("__init__.py"))
+    files = (path for path in files if path.relative_to(ROOT).parts[0] not in NO_ROOMS)
+    rows = ((f"`{path.parent.relative_to(ROOT)}/`", first_sentence(path)) for path in sorted(files))
+    return table(("folder", "holds"), rows)
+
+
+def first_sentence(path: Path) -> str:
+    """The first line of the text that a file begins with."""
+    return (ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "").splitlines()[0]

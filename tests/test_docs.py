@@ -11,12 +11,13 @@ import re
 import pytest
 
 from common import preflight
+from common.exchange import Event
 from common.limits import PATIENCE
 from common.messages import Command
 from common.patience import strict
 from common.plan import Plan
 from common.rig import ColumnMeasurement, TableCommand, TableMeasurement
-from common.safety.modes import TURNS, Mode
+from common.safety.modes import TURNS, Mode, Turn
 from common.tables import Limits
 from docs import generate
 from master.limits import MasterLimits
@@ -144,3 +145,10 @@ def test_the_plan_that_documents_the_keys_is_the_default_plan() -> None:
     from common.plan import load
 
     assert strict(load(ROOT / "rths/plans/default.toml")).digest() == Plan().digest()
+
+
+def test_the_table_of_verbs_has_every_event_of_the_protocol_and_every_turn_of_the_safety_machine() -> None:
+    page = (generate.FOLDER / "reference" / "words.md").read_text(encoding="utf-8")
+    shown = set(re.findall(r"^\| ([a-z]+)", page[page.index("## The verbs") :], flags=re.MULTILINE))
+    named = {"secured": "secure", "settled": "settle"}  # a verb's table says what is done, a turn that it was
+    assert {named.get(one.value, one.value) for one in (*Event, *Turn)} <= shown

@@ -181,8 +181,8 @@ def test_only_the_running_test_in_a_terminal_has_colours() -> None:
 def test_exit_codes_stand_in_one_table() -> None:
     classes = [one for one in vars(errors).values() if isinstance(one, type) and issubclass(one, RthsError)]
     assert {one.exit_code for one in classes} <= set(EXIT_CODES)
-    readme = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
-    assert f"Exit codes: {', '.join(f'{code} {text}' for code, text in EXIT_CODES.items())}." in readme
+    page = " ".join((ROOT / "docs/reference/commands.md").read_text(encoding="utf-8").split())
+    assert f"Exit codes: {', '.join(f'{code} {text}' for code, text in EXIT_CODES.items())}." in page
 
 
 def started(*words: str | Path) -> subprocess.Popen[str]:
