@@ -17,7 +17,7 @@ from common.outlet import Outlet, kept_items, next_of
 from common.plan import Plan
 from common.rig import GuardedRig
 from common.rig_time import RigTime
-from common.roles import title
+from common.roles import MASTER, SLAVE, title
 from common.safety.modes import Cause, Mode, Safety, Turn
 
 SLOW_RIG = "slow_rig"  # code of the event of a rig whose calls take too long, and of the message that says so
@@ -143,9 +143,10 @@ class Laboratory:
         self.tick = tick
         self.safety.at_rest()
         if self.safety.cause is not None:
+            code = self.safety.cause.code.removesuffix("_trip").replace("_", " ")
             text = (
-                f"At rest after '{self.safety.cause.code}': {values['duration']:.3g} s, "
-                f"{values['travel'] * 1e3:.3g} mm of way."
+                f"Came to rest {values['duration'] * 1e3:.3g} ms after the {code} trip, "
+                f"having moved {values['travel'] * 1e3:.3g} mm."
             )
             self.note("safe", text, tick=tick, values=values)
 
@@ -231,13 +232,15 @@ class Laboratory:
         return self.rig_time.behind >= self.interval_ns
 
     def silent(self, who: str, tick: int) -> None:
-        """End the test because nothing fresh has come from someone for too many intervals."""
+        """End the test because no valid message of the partner `who` has come for too many intervals."""
         if self.kept_by_rig:
             self.slow_rig(tick)
             return
         most = self.plan.safety.ramp_after
         milliseconds = most * self.plan.test.interval * 1e3
-        error = LostError(f"Nothing fresh came from the {who} for {most} intervals ({milliseconds:g} ms).")
+        message = "feedback" if self.name == MASTER else "command"
+        whom = "laboratory B" if who == SLAVE else f"the {who}"
+        error = LostError(f"No valid {message} from {whom} for {milliseconds:g} ms.")
         self.fail(Event.LOSE, error, code="watchdog", tick=tick, values={"intervals": float(most)})
 
     def tripped(self, lab: str, trip: Trip, tick: int) -> None:

@@ -76,8 +76,8 @@ class AtRest(Protocol):
     ) -> None:
         """Read channels of these names several times, an interval apart where `paced`; raise RigError where unsound."""
 
-    def spare(self, lab: str, *, hidden: bool) -> None:
-        """Take note of a rig that cannot be read at rest."""
+    def skip(self, kind: str, *, hidden: bool) -> None:
+        """Take note of a rig of the class `kind` that cannot be read at rest."""
 
 
 class GuardedRig:
@@ -134,7 +134,7 @@ class GuardedRig:
         elif getattr(self._rig, "idle_readings", False):
             at_rest.judge(self.read, fields, self._name, hidden=self._hidden, paced=True)
         else:
-            at_rest.spare(self._name, hidden=self._hidden)
+            at_rest.skip(type(self._rig).__name__, hidden=self._hidden)
 
     def read(self) -> Any:
         """The measurements as the NamedTuple; raises RigError where they are no finite numbers of the right count."""

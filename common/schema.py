@@ -17,6 +17,10 @@ Storeys = tuple[float, ...]
 StoreysOrMatrix = tuple[Any, ...]  # one number per storey, or one row of a matrix
 
 
+NAME = "[a-z0-9_-]+"
+PATTERNS = {NAME: "lower-case letters, digits, - and _"}  # of texts, in words for the user
+
+
 @dataclasses.dataclass(frozen=True)
 class Rule:
     """What a value must fulfil, beside its type."""
@@ -35,7 +39,7 @@ class Rule:
         if self.choices:
             return "one of " + ", ".join(self.choices)
         if self.pattern:
-            return f"text that matches {self.pattern}"
+            return PATTERNS[self.pattern]
         bounds = []
         if self.above is not None:
             bounds.append(f"above {self.above:g}")
@@ -169,6 +173,8 @@ def as_type(kind: str, value: object, name: str) -> Any:
 def in_range(value: Any, rule: Rule, name: str) -> Any:
     """`value` itself, or a PlanError that names the allowed range and, for a choice, the nearest name."""
     if isinstance(value, int | float | str) and not isinstance(value, bool) and not rule.admits(value):
+        if rule.pattern:
+            raise PlanError(f"{name} is {value!r}: use {rule.allowed()}.")
         hint = nearest(value, rule.choices) if rule.choices and isinstance(value, str) else ""
         raise PlanError(f"{name} is {value!r}, but must be {rule.allowed()}{'; ' + hint if hint else ''}.")
     return value

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from common.schema import Storeys, StoreysOrMatrix, key
+from common.schema import NAME, Storeys, StoreysOrMatrix, key
 
 
 @dataclass(frozen=True)
@@ -14,9 +14,7 @@ class Test:
 
     __test__ = False  # not a test case of pytest
 
-    name: str = key(
-        "name of the test, part of topics and file names", default="default", pattern="[a-z0-9_-]+"
-    )
+    name: str = key("name of the test, part of topics and file names", default="default", pattern=NAME)
     duration: float = key("length of the test", default=40.0, unit="s", above=0.0, most=7200.0)
     interval: float = key("control interval", default=0.002, unit="s", least=1e-4, most=0.1)
     seed: int = key("seed of every random draw", default=1, least=0)

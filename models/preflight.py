@@ -131,16 +131,16 @@ def serves(plan: Plan, lead: float) -> bool:
 def partition_text(plan: Plan, found: Partition) -> str:
     """What the partition bears and what is to be expected, in words."""
     if not found.stable:
-        return "partition unstable, as the actuator is so under its compensator"
-    expected = expected_delay(plan, found)
-    cost = f"{found.damping_points * 100.0:+.2f} points of damping lost at {found.frequency:.2f} Hz"
+        return "The actuator is unstable under its compensator"
+    expected, points = expected_delay(plan, found), found.damping_points * 100.0
+    cost = f"{'costing' if points >= 0.0 else 'adding'} {abs(points):.2f} points of damping at {found.frequency:.2f} Hz"
     if math.isinf(found.critical_delay):
-        return f"partition stable at any delay, {cost}"
-    figures = f"critical {found.critical_delay * 1e3:.1f} ms, expected {expected * 1e3:.1f} ms"
+        return f"Stable at any delay; {expected * 1e3:.1f} ms expected, {cost}"
+    figures = f"{found.critical_delay * 1e3:.1f} ms of delay; {expected * 1e3:.1f} ms expected"
     if found.unstable:
-        return f"partition unstable, {figures}"
-    ratio = f" (× {times(found.critical_delay / expected)})" if expected > 0.0 else ""
-    return f"partition {figures}{ratio}, {cost}"
+        return f"Unstable beyond {figures}"
+    ratio = f" (margin {times(found.critical_delay / expected)})" if expected > 0.0 else ""
+    return f"Stable up to {figures}{ratio}, {cost}"
 
 
 def times(ratio: float) -> str:
@@ -184,7 +184,9 @@ def simulated_peaks(plan: Plan, *, known_unstable: bool = False) -> tuple[Peaks 
         return (
             found,
             True,
-            Check("peaks not known, as the simulated loop is unstable", unstable_risk(plan, found)),
+            Check(
+                "The peaks are not known, because the simulated loop is unstable", unstable_risk(plan, found)
+            ),
         )
     return found, grows, Check(peaks_text(plan, found, short.ticks), peaks_risk(plan, found))
 
@@ -265,4 +267,4 @@ def peaks_risk(plan: Plan, found: Peaks) -> Risk | None:
 def peaks_text(plan: Plan, found: Peaks, ticks: int) -> str:
     """How near the simulated test comes to its limits, in words."""
     part = f" in the first {ticks * plan.test.interval:g} s" if ticks < plan.ticks else ""
-    return f"peaks ≤ {found.share:.0%} of their limits ({found.name}){part}"
+    return f"Simulated peaks reach {found.share * 100.0:.0f} % of their limits at most ({found.name}){part}"

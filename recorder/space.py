@@ -55,7 +55,9 @@ def check(plan: Plan, folder: Path) -> Check:
             "", Risk("disk", f"nobody can see how much room the folder {folder} has: {error.strerror}")
         )
     if disk.free >= wanted or not disk.total:  # what has no size is no disk, and writing there will say so
-        return Check(f"disk {disk.free / 1e6:.0f} MB free for {need(plan) / 1e6:.1f} MB")
+        return Check(
+            f"The disk has {disk.free / 1e6:.0f} MB free; the recording takes {need(plan) / 1e6:.1f} MB"
+        )
     return Check(
         "",
         Risk(

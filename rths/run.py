@@ -113,7 +113,7 @@ def in_virtual_time(
 
 
 def before_the_start(plan: Plan, output: Path, gate: Gate) -> str:
-    """Judge what can be judged before anything starts: what was passed and what is overruled, in words.
+    """Judge what can be judged before anything starts: what was passed and what is overruled, a line each.
 
     Raises:
         RefusedError: a risk that the gate does not accept.
@@ -121,9 +121,8 @@ def before_the_start(plan: Plan, output: Path, gate: Gate) -> str:
     """
     made = checks(plan, output)
     gate.judge(made)
-    return "pre-flight: " + "; ".join(
-        f"risk '{one.risk.name}' accepted" if one.risk else one.text for one in made
-    )
+    said = (f"risk '{one.risk.name}' is accepted" if one.risk else one.text for one in made)
+    return "\n".join(f"pre-flight: {text}." for text in said)
 
 
 def checks(plan: Plan, output: Path) -> list[Check]:

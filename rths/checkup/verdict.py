@@ -72,8 +72,10 @@ def remedy(report: dict[str, Any]) -> str:
         steps.insert(0, "try it with --rt auto")
     elif report["realtime"].get("missing"):
         steps.insert(0, "get what real time lacks")
-    host = "; a host that stalls it leaves no trace here but this" if "hypervisor" in report["facts"] else ""
-    return f"The interval is not kept: {', '.join(steps)}{host}."
+    text = f"The interval is not kept: {', '.join(steps)}."
+    if "hypervisor" in report["facts"]:
+        text += " A host that pauses this machine can cause this without any other sign."
+    return text
 
 
 def of_wake_up(report: dict[str, Any]) -> Iterator[Check]:

@@ -67,8 +67,8 @@ _ALL = (
     ),
     Picture(
         "tracking",
-        "target, measurement and error around the strongest motion: an error like the target's velocity is delay, "
-        "like the target itself amplitude",
+        "target, measurement and error around the strongest motion: an error shaped like velocity means delay; "
+        "shaped like the target, wrong amplitude",
         "column_target and column_displacement, or table_target and table_displacement",
         (SINGLE, 5.2),
         (DOUBLE, 3.6),

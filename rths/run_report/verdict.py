@@ -62,7 +62,7 @@ def amount(summary: Summary) -> str:
     if not planned or not topics:
         return "It does not say how many ticks there should be."
     counts = ", ".join(f"{facts['recorded']} of the {topic}" for topic, facts in topics.items())
-    return f"Of {planned} ticks there are {counts}."
+    return f"Of the {planned} ticks planned it holds {counts}."
 
 
 def sentences(run: Run, summary: Summary) -> list[str]:
@@ -104,10 +104,10 @@ def completeness(summary: Summary) -> str:
         if expected < planned:
             return f"{begin} at tick {expected} of {planned}; all until then are recorded ({names})."
         return f"All {expected} ticks are recorded ({names})."
-    counts = " and ".join(f"{topic} lacks {count}" for topic, count in gaps.items())
+    counts = " and ".join(f"the {topic} lacks {count}" for topic, count in gaps.items())
     if expected < planned:
-        return f"{begin} at tick {expected} of {planned}; until then the recording of {counts}."
-    return f"Of {planned} ticks the recording of {counts}."
+        return f"{begin} at tick {expected} of {planned}; until then {counts}."
+    return f"The test ran for all of its {planned} ticks; {counts}."
 
 
 def exchange(summary: Summary) -> list[str]:
@@ -159,14 +159,27 @@ def force_path(summary: Summary) -> str:
         return ""
     low, high = found["interval"]
     return (
-        f"The column force came {beside(found['delay'])} (95 %: {beside(low)} to {beside(high)}) what the plan's "
-        f"specimen gives at the measured displacement, with {found['gain']:.4f} of its size."
+        f"The measured force {beside(found['delay'])} (95 %: {between(low, high)}); "
+        f"amplitude {100.0 * (found['gain'] - 1.0):+.1f} %."
     )
 
 
 def beside(delay: float) -> str:
-    """A delay (s) in words: so long after, or before where it is negative."""
-    return f"{milliseconds(abs(delay))} {'before' if delay < 0.0 else 'after'}"
+    """A force's delay (s) beside that of the planned specimen, in words; it leads where the delay is negative."""
+    return f"{'leads' if delay < 0.0 else 'lags behind'} the planned specimen's by {short(abs(delay))} ms"
+
+
+def between(low: float, high: float) -> str:
+    """An interval of delays (s) in ms: magnitudes where both have one sign, else both ends with their signs."""
+    if low < 0.0 < high:
+        return f"from {short(-low)} ms ahead to {short(high)} ms behind"
+    ends = sorted((abs(low), abs(high)))
+    return f"{short(ends[0])}–{short(ends[1])}"
+
+
+def short(delay: float) -> str:
+    """A positive delay (s) in ms with two digits where it is below 1 ms, else with one after the point."""
+    return f"{delay * 1e3:.2f}" if delay < 1e-3 else f"{delay * 1e3:.1f}"
 
 
 def energy(summary: Summary) -> str:

@@ -59,7 +59,7 @@ WRONG = {
         r"scale in \[ground_motion\] is nan, but must be finite",
     ),
     "infinite": ("[ground_motion]\nscale = inf\n", "must be finite"),
-    "name with a slash": ("[test]\nname = 'a/b'\n", "must be text that matches"),
+    "name with a slash": ("[test]\nname = 'a/b'\n", "use lower-case letters, digits, - and _"),
     "value for a table": ("column = 3\n", r"\[column\] must be a table, not 3"),
     "lengths that differ": ("[structure]\nmass = [1.0, 2.0]\n", "has 2 masses but 1 values of stiffness"),
     "storey that is not there": (

@@ -78,7 +78,7 @@ def test_a_link_may_lose_nothing_and_be_late_as_often_as_the_plan_says() -> None
     quick, late = [0.0003] * 950, [0.0021] * 50
     assert link_risk(quick + late, 0, plan) is None
     assert preflight.link_check(quick + late, 0, plan).text == (
-        "link 1000 exchanges, none lost, 50 late, round trip p50 0.30 ms, p99 2.10 ms"
+        "Link check: 1000 exchanges, none lost, 50 late, round trip p50 0.30 ms, p99 2.10 ms"
     )
     lost = link_risk(quick, 1, plan)
     slow = link_risk(quick[1:] + late + late[:1], 0, plan)
@@ -176,7 +176,7 @@ def test_a_rig_that_says_so_is_read_at_rest_an_interval_apart() -> None:
     rig, gate = Idle(), Gate()
     armed(rig, gate)
     assert rig.read_at == [2_000_000 * place for place in range(1, 6)]
-    assert "sensors of lab A sound at rest" in gate.passed[0][1]
+    assert "Sensor check at rest: passed" in gate.passed[0][1]
 
 
 def test_another_rig_is_not_touched_and_nobody_sees_it_of_a_hidden_one() -> None:
@@ -185,7 +185,7 @@ def test_another_rig_is_not_touched_and_nobody_sees_it_of_a_hidden_one() -> None
     armed(rig, hidden, hidden=True)
     armed(Idle(), idle)
     assert rig.read_at == []
-    assert "not read at rest, idle_readings is not set" in open_.passed[0][1]
+    assert "Sensor check skipped: class Counting does not set idle_readings = True" in open_.passed[0][1]
     assert hidden.passed == idle.passed
 
 

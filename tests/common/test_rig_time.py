@@ -61,7 +61,7 @@ def laboratory(plan: Plan, read_ms: float, write_ms: float, ticks: int, role: st
 def test_a_slow_rig_is_named_where_its_loop_or_the_other_laboratory_notices_it(
     short_plan: Plan, read_ms: float, write_ms: float, sentence: str
 ) -> None:
-    missed = Trip(1, "master", "lost", "Nothing fresh came from the slave.")
+    missed = Trip(1, "master", "lost", "No valid feedback from laboratory B for 10 ms.")
     notices: list[Callable[[Laboratory], object]] = [
         lambda lab: lab.overrun(12 * MS, 5),
         lambda lab: lab.silent("master", 5),

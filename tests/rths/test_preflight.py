@@ -52,13 +52,14 @@ def test_a_risk_refuses_before_anything_starts(
     assert not (tmp_path / "a.mcap").exists()
 
 
-def test_what_is_passed_is_one_line_and_recorded(call: Any, capsys: Any, tmp_path: Path) -> None:
+def test_what_is_passed_is_a_line_each_and_recorded(call: Any, capsys: Any, tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     assert call("run", "--virtual", "--duration", "1", "-o", path, "--json") == 0
     lines = capsys.readouterr().err.splitlines()
-    assert lines[0].startswith("pre-flight: partition critical 32.9 ms, expected 2.2 ms (× 15), ")
-    assert "; peaks ≤ " in lines[0]
-    assert sum("partition" in line for line in lines) == 1
+    stable = "Stable up to 32.9 ms of delay; 2.2 ms expected (margin 15), costing 0.03 points of damping"
+    assert lines[0].startswith(f"pre-flight: {stable}")
+    assert lines[1].startswith("pre-flight: Simulated peaks reach ")
+    assert sum("Stable" in line for line in lines) == 1
     run = read(path)
     assert [lab for lab, _, _ in noted(run, "preflight")] == ["master"] * 3
     assert [(lab, level) for lab, level, _ in noted(run, "sensors")] == [
@@ -72,7 +73,7 @@ def test_a_risk_taken_by_name_is_in_the_recording(call: Any, capsys: Any, tmp_pa
     (tmp_path / "p.toml").write_text(UNSTABLE)
     path = tmp_path / "a.mcap"
     assert call("run", "--virtual", tmp_path / "p.toml", "-o", path, "--accept-risk", "partition") == 0
-    assert "pre-flight: risk 'partition' accepted; peaks" in capsys.readouterr().err
+    assert "pre-flight: risk 'partition' is accepted.\npre-flight: Simulated peaks" in capsys.readouterr().err
     ((lab, level, text),) = noted(read(path), "accepted_risk")
     assert (lab, level) == ("master", "warning")
     assert text.startswith("risk 'partition' accepted: the column's path is unstable beyond 32.9 ms")
@@ -133,7 +134,7 @@ def test_the_users_own_laboratory_is_not_disturbed_unless_it_says_so(
         code = call("run", tmp_path / "my_test.toml", "--virtual", "--duration", "1", "-o", path, "--force")
         said.append((code, capsys.readouterr().err))
     assert said[0][0] == 0
-    assert "sensors of laboratory A (ColumnLab) not read at rest" in said[0][1]
+    assert "Sensor check skipped: class ColumnLab does not set idle_readings = True." in said[0][1]
     assert said[1][0] == 3  # its displacement has none of the noise that the plan says
     assert "column_displacement of laboratory A (ColumnLab) is frozen" in said[1][1]
 

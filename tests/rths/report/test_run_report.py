@@ -73,7 +73,7 @@ def test_the_page_has_the_figures_of_inspect(
         assert f"{facts['nrmse']:.4f}{facts['peak_error']:.4f}" in text
     force = summary["force_path"]
     assert f"{force['gain']:.4f}{force['frequency']:.2f}Hz" in text
-    assert f"Thecolumnforcecame{force['delay'] * 1e3:.2f}ms" in text
+    assert f"plannedspecimen'sby{abs(force['delay']) * 1e3:.2f}ms" in text
     for segment, facts in summary["latency"].items():
         assert segment + "".join(f"{value * 1e6:.0f}" for value in facts.values()) in text
     for name, counts in summary["exchange"].items():
@@ -137,7 +137,7 @@ def test_a_recording_that_was_cut_off_says_so_on_top(
     assert 0 < ticks < 2000
     assert text.index("This recording was cut off before its end") < text.index("Verdict")
     assert "rths recover cut.mcap makes a finished one of it" in text
-    assert f"Of 2000 ticks there are {ticks} of the master" in text
+    assert f"Of the 2000 ticks planned it holds {ticks} of the master" in text
     assert "The recording does not say how the test ended." in text
 
 
@@ -212,7 +212,7 @@ def test_a_test_that_was_stopped_says_why(virtual_recording: Path) -> None:
     run.columns["slave"] = {name: values[kept] for name, values in run.columns["slave"].items()}
     run = replace(run, sequences=run.sequences | {"slave": kept})
     text = check_alone(undrawn(run)).text
-    assert "Of 2000 ticks the recording of slave lacks 3." in text
+    assert "The test ran for all of its 2000 ticks; the slave lacks 3." in text
     assert "100…102" in text
 
 
