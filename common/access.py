@@ -1,4 +1,4 @@
-"""Who may say what on the link: zenoh's access control, made of the routes of the roles.
+"""zenoh's access control on the link: which role may publish and subscribe on which route.
 
 The master's session routes and applies it to every other, by the common name of its certificate. Whatever is not
 allowed here is denied: other keys, wildcards, deletions, queries, tokens.

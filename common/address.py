@@ -12,9 +12,9 @@ ENDPOINT = re.compile(r"(tcp|tls|udp|quic)/(.+):(\d+)")
 
 
 def checked(endpoint: str) -> str:
-    """The endpoint itself; raises InputError where it is none."""
+    """The endpoint itself; raises InputError if it is not valid."""
     if endpoint and not ENDPOINT.fullmatch(endpoint):
-        raise InputError(f"'{endpoint}' is no endpoint: write it as tcp/HOST:PORT.")
+        raise InputError(f"'{endpoint}' is not an endpoint: write it as tcp/HOST:PORT.")
     return endpoint
 
 
@@ -40,13 +40,13 @@ def dialled(endpoint: str) -> str:
 
 
 def place(endpoint: str) -> tuple[str, int]:
-    """Host and port of an endpoint; raises InputError where it is none."""
+    """Host and port of an endpoint; raises InputError if it is not valid."""
     found = ENDPOINT.fullmatch(checked(endpoint))
     return (found[2].strip("[]"), int(found[3])) if found else ("", 0)
 
 
 def loopback(endpoint: str) -> bool:
-    """Whether only this machine reaches an endpoint; none is reached by nobody else."""
+    """Whether an endpoint can be reached from this machine only; so can an empty one."""
     host = place(endpoint)[0]
     with contextlib.suppress(ValueError):
         return ipaddress.ip_address(host).is_loopback

@@ -2,7 +2,7 @@
 
 `python -m common.bare_loop INTERVAL_NS [--priority N] [--processor N]` says "ready", sleeps to multiples of the
 interval from its start until its standard input ends, and prints what it found as one line of JSON. It does
-nothing else, so a tick that it misses the machine missed. `BareLoop` starts it beside a test.
+nothing else, so a tick that it misses was missed by the machine. `BareLoop` starts it beside a test.
 
 A tick that woke within its interval is one of `ticks`; one that woke a whole interval or more after its time is
 `late`, as are those whose time passed meanwhile: they are skipped, not caught up. A percentile is the lateness
@@ -42,7 +42,7 @@ class Lateness:
         self._late = 0
 
     def woke(self, late_ns: int) -> int:
-        """Take note of a tick; how many ticks on the next one is that has not passed by a whole interval."""
+        """Count a tick; how many ticks ahead the next one is whose time has not passed by a whole interval."""
         self._most_ns = max(self._most_ns, late_ns)
         behind = late_ns // self._interval_ns
         self._late += behind
@@ -90,7 +90,7 @@ def loop(interval_ns: int) -> Lateness:
 
 
 def shape(priority: int, processor: int) -> dict[str, float]:
-    """Take a place among the host's processes, or stay where the parent is; what it is then."""
+    """Set priority and processor, or keep those of the parent; what holds afterwards."""
     try:
         with open("/proc/self/timerslack_ns", "w") as slack:  # noqa: PTH123 - pathlib is not worth its time here
             slack.write("1")
@@ -196,7 +196,7 @@ class BareLoop:
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
-    """Leave nothing of a process."""
+    """End a process for certain, by force if it does not end by itself."""
     if process.poll() is None:
         process.kill()
         process.wait()

@@ -47,7 +47,7 @@ def check_storeys(plan: Plan) -> None:
         check_matrix(structure.stiffness, storeys)
         if structure.columns.model != "linear":
             raise PlanError(
-                f"stiffness in [structure] is a matrix, which knows no columns of model '{structure.columns.model}': "
+                f"stiffness in [structure] is a matrix, which has no columns of model '{structure.columns.model}': "
                 "leave [structure.columns] linear or give one stiffness per storey."
             )
     values = {"stiffness": structure.stiffness, "damping": structure.damping}

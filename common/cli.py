@@ -108,7 +108,7 @@ def accept_argument(parser: argparse.ArgumentParser) -> None:
 
 
 def accepted_risks(args: argparse.Namespace) -> tuple[str, ...]:
-    """Names of the risks that the command line accepts; raises InputError for one that is none."""
+    """Names of the risks that the command line accepts; raises InputError for an unknown name."""
     return preflight.known(args.accept_risk)
 
 
@@ -132,7 +132,7 @@ def load_reality(path: Path | None, plan: Plan) -> Reality:
 
 
 def json_report(kind: str, data: Mapping[str, Any]) -> None:
-    """One JSON object per line on standard output, as long as anybody reads it: a test goes on without."""
+    """One JSON object per line on standard output; a test goes on where its reader has gone."""
     with contextlib.suppress(OSError):
         sys.stdout.write(json.dumps({"kind": kind, **data}) + "\n")
         sys.stdout.flush()
@@ -163,7 +163,7 @@ def guarded(main: Callable[[], int]) -> int:
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C. Python itself ends by the signal, whatever the exit code, once a plain one has passed through `exec`."""
+    """Ctrl-C as a class of its own: a KeyboardInterrupt in `exec` makes Python end by the signal, whatever the code."""
 
 
 def interrupt(*_: object) -> NoReturn:
@@ -173,7 +173,7 @@ def interrupt(*_: object) -> NoReturn:
 
 @contextlib.contextmanager
 def interruptible() -> Iterator[None]:
-    """Within it Ctrl-C raises Interrupted, where nobody has taken the signal for something else."""
+    """Within the context Ctrl-C raises Interrupted, unless a handler of its own is set."""
     ours = threading.current_thread() is threading.main_thread()
     ours = ours and signal.getsignal(signal.SIGINT) is signal.default_int_handler
     if ours:
@@ -186,9 +186,9 @@ def interruptible() -> Iterator[None]:
 
 
 def answered(main: Callable[[], int]) -> int:
-    """Run a command until its last word is out, so that a pipe that nobody reads is noticed here and not at exit.
+    """Run a command and write out all its output, so that a closed pipe is noticed here and not at exit.
 
-    An error is the last word, and its exit code stays where nobody reads what came before.
+    Where an error ends the command, its exit code stays, although the reader of the output has gone.
     """
     try:
         return main()
@@ -221,5 +221,5 @@ def drain() -> None:
 
 
 def unread() -> None:
-    """The reader of standard output has gone: what is still to be written goes nowhere."""
+    """The reader of standard output has gone: discard what is still to be written."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -97,7 +97,7 @@ class ClockOffset:
         return math.ceil(max(self._high - value, value - self._low) + wander)
 
     def add(self, t1: int, t2: int, t3: int, t4: int) -> None:
-        """Take in one exchange; stamps in ns. One that came back before it can have gone there says nothing."""
+        """Take in one exchange; stamps in ns. An exchange received before it was sent is ignored."""
         trip = (t4 - t1) - (t3 - t2)
         if trip < -IMPOSSIBLE * (t4 - t1) - RESOLUTION:
             return

@@ -63,7 +63,7 @@ ARRAY = 0x90  # msgpack's mark of an array of up to 15 items, plus their count
 
 
 def checker(message: type[Any]) -> Callable[..., bool]:
-    """What tells whether the items of a message of numbers alone, its kind first, have values that it may have.
+    """A function that tells whether the items of a message of numbers, its kind first, are in their ranges.
 
     It is written out as one expression: after a wake-up the caches hold other things, and each further call costs
     more than the comparisons do.
@@ -221,10 +221,10 @@ def genuine(frame: bytes, key: Key) -> bool:
 
 
 def decode(frame: bytes, key: Key, *, allowed: Container[type] = KINDS, largest: int = MOST_FRAME) -> Message:
-    """The message of a frame; raises RejectedFrame with the reason where it is none.
+    """The message of a frame; raises RejectedFrame with the reason if it is not valid.
 
-    `allowed` are the kinds that may come this way, `largest` bounds the frame's bytes. A message has one frame
-    only: what is packed in another way than `encode` does it is none.
+    `allowed` are the kinds that may come this way, `largest` bounds the frame's bytes. A message has exactly one
+    valid frame: one that is packed in another way than by `encode` is rejected.
     """
     if not CHECK_SIZE < len(frame) <= largest:
         raise RejectedFrame(Reject.LENGTH)

@@ -74,7 +74,7 @@ class Loop(Protocol):
 
     @property
     def left(self) -> bool:
-        """Whether they were heard."""
+        """Whether the last words have been received."""
 
     @property
     def completed(self) -> bool:
@@ -186,7 +186,7 @@ def stay(loop: Loop, stopping: Callable[[], str]) -> None:
 def wait(loop: Loop, tick: int) -> None:
     """Sleep until the time of a tick, take what has come, and wait for its message as long as it may be waited for.
 
-    Who was held up himself says so before he reads what the others made of it.
+    A laboratory that was held up itself reports that first, before it reads how the others have reacted.
     """
     lab = loop.lab
     lab.clock.sleep_until(loop.earliest(tick))
@@ -208,11 +208,12 @@ def fetch(loop: Loop, deadline: int) -> bool:
 
 
 def depart(loop: Loop, over: int) -> None:
-    """Last words until they are heard, for a bounded time: what the recorder lacks it may still ask for.
+    """Send the last words until they are received, for a bounded time; the recorder may still ask for what it lacks.
 
     A recorder that is held up is waited for as long as during the test, counted from when it was last heard, and then
-    has as long as any other to come back to the link and to ask. Who routes for others stays while they come to rest,
-    for at most the longest way to rest since the ticks were `over`; what the recorder may take counts from then.
+    has as long as any other to come back to the link and to ask. A laboratory that routes for others stays while they
+    come to rest, at most for the longest way to rest after the ticks were `over`; the recorder's time counts from
+    then.
     """
     lab = loop.lab
     begun, patience = lab.clock.now(), round(lab.plan.recording.patience * 1e9)
@@ -229,9 +230,9 @@ def depart(loop: Loop, over: int) -> None:
 
 
 def coming_to_rest(loop: Loop, rest: int) -> bool:
-    """Whether others may still be on their way to rest, which takes until `rest` at most (ns).
+    """Whether other laboratories may still be on their way to rest, which ends at `rest` (ns) at the latest.
 
-    After a trip they say again and again why they have stopped, in an orderly end nothing before they are at rest.
+    After a trip they repeat their reason; in an orderly end they send nothing before they are at rest.
     """
     lab = loop.lab
     return (loop.needed or lab.exchange.state is State.STOPPING) and lab.clock.now() < rest

@@ -164,7 +164,7 @@ class FrameEndpoint:
         return self.rejections.news(now_ns)
 
     def _heard(self, packet: Packet) -> None:
-        """Decode a frame on the link's own thread, which is awake: whoever waits is woken by a message."""
+        """Decode a frame on the link's own thread, so that the waiting loop is woken by valid messages only."""
         try:
             message = self._decoded(packet)
         except RejectedFrame as rejection:
@@ -173,7 +173,7 @@ class FrameEndpoint:
         self._inbox.put(Received(message, packet.role, packet.received_ns, self._now()))
 
     def _decoded(self, packet: Packet) -> Message:
-        """The message of a frame; raises RejectedFrame where it is none that may come this way."""
+        """The message of a frame; raises RejectedFrame if it may not come this way."""
         role, channel, frame, _ = packet
         allowed = ALLOWED.get((kind_of(role), channel), frozenset())
         session, key = self._place

@@ -27,7 +27,7 @@ class PlanError(InputError):
 
 
 class RigError(RthsError):
-    """A laboratory is not ready, failed, or returned what is no measurement (exit 3).
+    """A laboratory is not ready, has failed, or returned something else than a measurement (exit 3).
 
     `details` is the traceback of the rig's own exception, for the recording; empty where there is none to show.
     """

@@ -27,7 +27,7 @@ class State(Enum):
 
 
 class Event(Enum):
-    """What can happen to it."""
+    """What can happen to a laboratory in a test."""
 
     REGISTER = "register"
     REFUSE = "refuse"

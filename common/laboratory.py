@@ -197,7 +197,7 @@ class Laboratory:
         return Cause(code, str(error), self.tick * self.plan.test.interval, self.name)
 
     def violated(self, violation: Violation | Standstill, tick: int) -> None:
-        """End the test because a value is beyond its limit, or a sensor stands still."""
+        """End the test because a value is beyond its limit, or a sensor is frozen."""
         error = InterlockError(str(violation))
         self.fail(Event.TRIP, error, code="limit", tick=tick, values=violation.values)
 
@@ -261,7 +261,7 @@ class Laboratory:
     def listen_to_recorder(self, message: Message) -> None:
         """Take note of the recorder's state, and send again what it has missed.
 
-        Once the test has begun only the recorder of its session counts: another one is nobody's business.
+        Once the test has begun, only the recorder of its session counts; any other is ignored.
         """
         if isinstance(message, Recorder):
             if self.exchange.belongs(message.session) or self.exchange.state is State.IDLE:

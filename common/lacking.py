@@ -27,7 +27,7 @@ def lacks(plan: Plan, granted: Granted) -> list[str]:
 
 
 def lateness(plan: Plan, found: Mapping[str, float]) -> list[str]:
-    """Of wake-ups that came a whole interval late or later."""
+    """A sentence on wake-ups that came late by a whole interval or more, if there were too many."""
     if not found.get("late"):
         return []
     interval, most = plan.test.interval * 1e3, plan.safety.overrun
@@ -39,14 +39,14 @@ def lateness(plan: Plan, found: Mapping[str, float]) -> list[str]:
 
 
 def looser(plan: Plan) -> list[str]:
-    """Of figures that the plan writes out larger than those that hold where they are left out."""
+    """A sentence for each figure that the plan sets larger than its default."""
     found = []
     for name in patience.FIGURES:
         written, standard = patience.figure(plan, name), patience.standard(name)
         if written > standard and not name.startswith("limits."):  # limits are the rig's own
             table, _, key = name.partition(".")
             found.append(
-                f"{key} in [{table}] is written out as {written:g}, which is laxer than {standard:g}; leave it out "
+                f"{key} in [{table}] is set to {written:g}, less strict than {standard:g}; leave it out "
                 "unless this rig can bear it."
             )
     return found

@@ -1,4 +1,4 @@
-"""Tells when so many ticks come late that a test has lost its claim to real time."""
+"""Detects when so many ticks come late that a test cannot be called real-time."""
 
 from __future__ import annotations
 
@@ -35,5 +35,5 @@ def sentence(late: int) -> str:
     """An episode that begins, in words."""
     return (
         f"{late} of the last {WINDOW} ticks came late, more than the {MOST} that pre-flight would let pass: the "
-        "laboratories do not keep real time, and the recording shows this machine too (`rths doctor`)."
+        "laboratories do not keep real time, and the recording contains the delays of this machine (`rths doctor`)."
     )

@@ -1,4 +1,4 @@
-"""What the host did to a process while it ran, and what kind of host it is; nothing here costs a privilege.
+"""What the host did to a process while it ran, and what kind of host it is; none of it needs a privilege.
 
 `Watch` counts between its start and `values()`. A count that the kernel does not offer, in a container or
 on another system than Linux, is left out rather than given as zero.

@@ -66,7 +66,7 @@ class MemoryEndpoint:
         return self._queue.popleft() if self._queue else None
 
     def news(self, now_ns: int) -> dict[str, Any] | None:
-        """Memory has no frames that could be none."""
+        """Memory carries no frames, so none is rejected."""
         return None
 
     def close(self) -> None:

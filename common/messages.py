@@ -39,7 +39,7 @@ class Refused(NamedTuple):
 
 
 class Arm(NamedTuple):
-    """Master to slave: the process of this `instance` shall make its rig ready; one of another is one too many."""
+    """Master to slave: the process of this `instance` shall make its rig ready; any other is superfluous."""
 
     session: int
     instance: int

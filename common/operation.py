@@ -24,7 +24,7 @@ class Operated(Protocol):
         """Stop the rig at once."""
 
     def standing(self) -> str:
-        """Why the cause of a latched state is not gone, empty where it is."""
+        """Why the cause of a latched state persists, empty where it is gone."""
 
 
 def obey(loop: Operated, wish: Operator) -> None:

@@ -60,7 +60,7 @@ def there(path: Path) -> bool:
 
 
 def exists(path: Path) -> InputError:
-    """What a user hears who would replace something."""
+    """The error of a command that would replace a file."""
     return InputError(f"{path} exists and is not replaced: give another name, or --force to replace it.")
 
 

@@ -36,7 +36,7 @@ def intervals(seconds: float) -> Figure:
     return lambda plan: math.ceil(seconds / plan.test.interval - 1e-9)
 
 
-# A table whose commands were held up moves to the newest one within an interval: its rates say nothing of the plan.
+# A table whose commands were held up moves to the newest one within an interval: its rates then show the pause.
 FIGURES: Mapping[str, Figure] = {
     "link.loss_timeout": lambda _: 2.5 * PATIENCE,  # beyond a silence and a pause of one's own together
     "safety.hold_after": intervals(NOTICED),
@@ -46,7 +46,7 @@ FIGURES: Mapping[str, Figure] = {
         PATIENCE
     ),  # a laboratory that is behind by `overrun` sends messages as old
     "preflight.lost": lambda plan: math.ceil(LOST_SHARE * plan.preflight.exchanges),
-    "preflight.late_share": lambda _: 1.0,  # a run that is late says so itself
+    "preflight.late_share": lambda _: 1.0,  # late ticks are reported while the test runs
     "limits.table_velocity": lambda _: math.inf,
     "limits.table_step": lambda _: math.inf,
     "limits.table_error": lambda _: math.inf,
@@ -106,9 +106,9 @@ def sentence(plan: Plan) -> str:
     """Which figures were eased, their values beside those with a rig, and why."""
     figures = (f"{name.partition('.')[2]} {figure(plan, name):g} ({standard(name):g})" for name in plan.eased)
     return (
-        "All laboratories are emulated, so a pause of this machine hurts nothing and does not end the test: what the "
-        f"plan does not write out is patient, with a rig it is as in brackets: {', '.join(figures)}. "
-        "A late tick is made good and counted."
+        "All laboratories are emulated, so a pause of this machine does no harm and does not end the test. "
+        f"Figures that the plan does not set are larger than beside a rig (in brackets): {', '.join(figures)}. "
+        "A late tick is made up for and counted."
     )
 
 

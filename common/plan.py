@@ -85,7 +85,7 @@ class Plan:
 
     @property
     def makes_good(self) -> bool:
-        """Whether a tick that comes late is made good: an emulated rig knows no time but its ticks."""
+        """Whether a tick that comes late is made up for: an emulated rig knows no time but its ticks."""
         return patience.OVERRUN in self.eased
 
     @property

@@ -1,9 +1,9 @@
-"""What a process says of its plan at the handshake, and what another one makes of it: the keys that differ, by name.
+"""The description of a plan that processes exchange at the handshake, and the keys in which two plans differ.
 
 The text is the plan's digest, a blank, and as JSON every key that is not at its default, with the package's version.
 It stays below the length of a message's text: where values would not fit, four hex digits of each stand in their
-place, and where these do not either, the digest stands alone. What comes over the wire is the word of a stranger:
-it is only compared and shown, clipped.
+place, and where these do not either, the digest stands alone. Text that comes over the wire is not trusted: it is
+only compared and shown, clipped.
 """
 
 from __future__ import annotations
@@ -94,6 +94,6 @@ def understood(heard: str) -> dict[str, str] | None:
 
 
 def shown(text: str) -> str:
-    """A stranger's text as a sentence may hold it."""
+    """Text of another process, clipped and made printable for a sentence."""
     clipped = text if len(text) <= MOST_SHOWN else f"{text[: MOST_SHOWN - 1]}…"
     return "".join(letter if letter.isprintable() else "?" for letter in clipped)

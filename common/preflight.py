@@ -20,8 +20,8 @@ NAMES = ("partition", "peaks", "sensors", "link", "disk")
 # codes of the recording's events
 PASSED, SENSORS, LINK, ACCEPTED = "preflight", "sensors", "link", "accepted_risk"
 
-NOISE_FACTOR = 10.0  # noise over the plan's rms: a wrong range or a loose cable, not a matter of tuning
-OFFSET_SHARE = 0.1  # of the limit, that a rig at rest may read
+NOISE_FACTOR = 10.0  # noise over the plan's rms: more of it points to a wrong range or a loose cable
+OFFSET_SHARE = 0.1  # share of the limit that a rig at rest may read: a zeroed sensor stays far below it
 
 NO_NOISE: Mapping[str, float] = {}
 
@@ -119,7 +119,7 @@ def link_risk(round_trips_s: Sequence[float], lost: int, plan: Plan) -> Risk | N
     late = sum(trip > interval for trip in round_trips_s)
     if not round_trips_s:
         return Risk(
-            "link", f"of {lost} exchanges over the link none came back, so look at network and firewall"
+            "link", f"none of {lost} exchanges over the link came back, so check network and firewall"
         )
     if lost <= plan.preflight.lost and late <= share * len(round_trips_s):
         return None

@@ -3,8 +3,8 @@ r"""Text that comes from elsewhere, made safe for a terminal: what would act on 
 A recording, a plan or a message may hold escape sequences, which move the cursor, set the window's title, hide a link
 or change what a reader sees of the lines before. `shown` writes such characters as Python does (`\u202e`), and leaves
 every letter, sign and space as it is. It is meant for a text within a line, so it writes line ends out too. Whatever a
-command prints goes through `Escaping`, which stands before standard output and standard error, and knows no line from
-another: it catches all but line ends and tabs. The few sequences of our own go to the stream behind it (`behind`).
+command prints goes through `Escaping`, which stands before standard output and standard error and works on single
+characters: it escapes all but line ends and tabs. The few sequences of our own go to the stream behind it (`behind`).
 """
 
 from __future__ import annotations

@@ -198,8 +198,8 @@ def reaches(limit: int, wanted: int) -> bool:
 def exempt(libc: ctypes.CDLL) -> bool:
     """Whether the limit on locked memory does not count for this process.
 
-    Asked by locking a page under a limit of 0: the capabilities in /proc also show those of a namespace,
-    with which the kernel is not content.
+    This is tried out by locking a page under a limit of 0, because /proc also shows capabilities that hold inside a
+    namespace only.
     """
     import resource
 

@@ -1,4 +1,4 @@
-"""What became of frames that were none: counted by reason, and told while the test runs."""
+"""Rejected frames: counted by reason, and reported while the test runs."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Rejections:
         self._fresh = False
 
     def add(self, reason: Reject, role: str, now_ns: int) -> None:
-        """Count one frame, from one who speaks as this role."""
+        """Count one rejected frame, whose sender claims this role."""
         name = reason.value
         with self._lock:
             first_ns = self.seen[name].first_ns if name in self.seen else now_ns

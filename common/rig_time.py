@@ -11,7 +11,7 @@ class RigTime:
         self.begin()
 
     def begin(self) -> None:
-        """The first tick: what was before it held up nothing."""
+        """The first tick: calls before it have delayed no tick."""
         self._behind = self._spent = 0
         self._longest: dict[str, int] = {}
 

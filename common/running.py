@@ -122,8 +122,8 @@ def alone() -> None:
     whose = "" if first.user == os.getuid() else f" of another user (uid {first.user})"
     when = time.strftime("%H:%M:%S", time.localtime(first.since))
     raise InputError(
-        f"The test '{first.test}'{whose} runs on this machine since {when} (process {first.process}), and two beside "
-        "each other spoil both: wait for its end or stop it (`rths stop`), or give --beside to run all the same."
+        f"The test '{first.test}'{whose} runs on this machine since {when} (process {first.process}), and two tests "
+        "at once disturb each other: wait for its end or stop it (`rths stop`), or give --beside to run all the same."
     )
 
 

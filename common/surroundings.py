@@ -21,8 +21,8 @@ CODES = ("real_time", "machine", "bare_loop", "rejected")
 class Surroundings:
     """Watches from the first tick to the last; `timed` where a bare timing loop runs beside the test.
 
-    `rejected` are the frames that were none, counted by reason as they come; of the `gate` before the test it is told
-    what was passed and what was overruled.
+    `rejected` counts the rejected frames by reason as they come; the `gate` of the pre-flight says what was passed
+    and what was overruled.
     """
 
     def __init__(

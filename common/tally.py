@@ -11,10 +11,10 @@ AHEAD, REPEATED = "ahead", "repeated"  # reasons of frames that the sender of a 
 class Tally:
     """Admits what is fresh and keeps the fate of every number; `ticks` are those of the test.
 
-    Fresh is what is newer than all before and was sent within `window` intervals of when it came, by the receiver's
-    own clock: what an interrupted transport delivers late is not, nor is a number far ahead. Of a number ahead nothing
-    is kept, for its sender cannot have come to it yet; and no transport of ours delivers a message twice, so that of a
-    number that is repeated one frame is another's.
+    A message is fresh if its number is higher than all before and if it was sent within `window` intervals of its
+    arrival, by the receiver's clock; a message that an interrupted transport delivers late is not fresh, nor is a
+    number far ahead. A number ahead is not stored, because its sender cannot have reached it yet. The transports
+    deliver no message twice, so one of two frames with the same number comes from another sender.
     """
 
     def __init__(self, ticks: int, window: int) -> None:

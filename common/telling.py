@@ -1,4 +1,4 @@
-"""How long work says what it is at, whoever listens."""
+"""Progress reports of long work."""
 
 from __future__ import annotations
 
@@ -8,4 +8,4 @@ Tell = Callable[[str, int, int], None]  # what is being done, how much of it is 
 
 
 def untold(_what: str, _done: int, _total: int) -> None:
-    """Nobody listens."""
+    """Discard a report."""

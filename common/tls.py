@@ -1,4 +1,4 @@
-"""Why a link over TLS does not come about: zenoh says of every failure that time ran out, so TLS itself is asked."""
+"""Why a link over TLS fails: zenoh reports every failure as a timeout, so a TLS handshake finds the cause."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How long somebody has been waited for, said once in a while."""
+"""Periodic notes on how long a process has been waiting for another."""
 
 from __future__ import annotations
 

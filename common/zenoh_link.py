@@ -94,7 +94,7 @@ def reach(
     """A session that has reached the master, tried for `seconds`; `refusal` says why an endpoint takes nobody in.
 
     Raises:
-        InputError: the certificate is refused, which no patience mends.
+        InputError: the certificate is refused, which waiting does not cure.
         LostError: nobody listens there.
         InterlockError: somebody wants to stop.
     """
@@ -112,7 +112,7 @@ def reach(
 
 
 def unrefused(_: str) -> str:
-    """Nobody is refused on an open link."""
+    """No certificate is refused on an open link."""
     return ""
 
 
@@ -216,7 +216,7 @@ class ZenohLink:
 
     def close(self) -> None:
         """Leave the link; without it, zenoh's threads would keep the process alive."""
-        with contextlib.suppress(zenoh.ZError):  # a peer that is gone cannot be said goodbye to
+        with contextlib.suppress(zenoh.ZError):  # closing fails where the peer has gone
             self._session.close()  # type: ignore[no-untyped-call]
 
 

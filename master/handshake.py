@@ -55,7 +55,7 @@ class Handshake:
                 pass
 
     def one_too_many(self, partner: Partner, instance: int) -> None:
-        """A process waits to take part: it is told where another one has its place."""
+        """A process waits to take part: if another one has its place, it is told so."""
         over = self._lab.exchange.ended or self._lab.exchange.state is State.STOPPING
         if partner.registered and not over and instance != partner.instance:
             partner.arm()
@@ -180,7 +180,7 @@ class Handshake:
         self._lab.fail(Event.LOSE, error, code="nobody")
 
     def _hesitant(self) -> None:
-        """All are there, and one does not go on."""
+        """All processes have joined, and one does not go on."""
         arming = self._lab.exchange.state is State.REGISTERED
         who = next(one for one in self._partners if not (one.armed if arming else one.scheduled))
         seconds = self._lab.plan.link.connect_timeout

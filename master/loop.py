@@ -132,7 +132,7 @@ class MasterLoop:
     def tick(self, tick: int) -> None:
         """One control interval (contract, section 3); a tick that comes a whole interval late moves nothing.
 
-        Where all laboratories are emulated it is made good: nobody waits for it but the emulation.
+        Where all laboratories are emulated the tick is made up for, because only the emulation waits for it.
         """
         lab = self.lab
         wake = lab.clock.now()
@@ -297,7 +297,7 @@ class MasterLoop:
         self.stop_rig()
 
     def standing(self) -> str:
-        """Why the cause of a latched state is not gone, empty where it is."""
+        """Why the cause of a latched state persists, empty where it is gone."""
         try:
             return self._limits.standing(self._rig.read())
         except RigError as error:

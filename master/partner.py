@@ -182,7 +182,7 @@ class Partner:
         return text, values
 
     def use(self, tick: int) -> tuple[float, int, float]:
-        """Of the feedback in use at a tick: damper force (N), its tick, its age (s)."""
+        """The damper force (N) in use at a tick, the tick at which it was measured, and its age (s)."""
         used = self.used
         age = (tick - used.seq) * self._lab.plan.test.interval if used.seq >= 0 else 0.0
         return used.damper_force, used.seq, age

@@ -45,7 +45,7 @@ class ColumnLab:
         self._advance = column_lab.enter
 
     def arm(self) -> None:
-        """Nothing can hinder an emulated laboratory."""
+        """An emulated laboratory is always ready."""
 
     def read(self) -> ColumnMeasurement:
         """Readings at the present tick, with the sensors' noise."""

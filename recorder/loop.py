@@ -169,7 +169,7 @@ class RecorderLoop:
         self._end(now)
 
     def _notice_stall(self, now: int) -> None:
-        """While this process was held up it could hear nobody: no silence of others."""
+        """Do not count the time in which this process was held up itself as silence of the others."""
         held = now - self._polled_ns
         self._polled_ns = now
         if held > STALL_NS:
@@ -272,7 +272,7 @@ class RecorderLoop:
         return SILENCE_NS if begun else max(SILENCE_NS, round(self._plan.link.connect_timeout * 1e9))
 
     def _fell_silent(self) -> None:
-        """Nobody is heard any more; a test that was ended in order has not come to its end where one never said so."""
+        """No laboratory is heard; a test that was to end in order is incomplete where one has not reported its end."""
         code, text = self._outcome
         missing = [title(lab) for lab, inlet in self._inlets.items() if inlet.total is None]
         if code == "stop" and missing:

@@ -51,9 +51,7 @@ def check(plan: Plan, folder: Path) -> Check:
     try:
         disk = shutil.disk_usage(folder)
     except OSError as error:
-        return Check(
-            "", Risk("disk", f"nobody can see how much room the folder {folder} has: {error.strerror}")
-        )
+        return Check("", Risk("disk", f"the free space of the folder {folder} is unknown: {error.strerror}"))
     if disk.free >= wanted or not disk.total:  # what has no size is no disk, and writing there will say so
         return Check(
             f"The disk has {disk.free / 1e6:.0f} MB free; the recording takes {need(plan) / 1e6:.1f} MB"

@@ -102,7 +102,7 @@ def in_virtual_time(
     said = before_the_start(plan, output, gate)
     with Working("running") as working:
         bench = virtual.assemble(plan, reality, output, partial(virtual_report, working), gate=gate)
-        sys.stderr.write(f"{said}\n")
+        sys.stderr.writelines(f"{line}\n" for line in said)
         freeze()
         started = time.monotonic()
         error = virtual.run(bench, stopping, working.tell)
@@ -112,7 +112,7 @@ def in_virtual_time(
     return error
 
 
-def before_the_start(plan: Plan, output: Path, gate: Gate) -> str:
+def before_the_start(plan: Plan, output: Path, gate: Gate) -> list[str]:
     """Judge what can be judged before anything starts: what was passed and what is overruled, a line each.
 
     Raises:
@@ -122,7 +122,7 @@ def before_the_start(plan: Plan, output: Path, gate: Gate) -> str:
     made = checks(plan, output)
     gate.judge(made)
     said = (f"risk '{one.risk.name}' is accepted" if one.risk else one.text for one in made)
-    return "\n".join(f"pre-flight: {text}." for text in said)
+    return [f"pre-flight: {text}." for text in said]
 
 
 def checks(plan: Plan, output: Path) -> list[Check]:
@@ -159,7 +159,8 @@ def in_real_time(
             if not args.beside:
                 running.alone()
             warm_up(progress)
-            progress.say(before_the_start(plan, output, gate))
+            for line in before_the_start(plan, output, gate):
+                progress.say(line)
             progress.say(
                 f"{plan.test.name}: {plan.test.duration:g} s, starting master, {crew(plan)} and recorder"
             )

@@ -67,7 +67,7 @@ class Handshake:
             lab.endpoint.send(Registered(request.session, self._instance))
         elif lab.safety.latched:
             lab.endpoint.send(Refused(request.session, STILL_LATCHED))
-        elif not lab.exchange.ended:  # one that leaves speaks for nobody: another process may be here already
+        elif not lab.exchange.ended:  # a process that leaves does not answer: its role may be taken
             lab.endpoint.send(Refused(request.session, "it takes part in another test already."))
 
     def make_way(self, session: int) -> None:

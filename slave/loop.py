@@ -144,7 +144,7 @@ class SlaveLoop:
     def tick(self, tick: int) -> None:
         """One control interval (contract, section 3); a tick that comes a whole interval late keeps its command.
 
-        Where all laboratories are emulated it is made good with its own command.
+        Where all laboratories are emulated the tick is made up for with its own command.
         """
         lab, now = self.lab, self.lab.clock.now()
         lab.tick = tick
@@ -284,7 +284,7 @@ class SlaveLoop:
         self.stop_rig()
 
     def standing(self) -> str:
-        """Why the cause of a latched state is not gone, empty where it is."""
+        """Why the cause of a latched state persists, empty where it is gone."""
         try:
             return self._limits.standing(self._rig.read())
         except RigError as error:
@@ -344,7 +344,7 @@ class SlaveLoop:
 
     @property
     def needed(self) -> bool:
-        """Nobody is reached through a slave."""
+        """No other process depends on the session of a slave."""
         return False
 
     @property

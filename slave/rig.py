@@ -45,7 +45,7 @@ class TableLab:
         self._advance = table_lab.enter
 
     def arm(self) -> None:
-        """Nothing can hinder an emulated laboratory."""
+        """An emulated laboratory is always ready."""
 
     def read(self) -> TableMeasurement:
         """Readings at the present tick, with the sensors' noise."""

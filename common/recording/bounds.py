@@ -1,4 +1,4 @@
-"""What a recording of some size can hold: bounds that stop a file made to hurt before it costs time and memory.
+"""What a recording of some size can hold: bounds that stop a hostile file before it costs time and memory.
 
 A test may last 7200 s at an interval of 0.1 ms with any number of slaves, so no bound on messages alone would tell a
 long test from a hostile file. What tells them apart is the size of the file. The recordings that pack best are those

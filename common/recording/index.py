@@ -14,7 +14,7 @@ LEVEL = 1  # of zlib: the highest ones save a tenth of it
 
 
 class ChunkIndexes:
-    """Stands in the writer for its list of chunk indexes, which holds some 700 bytes in objects for each.
+    """Replaces the writer's list of chunk indexes, whose objects take some 700 bytes each.
 
     Twenty chunks a second would make the recorder grow by 8 MB in ten minutes, for a summary that is written at the
     end. Encoded at once and compressed with those before it, a chunk's index takes a twentieth of that.
@@ -32,7 +32,7 @@ class ChunkIndexes:
         self._packed += self._deflate.compress(encoded)
 
     def __iter__(self) -> Iterator[ChunkIndexes]:
-        """What the writer writes one by one is written by one, itself."""
+        """Itself alone: the writer calls `write` of each index, and this one writes all of them."""
         yield self
 
     def write(self, builder: RecordBuilder) -> None:

@@ -96,7 +96,7 @@ class Descent(Generic[Command]):
             measured = self._rig.read()
         except EmergencyStopError:
             raise
-        except RigError as error:  # it comes to a hold blind
+        except RigError as error:  # it comes to a hold without measurements
             self._failed(error, tick)
             measured = None
         self.step(tick, measured)

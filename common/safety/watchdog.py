@@ -25,8 +25,8 @@ ROUND_TRIP = 2  # intervals that an echo may be later than a message: it has gon
 class Watchdog:
     """Counts own intervals without a fresh message, and those in which the echo of one's own has not moved.
 
-    That the other end speaks does not show that it hears: the number that its messages echo must go on as well, for
-    which it has a round trip more. Intervals in which the own loop came too late are not counted; the limit `overrun`
+    A partner that sends does not necessarily receive: the number that its messages echo must advance as well, with a
+    round trip of allowance. Intervals in which the own loop came too late are not counted; the limit `overrun`
     is for those.
     """
 
@@ -44,7 +44,8 @@ class Watchdog:
     def look(self, tick: int, seq: int, echo: int) -> Finding:
         """One interval: the tick whose message is due, the newest one's own number, and the one it echoes.
 
-        Before the first message has come it may be as late as a message may be old: a link's delay is no silence.
+        Until the first message has come, it may be as late as a message may be old: the delay of a link is not
+        silence.
         """
         fresh = seq > self._seq and tick - seq <= self._age
         self._unheard = 0 if fresh else self._unheard + 1

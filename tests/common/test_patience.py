@@ -121,7 +121,7 @@ def test_beside_a_rig_it_is_said_what_the_machine_lacks(monkeypatch: pytest.Monk
     assert (
         "30 of 500 by a whole interval of 2 ms or more, the worst by 19.0 ms; at 10 ms (overrun" in lateness
     )
-    assert "ramp_after in [safety] is written out as 50, which is laxer than 5" in lax
+    assert "ramp_after in [safety] is set to 50, less strict than 5" in lax
     found["late"] = 0.0
     assert len(lacking.lacks(planned, NOTHING)) == 1
 

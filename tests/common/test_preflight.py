@@ -93,7 +93,7 @@ def test_a_link_may_lose_nothing_and_be_late_as_often_as_the_plan_says() -> None
 def test_a_link_over_which_nothing_comes_back_is_a_risk() -> None:
     found = link_risk([], 1000, Plan())
     assert found is not None
-    assert "of 1000 exchanges over the link none came back" in found.sentence
+    assert "none of 1000 exchanges over the link came back" in found.sentence
 
 
 # -- sensors --------------------------------------------------------------------------------------

@@ -195,7 +195,7 @@ def test_with_security_an_endpoint_is_one_of_tls() -> None:
     assert secured("") == ""
     with pytest.raises(InputError, match=r"'udp/127.0.0.1:7447' cannot be used with \[link.security\]"):
         secured("udp/127.0.0.1:7447")
-    with pytest.raises(InputError, match=r"'somewhere' is no endpoint"):
+    with pytest.raises(InputError, match=r"'somewhere' is not an endpoint"):
         secured("somewhere")
 
 
