@@ -1,7 +1,7 @@
 """What became of every message between the laboratories: sent = used + rejected + lost, by direction.
 
-What came although the other laboratory did not send it is counted apart, as foreign. A frame does not say who made
-it, so a foreign one is known by its number: the sender never came to it, it came before, or it is far ahead.
+A message that the other laboratory did not send is counted apart, as foreign. A frame does not say who made it, so a
+foreign one is recognised by its number: the sender never reached it, it came before, or it is far ahead.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ class Account(NamedTuple):
 
 
 def account(sent: int, used: int, rejected: int, beyond: int, extra: int) -> Account:
-    """The account of what a sender sent and a receiver says that it used and rejected, numbers both.
+    """The account of what a sender has sent and a receiver reports as used and rejected.
 
     `beyond` of the numbers used were higher than any sent, and `extra` frames came under a number that was known
-    already or that could not be yet. More numbers than were sent cannot be the sender's; up to there they are taken
-    for its own.
+    already or that could not be yet. More messages than were sent cannot come from the sender; up to that count they
+    are taken for its own.
     """
     own = min(max(used - beyond, 0), sent)
     late = min(rejected, sent - own)
@@ -41,7 +41,8 @@ def account(sent: int, used: int, rejected: int, beyond: int, extra: int) -> Acc
 def accounts(run: Run) -> dict[str, dict[str, int]]:
     """The accounts by `<slave's role>/<direction>`.
 
-    Each end counts what it sent and what came of what it received. A direction of which an end has not told its count,
+    Each end counts what it sent, and what became of what it received.
+    A direction of which an end has not told its count,
     because it was killed or cut off, is absent.
     """
     told: dict[str, dict[str, float]] = {}  # by laboratory; the master tells of each slave apart
@@ -67,7 +68,7 @@ def accounts(run: Run) -> dict[str, dict[str, int]]:
 
 
 def extra(told: Mapping[str, float], prefix: str) -> int:
-    """Frames that a receiver turned away as none of the sender's."""
+    """Frames that a receiver turned away because the sender cannot have sent them."""
     return sum(int(told.get(f"{prefix}.turned_away.{reason}", 0)) for reason in (AHEAD, REPEATED))
 
 

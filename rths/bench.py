@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, metavar="N", help="seed of noise and random wave")
     cli.reality_argument(parser)
     parser.add_argument(
-        "--compensated", action="store_true", help="with the plan's compensator in front of the part"
+        "--compensated", action="store_true", help="put the plan's compensator in front of the part"
     )
     parser.add_argument(
         "--only",

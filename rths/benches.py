@@ -55,7 +55,7 @@ class Order(NamedTuple):
 
 
 class Result(NamedTuple):
-    """What came of it."""
+    """What a bench test has given."""
 
     path: Path
     part: str

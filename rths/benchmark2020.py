@@ -94,7 +94,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def check(args: argparse.Namespace) -> None:
-    """Raise InputError for numbers and options that make no comparison, and for those that --plan has no use for."""
+    """Raise InputError for values and options that do not fit together."""
     if args.plan is not None:
         for name, unused in USUAL.items():
             if getattr(args, name) != unused:

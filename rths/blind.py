@@ -105,7 +105,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def check(args: argparse.Namespace) -> None:
-    """Raise InputError for numbers that make no trial, and for what is missing, before any work is done."""
+    """Raise InputError for values out of range and for missing parts, before any work is done."""
     from rths.trial.judge import diagnose_all
     from rths.trial.spread import needed
 

@@ -34,6 +34,6 @@ def run(args: argparse.Namespace) -> int:
     try:
         sys.stdout.write(text)
         sys.stdout.flush()
-    except BrokenPipeError:  # who reads no further still gets the verdict
+    except BrokenPipeError:  # the verdict comes first, for readers who read no further
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return report.exit_code

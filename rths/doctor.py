@@ -77,7 +77,7 @@ def examine(args: argparse.Namespace, tell: Tell) -> dict[str, Any]:
     def until(share: float) -> float:
         return began + share * float(args.seconds)
 
-    # 'on' is judged rather than obeyed: the check goes on with what can be had
+    # with 'on' the check goes on with what is available, and its absence is judged
     mode = "off" if args.rt == "off" else "auto"
     tell("round trip over zenoh", 1, PARTS)
     granted, round_trip = children.exchange(interval_ns, round(until(EXCHANGE) * 1e9), mode)

@@ -112,12 +112,12 @@ class Ended(Protocol):
 def verdict(processes: Ended, wish: str) -> RthsError | None:
     """The error that ended a test, None where all processes ended with 0; `wish` is that of a user to stop.
 
-    It depends on how each process ended and not on who was seen to end first. That process counts which comes first in
-    this order, and of several the one that was started first:
+    It depends on how each process ended and not on which was seen to end first. The process counts that comes first
+    in this order, and among equals the one that was started first:
 
     - USED: it could not use a file or an option (exit 2).
     - OWN: it reported an error of its own: a limit, a rig, the disk, a stop that did not come from here.
-    - CRASHED: it failed without a word, or was killed by a signal that did not come from here.
+    - CRASHED: it failed without a report, or was killed by a signal that did not come from here.
     - LOST: it reported that another fell silent or never came (exit 4).
     - KILLED: it is a laboratory that did not end in time, and was killed from here.
     - WISHED: no process, but the user, who wanted to stop.
@@ -135,7 +135,7 @@ def verdict(processes: Ended, wish: str) -> RthsError | None:
 
 
 def rank(processes: Ended, name: str, code: int) -> int:
-    """How near the end of a process is to the cause, from `USED` to `LACKING`."""
+    """The rank of a process's end as the cause, from `USED` to `LACKING`."""
     reported = processes.errors.get(name, "")
     from_here = name in processes.asked or name in processes.killed
     if code == 2:

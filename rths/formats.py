@@ -91,7 +91,7 @@ def axis_unit(label: str, size: float) -> tuple[float, str]:
 
 
 def nats(value: float) -> str:
-    """A distance of two scores in words; beyond a thousand nats it says no more."""
+    """A difference of two scores in words; beyond a thousand nats only that it is larger."""
     if abs(value) >= 1000.0:
         return "more than 1,000 nats"
     return f"{value:.0f} nats" if abs(value) >= 10.0 else f"{value:.1f} nats"
@@ -119,7 +119,7 @@ def percent(value: object, places: int | None = None) -> str:
 
 
 def probability(value: object) -> str:
-    """A probability in percent, never quite certain."""
+    """A probability in percent, never rounded to 0 or 100 %."""
     number = as_float(value)
     if not math.isfinite(number):
         return MISSING
@@ -230,5 +230,5 @@ def modes(found: Sequence[Mapping[str, float | None]], most: int = 6) -> str:
 
 
 def apart(counts: dict[str, int]) -> str:
-    """What came beside the messages of the other laboratory, empty where nothing did."""
+    """How many messages came that the other laboratory did not send, in words; empty where there were none."""
     return f"; at least {counts['foreign']} more came that it did not send" if counts["foreign"] else ""

@@ -1,4 +1,4 @@
-"""Late ticks of a recording: how many, where they were thickest, and what that means for the result."""
+"""Late ticks of a recording: how many, the most in any window, and what that means for the result."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from common.roles import LATENCY, kind_of
 def late_ticks(run: Run) -> dict[str, Any] | None:
     """Ticks late in the exchange with any slave, of how many, and the most in any window; None where unknown.
 
-    None on a virtual clock too: what an effect delays there is no sign of a machine that does not keep up.
+    None on a virtual clock as well, where an effect may delay messages but the machine cannot be late.
     """
     tables = [columns for topic, columns in run.columns.items() if kind_of(topic) == LATENCY]
     if not any(columns["seq"].size for columns in tables):
@@ -37,5 +37,5 @@ def warning(found: dict[str, Any] | None) -> str:
     return (
         f"The test did not keep real time: {found['late']} of {found['ticks']} ticks "
         f"({found['late'] / found['ticks']:.0%}) were late, up to {found['worst']} of {WINDOW} in a row, "
-        f"where pre-flight lets {MOST} pass; what it shows is partly this machine's doing (`rths doctor`)."
+        f"where pre-flight lets {MOST} pass; the recording contains delays of this machine (`rths doctor`)."
     )

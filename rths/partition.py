@@ -1,4 +1,4 @@
-"""What a plan's partition can bear, for whoever works above the laboratories."""
+"""How much delay the partition of a plan bears, for the rooms above the laboratories."""
 
 from models.structures.partition import Partition, assess, critical_delay_of
 

@@ -1,4 +1,4 @@
-"""The processes of a test on one machine: started, listened to, asked to stop, killed."""
+"""The processes of a test on one machine: how they are started, heard, asked to stop and killed."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def understood(line: str) -> list[dict[str, Any]]:
 
 
 def report(line: str) -> dict[str, Any] | None:
-    """A report of a process, None where a line is none."""
+    """The report in a line of a process, None where the line is not a report."""
     try:
         data = json.loads(line)
     except (ValueError, RecursionError):
@@ -62,7 +62,7 @@ def report(line: str) -> dict[str, Any] | None:
 
 
 def text(line: str) -> dict[str, Any]:
-    """A line that is no report, as one."""
+    """A report that holds a line which is not a report itself."""
     return {"kind": TEXT, "text": line.rstrip("\n")}
 
 
@@ -109,8 +109,8 @@ class Leash:
 class Processes:
     """Master, slaves and recorder by role; what they say in one queue, their errors and complaints kept.
 
-    Where this process is killed, the master is interrupted, and when that has ended too, all others: the master ends
-    a test in order, and before there is one nobody else would end the others.
+    If this process is killed, the master is interrupted, and when the master has ended, all others are: the master
+    ends a test in order, and without a test nothing else would end the others.
     """
 
     def __init__(self) -> None:
@@ -209,7 +209,7 @@ class Processes:
             self._running[name].kill()
 
     def close(self) -> None:
-        """Leave nothing behind."""
+        """End all processes and threads."""
         for name, process in self._running.items():
             self.kill(name)
             process.wait()

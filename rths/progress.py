@@ -19,7 +19,7 @@ EVERY = 5.0  # at least between two elsewhere
 
 
 class Progress:
-    """What a command is at, for as long as the context lasts; nothing of one that ends within `UNSAID` seconds.
+    """The progress of a command, shown while the context lasts; nothing of one that ends within `UNSAID` seconds.
 
     A thread writes the lines, so that `tell` costs nothing in a loop and time goes on while a kernel computes. On a
     terminal the line is wiped when the work ends, and stays where an error or Ctrl-C ends it.
@@ -85,6 +85,6 @@ class Progress:
             self._width = 0
 
     def _write(self) -> None:
-        with contextlib.suppress(OSError, ValueError):  # nobody reads any more: the work goes on
+        with contextlib.suppress(OSError, ValueError):  # the reader has gone: the work goes on
             while not self._ended.wait(REDRAW):
                 self.look(time.monotonic())

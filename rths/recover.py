@@ -96,4 +96,4 @@ def verdict(found: Recovery) -> str:
         return "Nothing of what was in the file is lost."
     if found.finished or not found.lossy or found.lossy[-1].end < found.size:
         return "What is lost is listed above."
-    return "The file is torn at its end: of what followed the last messages above nothing is in it."
+    return "The file is cut off at its end: it holds nothing of what followed the last messages above."

@@ -135,7 +135,9 @@ def checks(plan: Plan, output: Path) -> list[Check]:
 
 def virtual_report(working: Working, kind: str, data: Any) -> None:
     """Events of a test in virtual time, on standard error."""
-    if kind == "event" and data["code"] not in UNSAID and data["level"] != "error":  # that is the last word
+    if (
+        kind == "event" and data["code"] not in UNSAID and data["level"] != "error"
+    ):  # the error is printed last
         working.leave(wipe=True)
         cli.text_report(kind, data)
 
@@ -297,7 +299,7 @@ def note(said: Said, ending: Ending, doing: dict[str, str]) -> None:
 
 
 def answer(processes: Processes, doing: Mapping[str, str]) -> str:
-    """What is said to who wants to stop again: what the processes are at, which nobody cuts short."""
+    """The answer to a second wish to stop: what the processes are doing, which is not cut short."""
     there = [name for name in processes.names if name not in processes.ended()]
     if resting := [f"{title(name)}: {text}" for name, text in doing.items() if name in there]:
         return f"already stopping, no laboratory is killed on its way to rest or as it arms ({'; '.join(resting)})"
@@ -307,7 +309,7 @@ def answer(processes: Processes, doing: Mapping[str, str]) -> str:
 
 
 def wind_up(processes: Processes, ending: Ending) -> None:
-    """Bring what runs on to its end in order, where this program has failed: a rig is not left in mid-motion."""
+    """End the processes in order if this program has failed, so that no rig is left in mid-motion."""
     doing: dict[str, str] = {}
     while not processes.all_ended():
         if (said := processes.said(POLL_S)) is not None:
@@ -323,7 +325,7 @@ def tell(said: Said, progress: Progress) -> None:
         case {"kind": "mode", "lab": lab, "mode": mode}:
             progress.mode(lab, mode)
         case {"kind": "event", "code": "real_time", "missing": missing} if missing:
-            pass  # beside a rig it was said before; an emulation can do without
+            pass  # with a rig it was reported before; an emulation does not need it
         case {"kind": "event", "level": "error", "code": code, "lab": lab}:
             progress.say(f"{lab}: ends the test ({code})")  # the sentence is this command's last word
         case {"kind": "event", "code": code, "lab": lab, "text": text} if code not in UNSAID:

@@ -60,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def rolled_out(plan: Plan, motion: Any, args: argparse.Namespace) -> tuple[dict[str, Any], str]:
-    """Signals of the compiled rollout, written where a file is wanted; what left the plan's limits."""
+    """Signals of the compiled rollout, written where a file is wanted; the first value beyond the plan's limits."""
     from models import substructure
     from models.closed_loop import signals, simulate
 

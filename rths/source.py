@@ -1,4 +1,4 @@
-"""Two kinds of the same thing: a recording, or a plan whose simulation stands for one."""
+"""Signals to compare: those of a recording, or of the simulation of a plan."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a recording amounts to: peaks, completeness, latency; used by `run` and `inspect`."""
+"""The summary of a recording: peaks, completeness, latency; used by `run` and `inspect`."""
 
 from __future__ import annotations
 
@@ -217,7 +217,7 @@ def patience(run: Run) -> str:
 
 
 def missed_ticks(run: Run) -> int | None:
-    """Of the late ticks, those in which no command went out: the master came a whole interval too late."""
+    """How many of the late ticks sent no command, because the master was late by a whole interval."""
     return ticks_where(run, lambda columns: columns["command_sent_ns"] == 0)
 
 

@@ -1,4 +1,4 @@
-"""The processes that a check starts: out of reach of the terminal, and gone with it whatever happens."""
+"""The processes that a check starts: the terminal's signals do not reach them, and they always end with the check."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ GRACE = 3.0  # s, for a child to say its last words after its time
 
 @contextlib.contextmanager
 def child(*words: str) -> Iterator[subprocess.Popen[str]]:
-    """A process of the exchange; its standard input ends with the context, and it too, one way or the other."""
+    """A process of the exchange; with the context its standard input ends, and it is killed if it does not end then."""
     process = subprocess.Popen(
         [sys.executable, "-P", "-m", "rths.checkup.exchange", *words],
         stdin=subprocess.PIPE,

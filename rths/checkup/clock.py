@@ -1,4 +1,4 @@
-"""The clocks of this machine: how fine, how dear to read, how they run, and whether somebody sets them right."""
+"""The clocks of this machine: resolution, cost of a reading, drift, and whether they are synchronised."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def readings() -> tuple[int, int, int]:
 
 
 def raw_ns() -> int:
-    """The clock that nobody sets right, ns; the monotonic one where there is none such."""
+    """The raw clock, which is never adjusted, ns; the monotonic clock where there is none."""
     if sys.platform == "linux":
         return time.clock_gettime_ns(time.CLOCK_MONOTONIC_RAW)
     return time.monotonic_ns()
@@ -73,7 +73,7 @@ def fineness() -> dict[str, float]:
 
 
 def synchronisation() -> dict[str, float | bool]:
-    """Whether the kernel says that NTP or PTP sets its clock right, and to what error, s; empty if it is silent."""
+    """Whether the kernel reports a clock synchronised by NTP or PTP, and its error, s; empty if it does not say."""
     if sys.platform != "linux":
         return {}
     timex = Timex()

@@ -1,6 +1,6 @@
-"""The place of recordings: whether it can be written, how fast, how long it takes to be safe, how much it holds.
+"""The folder of recordings: whether it can be written, how fast, how long a sync takes, how much space is free.
 
-What is written stands in a file without a name: whatever ends the check, nothing is left.
+The data go into a file without a name, so that nothing is left however the check ends.
 """
 
 from __future__ import annotations

@@ -41,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Be one of the two."""
+    """Run one of the two processes."""
     granted = realtime.prepare(args.rt, args.processor)
     if args.role == "master":
         say(granted._asdict() | {"scheduler": scheduler_name()})
@@ -66,7 +66,7 @@ def say(found: dict[str, Any]) -> None:
 
 
 def unwanted() -> str:
-    """A sentence where whoever started this process is gone, else empty."""
+    """A sentence where the process that started this one has ended, else empty."""
     ready, _, _ = select.select([0], [], [], 0.0)
     return "The doctor has ended." if ready and not os.read(0, 4096) else ""
 
@@ -78,7 +78,7 @@ def filled(message: type[Any], **values: int) -> Any:
 
 
 def answer(endpoint: FrameEndpoint) -> None:
-    """Answer every command until nobody wants it any more."""
+    """Answer every command until the starting process has ended."""
     realtime.freeze()
     while not unwanted():
         received = endpoint.receive(IDLE)

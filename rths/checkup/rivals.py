@@ -1,4 +1,4 @@
-"""Other programs of this machine at a real-time priority: one that does not rest keeps a laboratory waiting."""
+"""Other programs of this machine at a real-time priority: one that never sleeps keeps a laboratory waiting."""
 
 from __future__ import annotations
 

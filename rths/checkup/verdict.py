@@ -13,9 +13,7 @@ CLOCK_STEP = 0.01  # of the interval: finer than this nothing is judged
 WORST_SYNC = 1.0  # s; a recording that is cut off may lose its last second, no more
 RATE = 1e6  # bytes/s, above what a recorder writes
 FREE = 1_000_000_000  # bytes, a quarter of an hour of recording
-STOLEN_SHARE = (
-    0.01  # of the processors' time; above, the check says more about the host than about this machine
-)
+STOLEN_SHARE = 0.01  # of the processors' time; above it the check measures the host, not this machine
 
 TIMING = ("wake-up", "wake-up + round trip", "late exchanges", "clock")
 
@@ -52,14 +50,14 @@ def checks(report: dict[str, Any]) -> list[Check]:
 
 
 def of_realtime(report: dict[str, Any]) -> Iterator[Check]:
-    """Whether all that was insisted on was granted."""
+    """Whether everything that `--rt on` asks for was granted."""
     missing = report["realtime"].get("missing", [])
     if report["rt"] == "on":
         yield Check("real time", f"{len(missing)} missing", "all", not missing, " ".join(missing))
 
 
 def judged(report: dict[str, Any]) -> tuple[str, dict[str, float]]:
-    """The bare loop that stands for a test's processes, and what it found."""
+    """The bare timing loop whose priority is that of a test's processes, and what it measured."""
     loops: dict[str, dict[str, float]] = report["wake_up"]
     name = "fifo" if "fifo" in loops else "ordinary"
     return name, loops[name]
@@ -170,7 +168,7 @@ def of_host(report: dict[str, Any]) -> Iterator[Check]:
 
 
 def notes(report: dict[str, Any]) -> list[str]:
-    """What no check fails for and is worth knowing."""
+    """Notes on what is worth knowing although no check fails for it."""
     found = list(report["realtime"].get("missing", [])) if report["rt"] == "auto" else []
     found += [
         f"Another program runs at a real-time priority: {rival}; end it, or give it a processor of its own."

@@ -1,4 +1,4 @@
-"""Frames of those who have no business on the link: noise, wrong keys, other sessions, and a peer who has all keys."""
+"""Hostile frames on the link: noise, wrong keys, other sessions, and a peer who has all keys."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ FAR = 100_000  # numbers ahead
 
 
 def letter(message: Message, key: codec.Key, origin: str) -> Letter:
-    """A message as a frame of a stranger's."""
+    """A message as the frame of a process outside the test."""
     return Letter(codec.encode(message, key), type(message).__name__, -1, 0, origin, intact=False)
 
 

@@ -1,4 +1,4 @@
-"""What must hold in every simulated test, whatever went wrong: one small function each, named by what it says.
+"""What must hold in every simulated test, whatever fault was played: one small function each, named by what it checks.
 
 They look at the rigs' probes, the wire's ledgers, the reported events and the recording; of the laboratories' own state
 they know the mode at each write (`rigs.mode_of`) and the cause of a stop alone.
@@ -101,14 +101,14 @@ def last_valid(simulation: Simulation, role: str, told: Seen) -> int:
 
 
 def noticed(simulation: Simulation, told: Seen, valid: int) -> int:
-    """When a laboratory could know at the latest that messages stay away; later where it stood still itself."""
+    """The latest time at which a laboratory could know that messages stay away; later where it was held up itself."""
     time = valid + round(simulation.plan.safety.ramp_after * interval(simulation))
     place = told.until(time)
     return int(told.times[place]) if place < told.times.size else time
 
 
 def stopped_early(simulation: Simulation, role: str) -> bool:
-    """Whether a laboratory whose rig moved came to an end that was not the test's, and lived to see it."""
+    """Whether a laboratory whose rig moved ended before the test did, without being killed."""
     loop, process = simulation.loops[role], simulation.world.processes[role]
     return bool(simulation.probes[role].log.times) and not process.killed and loop.lab.error is not None
 
@@ -122,14 +122,14 @@ def interval(simulation: Simulation) -> float:
 
 
 def no_exception(simulation: Simulation) -> Iterator[str]:
-    """Nothing but an orderly end leaves a process."""
+    """No process ends by an exception."""
     for name, process in simulation.world.processes.items():
         if process.error is not None:
             yield f"{name}: {type(process.error).__name__}: {process.error}"
 
 
 def everybody_ends(simulation: Simulation) -> Iterator[str]:
-    """No process goes on for ever, and no rig is left as it was."""
+    """Every process ends, and every rig is disarmed."""
     for name, process in simulation.world.processes.items():
         if not process.ended:
             yield f"{name} still goes on at {simulation.world.time * 1e-9:.3f} s."
@@ -172,10 +172,10 @@ def at(told: Seen, place: int) -> str:
 
 
 def nobody_runs_unheard(simulation: Simulation) -> Iterator[str]:
-    """A laboratory that has had no fresh message for too long neither runs nor holds.
+    """A laboratory without a fresh message for too long neither runs nor holds.
 
     The first message is due an interval after the first tick (the master's is the answer to that tick), and may be as
-    late as a message may be old: a link's delay is no silence.
+    late as a message may be old: the delay of a link is not silence.
     """
     safety = simulation.plan.safety
     watched = safety.ramp_after * interval(simulation)
@@ -240,7 +240,7 @@ def damper_is_released(simulation: Simulation) -> Iterator[str]:
 
 
 def latched_stays(simulation: Simulation) -> Iterator[str]:
-    """Who has begun to come to rest does not move on: nobody resets here."""
+    """A laboratory that has begun to come to rest does not run again, since these tests contain no reset."""
     for role, probe in simulation.probes.items():
         modes = [named(mode) for mode in [*probe.log.modes, mode_of(simulation.loops[role].lab)]]
         first = next((place for place, mode in enumerate(modes) if mode in LATCHED), len(modes))
@@ -250,7 +250,7 @@ def latched_stays(simulation: Simulation) -> Iterator[str]:
 
 
 def causes_are_named(simulation: Simulation) -> Iterator[str]:
-    """Where one laboratory stops early, every one that lives to tell says why."""
+    """Where one laboratory stops early, every one that was not killed reports a cause."""
     if not any(stopped_early(simulation, role) for role in simulation.loops):
         return
     for role, loop in simulation.loops.items():
@@ -265,7 +265,7 @@ def causes_are_named(simulation: Simulation) -> Iterator[str]:
 
 
 def frames_add_up(simulation: Simulation) -> Iterator[str]:
-    """What reached a process was given to its loop, rejected, or not yet read; every damaged frame was rejected."""
+    """A frame that reached a process was given to its loop, rejected, or not yet read; damaged ones were rejected."""
     for role, port in simulation.ports.items():
         if role in simulation.strangers:
             continue
@@ -282,7 +282,7 @@ def frames_add_up(simulation: Simulation) -> Iterator[str]:
 
 
 def numbers_add_up(simulation: Simulation) -> Iterator[str]:
-    """Sent = used + lost + rejected + superseded by number: what was there in time and newest was used."""
+    """Sent = used + lost + rejected + superseded, by number: the newest message that came in time was used."""
     for role in simulation.loops:
         if role in simulation.strangers:
             continue
@@ -307,7 +307,7 @@ def numbers_add_up(simulation: Simulation) -> Iterator[str]:
 
 
 def not_old(simulation: Simulation, age: int) -> bool:
-    """Whether a message of an age is surely fresh: there and back it took no longer than it may."""
+    """Whether a message of this age is certainly fresh: its round trip was within the bound."""
     return age < 0.25 * simulation.plan.safety.message_age * 1e9
 
 

@@ -49,7 +49,7 @@ CALM = Surrounding()
 
 
 class Nowhere(Surroundings):
-    """No machine of whose real-time shape there is anything to say."""
+    """A machine that reports nothing of its real-time settings."""
 
     def begin(self) -> None:
         """Nothing is watched."""

@@ -1,4 +1,4 @@
-"""Rigs behind a probe: what they are told is kept with its world time, what they read can be made wrong."""
+"""Rigs behind a probe, which keeps their commands with the world time and can falsify their readings."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Wrong(NamedTuple):
 
 
 class Probe:
-    """What is known of a rig independently of loop and recording; the loop is given once it is built."""
+    """Observations of a rig that do not depend on loop and recording; the loop is given once it is built."""
 
     def __init__(self, inner: GuardedRig, process: Process) -> None:
         self.inner = inner

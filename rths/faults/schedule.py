@@ -1,4 +1,4 @@
-"""What goes wrong in a simulated test, and when: drawn from a seed, written in one line, read back from it."""
+"""The faults of a simulated test and their times: drawn from a seed, written in one line, read back from it."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ KINDS: dict[str, Kind] = {
 
 @dataclass(frozen=True)
 class Fault:
-    """One thing that goes wrong at a world time (s), for a while; `where` is a role, `A>B` or `A<>B`.
+    """One fault at a world time (s), for a while; `where` is a role, `A>B` or `A<>B`.
 
     A kind without a duration happens at once. A clock differs from the beginning, whatever `at` says.
     """
@@ -227,7 +227,7 @@ def checked(schedule: Schedule) -> Schedule:
 
 
 def number(text: str, where: str) -> float:
-    """A finite number; raises InputError."""
+    """A finite number from text; raises InputError."""
     try:
         value = float(text)
     except ValueError:

@@ -13,7 +13,7 @@ from rths.faults.schedule import Schedule
 
 
 class Result(NamedTuple):
-    """What came of a schedule; `ends` is the state of the protocol in which each laboratory ended."""
+    """The result of a schedule; `ends` is the state of the protocol in which each laboratory ended."""
 
     schedule: Schedule
     violations: list[Violation]

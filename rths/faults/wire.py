@@ -47,7 +47,7 @@ class Conditions(NamedTuple):
     state: str = OPEN
 
     def over(self, other: Conditions) -> Conditions:
-        """Both at once: times add up, probabilities are of either."""
+        """Two conditions at once: times add up, probabilities are those of at least one event."""
         either = {
             name: 1.0 - (1.0 - getattr(self, name)) * (1.0 - getattr(other, name))
             for name in ("loss", "burst", "duplicate", "reorder", "corrupt")
@@ -165,7 +165,7 @@ class Direction:
     # -- frames -----------------------------------------------------------------------------------
 
     def send(self, letter: Letter, time: int) -> None:
-        """Take a frame at a world time."""
+        """Take a frame from a sender at a world time."""
         self.ledger.enter("sent", letter)
         self.history.append(letter)
         if self._quiet:

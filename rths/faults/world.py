@@ -1,8 +1,8 @@
-"""One thread, many processes, virtual time: a scheduler of events and the processes that wait for them.
+"""Many processes in one thread and in virtual time: a scheduler of events and the processes that wait for them.
 
 Every process is a greenlet. Where it would block it hands over to the scheduler, which takes the earliest event from
 a heap of (time, order, action): the same calls give the same order, whatever the machine does. World time is in ns
-and belongs to nobody; each process has a clock of its own, offset and drifting.
+and is known to no process; each process has a clock of its own, offset and drifting.
 """
 
 from __future__ import annotations
@@ -157,7 +157,7 @@ class Process:
         self._listening = False
 
     def settle(self) -> None:
-        """Let world time catch up with what it has computed: what came meanwhile is there."""
+        """Let world time catch up with the time it has spent computing, so that what came meanwhile is received."""
         if self.ahead:
             self._wait(self.time)
 
@@ -210,12 +210,12 @@ class Process:
                 action()
 
     def kill(self) -> None:
-        """It ends at once, without a last word."""
+        """End it at once, as SIGKILL would."""
         self.killed = not self.ended
         self._end()
 
     def stop(self, reason: str) -> None:
-        """Somebody wants it to stop."""
+        """Ask it to stop."""
         self.reason = reason
 
     def stopping(self) -> str:
@@ -230,7 +230,7 @@ class Process:
 
 @contextmanager
 def _garbage_kept() -> Iterator[None]:
-    """The loops freeze their interpreter as they begin: here it is everybody's, and thawed at the end."""
+    """Undo at the end that the loops freeze the garbage collector, because all of them share this interpreter."""
     enabled, interval = gc.isenabled(), sys.getswitchinterval()
     gc.freeze()  # so that the loops' own collections find little to look at
     try:

@@ -232,7 +232,7 @@ def bare_loop(record: Mapping[str, str]) -> Bare | None:
 
 
 def warnings(run: Run, ticks: Values, exchanges: list[Exchange]) -> list[str]:
-    """What makes the figures less than those of the whole test, a sentence each; `ticks` have a row of the master's."""
+    """Why the figures are not those of the whole test, a sentence each; `ticks` have a row of the master's."""
     found = [] if run.finished else ["The recording was cut off before its end: judged as far as it goes."]
     if clock_of(run) == VIRTUAL:
         found.append(f"{NO_LATENCY}: the times above come from the interval and the link's model alone.")

@@ -118,7 +118,7 @@ def unfitness(found: Figures, machine: Machine) -> list[str]:
 
 
 def unsteadiness(found: Figures, machine: Machine) -> list[str]:
-    """A sentence where the bare loop stood still too often to judge that of the master; none where it did not."""
+    """A sentence if the bare loop was held up too often to judge the master's wake-ups, else none."""
     if late_share(found) <= machine.standstill_share:
         return []
     return [
@@ -156,7 +156,7 @@ def counts(item: Exchange) -> dict[str, float | int]:
 
 
 def remarks(found: Figures, budget: Budget, checks: list[Check]) -> list[str]:
-    """What was not judged, or with less than the budget assumes, a sentence each."""
+    """What was not judged, or judged with less data than the budget assumes, a sentence each."""
     said = []
     if gone := [name for item in found.exchanges if not item.silent for name in absent(item, budget)]:
         said.append(f"The recording has no value of {', '.join(gone)}: not judged.")

@@ -1,4 +1,4 @@
-"""What a recording that grows has to show: traces, exchanges, modes and events, brought up to date look by look."""
+"""The content of a growing recording for the views: traces, exchanges, modes and events, updated look by look."""
 
 from __future__ import annotations
 

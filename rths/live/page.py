@@ -47,7 +47,7 @@ THEME = Theme(
 
 
 def parting(feed: Feed) -> Div:
-    """What the page says by itself when the server is gone, and with it all that could be new."""
+    """The sentence that the page shows by itself when the server has ended."""
     text = f"The view has ended. Again: <code>rths live {escape(str(feed.path))}</code>"
     style: dict[str, str | None] = {"color": ORANGE, "font-size": "14px", "overflow-wrap": "anywhere"}
     return Div(text=text, visible=False, sizing_mode="stretch_width", styles=style, name="parting")
@@ -92,7 +92,7 @@ class Page:
         document.theme = THEME
         document.template = Template(TEMPLATE.read_text(encoding="utf-8"))
         document.template_variables["plots"] = list(self.plots)
-        for model in document.models:  # what a browser makes of the ranges is its own affair
+        for model in document.models:  # the ranges that a reader chooses in the browser stay as they are
             model.syncable = model is self.slave
 
     def update(self) -> None:

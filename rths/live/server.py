@@ -31,7 +31,7 @@ class Server:
 
     def __init__(self, feed: Feed, port: int, rate: float) -> None:
         self._feed = feed
-        logging.getLogger("bokeh").setLevel(logging.ERROR)  # that a reader has left is no warning
+        logging.getLogger("bokeh").setLevel(logging.ERROR)  # a reader who leaves is no reason for a warning
         self._period = 1e3 / rate
         try:
             sockets, self._port = bind_sockets(HOST, port)

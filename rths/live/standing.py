@@ -1,4 +1,4 @@
-"""How every laboratory stood when it was last heard of, how long ago that was, and what stopped the test."""
+"""The newest known state of every laboratory, how old that is, and what stopped the test."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from common.safety.modes import LATCHED, Mode
 from recorder.loop import CONSEQUENCE
 
 MODES = [mode.value for mode in Mode]
-GRAVEST = (  # of several laboratories the one that stands first here says how the test stands
+GRAVEST = (  # the first of these modes that a laboratory is in says how the test stands
     Mode.EMERGENCY_STOP,
     Mode.SAFE,
     Mode.RAMPING,
@@ -66,7 +66,7 @@ class Standing:
             self.stops = own or self.stops
 
     def last(self, lab: str) -> float | None:
-        """Test time of a laboratory's newest word, s; None before its first row."""
+        """Test time of a laboratory's newest row or event, s; None before the first row."""
         return self._t.get(lab) if math.isfinite(self._shift) else None
 
     def age(self, lab: str) -> float:

@@ -60,7 +60,7 @@ class Trace:
             self._keep({name: np.concatenate([points[name] for points in thinned]) for name in columns})
 
     def close(self) -> None:
-        """Of the newest group no more ticks will come."""
+        """The newest group is complete: no more ticks of it will come."""
         group, self._open = self._open, {}
         if group and self._thin is not None:
             del group[""]

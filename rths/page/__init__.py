@@ -1,7 +1,7 @@
-"""The one frame of every HTML page: style, contents, blocks; a page is one file that asks for nothing else.
+"""The common frame of all HTML pages: style, contents, blocks; a page is one file that loads nothing else.
 
-Templates are jinja2's with autoescape, not strings put together: what a recording says reaches a page only as text,
-wherever it stands, and nobody has to remember to escape it. What is HTML already is `Markup`.
+Templates are jinja2's with autoescape, not strings put together: text of a recording is escaped wherever it stands,
+without a call for it. What is HTML already is `Markup`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Amplitude density over frequency: what shook, what moved, and what of it was error.
+"""Amplitude density over frequency: of the ground motion, the response and the tracking errors.
 
 The density is the square root of the power spectral density by Welch's method (The use of fast Fourier transform for
 the estimation of power spectra, IEEE Trans. Audio Electroacoust. 15, 1967), one-sided, so that the integral of its
@@ -60,7 +60,7 @@ def draw(recording: Run, canvas: Any) -> bool:
 
 
 def accelerations(recording: Run) -> list[Line]:
-    """Of the ground, and of the floor as the table had it."""
+    """Spectra of the ground's acceleration and of the floor's as the table imposed it."""
     names = (
         ("ground", "ground_acceleration", COLOURS[0], "-"),
         ("table", "table_acceleration", COLOURS[1], DASHED),
@@ -126,7 +126,7 @@ def amplitude_density(item: Curve) -> tuple[Values, Values]:
     step = interval(item.t[known])
     begin, end = item.t[known][[0, -1]]
     if not 0.0 < end - begin <= HOLES * step * known.sum():
-        raise ValueError("the times of a signal are none of regular ticks")
+        raise ValueError("the times of a signal are not those of regular ticks")
     even = np.interp(
         begin + step * np.arange(round((end - begin) / step) + 1), item.t[known], item.values[known]
     )

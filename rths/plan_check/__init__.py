@@ -1,1 +1,1 @@
-"""What a plan describes, for whoever has just written it: figures, likely slips of units, classes that it would run."""
+"""What a plan describes, for its author: figures, likely slips of units, classes that it would run."""

@@ -137,7 +137,7 @@ def gate_of(name: str, plan: Plan) -> Gate:
 
 
 def never() -> str:
-    """Nobody stops an experiment."""
+    """An experiment is never stopped by a user."""
     return ""
 
 

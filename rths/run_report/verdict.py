@@ -1,4 +1,4 @@
-"""A run in sentences with their figures, and what of it is lost."""
+"""The verdict on a run in sentences with figures, and what of its recording is lost."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def exchange(summary: Summary) -> list[str]:
 
 
 def rejected(summary: Summary) -> str:
-    """Frames that were none of the test's, or damaged."""
+    """How many frames were rejected: damaged ones, and those that do not belong to the test."""
     counts = {lab: sum(reasons.values()) for lab, reasons in summary["rejected"].items()}
     if not counts:
         return ""
@@ -153,7 +153,7 @@ def followed(name: str, facts: Mapping[str, Any]) -> str:
 
 
 def force_path(summary: Summary) -> str:
-    """How late the column force was, which tracking does not show."""
+    """How late the measured column force was; the tracking of displacements does not show it."""
     found = summary["force_path"]
     if found is None:
         return ""
@@ -201,7 +201,9 @@ def margins(run: Run, summary: Summary) -> list[Margin]:
     found = []
     for name, facts in peaks.items():
         topic, _, signal = name.partition("/")
-        of_all_slaves = topic == MASTER and signal in of_slaves  # the master's are all slaves' at once
+        of_all_slaves = (
+            topic == MASTER and signal in of_slaves
+        )  # those of the master hold all slaves together
         if signal not in UNITS or of_all_slaves or not math.isfinite(facts["peak"]):
             continue
         plan = plan_of(run.of(topic) if name_of(topic) else run)

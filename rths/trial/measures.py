@@ -1,4 +1,4 @@
-"""What the diagnosis is worth over many cases: measures with their goals, confusion, calibration."""
+"""The quality of the diagnosis over many cases: measures with their goals, confusion, calibration."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A case becomes a recording; what it hides stays in the memory of the process that asked."""
+"""Recording a case: what it hides stays in the memory of the process that asked."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ class Recorded:
     """Where a case was recorded, and how large what it hides is."""
 
     index: int
-    name: str  # of the file; drawn at random, it says nothing
+    name: str  # of the file; drawn at random, so that it reveals nothing
     sizes: tuple[float, ...]  # residual to noise of every effect by itself
     stopped: str  # why the test ended early, empty where it was completed
 
 
 def record_all(cases: Sequence[Case], folder: Path, jobs: int = 1) -> Iterator[Recorded]:
-    """Record every case into a folder, in an order that says nothing."""
+    """Record every case into a folder, in an order that reveals nothing."""
     order = np.random.default_rng(secrets.randbits(64)).permutation(len(cases))
     yield from spread(partial(record, folder=folder), [cases[place] for place in order], jobs)
 

@@ -2,7 +2,7 @@
 
 Both laboratories and the building are played with and without the effect, sensors silent, on the inputs
 that the recording holds. Of each signal the rms of the difference is divided by the rms of its true
-noise; the largest counts. An effect of the link is what it did to the messages themselves.
+noise; the largest counts. The size of an effect of the link is measured by the messages that it changed.
 """
 
 from __future__ import annotations
@@ -113,7 +113,7 @@ def play_building(case: Case, laid: tuple[Laid, ...], run: Run) -> dict[str, Val
 
 
 def _messages(run: Run) -> dict[str, Values]:
-    """What arrived minus what would have arrived in time."""
+    """The messages that arrived minus those that would have arrived in time."""
     master, slave = run.columns["master"], run.columns["slave"]
     ticks = min(run.ticks("master"), run.ticks("slave"))
     on_time = np.concatenate([[0.0], slave["damper_force"][: ticks - 1]]) if ticks else np.zeros(0)

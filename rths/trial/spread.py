@@ -37,7 +37,7 @@ def spread(
 
 @contextlib.contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Ctrl-C waits for the end of the block; a process that starts within never hears it: who started it ends it."""
+    """Ctrl-C waits for the end of the block; a process that starts within ignores it and is ended by this one."""
     if not hasattr(signal, "pthread_sigmask"):  # not POSIX
         yield
         return
@@ -67,7 +67,7 @@ def _backend(joblib: Any, jobs: int, dask: str) -> Iterator[None]:
             with joblib.parallel_config(backend="loky", n_jobs=jobs, inner_max_num_threads=1):
                 yield
             done = True
-        finally:  # it would wait for more work, and for the end of what nobody wants any more
+        finally:  # it would wait for more work, and for work whose result is not needed
             loky.get_reusable_executor().shutdown(wait=True, kill_workers=not done)
         return
     distributed = needed("dask.distributed", "--dask")

@@ -69,7 +69,7 @@ class Evidence(NamedTuple):
 
 
 def gather(settings: Mapping[str, Compensator], plants: int, seed: int, jobs: int, tell: Tell) -> Evidence:
-    """Every test of the benchmark, `jobs` at once."""
+    """All tests of the benchmark, `jobs` at a time."""
     tell("critical delays", 0, 0)
     critical = critical_delays()
     stages = []

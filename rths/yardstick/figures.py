@@ -70,7 +70,7 @@ def compensators(evidence: Evidence, canvas: Any) -> None:
 
 
 def late_force(evidence: Evidence, canvas: Any) -> None:
-    """What sees a late force, and what does not."""
+    """Which criteria show a late force, and which do not."""
     upper, lower = canvas.subplots(2, 1, sharex=True)
     cases = sorted({item.result.case for item in evidence.late})
     for case in (cases[0], cases[-1]):
@@ -127,7 +127,7 @@ FIGURES = (
     ),
     Figure(
         "late_force.png",
-        "A force that comes late, with the adaptive model-based compensator: J1 and J2 stay quiet while J4 grows; the "
+        "A force that comes late, with the adaptive model-based compensator: J1 and J2 hardly change, J4 grows; the "
         "indicator of the force's path reads the delay",
         late_force,
         4.2,

@@ -131,7 +131,7 @@ def with_plant(plan: Plan, plant: Drawn) -> Plan:
     )
     own = plan.structure.experimental
     if own is None:
-        raise ValueError("The plan says not what the specimen takes over of the building.")
+        raise ValueError("The plan does not say what the specimen takes over of the building.")
     experimental = replace(own, stiffness=plant.stiffness)
     return replace(
         plan,

@@ -1,4 +1,4 @@
-"""What is published of the benchmark, to be met: Table 3, and the critical delays of the four cases."""
+"""The published results of the benchmark: Table 3, and the critical delays of the four cases."""
 
 from __future__ import annotations
 

@@ -102,7 +102,7 @@ def play(
 
 
 def unstable(on: Stage, setting: str, plant: int) -> Result:
-    """The result of a loop that ran away."""
+    """The result of an unstable loop."""
     none, worst = math.nan, math.inf
     return Result(
         setting,
@@ -126,7 +126,7 @@ def sweep(
     tell: Tell = untold,
     total: int = 0,
 ) -> list[Result]:
-    """Every setting on every plant of every stage, `jobs` at once: kernels let go of the interpreter's lock."""
+    """Every setting on every plant of every stage, `jobs` at once: kernels release the interpreter's lock."""
     results: list[Result] = []
     with threadpool_limits(1), ThreadPoolExecutor(jobs) as pool:
         for on in stages:

@@ -50,7 +50,7 @@ WRONG = {
     "a share of a matrix": ("[structure]\nstiffness = [[25e6]]\n", r"say in \[structure.experimental\]"),
     "other columns under a matrix": (
         "[structure]\nstiffness = [[25e6]]\n[structure.columns]\nmodel = 'bilinear'\nyield_displacement = 0.01\n",
-        "knows no columns of model 'bilinear'",
+        "has no columns of model 'bilinear'",
     ),
     "more mass than the floor has": (
         "[structure.experimental]\nmass = 160e3\nstiffness = 1.0\n",

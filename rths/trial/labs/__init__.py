@@ -1,4 +1,4 @@
-"""Laboratories written differently from those that the diagnosis believes in, as plug-in rigs.
+"""Laboratories written independently of the diagnosis' models, as plug-in rigs.
 
 They share no model with `models`: time is cut into steps of 0.1 ms with Runge-Kutta, and the effects of the
 catalogue have other formulas here. Effects whose names begin with `x.` are in no catalogue.

@@ -54,7 +54,7 @@ class ColumnLab:
         self._true: tuple[float, ...] = (0.0, 0.0)
 
     def arm(self) -> None:
-        """Nothing can hinder this laboratory."""
+        """An emulated laboratory is always ready."""
 
     def read(self) -> ColumnMeasurement:
         """Readings at the present tick."""

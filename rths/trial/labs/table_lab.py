@@ -52,7 +52,7 @@ class TableLab:
         self._true: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
 
     def arm(self) -> None:
-        """Nothing can hinder this laboratory."""
+        """An emulated laboratory is always ready."""
 
     def read(self) -> TableMeasurement:
         """Readings at the present tick."""
