@@ -24,6 +24,9 @@ COPY master master
 COPY slave slave
 COPY recorder recorder
 COPY diagnosis diagnosis
+COPY simulation simulation
+COPY report report
+COPY validation validation
 COPY rths rths
 COPY examples examples
 # A plan's folder for recordings is `runs` unless it says otherwise: the one that is mounted.

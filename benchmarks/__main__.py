@@ -11,7 +11,7 @@ from pathlib import Path
 
 from benchmarks import BENCHMARKS
 from benchmarks.result import Figure
-from rths.terminal import table
+from report.text.terminal import table
 
 
 def machine() -> dict[str, str]:

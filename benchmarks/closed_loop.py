@@ -10,10 +10,10 @@ import numpy as np
 from benchmarks import loops, opensees_peer
 from benchmarks.opensees_peer import Answer, Case
 from benchmarks.result import Figure, rate_figure, rates
-from common.plan import Plan, ideal
-from common.tables import Control, Recording
-from models import substructure
-from models.closed_loop import signals, simulate
+from common.plan.plan import Plan, ideal
+from common.plan.tables import Control, Recording
+from models.loop import substructure
+from models.loop.closed_loop import signals, simulate
 from models.registry import Array
 
 TARGET = 5e6

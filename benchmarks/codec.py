@@ -8,8 +8,8 @@ import struct
 import msgpack
 
 from benchmarks.result import Figure, rate_figure, rates
-from common import codec
-from common.messages import Command, Feedback
+from common.protocol import codec
+from common.protocol.messages import Command, Feedback
 
 COUNT = 20_000
 REPEATS = 7

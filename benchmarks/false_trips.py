@@ -16,15 +16,15 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.result import Figure
-from common.plan import Plan
-from common.reality import as_planned
+from common.plan.plan import Plan
+from common.plan.reality import as_planned
+from common.plan.tables import Recording
 from common.roles import MASTER
-from common.tables import Recording
 from models.indicators import nrmse, peak_error
 from models.registry import Array
-from rths.faults.invariants import judge
-from rths.faults.lab import Simulation, Surrounding
-from rths.faults.wire import CABLE, Conditions
+from validation.faults.invariants import judge
+from validation.faults.lab import Simulation, Surrounding
+from validation.faults.wire import CABLE, Conditions
 
 MINUTES = int(os.environ.get("RTHS_FALSE_TRIPS_MINUTES", "60"))
 PIECE, QUICK_PIECE = 60.0, 1.0  # s

@@ -11,10 +11,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from benchmarks.result import Figure, rate_figure
-from common import reality
-from common.plan import Plan
-from common.tables import Recording
-from rths import virtual
+from common.plan import reality
+from common.plan.plan import Plan
+from common.plan.tables import Recording
+from simulation import virtual
 
 TARGET = 50_000
 REPEATS = 7

@@ -16,15 +16,15 @@ import numpy as np
 from mcap.writer import CompressionType, Writer
 
 from benchmarks.result import Figure, rate_figure, rates
-from common.clock import MonotonicClock
-from common.endpoint import FrameEndpoint
-from common.laboratory import Laboratory, Setting
-from common.messages import Register, Resend
-from common.plan import PROTOCOL_VERSION, Plan
+from common.host.clock import MonotonicClock
+from common.lab.laboratory import Laboratory, Setting
+from common.link.endpoint import FrameEndpoint
+from common.link.zenoh_link import ZenohLink, listenable
+from common.plan.plan import PROTOCOL_VERSION, Plan
+from common.protocol.messages import Register, Resend
 from common.recording.reader import Run, read
 from common.recording.writer import CHUNK_SIZE, Recording
 from common.signals import TICK_TOPICS, TOPICS, Kind
-from common.zenoh_link import ZenohLink, listenable
 
 ROOT = Path(__file__).resolve().parent.parent
 COUNT = 20_000

@@ -17,14 +17,14 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.result import Figure
-from common import reality
-from common.plan import Plan, ideal
-from common.tables import Recording, SlaveLaboratory
-from models import substructure
-from models.closed_loop import simulate
+from common.plan import reality
+from common.plan.plan import Plan, ideal
+from common.plan.tables import Recording, SlaveLaboratory
+from models.loop import substructure
+from models.loop.closed_loop import simulate
 from models.registry import Array
 from models.structures import partition, shear_building
-from rths import virtual
+from simulation import virtual
 
 STOREYS = (1, 2, 5, 10, 20, 50, 100)
 LABORATORIES = (1, 2, 4, 8)

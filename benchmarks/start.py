@@ -11,7 +11,7 @@ from pathlib import Path
 
 from benchmarks.result import Figure, cost_figure
 from benchmarks.whole_test import ROOT, Ending, ended_early, played
-from common.zenoh_link import listenable
+from common.link.zenoh_link import listenable
 
 REPEATS = 5
 MEMORY_S, QUICK_S = 5.0, 0.2  # of the test whose memory is watched

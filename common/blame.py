@@ -6,7 +6,7 @@ import sys
 import traceback
 from pathlib import Path
 
-HOUSE = Path(__file__).resolve().parent
+HOUSE = Path(__file__).resolve().parents[1]
 
 
 def source_of(kind: type[object]) -> str:
@@ -21,7 +21,7 @@ def place(error: BaseException, source: str) -> str:
     """
     frames = traceback.extract_tb(error.__traceback__)
     own = [frame for frame in frames if frame.filename == source]
-    others = [frame for frame in frames if Path(frame.filename).parent != HOUSE]
+    others = [frame for frame in frames if HOUSE not in Path(frame.filename).parents]
     found = own or others
     return f"{Path(found[-1].filename).name}, line {found[-1].lineno}" if found else ""
 

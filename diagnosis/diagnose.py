@@ -10,18 +10,20 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from common.errors import InputError
-from common.plan import Plan
-from common.telling import Tell, untold
-from diagnosis import fitting, link, readings, report
-from diagnosis.fitting import Data, Values
+from common.plan.plan import Plan
+from common.terminal.telling import Tell, untold
+from diagnosis import link, readings
+from diagnosis.findings import report
+from diagnosis.findings.verdict import Verdict, judge
+from diagnosis.fits import fitting
+from diagnosis.fits.fitting import Data, Values
+from diagnosis.fits.scales import Scales
+from diagnosis.fits.search import Searcher
 from diagnosis.ground import Ground
 from diagnosis.link import Finding
 from diagnosis.parts import Building, ColumnAlone, LaboratoryA, LaboratoryB, Part
 from diagnosis.readings import Reading
 from diagnosis.record import LEAST_TICKS, Record
-from diagnosis.scales import Scales
-from diagnosis.search import Searcher
-from diagnosis.verdict import Verdict, judge
 from models.effects import CATALOGUE
 from models.system import System
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from diagnosis.parts import Nuisance, of_sites
 from diagnosis.record import Record
-from models import substructure
+from models.loop import substructure
 from models.registry import Array
 from models.system import System
 

@@ -22,7 +22,7 @@ from scipy.stats import beta
 
 from common.recording.reader import Run
 from diagnosis.record import Mask, laid_out
-from models.closed_loop import Exchange
+from models.loop.closed_loop import Exchange
 from models.registry import Array
 
 Index = NDArray[np.int64]

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.record import Mask, Record
-from models import closed_loop, substructure
-from models.closed_loop import Exchange
+from models.loop import closed_loop, substructure
+from models.loop.closed_loop import Exchange
 from models.registry import Array
 from models.system import System
 

@@ -13,14 +13,14 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
-from common.plan import Plan
+from common.plan.plan import Plan
 from diagnosis.record import Mask, Record
 from models import effects
-from models.closed_loop import MEASURED_A, MEASURED_B
 from models.effects.effect import Effect
-from models.labs import replay
+from models.loop import replay
+from models.loop.closed_loop import MEASURED_A, MEASURED_B
+from models.loop.substructure import STOREYS
 from models.registry import Array
-from models.substructure import STOREYS
 from models.system import System
 
 EXACT = 1e-4  # share of a computed signal's rms below which a difference is rounding, not gap

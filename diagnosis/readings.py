@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from diagnosis.fitting import Data
+from diagnosis.fits.fitting import Data
 from diagnosis.record import Record
 from diagnosis.signals.noise import quantum
-from models.closed_loop import MEASURED_A, MEASURED_B
+from models.loop.closed_loop import MEASURED_A, MEASURED_B
 from models.registry import Array
 
 LOUDER = 2.5  # noise over what the plan and the other sensors' noise make expected

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import InputError
-from common.plan import Plan, ideal, parse
+from common.plan.plan import Plan, ideal, parse
 from common.recording.reader import GROUND, Run
 from common.roles import SLAVE
-from models import substructure
+from models.loop import substructure
 from models.registry import Array
 
 Mask = NDArray[np.bool_]

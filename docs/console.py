@@ -32,7 +32,9 @@ ANYTHING = "…"
 MARK = "-- exit of the command"
 TIMEOUT_S = 180.0
 LAST_WORDS_S = 5.0  # of a block that was killed
-PROGRESS = re.compile(r"[a-z ]+: (?:.+, )?\d+ s")  # of rths/progress.py: how often depends on the machine
+PROGRESS = re.compile(
+    r"[a-z ]+: (?:.+, )?\d+ s"
+)  # of report/text/progress.py: how often depends on the machine
 
 
 class Block(NamedTuple):

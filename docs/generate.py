@@ -9,13 +9,13 @@ import dataclasses
 from pathlib import Path
 from typing import Any
 
-from common import patience
-from common.messages import Command
-from common.plan import Plan, parse
+from common.plan import patience
+from common.plan.plan import Plan, parse
+from common.plan.tables import Limits, Preflight, Safety
+from common.protocol.messages import Command
 from common.rig import ColumnMeasurement, TableCommand, TableMeasurement
 from common.safety.modes import MEANING, TURNS, mermaid
 from common.signals import TOPICS
-from common.tables import Limits, Preflight, Safety
 from docs import reference_tables
 from docs.markdown import quantity, table
 from master.step import Outputs

@@ -58,7 +58,7 @@ def draw(path: Path) -> None:
     """Write the picture as SVG, with its letters as outlines, so that every viewer shows the same."""
     import matplotlib as mpl
 
-    from rths.figure import figure
+    from report.pictures.figure import figure
 
     canvas = figure(*SIZE)
     axes = canvas.subplots()

@@ -73,7 +73,7 @@ def modes() -> list[str]:
     """Draw the safety machine; the emergency stop, to which every mode leads, without its arrows."""
     import matplotlib as mpl
 
-    from rths.figure import figure
+    from report.pictures.figure import figure
 
     canvas = figure(8.4, 4.4)
     axes = canvas.subplots()

@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any, get_type_hints
 
 from common import errors
-from common.patience import FIGURES
-from common.plan import TABLES, Plan
-from common.schema import Rule, required, table_fields
+from common.plan.patience import FIGURES
+from common.plan.plan import TABLES, Plan
+from common.plan.schema import Rule, required, table_fields
 from docs.markdown import quantity, table
 from models.compensators import COMPENSATORS
 from models.effects import FILES, READINGS
@@ -242,7 +242,7 @@ def exits() -> str:
 
 def budget() -> str:
     """The latency budget that ships, as it is."""
-    from rths.latency_budget.limits import DEFAULT
+    from report.budget.limits import DEFAULT
 
     return f"```toml\n{DEFAULT.read_text(encoding='utf-8')}```\n"
 

@@ -22,12 +22,14 @@ except ImportError:
 import msgpack
 
 with atheris.instrument_imports(
-    include=["common.codec", "common.endpoint", "common.outlet", "recorder.items"]
+    include=["common.protocol.codec", "common.link.endpoint", "common.lab.outlet", "recorder.items"]
 ):
-    from common import codec, endpoint, outlet
-    from common.messages import Samples
-    from common.plan import Plan
-    from common.transport import CHANNELS, Packet, Transport
+    from common.lab import outlet
+    from common.link import endpoint
+    from common.link.transport import CHANNELS, Packet, Transport
+    from common.plan.plan import Plan
+    from common.protocol import codec
+    from common.protocol.messages import Samples
     from recorder.items import Items
 
 SESSION = 7

@@ -6,25 +6,25 @@ import secrets
 from functools import partial
 from typing import Any
 
-from common import schema
-from common.clock import unix_ns
-from common.laboratory import Setting
-from common.links import link_model
-from common.plan import Plan
-from common.plugins import construct, find
-from common.preflight import Check, Gate, SensorsAtRest
-from common.reality import Reality
+from common.host.clock import unix_ns
+from common.lab.laboratory import Setting
+from common.lab.preflight import Check, Gate, SensorsAtRest
+from common.link.links import link_model
+from common.plan import schema
+from common.plan.plan import Plan
+from common.plan.plugins import construct, find
+from common.plan.reality import Reality
 from common.rig import METHODS, AtRest, ColumnMeasurement, GuardedRig
 from master.limits import MasterLimits
 from master.loop import MasterLoop
 from master.rig import ColumnLab
 from master.step import MasterStep
-from models import preflight as nominal
-from models import substructure
-from models.closed_loop import build_a
 from models.compiled import plain
 from models.labs import column_lab, noise, readings
-from models.realised import true_system
+from models.loop import preflight as nominal
+from models.loop import substructure
+from models.loop.closed_loop import build_a
+from models.loop.realised import true_system
 from models.registry import Array
 from models.system import System
 

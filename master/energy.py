@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from common.limits import Violation, violated
-from common.plan import Plan
+from common.plan.limits import Violation, violated
+from common.plan.plan import Plan
 from common.rig import ColumnMeasurement
 from master.step import Outputs
 from models import energy_balance

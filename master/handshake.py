@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from common.errors import InputError, LostError, RigError
-from common.exchange import Event, State
-from common.laboratory import REPEAT_NS, Laboratory
-from common.messages import Armed, Message, Refused, Register, Registered, Scheduled, SyncReply
-from common.plan import PROTOCOL_VERSION
-from common.plan_difference import differences, digest_of, said
-from common.preflight import LINK, Gate, RefusedError, link_check
+from common.lab.laboratory import REPEAT_NS, Laboratory
+from common.lab.preflight import LINK, Gate, RefusedError, link_check
+from common.plan.plan import PROTOCOL_VERSION
+from common.plan.plan_difference import differences, digest_of, said
+from common.protocol.exchange import Event, State
+from common.protocol.messages import Armed, Message, Refused, Register, Registered, Scheduled, SyncReply
 from common.rig import GuardedRig
 from common.safety.modes import STILL_LATCHED
 from master.partner import Partner

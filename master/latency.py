@@ -14,10 +14,10 @@ from collections import deque
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from common.clock_offset import ClockOffset
-from common.laboratory import Laboratory
-from common.mailbox import ticks_late
-from common.messages import Feedback
+from common.host.clock_offset import ClockOffset
+from common.lab.laboratory import Laboratory
+from common.link.mailbox import ticks_late
+from common.protocol.messages import Feedback
 
 NAN = math.nan
 

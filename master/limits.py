@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from common.limits import Change, Frozen, Guard, Lasting, Standstill, Violation
-from common.plan import Plan
+from common.plan.limits import Change, Frozen, Guard, Lasting, Standstill, Violation
+from common.plan.plan import Plan
 from common.rig import ColumnCommand, ColumnMeasurement
 from master.energy import EnergyMonitor
 from master.step import Outputs

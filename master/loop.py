@@ -10,13 +10,19 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
-from common import lateness, patience
-from common.endpoint import Received
 from common.errors import EmergencyStopError, InterlockError, RigError
-from common.exchange import Event, State
-from common.laboratory import REPEAT_NS, Laboratory, Setting
-from common.mailbox import LinkModel
-from common.messages import (
+from common.host import lateness
+from common.lab.descent import Descent, Resting
+from common.lab.laboratory import REPEAT_NS, Laboratory, Setting
+from common.lab.operation import obey
+from common.lab.preflight import Gate
+from common.link.endpoint import Received
+from common.link.mailbox import LinkModel
+from common.plan import patience
+from common.plan.plan import PROTOCOL_VERSION
+from common.plan.plan_difference import digest_of, said
+from common.protocol.exchange import Event, State
+from common.protocol.messages import (
     Feedback,
     Message,
     Operator,
@@ -27,13 +33,8 @@ from common.messages import (
     Trip,
     Waiting,
 )
-from common.operation import obey
-from common.plan import PROTOCOL_VERSION
-from common.plan_difference import digest_of, said
-from common.preflight import Gate
 from common.rig import ColumnCommand, ColumnMeasurement, GuardedRig
 from common.roles import MASTER, RECORDER
-from common.safety.descent import Descent, Resting
 from common.safety.modes import Turn
 from common.safety.watchdog import Finding
 from master.descent import ColumnRamp

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from common.clock_offset import ClockOffset
-from common.laboratory import REPEAT_NS, Laboratory
-from common.mailbox import LinkModel, Mailbox
-from common.messages import Arm, Command, Feedback, Start, Sync, SyncReply
+from common.host.clock_offset import ClockOffset
+from common.lab.laboratory import REPEAT_NS, Laboratory
+from common.link.mailbox import LinkModel, Mailbox
+from common.link.transport import addressed
+from common.protocol.messages import Arm, Command, Feedback, Start, Sync, SyncReply
+from common.protocol.tally import Tally
 from common.roles import latency_topic, name_of, title
 from common.safety.watchdog import Finding, Watchdog
-from common.tally import Tally
-from common.transport import addressed
 from master.latency import Account
 from master.step import Sent
 

@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from operator import add
 from typing import Any
 
-from common import schema
+from common.plan import schema
+from common.plan.tables import Actuator, Column, Sensors
 from common.rig import ColumnCommand, ColumnMeasurement
-from common.tables import Actuator, Column, Sensors
-from models.closed_loop import MEASURED_A
 from models.compiled import plain
 from models.labs import column_lab, noise, readings
+from models.loop.closed_loop import MEASURED_A
 from models.system import Effects
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from common.plan import Plan
-from models import substructure
+from common.plan.plan import Plan
 from models.compiled import plain
+from models.loop import substructure
 from models.registry import Array
 
 Values = float | list[float]

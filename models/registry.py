@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import InputError
-from common.schema import nearest
+from common.plan.schema import nearest
 
 Array = NDArray[np.float64]
 

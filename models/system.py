@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from common.plan import Plan
+from common.plan.plan import Plan
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from common.plan import Plan
-from models import cache, column_loop, compensators, energy_balance, substructure
-from models.closed_loop import simulate
+from common.plan.plan import Plan
+from models import cache, compensators, energy_balance
 from models.compiled import plain
-from models.labs import column_lab, readings, replay, table_lab
+from models.labs import column_lab, readings, table_lab
+from models.loop import column_loop, replay, substructure
+from models.loop.closed_loop import simulate
 from models.structures.response import response
 from models.system import System
 

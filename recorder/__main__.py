@@ -7,15 +7,16 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from common import cli, process
-from common.clock import MonotonicClock, unix_ns
-from common.endpoint import Endpoint, FrameEndpoint
-from common.laboratory import Setting
-from common.preflight import Gate
-from common.stopping import Stopper
+from common.host.clock import MonotonicClock, unix_ns
+from common.host.stopping import Stopper
+from common.lab import process
+from common.lab.laboratory import Setting
+from common.lab.preflight import Gate
+from common.link.endpoint import Endpoint, FrameEndpoint
+from common.terminal import cli
 
 if TYPE_CHECKING:
-    from common.plan import Plan
+    from common.plan.plan import Plan
     from recorder.loop import RecorderLoop
 
 WAIT_S = 0.02
@@ -48,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
 
 def record(args: argparse.Namespace, plan: Plan, path: Path) -> int:
     """Record a test into a file; the exit code."""
-    from models import substructure
+    from models.loop import substructure
     from recorder import files, space
     from recorder.loop import RecorderLoop
     from recorder.sink import FileSink, ThreadedSink

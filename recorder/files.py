@@ -10,15 +10,15 @@ from collections.abc import Iterator, Sequence
 from importlib import metadata
 from pathlib import Path
 
-from common import outputs
-from common.clock import unix_ns
 from common.errors import InputError
-from common.machine import facts
-from common.plan import Plan
-from common.preflight import ACCEPTED, Risk
+from common.host.clock import unix_ns
+from common.host.machine import facts
+from common.lab.preflight import ACCEPTED, Risk
+from common.plan.plan import Plan
 from common.recording.reader import CLOCK, GROUND
 from common.recording.writer import Recording
 from common.signals import topics
+from common.terminal import outputs
 from models.ground_motion import GroundMotion
 from models.registry import Array
 

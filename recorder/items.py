@@ -9,8 +9,8 @@ from typing import Any
 import msgpack
 
 from common import signals
-from common.outlet import PIECE
-from common.plan import Plan
+from common.lab.outlet import PIECE
+from common.plan.plan import Plan
 from common.roles import MASTER, latency_topic, ramp_topic
 from common.signals import Kind, Signal
 

@@ -5,17 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from common import patience, signals
-from common.clock import Clock
-from common.endpoint import Endpoint
+from common import signals
 from common.errors import IncompleteError, InputError, InterlockError, LostError
-from common.laboratory import REPEAT_NS, SLOW_RIG, Report, Setting
-from common.messages import Finished, Message, Recorder, Register, Resend, Samples
-from common.outlet import BURST, PIECE, Inlet, pack_nexts
-from common.plan import PROTOCOL_VERSION, Plan
-from common.plan_difference import differences, digest_of, said
+from common.host.clock import Clock
+from common.lab.laboratory import REPEAT_NS, SLOW_RIG, Report, Setting
+from common.lab.outlet import BURST, PIECE, Inlet, pack_nexts
+from common.lab.surroundings import CODES, described
+from common.link.endpoint import Endpoint
+from common.plan import patience
+from common.plan.plan import PROTOCOL_VERSION, Plan
+from common.plan.plan_difference import differences, digest_of, said
+from common.protocol.messages import Finished, Message, Recorder, Register, Resend, Samples
 from common.roles import LATENCY, MASTER, RECORDER, kind_of, title
-from common.surroundings import CODES, described
 from recorder.items import Items
 from recorder.sink import Item, Sink
 

@@ -6,8 +6,8 @@ import threading
 from queue import Empty, Queue
 from typing import Any, Protocol
 
-from common.clock import Clock
-from common.outlet import AT_ONCE
+from common.host.clock import Clock
+from common.lab.outlet import AT_ONCE
 from common.recording.reader import MACHINES
 from common.recording.writer import Recording
 

@@ -6,8 +6,8 @@ import shutil
 from pathlib import Path
 
 from common import signals
-from common.plan import Plan
-from common.preflight import Check, Risk
+from common.lab.preflight import Check, Risk
+from common.plan.plan import Plan
 from common.roles import kind_of
 from common.signals import Kind, Signal
 

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import common
-from common import cli
 from common.errors import EXIT_CODES, InputError
+from common.terminal import cli
 
 VERBS = {
     "run": "run the whole test on this machine",
@@ -44,8 +44,27 @@ VERBS = {
     "completion": "write a script with which the shell completes all this",
 }
 
-MODULES = {
-    "import": "rths.import_",
+FOLDERS = {
+    "rths.perform": ("run", "live", "stop", "reset"),
+    "rths.prepare": ("check", "simulate", "bench", "identify", "keys", "doctor"),
+    "rths.examine": (
+        "inspect",
+        "report",
+        "recover",
+        "budget",
+        "plot",
+        "layout",
+        "replay",
+        "compare",
+        "diagnose",
+        "export",
+    ),
+    "rths.prove": ("reproduce", "benchmark2020", "blind", "faults"),
+    "rths": ("completion",),
+}
+
+MODULES = {verb: f"{folder}.{verb}" for folder, verbs in FOLDERS.items() for verb in verbs} | {
+    "import": "rths.examine.import_",
     "master": "master.__main__",
     "slave": "slave.__main__",
     "record": "recorder.__main__",
@@ -74,7 +93,7 @@ def parser_for(verb: str) -> argparse.ArgumentParser:
 
 def fill(parser: argparse.ArgumentParser, verb: str) -> None:
     """Give a parser the arguments of a command, and what runs it as the default `run`."""
-    module = importlib.import_module(MODULES.get(verb, f"rths.{verb}"))
+    module = importlib.import_module(MODULES[verb])
     module.add_arguments(parser)
     parser.set_defaults(run=module.run)
 
@@ -141,7 +160,7 @@ def command(words: Sequence[str]) -> int:
         raise InputError(complaint)
     verb = words[0]
     if verb not in VERBS:
-        from common.schema import nearest
+        from common.plan.schema import nearest
 
         raise InputError(f"unknown command '{verb}': {nearest(verb, VERBS)}")
     args = parser_for(verb).parse_intermixed_args(words[1:])

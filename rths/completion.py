@@ -7,8 +7,8 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from common import cli
 from common.errors import InputError
+from common.terminal import cli
 
 SHELLS = ("bash", "zsh", "fish")
 RECORDINGS, TABLES = "*.mcap", "*.toml"

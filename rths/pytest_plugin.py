@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 if TYPE_CHECKING:
-    from rths.latency_budget import Report
+    from report.budget import Report
 
     LatencyBudget = Callable[..., Report]
 
@@ -47,7 +47,7 @@ def expect(recording: str | Path, budget: str | Path | None) -> Report:
     """The report of a recording that is within its budget; ends the test otherwise."""
     __tracebackhide__ = True
     from common.errors import RthsError
-    from rths.latency_budget import assess
+    from report.budget import assess
 
     report, mistake = None, ""
     try:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 import sys
 
-from common import cli, process
+from common.lab import process
+from common.terminal import cli
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

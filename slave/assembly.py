@@ -6,19 +6,19 @@ import secrets
 from functools import partial
 from typing import Any
 
-from common import schema
-from common.laboratory import Setting
-from common.links import link_model
-from common.plan import Plan
-from common.plugins import construct, find
-from common.preflight import Check, Gate, SensorsAtRest
-from common.reality import Reality
+from common.lab.laboratory import Setting
+from common.lab.preflight import Check, Gate, SensorsAtRest
+from common.link.links import link_model
+from common.plan import schema
+from common.plan.plan import Plan
+from common.plan.plugins import construct, find
+from common.plan.reality import Reality
 from common.rig import METHODS, AtRest, GuardedRig, TableMeasurement
 from common.roles import name_of, title
-from models.closed_loop import build_b
 from models.compiled import plain
 from models.labs import noise, readings, table_lab
-from models.realised import true_system
+from models.loop.closed_loop import build_b
+from models.loop.realised import true_system
 from slave.loop import NO_COMMAND, SlaveLoop
 from slave.rig import TableLab
 from slave.step import SlaveStep

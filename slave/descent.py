@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from common.plan import Plan
+from common.plan.plan import Plan
 from common.rig import TableCommand, TableMeasurement
 from common.safety.ramp import ForceRelease, MotionRamp
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from common.errors import InputError, LostError, RigError
-from common.exchange import Event, State
-from common.laboratory import REPEAT_NS, Laboratory
-from common.messages import (
+from common.lab.laboratory import REPEAT_NS, Laboratory
+from common.plan.plan import PROTOCOL_VERSION
+from common.plan.plan_difference import differences, digest_of
+from common.protocol.exchange import Event, State
+from common.protocol.messages import (
     Arm,
     Armed,
     Message,
@@ -18,8 +20,6 @@ from common.messages import (
     SyncReply,
     Waiting,
 )
-from common.plan import PROTOCOL_VERSION
-from common.plan_difference import differences, digest_of
 from common.rig import GuardedRig
 from common.roles import name_of, title
 from common.safety.modes import STILL_LATCHED

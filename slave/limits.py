@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from common.limits import Change, Frozen, Guard, Lasting, Standstill, Violation
-from common.messages import Command
-from common.plan import Plan
+from common.plan.limits import Change, Frozen, Guard, Lasting, Standstill, Violation
+from common.plan.plan import Plan
+from common.protocol.messages import Command
 from common.rig import TableCommand, TableMeasurement
 
 AT_REST = TableCommand(0.0, 0.0)

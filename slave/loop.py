@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from functools import partial
 
-from common.endpoint import Received
 from common.errors import EmergencyStopError, InterlockError, RigError
-from common.exchange import Event, State
-from common.laboratory import REPEAT_NS, Laboratory, Setting
-from common.mailbox import LinkModel, Mailbox
-from common.messages import (
+from common.lab.descent import Descent, Resting
+from common.lab.laboratory import REPEAT_NS, Laboratory, Setting
+from common.lab.operation import obey
+from common.link.endpoint import Received
+from common.link.mailbox import LinkModel, Mailbox
+from common.protocol.exchange import Event, State
+from common.protocol.messages import (
     Arm,
     Command,
     Feedback,
@@ -26,13 +28,11 @@ from common.messages import (
     Stopped,
     Trip,
 )
-from common.operation import obey
+from common.protocol.tally import Tally
 from common.rig import GuardedRig, TableCommand, TableMeasurement
 from common.roles import MASTER, SLAVE
-from common.safety.descent import Descent, Resting
 from common.safety.modes import Turn
 from common.safety.watchdog import Finding, Watchdog
-from common.tally import Tally
 from slave.descent import TableRamp
 from slave.handshake import Handshake
 from slave.limits import SlaveLimits

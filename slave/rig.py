@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from operator import add
 from typing import Any
 
-from common import schema
+from common.plan import schema
+from common.plan.tables import Damper, Sensors, Table
 from common.rig import TableCommand, TableMeasurement
-from common.tables import Damper, Sensors, Table
-from models.closed_loop import MEASURED_B
 from models.compiled import plain
 from models.labs import noise, readings, table_lab
+from models.loop.closed_loop import MEASURED_B
 from models.system import Effects
 
 

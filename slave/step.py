@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from common.messages import Command
-from common.plan import Plan
+from common.plan.plan import Plan
+from common.protocol.messages import Command
 from common.rig import TableMeasurement
 from models import compensators
 from models.compiled import plain

@@ -5,8 +5,8 @@ from __future__ import annotations
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
-from common.security import Identity
-from rths import keys
+from common.link.security import Identity
+from rths.prepare import keys
 
 ROLES = ("master", "slave", "recorder", "operator", "observer")
 NOW = datetime.now(UTC)

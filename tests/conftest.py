@@ -13,10 +13,12 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from common import cli, plan, reality, running
-from common.patience import strict
-from common.plan import Plan
-from rths import virtual
+from common.host import running
+from common.plan import plan, reality
+from common.plan.patience import strict
+from common.plan.plan import Plan
+from common.terminal import cli
+from simulation import virtual
 from tests.limited import Left, adopt, children, descendants, end, look
 
 # of libraries, which end them with the interpreter: joblib's idle workers, the counters of shared memory
@@ -109,7 +111,7 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 @pytest.fixture(autouse=True)
 def unhurried(monkeypatch: pytest.MonkeyPatch) -> None:
     """No command says how far it is because this machine is slow today."""
-    monkeypatch.setattr("rths.progress.UNSAID", math.inf)
+    monkeypatch.setattr("report.text.progress.UNSAID", math.inf)
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from common import plan
-from common.plan import Plan
+from common.plan import plan
+from common.plan.plan import Plan
 
 ROOT = Path(__file__).resolve().parent.parent
 

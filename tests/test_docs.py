@@ -10,15 +10,15 @@ import re
 
 import pytest
 
-from common import preflight
-from common.exchange import Event
-from common.limits import PATIENCE
-from common.messages import Command
-from common.patience import strict
-from common.plan import Plan
+from common.lab import preflight
+from common.plan.limits import PATIENCE
+from common.plan.patience import strict
+from common.plan.plan import Plan
+from common.plan.tables import Limits
+from common.protocol.exchange import Event
+from common.protocol.messages import Command
 from common.rig import ColumnMeasurement, TableCommand, TableMeasurement
 from common.safety.modes import TURNS, Mode, Turn
-from common.tables import Limits
 from docs import generate
 from master.limits import MasterLimits
 from master.step import Outputs
@@ -142,7 +142,7 @@ def codes(node: ast.AST) -> list[str]:
 
 
 def test_the_plan_that_documents_the_keys_is_the_default_plan() -> None:
-    from common.plan import load
+    from common.plan.plan import load
 
     assert strict(load(ROOT / "rths/plans/default.toml")).digest() == Plan().digest()
 

@@ -19,9 +19,9 @@ from benchmarks.cable import ADDRESSES, NoCableError, cable
 from benchmarks.exchange.transports import NAMES
 from benchmarks.load import BUSY, busy
 from benchmarks.result import Figure
-from common.realtime import assign
-from common.zenoh_link import listenable
-from rths import keys
+from common.host.realtime import assign
+from common.link.zenoh_link import listenable
+from rths.prepare import keys
 
 ROOT = Path(__file__).resolve().parents[2]
 REPEATS = 3

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from benchmarks.exchange import transports
 from benchmarks.exchange.transports import NAMES
-from common import realtime
+from common.host import realtime
 
 
 def main() -> int:

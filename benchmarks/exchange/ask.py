@@ -24,7 +24,7 @@ from benchmarks.exchange.transports import (
     UdpAsking,
     ZenohAsking,
 )
-from common import realtime
+from common.host import realtime
 
 OURS = ("rths", "rths_tls", "rths_lab")
 PEERS: dict[str, Callable[[str, int], Asking]] = {"zenoh": ZenohAsking, "tcp": TcpAsking, "udp": UdpAsking}

@@ -18,16 +18,27 @@ from typing import Protocol
 
 import zenoh
 
-from common import reality, security
-from common.clock import MonotonicClock
-from common.endpoint import FrameEndpoint
-from common.laboratory import Setting
-from common.messages import Arm, Armed, Command, Feedback, Message, Register, Registered, Scheduled, Start
-from common.plan import PROTOCOL_VERSION, Plan
+from common.host.clock import MonotonicClock
+from common.lab.laboratory import Setting
+from common.link import security
+from common.link.endpoint import FrameEndpoint
+from common.link.security import Identity
+from common.link.zenoh_link import ZenohLink
+from common.plan import reality
+from common.plan.plan import PROTOCOL_VERSION, Plan
+from common.plan.tables import Laboratory, Link, Recording, Rig, Safety, Security
+from common.protocol.messages import (
+    Arm,
+    Armed,
+    Command,
+    Feedback,
+    Message,
+    Register,
+    Registered,
+    Scheduled,
+    Start,
+)
 from common.rig import TableCommand
-from common.security import Identity
-from common.tables import Laboratory, Link, Recording, Rig, Safety, Security
-from common.zenoh_link import ZenohLink
 from slave.assembly import build_loop
 
 PAYLOAD = b"x" * 110  # a command's frame is about as long

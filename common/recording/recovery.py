@@ -14,7 +14,6 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Header, Metadata, Schema, Statistics
 from mcap.writer import CompressionType, Writer
 
-from common import outputs
 from common.errors import InputError
 from common.recording.checksums import CHECKSUMS, checksum, fits, opened, sealed
 from common.recording.salvage import (
@@ -33,6 +32,7 @@ from common.recording.salvage import (
 )
 from common.recording.writer import CHUNK_SIZE
 from common.roles import ramps_of
+from common.terminal import outputs
 
 RECOVERY = "recovery"  # metadata of a recovered recording
 DAMAGED = " (damaged)"  # after the name of what is there, but not as it was written

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from common.plan import Plan
+from common.plan.plan import Plan
+from common.plan.tables import Limits
 from common.safety.speed_change import SpeedChange
-from common.tables import Limits
 
 MARGIN_S = 1.0  # on the way itself, for intervals that are left out
 

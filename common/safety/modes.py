@@ -1,7 +1,7 @@
 """The safety state machine of a laboratory as a table: what its rig may do, and how it comes to rest.
 
-It stands beside the protocol of a test (common/exchange.py), which says what the laboratories have agreed on. A state
-that is latched is left by an operator's reset alone, and only when its cause is gone.
+It stands beside the protocol of a test (common/protocol/exchange.py), which says what the laboratories have agreed on.
+A state that is latched is left by an operator's reset alone, and only when its cause is gone.
 """
 
 from __future__ import annotations

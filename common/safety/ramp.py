@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from enum import Enum, auto
 
+from common.plan.tables import Safety
 from common.safety.speed_change import SpeedChange
-from common.tables import Safety
 
 UNLOADED = 0.01  # of the force at the hold: below it the specimen counts as unloaded
 STEPS = 4  # intervals at most in which a phase ends beside its profile: one each, and the last command

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from enum import Enum
 
-from common.tables import Safety
+from common.plan.tables import Safety
 
 
 class Finding(Enum):

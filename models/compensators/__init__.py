@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from common.errors import InputError
-from common.schema import Rule, nearest
+from common.plan.schema import Rule, nearest
 from models import registry
 from models.compensators import (
     amb,

@@ -28,7 +28,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from common.schema import Rule
+from common.plan.schema import Rule
 from models.compensators import low_pass, series
 from models.compiled import jit, jit_apart
 from models.registry import Array

@@ -30,7 +30,7 @@ from typing import NamedTuple
 import numpy as np
 
 from common.errors import InputError
-from common.schema import Rule
+from common.plan.schema import Rule
 from models.compensators import low_pass
 from models.compiled import jit
 from models.registry import Array

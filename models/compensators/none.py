@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from common.schema import Rule
+from common.plan.schema import Rule
 
 
 class Params(NamedTuple):

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from common.schema import Rule
+from common.plan.schema import Rule
 from models.compiled import jit
 from models.registry import Array
 

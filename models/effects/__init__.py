@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from common.errors import InputError
-from common.schema import Rule, nearest
+from common.plan.schema import Rule, nearest
 from models.effects import (
     actuator_backlash,
     actuator_compliance,

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from common.plan import Plan
+from common.plan.plan import Plan
 from models.system import System
 
 Kind = Literal["physics", "measurement"]

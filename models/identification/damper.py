@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from common.errors import InputError
-from common.schema import nearest
-from common.tables import Damper
+from common.plan.schema import nearest
+from common.plan.tables import Damper
 from models.compiled import jit
 from models.identification import checks, estimate
 from models.identification.estimate import Estimate

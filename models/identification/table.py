@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from common.errors import InputError
-from common.tables import Damper, Table
+from common.plan.tables import Damper, Table
 from models.compiled import jit
 from models.identification import checks, estimate
 from models.identification.estimate import Estimate

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from common.errors import InputError
-from common.schema import Rule, nearest
+from common.plan.schema import Rule, nearest
 from models.compiled import jit
 from models.integrators import central_difference, cr, kr_alpha, newmark_explicit, rk4
 from models.integrators.state import ROWS

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from common.errors import InputError
-from common.tables import Actuator, Column
+from common.plan.tables import Actuator, Column
 from models.compiled import jit
 from models.labs import specimen
 from models.labs.specimen import REACTION, Specimen

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from common.errors import InputError
-from common.plan import Plan
+from common.plan.plan import Plan
 from models import indicators
 from models.indicators import ForcePath
-from models.labs import replay
+from models.loop import replay
 from models.registry import Array
 from models.system import System
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from common.tables import Sensors
+from common.plan.tables import Sensors
 from models.registry import Array
 
 LAB_A, LAB_B = 1, 2

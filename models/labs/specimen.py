@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from common.tables import Column
+from common.plan.tables import Column
 from models import specimens
 from models.compiled import jit, jit_apart
 from models.registry import Array

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from common.errors import InputError
-from common.tables import Damper, Table
+from common.plan.tables import Damper, Table
 from models.compiled import jit
 from models.labs.column_lab import substeps
 from models.registry import Array

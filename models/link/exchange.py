@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from common.mailbox import LinkModel, ticks_late
-from models.closed_loop import Exchange, Index
+from common.link.mailbox import LinkModel, ticks_late
+from models.loop.closed_loop import Exchange, Index
 
 COMMAND, FEEDBACK = (
     ("command", 0),

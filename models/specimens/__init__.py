@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from common.errors import InputError
-from common.schema import Rule, nearest
+from common.plan.schema import Rule, nearest
 from models import registry
 from models.compiled import jit
 from models.registry import Array

@@ -24,7 +24,7 @@ from scipy.optimize import least_squares
 from scipy.stats import t as student
 
 from common.errors import InputError
-from common.schema import nearest
+from common.plan.schema import nearest
 from models import specimens
 from models.compiled import jit
 from models.registry import Array

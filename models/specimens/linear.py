@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from common.schema import Rule
+from common.plan.schema import Rule
 from models.compiled import jit
 from models.registry import Array
 

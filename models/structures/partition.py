@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from common.errors import InputError
-from common.plan import Plan
-from common.tables import Experimental
+from common.plan.plan import Plan
+from common.plan.tables import Experimental
 from models import indicators
 from models.registry import Array
 from models.structures import shear_building

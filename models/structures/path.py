@@ -7,12 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from common.plan import Plan
+from common.plan.plan import Plan
 from models import excitation, indicators
+from models.compensators.follower import Follower
 from models.compiled import plain
 from models.excitation import Programme, join
 from models.excitation.pieces import Piece, sine
-from models.follower import Follower
 from models.indicators.growth import grows
 from models.labs import column_lab
 from models.registry import Array

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from common.errors import InputError
-from common.plan import Plan
+from common.plan.plan import Plan
 from models import integrators
 from models.compiled import jit
 from models.integrators.state import NEXT_DISPLACEMENT

@@ -12,10 +12,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from common import realtime
-from common.bare_loop import BareLoop
+from common.host import realtime
+from common.host.bare_loop import BareLoop
 
-ROOT = Path(__file__).resolve().parent.parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 GRACE = 3.0  # s, for a child to say its last words after its time
 
 
@@ -46,7 +46,7 @@ def exchange(interval_ns: int, until_ns: int, mode: str) -> tuple[dict[str, Any]
 
     `error` in the latter says why it found nothing.
     """
-    from common.zenoh_link import listenable
+    from common.link.zenoh_link import listenable
 
     endpoint = listenable()
     words = [endpoint, "--rt", mode, "--interval-ns", str(interval_ns), "--until-ns", str(until_ns)]

@@ -16,12 +16,13 @@ import time
 from collections.abc import Callable
 from typing import Any, get_type_hints
 
-from common import cli, realtime
-from common.endpoint import FrameEndpoint, Received
 from common.errors import LostError
-from common.machine import scheduler_name
-from common.messages import Command, Feedback
-from common.zenoh_link import ZenohLink
+from common.host import realtime
+from common.host.machine import scheduler_name
+from common.link.endpoint import FrameEndpoint, Received
+from common.link.zenoh_link import ZenohLink
+from common.protocol.messages import Command, Feedback
+from common.terminal import cli
 
 TEST = "doctor"
 PATIENCE = 5.0  # s, for the other process to be there

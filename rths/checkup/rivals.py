@@ -13,7 +13,7 @@ def rivals() -> list[str]:
 
     The kernel's own threads are left out: they have no command line, and they are meant to come first.
     """
-    from common.machine import scheduler_name
+    from common.host.machine import scheduler_name
 
     found = []
     for folder in PROC.glob("[0-9]*"):

@@ -10,9 +10,9 @@ import pytest
 
 from benchmarks import closed_loop, opensees_peer
 from benchmarks.opensees_peer import PYTHON, Answer, Case
-from common.plan import Plan
-from models import substructure
-from models.closed_loop import signals, simulate
+from common.plan.plan import Plan
+from models.loop import substructure
+from models.loop.closed_loop import signals, simulate
 
 CASE = Case(160e3, 25e6, 200e3, 0.002, [0.0, 1.0, 0.5, 0.0], repeats=2)
 

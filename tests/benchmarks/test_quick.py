@@ -12,7 +12,7 @@ from benchmarks import BENCHMARKS, live, real_time
 from benchmarks.exchange import transports
 from benchmarks.result import Figure
 from benchmarks.whole_test import Ending, ended_early, ending
-from common.tables import Safety
+from common.plan.tables import Safety
 
 IN_REAL_TIME = {"exchange", "real_time", "live", "start", "recorder"}  # tests/system/test_benchmarks.py
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from benchmarks import scale
-from common.plan import Plan
+from common.plan.plan import Plan
 
 
 def test_one_storey_is_the_default_building() -> None:

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from common import bare_loop
-from common.bare_loop import BareLoop, Lateness
-from common.realtime import NOTHING, Granted
+from common.host import bare_loop
+from common.host.bare_loop import BareLoop, Lateness
+from common.host.realtime import NOTHING, Granted
 from tests.helpers import ROOT
 
 INTERVAL_NS = 2_000_000
@@ -122,7 +122,7 @@ def test_it_runs_above_the_process_it_watches_and_on_its_processor() -> None:
 
 def test_it_ends_with_a_parent_that_is_killed() -> None:
     text = (
-        "import time; from common.bare_loop import BareLoop; from common.realtime import NOTHING;"
+        "import time; from common.host.bare_loop import BareLoop; from common.host.realtime import NOTHING;"
         "loop = BareLoop(); loop.start(2_000_000, NOTHING); print(loop._process.pid, flush=True); time.sleep(60)"
     )
     parent = subprocess.Popen(
@@ -158,14 +158,14 @@ def test_a_loop_that_was_killed_or_hangs_or_never_started_gives_nothing(
 
 def test_it_runs_as_a_module_and_imports_next_to_nothing() -> None:
     heavy = {"numpy", "typing", "subprocess", "asyncio"}
-    text = f"import sys, common.bare_loop; print(sorted(set(sys.modules) & {heavy}))"
+    text = f"import sys, common.host.bare_loop; print(sorted(set(sys.modules) & {heavy}))"
     environment = {"PYTHONPATH": str(ROOT)}
     bare = subprocess.run(
         [sys.executable, "-S", "-c", text], capture_output=True, text=True, env=environment, timeout=60
     )
     assert bare.stdout == "[]\n"
     done = subprocess.run(
-        [sys.executable, "-m", "common.bare_loop", "1000000"],
+        [sys.executable, "-m", "common.host.bare_loop", "1000000"],
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,
@@ -176,7 +176,7 @@ def test_it_runs_as_a_module_and_imports_next_to_nothing() -> None:
     assert ready == "ready"
     assert json.loads(line)["interval"] == 0.001
     refused = subprocess.run(
-        [sys.executable, "-m", "common.bare_loop", "5"],
+        [sys.executable, "-m", "common.host.bare_loop", "5"],
         capture_output=True,
         text=True,
         env=environment,

@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common import building, reality
 from common.errors import PlanError
-from common.plan import Plan, from_tables, ideal, parse
-from common.tables import Actuator, ServoHydraulics
+from common.plan import building, reality
+from common.plan.plan import Plan, from_tables, ideal, parse
+from common.plan.tables import Actuator, ServoHydraulics
 from tests.helpers import SERVO_PLAN, with_table
 
 

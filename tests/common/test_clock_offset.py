@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.clock_offset import ClockOffset
+from common.host.clock_offset import ClockOffset
 
 US, MS, S = 1_000, 1_000_000, 1_000_000_000
 YEAR = 365 * 86_400 * S

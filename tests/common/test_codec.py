@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common import codec
-from common.codec import MESSAGES, RejectedFrame, decode, encode, session_key
-from common.messages import Command, Feedback, Message, Register
+from common.protocol import codec
+from common.protocol.codec import MESSAGES, RejectedFrame, decode, encode, session_key
+from common.protocol.messages import Command, Feedback, Message, Register
 
 KEY = session_key(7, "plan")
 

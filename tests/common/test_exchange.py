@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.errors import LocalProtocolError, RemoteProtocolError
-from common.exchange import FINAL, TRANSITIONS, Event, Exchange, State
+from common.protocol.exchange import FINAL, TRANSITIONS, Event, Exchange, State
 
 
 def reachable() -> set[State]:

@@ -15,10 +15,12 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from common import codec
-from common.codec import MESSAGES, MOST_TEXT, Reject, RejectedFrame, decode, encode, session_key
-from common.endpoint import ALLOWED, CHANNELS, LARGEST, OPEN, SPOKEN, FrameEndpoint, channel_of
-from common.messages import (
+from common.link.endpoint import ALLOWED, CHANNELS, LARGEST, OPEN, SPOKEN, FrameEndpoint, channel_of
+from common.link.rejections import NEWS_NS, Rejections
+from common.link.transport import CONTROL, SAMPLES, TICK, Packet
+from common.protocol import codec
+from common.protocol.codec import MESSAGES, MOST_TEXT, Reject, RejectedFrame, decode, encode, session_key
+from common.protocol.messages import (
     Arm,
     Command,
     Feedback,
@@ -33,9 +35,7 @@ from common.messages import (
     Trip,
     Waiting,
 )
-from common.rejections import NEWS_NS, Rejections
 from common.roles import MASTER, RECORDER, SLAVE
-from common.transport import CONTROL, SAMPLES, TICK, Packet
 from tests.common.test_codec import COMMAND, KEY, framed, messages_of
 from tests.helpers import ROOT
 

@@ -11,12 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import InputError, PlanError, RthsError
-from common.plan import Plan, parse
+from common.plan.plan import Plan, parse
 from common.recording.reader import read
 from common.recording.salvage import RECORD_LIMIT
 from common.recording.writer import Recording
 from common.signals import TOPICS
-from rths.summary import rejected
+from report.facts.summary import rejected
 
 MAGIC = b"\x89MCAP0\r\n"
 VALUES = [

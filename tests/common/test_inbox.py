@@ -5,8 +5,8 @@ import signal
 import threading
 import time
 
-from common.inbox import Inbox
-from common.transport import Packet
+from common.link.inbox import Inbox
+from common.link.transport import Packet
 
 
 def packet(number: int) -> Packet:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from common.lateness import CALM, MOST, WINDOW, LateTicks, sentence
+from common.host.lateness import CALM, MOST, WINDOW, LateTicks, sentence
 
 
 def told(late: set[int], ticks: int) -> list[tuple[int, int]]:

@@ -7,9 +7,19 @@ import math
 import numpy as np
 import pytest
 
-from common.limits import PATIENCE, TRAVEL, Change, Frozen, Guard, Lasting, Standstill, Violation, violated
-from common.plan import Plan
-from common.tables import Limits
+from common.plan.limits import (
+    PATIENCE,
+    TRAVEL,
+    Change,
+    Frozen,
+    Guard,
+    Lasting,
+    Standstill,
+    Violation,
+    violated,
+)
+from common.plan.plan import Plan
+from common.plan.tables import Limits
 from tests.helpers import with_table
 
 INTERVAL = 0.002

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from common import machine
+from common.host import machine
 
 STAT = """cpu  100 10 50 800 5 3 7 40 0 0
 cpu0 50 5 25 400 3 2 3 10 0 0

@@ -5,7 +5,7 @@ import math
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.mailbox import Mailbox, PerfectLink
+from common.link.mailbox import Mailbox, PerfectLink
 
 DT = 0.002
 

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common import outlet
-from common.messages import Resend, Samples
-from common.outlet import BURST, PATIENCES, PIECE, Inlet, Outlet, kept_items
-from common.plan import Plan
+from common.lab import outlet
+from common.lab.outlet import BURST, PATIENCES, PIECE, Inlet, Outlet, kept_items
+from common.plan.plan import Plan
+from common.protocol.messages import Resend, Samples
 from tests.helpers import with_table
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from common import outputs
 from common.errors import InputError
+from common.terminal import outputs
 
 
 def test_a_file_takes_its_name_when_it_is_whole(tmp_path: Path) -> None:

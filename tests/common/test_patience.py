@@ -7,13 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from common import cli, lacking, patience, reality
-from common import plan as plans
-from common.bare_loop import BareLoop
 from common.errors import PlanError
-from common.plan import Plan, from_tables, parse
-from common.realtime import NOTHING
+from common.host.bare_loop import BareLoop
+from common.host.realtime import NOTHING
+from common.lab import lacking
+from common.plan import patience, reality
+from common.plan import plan as plans
+from common.plan.plan import Plan, from_tables, parse
 from common.safety.longest import resting
+from common.terminal import cli
 
 RIGS = {
     "the master's": '[master.rig]\nclass = "lab.py:Lab"\n',

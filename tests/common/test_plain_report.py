@@ -7,11 +7,12 @@ from typing import Any
 
 import pytest
 
-from common import cli, process
 from common.errors import LostError
-from common.plain_report import PlainReport
+from common.host.waited import SAY_NS, Waited
+from common.lab import process
 from common.recording.outcome import outcome
-from common.waited import SAY_NS, Waited
+from common.terminal import cli
+from common.terminal.plain_report import PlainReport
 
 
 def test_progress_is_a_line_now_and_then_without_numbers_that_are_none(capsys: Any) -> None:

@@ -7,10 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common import cli, plan, reality
 from common.errors import PlanError
-from common.patience import strict
-from common.plan import Plan, from_tables, parse
+from common.plan import plan, reality
+from common.plan.patience import strict
+from common.plan.plan import Plan, from_tables, parse
+from common.terminal import cli
 
 
 def test_the_shipped_default_plan_is_what_a_plan_is_by_default(default_plan: Plan) -> None:

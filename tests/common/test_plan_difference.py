@@ -10,11 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
 
-from common import cli, codec
-from common import plan as plans
-from common import plan_difference as difference
-from common.messages import Recorder, Register
-from common.plan import PROTOCOL_VERSION, Plan, parse
+from common.plan import plan as plans
+from common.plan import plan_difference as difference
+from common.plan.plan import PROTOCOL_VERSION, Plan, parse
+from common.protocol import codec
+from common.protocol.messages import Recorder, Register
+from common.terminal import cli
 
 ONE = parse("[test]\nduration = 5.0\n", Path())
 OTHER = parse(
@@ -39,7 +40,7 @@ def test_the_keys_that_differ_are_named_with_both_values() -> None:
 
 def test_another_version_of_the_package_is_named_first(monkeypatch: Any) -> None:
     heard = difference.said(OTHER)
-    monkeypatch.setattr("common.plan_difference.metadata.version", lambda _name: "9.9")
+    monkeypatch.setattr("common.plan.plan_difference.metadata.version", lambda _name: "9.9")
     assert difference.differences(ONE, heard, "slave", "master").startswith("in rths (master ")
 
 

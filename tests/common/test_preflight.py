@@ -9,14 +9,15 @@ from typing import Any
 
 import pytest
 
-from common import cli, preflight
-from common.clock import VirtualClock
 from common.errors import InputError, RigError
-from common.laboratory import Laboratory, Setting
-from common.memory_link import MemoryHub
-from common.plan import Plan
-from common.preflight import Check, Gate, RefusedError, Risk, SensorsAtRest, link_risk, sensor_risk
+from common.host.clock import VirtualClock
+from common.lab import preflight
+from common.lab.laboratory import Laboratory, Setting
+from common.lab.preflight import Check, Gate, RefusedError, Risk, SensorsAtRest, link_risk, sensor_risk
+from common.link.memory_link import MemoryHub
+from common.plan.plan import Plan
 from common.rig import ColumnMeasurement, GuardedRig
+from common.terminal import cli
 from tests.helpers import with_table
 
 PEAKS, LINK = Risk("peaks", "too high, so lower it"), Risk("link", "too slow, so hurry")

@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from common import realtime
 from common.errors import InputError
+from common.host import realtime
 from tests.helpers import ROOT
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="real-time scheduling is made for Linux here")
@@ -27,8 +27,9 @@ resource.setrlimit(resource.RLIMIT_RTPRIO, (0, 0))
 def child(text: str) -> subprocess.CompletedProcess[str]:
     lines = f"""
 import gc, json, os, resource, sys, threading
-from common import cli, realtime
-from common.machine import scheduler_name
+from common.terminal import cli
+from common.host import realtime
+from common.host.machine import scheduler_name
 def say(**values): print(json.dumps(values))
 {text}
 """
@@ -270,7 +271,7 @@ def test_one_processor_of_each_core_comes_first_and_processor_0_last(monkeypatch
 def test_a_process_that_has_done_its_work_keeps_its_exit_code_under_late_signals() -> None:
     late = child("""
 import signal
-from common.stopping import Stopper
+from common.host.stopping import Stopper
 class Late:
     def __del__(self): os.kill(os.getpid(), signal.SIGTERM)
 stopping = Stopper()

@@ -25,7 +25,7 @@ from common.recording.recovery import recover
 from common.recording.salvage import HEAD
 from common.recording.writer import REPEAT_BYTES, Recording
 from common.signals import TICK_TOPICS, TOPICS, Kind
-from rths.recover import write_account
+from rths.examine.recover import write_account
 
 TICKS = 600
 RAMPS = ("master_ramp", "slave_ramp")

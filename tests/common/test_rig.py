@@ -7,13 +7,13 @@ from typing import Any
 
 import pytest
 
-from common import tables
 from common.errors import InputError, RigError
-from common.limits import Guard
-from common.links import link_model
-from common.plan import Plan
-from common.plugins import construct, find
-from common.reality import as_planned
+from common.link.links import link_model
+from common.plan import tables
+from common.plan.limits import Guard
+from common.plan.plan import Plan
+from common.plan.plugins import construct, find
+from common.plan.reality import as_planned
 from common.rig import METHODS, ColumnCommand, ColumnMeasurement, GuardedRig
 
 

@@ -5,12 +5,12 @@ from typing import Any
 
 import pytest
 
-from common.clock import VirtualClock
 from common.errors import LostError
-from common.laboratory import SLOW_RIG, Laboratory, Setting
-from common.memory_link import MemoryHub
-from common.messages import Trip
-from common.plan import Plan
+from common.host.clock import VirtualClock
+from common.lab.laboratory import SLOW_RIG, Laboratory, Setting
+from common.link.memory_link import MemoryHub
+from common.plan.plan import Plan
+from common.protocol.messages import Trip
 from common.rig import GuardedRig, TableCommand, TableMeasurement
 from common.safety.modes import Turn
 

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from common import running
 from common.errors import InputError
-from common.plan import Plan
+from common.host import running
+from common.plan.plan import Plan
 
 PLAN = Plan()
 

@@ -14,14 +14,15 @@ import pytest
 from cryptography import x509
 from cryptography.x509.oid import ExtendedKeyUsageOID
 
-from common import plan, security
-from common.access import access_control
-from common.address import dialled, loopback, place, secured
 from common.errors import InputError
-from common.plan import Plan
-from common.process import join
-from common.transport import heard, said
-from common.zenoh_link import key
+from common.lab.process import join
+from common.link import security
+from common.link.access import access_control
+from common.link.address import dialled, loopback, place, secured
+from common.link.transport import heard, said
+from common.link.zenoh_link import key
+from common.plan import plan
+from common.plan.plan import Plan
 from rths.__main__ import main
 from tests.certificates import DAY, NOW, ROLES, again, made
 
@@ -215,7 +216,7 @@ def test_an_endpoint_on_loopback_is_known_as_such() -> None:
 def test_an_open_link_that_others_reach_is_warned_of(
     endpoint: str, warned: bool, default_plan: Plan, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("common.zenoh_link.ZenohLink", lambda *args, **_: args)
+    monkeypatch.setattr("common.link.zenoh_link.ZenohLink", lambda *args, **_: args)
     told: list[Any] = []
     join(default_plan, "master", str, lambda *words: told.append(words), listen=endpoint)
     assert [data["code"] for _, data in told if "code" in data] == ["open_link"] * warned

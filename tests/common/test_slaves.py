@@ -11,15 +11,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common import cli, plan, reality, roles, signals, transport
+from common import roles, signals
 from common.errors import InputError, PlanError
-from common.links import seed_of
-from common.outlet import next_of, pack_nexts
-from common.plan import MOST_SLAVES, Plan, from_tables, parse
+from common.lab.outlet import next_of, pack_nexts
+from common.link import transport
+from common.link.links import seed_of
+from common.link.transport import Route, heard, said
+from common.plan import plan, reality
+from common.plan.plan import MOST_SLAVES, Plan, from_tables, parse
 from common.recording.reader import read
 from common.recording.writer import Recording
 from common.signals import topics
-from common.transport import Route, heard, said
+from common.terminal import cli
 
 TWO = "[slave.roof.damper]\nmass = 20.0\n[slave.cellar.control]\ngain = 1.0\n"
 

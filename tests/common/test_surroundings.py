@@ -5,13 +5,13 @@ from pathlib import Path
 
 import pytest
 
-from common.bare_loop import BareLoop
-from common.clock import VirtualClock
-from common.laboratory import Laboratory, Setting
-from common.memory_link import MemoryHub
-from common.plan import Plan, parse
-from common.realtime import NOTHING, Granted
-from common.surroundings import Surroundings, described
+from common.host.bare_loop import BareLoop
+from common.host.clock import VirtualClock
+from common.host.realtime import NOTHING, Granted
+from common.lab.laboratory import Laboratory, Setting
+from common.lab.surroundings import Surroundings, described
+from common.link.memory_link import MemoryHub
+from common.plan.plan import Plan, parse
 
 
 def laboratory(plan: Plan | None = None) -> Laboratory:

@@ -3,7 +3,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.tally import Tally
+from common.protocol.tally import Tally
 
 TICKS, WINDOW = 200, 50
 

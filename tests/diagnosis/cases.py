@@ -8,16 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from common import cli, plan, reality
 from common.errors import InterlockError, RthsError
-from common.plan import Plan
+from common.plan import plan, reality
+from common.plan.plan import Plan
 from common.recording.reader import read
+from common.terminal import cli
 from diagnosis import record
 from diagnosis.record import Record
 from models.effects import CATALOGUE
 from models.registry import Array
-from rths import virtual
-from rths.diagnose import diagnose_file
+from rths.examine.diagnose import diagnose_file
+from simulation import virtual
 
 SECONDS = 10.0
 JITTERED = (  # nominal parameters that no laboratory meets exactly

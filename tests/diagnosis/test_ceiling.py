@@ -9,7 +9,7 @@ import pytest
 from scipy import signal
 
 from common.errors import InputError
-from diagnosis.fitting import withheld_ticks
+from diagnosis.fits.fitting import withheld_ticks
 from diagnosis.record import Mask
 from diagnosis.signals.ceiling import ceiling, depends_on
 from diagnosis.signals.features import plays

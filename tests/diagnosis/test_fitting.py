@@ -12,10 +12,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.plan import Plan
+from common.plan.plan import Plan
 from common.recording.reader import read
-from diagnosis import fitting, record
-from diagnosis.fitting import Data, Fit
+from diagnosis import record
+from diagnosis.fits import fitting
+from diagnosis.fits.fitting import Data, Fit
 from diagnosis.parts import MODEL_ERROR, Building, LaboratoryA, LaboratoryB, Part
 from models.effects import CATALOGUE
 from models.registry import Array

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from common.recording.reader import read
-from diagnosis import how_far, record
+from diagnosis import record
 from diagnosis.diagnose import examine
+from diagnosis.findings import how_far
 from diagnosis.loop import closed_share, overall
-from rths.diagnose import diagnose_file
+from rths.examine.diagnose import diagnose_file
 from tests.diagnosis.cases import Cases, Effects
 
 FOUND: dict[str, Effects] = {

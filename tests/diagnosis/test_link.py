@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common import reality
-from common.mailbox import LinkModel
-from common.plan import Plan
+from common.link.mailbox import LinkModel
+from common.plan import reality
+from common.plan.plan import Plan
+from common.plan.tables import Rig
 from common.recording.reader import Run, read
-from common.tables import Rig
 from diagnosis.link import Finding, account, exchange_of, findings
-from models.closed_loop import on_time
 from models.link.exchange import exchange
 from models.link.impaired import ImpairedLink
-from rths import virtual
+from models.loop.closed_loop import on_time
+from simulation import virtual
 
 DT = 0.002
 TICKS = 15_000

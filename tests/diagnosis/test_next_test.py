@@ -7,9 +7,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from diagnosis import fitting, next_test
-from diagnosis.fitting import Data, Values
-from diagnosis.next_test import Choice
+from diagnosis.findings import next_test
+from diagnosis.findings.next_test import Choice
+from diagnosis.fits import fitting
+from diagnosis.fits.fitting import Data, Values
 from diagnosis.parts import LaboratoryA
 from models.effects import CATALOGUE, checked
 from tests.diagnosis.cases import Cases

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from common.recording.reader import read
-from diagnosis import fitting, readings, record
+from diagnosis import readings, record
+from diagnosis.fits import fitting
 from diagnosis.parts import LaboratoryA, LaboratoryB
 from diagnosis.readings import Reading
 from diagnosis.record import Record

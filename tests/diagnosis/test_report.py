@@ -12,9 +12,9 @@ from typing import Any
 
 import pytest
 
-from rths.diagnose import diagnose_file
-from rths.diagnosis_report import page
-from rths.diagnosis_report.schema import schema
+from report.gap import page
+from report.gap.schema import schema
+from rths.examine.diagnose import diagnose_file
 from tests.diagnosis.cases import Cases, Effects
 
 KINDS: dict[str, Effects] = {

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis import fitting, search
+from diagnosis.fits import fitting, search
+from diagnosis.fits.scales import Scales
+from diagnosis.fits.search import Searcher
 from diagnosis.parts import LaboratoryA
-from diagnosis.scales import Scales
-from diagnosis.search import Searcher
 from tests.diagnosis.cases import Cases, Effects, counts_as, estimate, named, white
 
 ALONE: list[tuple[str, dict[str, float], dict[str, float]]] = [  # effect, truth, relative error allowed

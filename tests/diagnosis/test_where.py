@@ -10,11 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from diagnosis import fitting, where
-from diagnosis.fitting import Data
+from diagnosis.findings import where
+from diagnosis.findings.where import Trace
+from diagnosis.fits import fitting
+from diagnosis.fits.fitting import Data
 from diagnosis.parts import Building, LaboratoryA, LaboratoryB, Part
 from diagnosis.record import Record
-from diagnosis.where import Trace
 from models.effects import CATALOGUE, checked, lay
 from models.registry import Array
 from tests.diagnosis.cases import Cases, white

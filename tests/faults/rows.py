@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from common.plan import Plan
+from common.plan.plan import Plan
 from common.recording.reader import Run
 from common.roles import MASTER, kind_of
 

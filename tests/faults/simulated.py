@@ -11,21 +11,21 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from common import codec
-from common import plan as plans
-from common.messages import Message
-from common.plan import Plan
-from common.reality import Reality, as_planned
+from common.link.transport import TICK
+from common.plan import plan as plans
+from common.plan.plan import Plan
+from common.plan.reality import Reality, as_planned
+from common.protocol import codec
+from common.protocol.messages import Message
 from common.recording.reader import Run, read
 from common.roles import MASTER, SLAVE
-from common.transport import TICK
-from rths.faults.apply import plan_of
-from rths.faults.invariants import judge, last_valid, seen
-from rths.faults.lab import SESSION, Simulation, Surrounding
-from rths.faults.rigs import COMPUTED
-from rths.faults.schedule import Schedule
-from rths.faults.wire import DROPS, INSIDER, Conditions, Direction, Letter
 from tests.faults.rows import motion_after, motion_bound
+from validation.faults.apply import plan_of
+from validation.faults.invariants import judge, last_valid, seen
+from validation.faults.lab import SESSION, Simulation, Surrounding
+from validation.faults.rigs import COMPUTED
+from validation.faults.schedule import Schedule
+from validation.faults.wire import DROPS, INSIDER, Conditions, Direction, Letter
 
 AT = 860  # the tick of a fault: the building moves, and so do all commands
 DURATION = 2.4  # s of a test

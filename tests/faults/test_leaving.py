@@ -11,8 +11,8 @@ import pytest
 from common.recording.reader import read
 from common.roles import MASTER, RECORDER, SLAVE
 from common.safety.modes import Mode
-from rths.faults.rigs import Probe, Wrong
 from tests.faults.simulated import LOST, Scene
+from validation.faults.rigs import Probe, Wrong
 
 AT = 250  # the tick of a trip
 DURATION = 0.6  # s

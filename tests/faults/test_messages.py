@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from common.roles import MASTER, SLAVE
-from rths.faults.wire import Conditions
 from tests.faults.rows import Row, passed
 from tests.faults.simulated import AT, LOST, Course, Scene, longest_silence, same_commands
+from validation.faults.wire import Conditions
 
 
 def kept(course: Course, first: int, count: int) -> float:

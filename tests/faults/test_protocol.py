@@ -7,19 +7,19 @@ from typing import Any
 
 import pytest
 
-from common import messages
-from common.codec import MESSAGES
-from common.endpoint import CHANNELS, SPOKEN
-from common.exchange import State
-from common.messages import Message
-from common.plan import PROTOCOL_VERSION
+from common.link.endpoint import CHANNELS, SPOKEN
+from common.link.transport import CONTROL
+from common.plan.plan import PROTOCOL_VERSION
+from common.protocol import messages
+from common.protocol.codec import MESSAGES
+from common.protocol.exchange import State
+from common.protocol.messages import Message
 from common.roles import MASTER, RECORDER, SLAVE
-from common.transport import CONTROL
-from rths.faults.hostile import blank
 from tests.faults.rows import Row, passed
 from tests.faults.simulated import AT, LOST, Course, Scene, same_commands
 from tests.rths.faults import test_protocol as machines
 from tests.rths.faults.test_protocol import INSTANCE, PLAN, SESSION, MasterMachine, SlaveMachine
+from validation.faults.hostile import blank
 
 
 @pytest.mark.parametrize(
@@ -101,8 +101,8 @@ def test_f35_start_twice_stop_lost_stop_too_early(tmp_path: Path, undisturbed: C
 
 def letter_of(scene: Scene, message: Message) -> Any:
     """A control message of an old session as a frame."""
-    from common import codec
-    from rths.faults.wire import Letter
+    from common.protocol import codec
+    from validation.faults.wire import Letter
 
     key = codec.session_key(message.session, scene.plan.digest())
     return Letter(codec.encode(message, key), type(message).__name__, -1, 0, "injected", intact=False)

@@ -12,18 +12,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common import codec
-from common.messages import Command, Feedback, Message
+from common.link.transport import CONTROL, TICK
+from common.plan.tables import Test
+from common.protocol import codec
+from common.protocol.messages import Command, Feedback, Message
 from common.roles import MASTER, SLAVE
-from common.tables import Test
-from common.transport import CONTROL, TICK
-from rths.faults import hostile, lab
-from rths.faults.lab import SESSION, Surrounding
-from rths.faults.wire import INSIDER, Letter
-from rths.faults.world import Drift
 from tests.common.test_hostile import CONTENTS
 from tests.faults.rows import Row, passed
 from tests.faults.simulated import AT, Course, Scene, same_commands, signed
+from validation.faults import hostile, lab
+from validation.faults.lab import SESSION, Surrounding
+from validation.faults.wire import INSIDER, Letter
+from validation.faults.world import Drift
 
 
 def from_(tick: int, **fields: float) -> Callable[[Any], Message | None]:

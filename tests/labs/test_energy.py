@@ -10,16 +10,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common import cli, plan, reality
-from common.plan import Plan
+from common.plan import plan, reality
+from common.plan.plan import Plan
 from common.recording.reader import Run, read
 from common.rig import ColumnMeasurement
+from common.terminal import cli
 from master.energy import EnergyMonitor, floor
 from master.step import Outputs
 from models import indicators
 from models.energy_balance import ERROR
 from models.structures.partition import matrices
-from rths import virtual
+from simulation import virtual
 from tests.helpers import largest, with_table
 
 KINDS = ("newmark_explicit", "central_difference", "cr", "kr_alpha")

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from common import reality
-from common.endpoint import Received
-from common.exchange import State
-from common.messages import Arm, Register
-from common.plan import PROTOCOL_VERSION, Plan
-from rths import virtual
+from common.link.endpoint import Received
+from common.plan import reality
+from common.plan.plan import PROTOCOL_VERSION, Plan
+from common.protocol.exchange import State
+from common.protocol.messages import Arm, Register
+from simulation import virtual
 
 
 @pytest.mark.parametrize("state", [State.ARMED, State.SCHEDULED, State.RUNNING, State.STOPPING])

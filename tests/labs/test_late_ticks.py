@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common import patience, reality
-from common.plan import Plan, parse
+from common.plan import patience, reality
+from common.plan.plan import Plan, parse
 from common.recording.reader import Run, read
 from common.roles import MASTER, SLAVE
-from rths.faults.lab import Simulation, Surrounding
-from rths.summary import summarize
+from report.facts.summary import summarize
+from validation.faults.lab import Simulation, Surrounding
 
 EMULATED = parse("[test]\nduration = 2.6\n", Path())
 PAUSE = 0.05  # s

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from common import signals
-from common.clock import VirtualClock
-from common.clock_offset import ClockOffset
-from common.laboratory import Laboratory, Setting
-from common.memory_link import MemoryHub
-from common.messages import Feedback, Recorder
-from common.plan import Plan
+from common.host.clock import VirtualClock
+from common.host.clock_offset import ClockOffset
+from common.lab.laboratory import Laboratory, Setting
+from common.link.memory_link import MemoryHub
+from common.plan.plan import Plan
+from common.protocol.messages import Feedback, Recorder
 from master.latency import Account
 from master.partner import NO_FEEDBACK, OFFSET_BLOCK, OFFSET_BLOCKS
 

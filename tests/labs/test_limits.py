@@ -11,17 +11,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common import cli, plan, reality
 from common.errors import InterlockError
-from common.limits import PATIENCE
-from common.plan import Plan, from_tables, ideal
-from common.reality import Reality, from_reality
+from common.plan import plan, reality
+from common.plan.limits import PATIENCE
+from common.plan.plan import Plan, from_tables, ideal
+from common.plan.reality import Reality, from_reality
+from common.plan.tables import Limits
 from common.recording.reader import Run, read
-from common.tables import Limits
-from models import integrators, substructure
-from models.closed_loop import signals, simulate
-from rths import virtual
-from rths.virtual import Bench
+from common.terminal import cli
+from models import integrators
+from models.loop import substructure
+from models.loop.closed_loop import signals, simulate
+from simulation import virtual
+from simulation.virtual import Bench
 from tests.helpers import largest, with_table, without_recorder
 
 NO_LIMITS = dict.fromkeys(("error_energy", "numerical_drift", "column_error"), math.inf)

@@ -9,25 +9,25 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common import reality
-from common.clock import VirtualClock
-from common.endpoint import Received
 from common.errors import InputError, InterlockError, LostError, RigError, RthsError
-from common.exchange import State
-from common.laboratory import REPEAT_NS
-from common.memory_link import MemoryEndpoint
-from common.messages import Command, Feedback, Register, Stop, SyncReply, Trip
-from common.plan import PROTOCOL_VERSION, Plan, from_tables
-from common.reality import Reality
+from common.host.clock import VirtualClock
+from common.lab.laboratory import REPEAT_NS
+from common.link.endpoint import Received
+from common.link.memory_link import MemoryEndpoint
+from common.plan import reality
+from common.plan.plan import PROTOCOL_VERSION, Plan, from_tables
+from common.plan.reality import Reality
+from common.plan.tables import Rig
+from common.protocol.exchange import State
+from common.protocol.messages import Command, Feedback, Register, Stop, SyncReply, Trip
 from common.recording.reader import Run, read
 from common.safety.modes import Mode
 from common.signals import TOPICS
-from common.tables import Rig
-from models import substructure
-from models.closed_loop import rows, signals, simulate
-from rths import virtual
-from rths.replay import replay_master, replay_slave
-from rths.virtual import Bench
+from models.loop import substructure
+from models.loop.closed_loop import rows, signals, simulate
+from rths.examine.replay import replay_master, replay_slave
+from simulation import virtual
+from simulation.virtual import Bench
 from tests.helpers import with_table, without_recorder
 
 
@@ -410,7 +410,7 @@ class SlowLink:
 
 
 def test_a_link_plug_in_delays_and_loses_messages(short_plan: Plan, tmp_path: Path, monkeypatch: Any) -> None:
-    monkeypatch.setattr("common.links.find", lambda *_: SlowLink)
+    monkeypatch.setattr("common.link.links.find", lambda *_: SlowLink)
     real = dataclasses.replace(reality.as_planned(short_plan), link=Rig("x:SlowLink"))
     found, error, _ = run(short_plan, tmp_path / "slow.mcap", real)
     assert error is None
@@ -469,7 +469,7 @@ class OneWay:
 def test_a_plug_ins_delay_is_in_the_stamps_and_not_in_the_clocks_offset(
     short_plan: Plan, tmp_path: Path, monkeypatch: Any
 ) -> None:
-    monkeypatch.setattr("common.links.find", lambda *_: OneWay)
+    monkeypatch.setattr("common.link.links.find", lambda *_: OneWay)
     real = dataclasses.replace(reality.as_planned(short_plan), link=Rig("x:OneWay"))
     path = tmp_path / "one_way.mcap"
     bench = virtual.assemble(short_plan, real, path)

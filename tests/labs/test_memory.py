@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from common import reality
-from common.outlet import kept_seconds
-from common.plan import Plan
+from common.lab.outlet import kept_seconds
+from common.plan import reality
+from common.plan.plan import Plan
 from models.labs.noise import BLOCK
-from rths import virtual
+from simulation import virtual
 from tests.helpers import with_table
 
 # ticks: noise is drawn in blocks, of which as much is left then; before 2^32 ns a packed stamp is shorter than after

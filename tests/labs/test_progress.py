@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from common import plan, reality
-from common.plan import Plan
+from common.plan import plan, reality
+from common.plan.plan import Plan
 from common.recording.reader import read
-from rths import virtual
+from simulation import virtual
 from tests.helpers import ROOT
 
 

@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common import reality
-from common.endpoint import Received
 from common.errors import EmergencyStopError, RigError
-from common.messages import Answer, Operator
-from common.plan import Plan
+from common.link.endpoint import Received
+from common.plan import reality
+from common.plan.plan import Plan
+from common.protocol.messages import Answer, Operator
 from common.recording.reader import Run, read
 from common.safety.modes import Mode
-from rths import virtual
-from rths.accounts import accounts
-from rths.virtual import Bench
+from report.facts.accounts import accounts
+from simulation import virtual
+from simulation.virtual import Bench
 from tests.faults.rows import motion_after, motion_bound
 from tests.helpers import with_table, without_recorder
 

@@ -9,22 +9,23 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common import cli, plan, reality
-from common.endpoint import Received
 from common.errors import InputError, InterlockError, LostError, RigError
-from common.exchange import State
-from common.laboratory import Setting
-from common.messages import Arm, Feedback, Recorder, Register, Start, Sync, Waiting
-from common.patience import strict
-from common.plan import PROTOCOL_VERSION, Plan, from_tables
-from common.reality import Reality
+from common.lab.laboratory import Setting
+from common.link.endpoint import Received
+from common.plan import plan, reality
+from common.plan.patience import strict
+from common.plan.plan import PROTOCOL_VERSION, Plan, from_tables
+from common.plan.reality import Reality
+from common.plan.tables import Rig
+from common.protocol.exchange import State
+from common.protocol.messages import Arm, Feedback, Recorder, Register, Start, Sync, Waiting
 from common.recording.reader import Run, read
-from common.tables import Rig
-from models import substructure
-from models.closed_loop import signals, simulate
-from rths import virtual
-from rths.replay import replay_master, replay_slave
-from rths.virtual import Bench
+from common.terminal import cli
+from models.loop import substructure
+from models.loop.closed_loop import signals, simulate
+from rths.examine.replay import replay_master, replay_slave
+from simulation import virtual
+from simulation.virtual import Bench
 from slave.assembly import build_loop as build_slave
 from tests.helpers import largest, without_recorder
 
@@ -143,7 +144,7 @@ class LateRoof:
 
 
 def test_late_messages_of_one_slave_affect_that_one_alone(tmp_path: Path, monkeypatch: Any) -> None:
-    monkeypatch.setattr("common.links.find", lambda *_: LateRoof)
+    monkeypatch.setattr("common.link.links.find", lambda *_: LateRoof)
     real = dataclasses.replace(reality.as_planned(TWO), link=Rig("x:LateRoof"))
     found, error, _ = run(TWO, tmp_path / "late.mcap", real)
     assert error is None

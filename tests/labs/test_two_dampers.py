@@ -9,9 +9,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import StateSpace, lsim
 
-from common.plan import Plan, from_tables, ideal
-from models import substructure
-from rths import virtual
+from common.plan.plan import Plan, from_tables, ideal
+from models.loop import substructure
+from simulation import virtual
 
 Array = NDArray[np.float64]
 

@@ -8,11 +8,11 @@ import math
 import numpy as np
 import pytest
 
-from common.plan import Plan, from_tables, ideal
+from common.plan.plan import Plan, from_tables, ideal
+from common.plan.tables import Actuator, Compensator, Control
 from common.signals import TOPICS
-from common.tables import Actuator, Compensator, Control
-from models import substructure
-from models.closed_loop import Exchange, on_time, rows, signals, simulate
+from models.loop import substructure
+from models.loop.closed_loop import Exchange, on_time, rows, signals, simulate
 from models.structures import shear_building
 from tests.helpers import largest, with_table
 

@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common import plan as plans
 from common.errors import InputError
-from common.plan import Plan, ideal, parse
-from common.tables import Compensator
-from models import closed_loop, column_loop, effects, substructure
-from models.column_loop import ColumnRollout
+from common.plan import plan as plans
+from common.plan.plan import Plan, ideal, parse
+from common.plan.tables import Compensator
+from models import effects
+from models.loop import closed_loop, column_loop, substructure
+from models.loop.column_loop import ColumnRollout
 from models.registry import Array
 from models.structures import partition, shear_building
 from models.structures.response import response

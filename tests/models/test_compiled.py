@@ -28,7 +28,7 @@ def kernels() -> dict[str, Callable[..., object]]:
 
 def test_no_kernel_returns_an_array() -> None:
     returned = {name: kernel.__annotations__["return"] for name, kernel in kernels().items()}
-    assert "models.closed_loop.roll" in returned
+    assert "models.loop.closed_loop.roll" in returned
     allowed = {"None", "int", "float", "bool"}
     for name, words in returned.items():
         inner = words.removeprefix("tuple[").removesuffix("]")

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from common import cli
-from common import plan as plans
-from common.tables import ForceCorrection
+from common.plan import plan as plans
+from common.plan.tables import ForceCorrection
+from common.terminal import cli
 from models import force_correction
-from rths.reproduction.experiments import free_damping, without_amd
+from validation.paper.experiments import free_damping, without_amd
 
 DT = 0.002
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from common import cli
-from common import plan as plans
-from common.plan import Plan
-from models import free_motion
+from common.plan import plan as plans
+from common.plan.plan import Plan
+from common.terminal import cli
 from models.indicators.growth import grows
-from rths.reproduction.experiments import delayed
+from models.loop import free_motion
 from tests.helpers import with_table
+from validation.paper.experiments import delayed
 
 
 @pytest.mark.parametrize(("delay", "unstable"), [(0.0324, False), (0.0334, True), (0.1, True)])

@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from common import cli
-from common import plan as plans
-from common.plan import Plan
-from common.tables import Compensator, Control
-from models import limited, preflight, several_slaves, substructure
-from models.closed_loop import signals, simulate
-from models.preflight import expected_delay, partition_check, peaks, peaks_check
+from common.plan import plan as plans
+from common.plan.plan import Plan
+from common.plan.tables import Compensator, Control
+from common.terminal import cli
+from models.loop import limited, preflight, several_slaves, substructure
+from models.loop.closed_loop import signals, simulate
+from models.loop.preflight import expected_delay, partition_check, peaks, peaks_check
 from models.registry import Array
 from models.structures.partition import assess, critical_delay_of
-from rths import virtual
+from simulation import virtual
 from tests.helpers import with_table
 
 

@@ -9,18 +9,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common import reality
 from common.errors import InputError, RthsError
-from common.plan import Plan, from_tables
-from common.reality import Reality
+from common.plan import reality
+from common.plan.plan import Plan, from_tables
+from common.plan.reality import Reality
 from common.recording.reader import Run, read
 from common.signals import TOPICS
-from models import substructure
-from models.closed_loop import rows, simulate
 from models.effects import CATALOGUE, lay
-from models.realised import laboratory, true_system
+from models.loop import substructure
+from models.loop.closed_loop import rows, simulate
+from models.loop.realised import laboratory, true_system
 from models.system import System
-from rths import virtual
+from simulation import virtual
 from tests.models.effects.distinct import DISTINCT
 
 

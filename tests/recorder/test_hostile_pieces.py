@@ -9,14 +9,15 @@ import msgpack
 import pytest
 from hypothesis import given
 
-from common import outlet, reality
-from common.memory_link import MemoryEndpoint
-from common.messages import Finished, Message, Samples
-from common.outlet import PIECE, Inlet
-from common.plan import Plan
+from common.lab import outlet
+from common.lab.outlet import PIECE, Inlet
+from common.link.memory_link import MemoryEndpoint
+from common.plan import reality
+from common.plan.plan import Plan
+from common.protocol.messages import Finished, Message, Samples
 from common.recording.reader import read
 from recorder.items import Items
-from rths import virtual
+from simulation import virtual
 from tests.common.test_hostile import STRUCTURES
 from tests.common.test_slaves import two
 

@@ -10,18 +10,18 @@ from typing import Any
 
 import pytest
 
-from common import reality
-from common.clock import MonotonicClock, VirtualClock
 from common.errors import IncompleteError, InputError, InterlockError, LostError
-from common.memory_link import MemoryEndpoint
-from common.messages import Samples
-from common.plan import Plan
+from common.host.clock import MonotonicClock, VirtualClock
+from common.link.memory_link import MemoryEndpoint
+from common.plan import reality
+from common.plan.plan import Plan
+from common.protocol.messages import Samples
 from common.recording.reader import read
 from common.recording.writer import Recording
 from common.signals import TOPICS
 from recorder.files import reserved
 from recorder.sink import FileSink, ThreadedSink
-from rths import virtual
+from simulation import virtual
 from tests.helpers import with_table
 
 ITEM = ["slave", 0, 0, 0, 0.0, -1, *[0.0] * 10]

@@ -13,11 +13,11 @@ import zstandard
 from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
 
-from common import plan as plans
-from common import reality
-from common.plan import Plan
-from common.zenoh_link import listenable
-from rths import virtual
+from common.link.zenoh_link import listenable
+from common.plan import plan as plans
+from common.plan import reality
+from common.plan.plan import Plan
+from simulation import virtual
 from tests.helpers import PATIENT, ROOT
 from tests.processes import environment, tied
 

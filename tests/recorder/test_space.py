@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
-from common.plan import Plan
-from common.preflight import RefusedError
+from common.lab.preflight import RefusedError
+from common.plan.plan import Plan
 from common.recording.reader import read
 from common.recording.schema import message_class, message_name, schema_file
 from common.signals import TICK_TOPICS, TOPICS, Kind
 from recorder import space
-from rths.run import run
+from rths.perform.run import run
 from tests.helpers import with_table
 
 Usage = namedtuple("Usage", "total used free")

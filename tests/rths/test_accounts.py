@@ -8,11 +8,11 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from common import signals
+from common.protocol.tally import AHEAD, REPEATED, Tally
 from common.recording.reader import read
 from common.recording.writer import Recording
-from common.tally import AHEAD, REPEATED, Tally
-from rths.accounts import account, accounts
-from rths.formats import apart
+from report.facts.accounts import account, accounts
+from report.text.formats import apart
 
 TICKS, WINDOW = 60, 20
 NUMBERS = st.integers(0, 10_000)

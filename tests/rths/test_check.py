@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
-from common import cli
-from common import plan as plans
-from models import preflight
-from rths.plan_check import classes
-from rths.run import checks
+from common.plan import plan as plans
+from common.terminal import cli
+from models.loop import preflight
+from report.plan import classes
+from rths.perform.run import checks
 
 SHORT = "[test]\nduration = 4.0\n[control]\namd = false\n"
 

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common.plan import Plan, from_tables
+from common.plan.plan import Plan, from_tables
+from common.plan.tables import Laboratory, Rig
 from common.recording.reader import CLOCK, Run, read
-from common.tables import Laboratory, Rig
-from rths import circumstances, storeys
-from rths.summary import plan_of, summarize
+from report.facts import circumstances, storeys
+from report.facts.summary import plan_of, summarize
 
 
 def without_the_record(path: Path) -> Run:

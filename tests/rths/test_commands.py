@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common.cli import plan_path
-from common.plan import load
+from common.plan.plan import load
 from common.recording.reader import read
+from common.terminal.cli import plan_path
 from rths.__main__ import EXAMPLES, MODULES, VERBS, main, parser_for
 from tests.helpers import ROOT
 

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from common.errors import InputError
-from common.messages import Command, Feedback
+from common.protocol.messages import Command, Feedback
 from rths.checkup import clock, disk, exchange, rivals, verdict
 from tests.helpers import ROOT
 

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common.plan import Plan
+from common.plan.plan import Plan
 from common.recording.reader import Run
 from common.safety.modes import Mode
-from rths.due import due
-from rths.inspect import stopped
-from rths.run_report.verdict import completeness
+from report.facts.due import due
+from report.run.verdict import completeness
+from rths.examine.inspect import stopped
 
 PLAN = Plan().with_test(duration=0.02)  # ten ticks
 

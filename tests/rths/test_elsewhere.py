@@ -18,15 +18,17 @@ import pytest
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
-from common import reality, signals
-from common.plan import from_tables
+from common import signals
+from common.plan import reality
+from common.plan.plan import from_tables
 from common.recording.checksums import CHECKSUMS
 from common.recording.reader import Run, read
 from common.recording.recovery import recover
 from common.recording.writer import Recording
 from common.roles import latency_topic, ramp_topic
 from common.signals import Kind
-from rths import layout, virtual
+from rths.examine import layout
+from simulation import virtual
 from tests.helpers import ROOT
 from tests.processes import finished
 from tests.rths import extremes

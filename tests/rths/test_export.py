@@ -16,7 +16,7 @@ from scipy.io import loadmat
 from common import signals
 from common.recording.reader import Run, read
 from common.recording.writer import Recording
-from rths import export
+from rths.examine import export
 from tests.rths import extremes
 
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rths.diagnose import diagnose_file
-from rths.import_ import add_arguments, run
+from rths.examine.diagnose import diagnose_file
+from rths.examine.import_ import add_arguments, run
 
 Array = NDArray[np.float64]
 MASS, DASHPOT, FRICTION, OFFSET = 95.0, 200.0, 20.0, 3.0

@@ -11,15 +11,16 @@ import pytest
 from mcap.reader import make_reader
 from mcap.writer import Writer
 
-from common import cli, signals
-from common.printable import ACTING, ANYWHERE, all_shown, escaping, shown
+from common import signals
 from common.recording.schema import message_class, schema_file
+from common.terminal import cli
+from common.terminal.printable import ACTING, ANYWHERE, all_shown, escaping, shown
+from report.run import drawing
+from report.text.progress import Progress as Working
+from report.text.terminal import Progress, table
 from rths.__main__ import VERBS
-from rths.processes import TEXT, Said
-from rths.progress import Progress as Working
-from rths.run import tell
-from rths.run_report import drawing
-from rths.terminal import Progress, table
+from rths.perform.processes import TEXT, Said
+from rths.perform.run import tell
 
 READABLE = "µ²λ–Ωé"
 HOSTILE = (
@@ -80,7 +81,7 @@ def test_a_board_keeps_its_own_sequences_and_shows_those_of_others(monkeypatch: 
 
 
 def test_a_link_and_tables_and_progress_are_escaped(capsys: Any, monkeypatch: Any) -> None:
-    monkeypatch.setattr("rths.progress.UNSAID", 0.0)
+    monkeypatch.setattr("report.text.progress.UNSAID", 0.0)
     with escaping():
         cli.text_report("event", {"lab": HOSTILE, "text": HOSTILE})
         cli.text_report("state", {"lab": HOSTILE, "state": HOSTILE})
@@ -175,7 +176,7 @@ def test_a_command_prints_the_text_of_a_recording_as_letters(
     if verb == "diagnose":  # its search takes a minute and prints nothing of the recording
         monkeypatch.setattr("diagnosis.diagnose.diagnose", said_of)
     if verb == "identify":
-        monkeypatch.setattr("rths.identification.identify", identified)
+        monkeypatch.setattr("report.facts.identification.identify", identified)
     call(verb, hostile, *(word.format(tmp=tmp_path, file=hostile) for word in PRINTING[verb]))
     said = capsys.readouterr()
     harmless(said.out)

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from common.recording.reader import Run, read
-from rths import inspect, late
-from rths.run_report import verdict
-from rths.summary import summarize
+from report.facts import late
+from report.facts.summary import summarize
+from report.run import verdict
+from rths.examine import inspect
 
 
 def with_late(path: Path, *spans: tuple[int, int]) -> Run:

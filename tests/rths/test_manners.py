@@ -223,7 +223,9 @@ def test_ctrl_c_is_one_sentence_and_exit_code_3(line: str) -> None:
 
 def test_ctrl_c_within_code_that_is_made_as_it_goes_keeps_its_exit_code(tmp_path: Path) -> None:
     text = "import os, signal, time; os.kill(os.getpid(), signal.SIGINT); time.sleep(60)"
-    program = f"import sys; from common.cli import guarded; sys.exit(guarded(lambda: exec({text!r})))"
+    program = (
+        f"import sys; from common.terminal.cli import guarded; sys.exit(guarded(lambda: exec({text!r})))"
+    )
     (tmp_path / "made.py").write_text(program)
     own = environment(PYTHONPATH=f"{tmp_path}{os.pathsep}{ROOT}")
     done = finished(sys.executable, "-m", "made", seconds=60.0, env=own)

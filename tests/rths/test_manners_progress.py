@@ -6,7 +6,7 @@ import io
 
 import pytest
 
-from rths.progress import Progress
+from report.text.progress import Progress
 
 
 @pytest.fixture(autouse=True)

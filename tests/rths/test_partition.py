@@ -8,16 +8,16 @@ import math
 import numpy as np
 import pytest
 
-from common import cli
-from common import plan as plans
-from common.plan import Plan
-from common.tables import Compensator
-from models import substructure
-from models.closed_loop import signals, simulate
-from models.preflight import partition_text
-from rths.partition import assess, critical_delay_of
-from rths.reproduction.experiments import delayed, pulse
+from common.plan import plan as plans
+from common.plan.plan import Plan
+from common.plan.tables import Compensator
+from common.terminal import cli
+from models.loop import substructure
+from models.loop.closed_loop import signals, simulate
+from models.loop.preflight import partition_text
+from models.structures.partition import assess, critical_delay_of
 from tests.helpers import with_table
+from validation.paper.experiments import delayed, pulse
 
 
 def test_the_default_partition(default_plan: Plan) -> None:

@@ -9,8 +9,9 @@ from typing import Any
 import pytest
 
 from common.roles import SLAVE
-from rths import import_, plot, tabular
-from rths.pictures import PICTURES
+from report.pictures import PICTURES
+from report.text import tabular
+from rths.examine import import_, plot
 from tests.helpers import ROOT
 from tests.rths.pictures.made_up import RECORD, made_up
 from tests.rths.test_commands import rths

@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common import reality
-from common.plan import Plan
-from common.preflight import Gate, RefusedError
+from common.lab.preflight import Gate, RefusedError
+from common.plan import reality
+from common.plan.plan import Plan
+from common.plan.tables import Compensator
 from common.recording.reader import Run, read
-from common.tables import Compensator
-from rths import virtual
 from rths.__main__ import parser_for
-from rths.reproduction import experiments
-from rths.run import start_all
+from rths.perform.run import start_all
+from simulation import virtual
 from tests.helpers import ROOT
+from validation.paper import experiments
 
 UNSTABLE = "[test]\nduration = 1.0\n[compensator]\nkind = 'none'\n[control]\namd = false\n"
 NEAR = "[test]\nduration = 4.0\n[limits]\ndamper_stroke = 0.01\n"
@@ -38,9 +38,9 @@ def noted(run: Run, code: str) -> list[tuple[str, str, str]]:
 def test_a_risk_refuses_before_anything_starts(
     verb: str, text: str, name: str, sentence: str, call: Any, capsys: Any, tmp_path: Path, monkeypatch: Any
 ) -> None:
-    monkeypatch.setattr("common.zenoh_link.ZenohLink", None)  # no link may open
-    monkeypatch.setattr("rths.processes.Processes.start", None)  # and no process start
-    monkeypatch.setattr("rths.run.warm_up", lambda _progress: None)
+    monkeypatch.setattr("common.link.zenoh_link.ZenohLink", None)  # no link may open
+    monkeypatch.setattr("rths.perform.processes.Processes.start", None)  # and no process start
+    monkeypatch.setattr("rths.perform.run.warm_up", lambda _progress: None)
     (tmp_path / "p.toml").write_text(text)
     output = ["-o", tmp_path / "a.mcap"] if verb != "master" else []
     assert call(*verb.split(), tmp_path / "p.toml", *output) == 3

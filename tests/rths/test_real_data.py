@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from common.recording.reader import read
-from rths import import_, tabular
-from rths.diagnose import diagnose_file
+from report.text import tabular
+from rths.examine import import_
+from rths.examine.diagnose import diagnose_file
 from tests.helpers import ROOT
 
 EXAMPLES = ROOT / "examples" / "real_data"

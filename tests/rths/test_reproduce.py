@@ -12,14 +12,14 @@ from typing import Any
 import pytest
 
 from common.recording.reader import read
-from common.telling import untold
+from common.terminal.telling import untold
 from rths.__main__ import main
-from rths.reproduction import experiments, figures
-from rths.reproduction.experiments import Evidence
-from rths.reproduction.figures import FIGURES
-from rths.reproduction.page import page
-from rths.reproduction.rows import apparent_damping, beyond, building, critical_delay, instability, rows
 from tests.rths.report.pages import check_alone, check_in_browser
+from validation.paper import experiments, figures
+from validation.paper.experiments import Evidence
+from validation.paper.figures import FIGURES
+from validation.paper.page import page
+from validation.paper.rows import apparent_damping, beyond, building, critical_delay, instability, rows
 
 
 @pytest.fixture(scope="module")

@@ -14,23 +14,23 @@ from typing import Any
 
 import pytest
 
-from common import reality
-from common.clock import VirtualClock
-from common.drive import longest_leave
 from common.errors import IncompleteError, InputError, InterlockError, LostError, RigError
-from common.exchange import State
-from common.laboratory import Setting
-from common.memory_link import MemoryHub
-from common.plan import Plan
+from common.host.clock import VirtualClock
+from common.lab.drive import longest_leave
+from common.lab.laboratory import Setting
+from common.link.memory_link import MemoryHub
+from common.plan import reality
+from common.plan.plan import Plan
+from common.plan.tables import Rig
+from common.protocol.exchange import State
 from common.safety.longest import resting
 from common.safety.ramp import MotionRamp
-from common.tables import Rig
 from recorder.loop import RecorderLoop
-from rths import virtual
-from rths.ending import KILL_S, LEAVE_S, MARGIN_S, SILENCE_S, WRITE_S, Ending, verdict
-from rths.processes import Leash, Processes, Said, understood
-from rths.run import answer, follow, note
-from rths.terminal import Progress
+from report.text.terminal import Progress
+from rths.perform.ending import KILL_S, LEAVE_S, MARGIN_S, SILENCE_S, WRITE_S, Ending, verdict
+from rths.perform.processes import Leash, Processes, Said, understood
+from rths.perform.run import answer, follow, note
+from simulation import virtual
 
 NAMES = ("master", "slave", "recorder")
 EVENT = {"kind": "event", "lab": "slave", "level": "error", "code": "lost", "text": "gone"}
@@ -389,7 +389,7 @@ OBEDIENT = (
 
 @pytest.fixture
 def processes(tmp_path: Path, monkeypatch: Any) -> Any:
-    monkeypatch.setattr("rths.processes.ROOT", tmp_path)
+    monkeypatch.setattr("rths.perform.processes.ROOT", tmp_path)
     monkeypatch.chdir(tmp_path)
     running = Processes()
     yield running
@@ -446,8 +446,8 @@ def test_who_hangs_on_its_way_to_rest_is_killed_after_it_and_not_by_further_pres
     processes: Processes, tmp_path: Path, short_plan: Plan, monkeypatch: Any, capsys: Any
 ) -> None:
     for name in ("LEAVE_S", "MARGIN_S", "KILL_S"):
-        monkeypatch.setattr(f"rths.ending.{name}", 0.1)
-    monkeypatch.setattr("rths.ending.longest_leave", lambda _plan: 0.1)
+        monkeypatch.setattr(f"rths.perform.ending.{name}", 0.1)
+    monkeypatch.setattr("rths.perform.ending.longest_leave", lambda _plan: 0.1)
     lines = "".join(f"print({json.dumps(one)!r}, flush=True)\n" for one in (RAMPING, LEFT))
     program(tmp_path, "master", lines + DEAF)
     processes.start("master", [])
@@ -484,7 +484,7 @@ def test_who_hangs_after_anothers_end_is_killed_without_a_wish(
     processes: Processes, tmp_path: Path, short_plan: Plan, monkeypatch: Any
 ) -> None:
     for name in ("LEAVE_S", "MARGIN_S", "KILL_S"):
-        monkeypatch.setattr(f"rths.ending.{name}", 0.2)
+        monkeypatch.setattr(f"rths.perform.ending.{name}", 0.2)
     program(tmp_path, "master", f"print({json.dumps(EVENT)!r}, flush=True)\nraise SystemExit(4)\n")
     program(tmp_path, "slave", DEAF)
     program(tmp_path, "recorder", DEAF)

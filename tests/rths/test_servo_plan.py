@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common import reality
-from common.plan import parse
+from common.plan import reality
+from common.plan.plan import parse
 from common.recording.reader import Run, read
 from diagnosis import record
 from diagnosis.parts import Building, LaboratoryA
-from models import closed_loop, substructure
+from models.loop import closed_loop, substructure
 from models.system import System
-from rths import virtual
+from simulation import virtual
 from tests.helpers import SERVO_PLAN
 
 Call = Callable[..., int]

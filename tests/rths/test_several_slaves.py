@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common import reality
-from common.plan import Plan, from_tables
+from common.plan import reality
+from common.plan.plan import Plan, from_tables
 from common.recording.reader import read
-from rths import tabular, virtual
+from report.text import tabular
+from simulation import virtual
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +42,9 @@ def recording(two: Plan, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_inspect_has_every_topic_and_a_latency_table_per_slave(
     call: Any, capsys: Any, recording: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rths.circumstances.clock_of", lambda run: "real")  # virtual time shows no latency
+    monkeypatch.setattr(
+        "report.facts.circumstances.clock_of", lambda run: "real"
+    )  # virtual time shows no latency
     assert call("inspect", recording) == 0
     lines = [line.split() for line in capsys.readouterr().out.splitlines()]
     for topic in ("master", "slave.roof", "slave.cellar", "latency.roof", "latency.cellar"):
@@ -69,7 +72,7 @@ def test_replay_matches_to_the_last_bit(call: Any, capsys: Any, recording: Path)
 
 
 def test_replay_finds_one_bit_of_one_slave(call: Any, recording: Path, monkeypatch: Any) -> None:
-    from rths import replay
+    from rths.examine import replay
 
     found = read(recording)
     values = found.columns["master"]["damper_force_used"]

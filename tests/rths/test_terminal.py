@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from rths.board import BLOCKS, Board, sparkline
-from rths.terminal import Progress
+from report.text.board import BLOCKS, Board, sparkline
+from report.text.terminal import Progress
 
 REPORT = {
     "t": 5.0,

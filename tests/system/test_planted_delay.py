@@ -16,8 +16,8 @@ from queue import SimpleQueue
 import numpy as np
 import pytest
 
+from common.link.zenoh_link import listenable
 from common.recording.reader import read
-from common.zenoh_link import listenable
 from tests.helpers import patient
 from tests.processes import environment, tied
 

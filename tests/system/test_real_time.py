@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common import plan as plans
-from common import reality
-from common.plan import Plan
+from common.plan import plan as plans
+from common.plan import reality
+from common.plan.plan import Plan
 from common.recording.reader import Run, read
-from rths import virtual
+from simulation import virtual
 from tests.helpers import PATIENT, SLOW, patient
 from tests.processes import environment, tied
 

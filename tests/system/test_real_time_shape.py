@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from common.realtime import PRIORITY
+from common.host.realtime import PRIORITY
+from common.link.zenoh_link import listenable
 from common.recording.reader import MACHINES, read
-from common.zenoh_link import listenable
 from tests.processes import environment, tied
 
 pytestmark = pytest.mark.slow

@@ -20,10 +20,10 @@ import zenoh
 from mcap.reader import make_reader
 
 from common.errors import InputError, LostError
-from common.security import Identity
-from common.transport import CHANNELS, CONTROL, SAMPLES, TICK, Packet, Route
-from common.zenoh_link import ZenohLink, key, listenable
-from rths import keys
+from common.link.security import Identity
+from common.link.transport import CHANNELS, CONTROL, SAMPLES, TICK, Packet, Route
+from common.link.zenoh_link import ZenohLink, key, listenable
+from rths.prepare import keys
 from tests.certificates import DAY, NOW, again, identity, made
 from tests.faults.rows import Row, passed
 from tests.helpers import PATIENT, ROOT

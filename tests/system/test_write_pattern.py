@@ -17,9 +17,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from common.endpoint import FrameEndpoint
-from common.messages import Command, Feedback, Message
-from common.zenoh_link import ZenohLink, listenable
+from common.link.endpoint import FrameEndpoint
+from common.link.zenoh_link import ZenohLink, listenable
+from common.protocol.messages import Command, Feedback, Message
 
 SESSION, DIGEST = 1, "plan"
 EXCHANGES = 60

@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from common.plan.tables import Safety
 from common.safety.ramp import ForceRelease, MotionRamp
-from common.tables import Safety
 
 INTERVAL = 0.002
 PLAN = Safety(velocity=0.05, acceleration=10.0, jerk=2000.0, release=0.02)

@@ -5,8 +5,8 @@ from dataclasses import replace
 from hypothesis import given
 from hypothesis import strategies as st
 
+from common.plan.tables import Safety
 from common.safety.watchdog import Finding, Watchdog
-from common.tables import Safety
 
 PLAN = Safety(hold_after=3, ramp_after=5)
 

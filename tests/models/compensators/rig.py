@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from common.tables import Actuator, Column
+from common.plan.tables import Actuator, Column
 from models import compensators
 from models.compensators import Built, Wanted
 from models.labs import column_lab

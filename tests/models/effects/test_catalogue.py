@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.errors import InputError
-from common.plan import Plan
-from common.tables import Damper, Structure, Table
+from common.plan.plan import Plan
+from common.plan.tables import Damper, Structure, Table
 from models import effects
 from models.effects import CATALOGUE, lay, null_parameters, of_site
 from models.effects.effect import Effect, Kind, Parameter

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from common.errors import InputError
-from common.tables import Actuator, Column
+from common.plan.tables import Actuator, Column
 from models.identification import actuator, estimate, step_response
 from models.labs import column_lab
 

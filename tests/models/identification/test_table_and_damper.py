@@ -11,7 +11,7 @@ from scipy import signal
 from scipy.integrate import solve_ivp
 
 from common.errors import InputError
-from common.tables import Damper, Table
+from common.plan.tables import Damper, Table
 from models.identification import damper, table
 from models.labs import table_lab
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from common.errors import InputError
-from common.plan import Plan
+from common.plan.plan import Plan
 from models import indicators
 from models.labs.force_path import force_path
 from models.registry import Array

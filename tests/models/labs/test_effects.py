@@ -16,16 +16,16 @@ from numpy.typing import NDArray
 from scipy.integrate import quad, solve_ivp, trapezoid
 
 from common.errors import InputError
-from common.plan import Plan
+from common.plan.plan import Plan
+from common.plan.schema import plain
+from common.plan.tables import Actuator, Column, Damper, Table
 from common.rig import ColumnCommand, TableCommand
-from common.schema import plain
-from common.tables import Actuator, Column, Damper, Table
 from master.rig import ColumnLab
-from models import substructure
-from models.closed_loop import MEASURED_A, MEASURED_B, Rollout, signals, simulate
 from models.effects import CATALOGUE, lay, null_parameters
 from models.effects.effect import Effect, Parameter
 from models.labs import column_lab, specimen, table_lab
+from models.loop import substructure
+from models.loop.closed_loop import MEASURED_A, MEASURED_B, Rollout, signals, simulate
 from models.system import ActuatorEffects, ColumnEffects, DamperEffects, System, TableEffects
 from slave.rig import TableLab
 from tests.models.effects.distinct import DISTINCT

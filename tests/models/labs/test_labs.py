@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from common.tables import Actuator, Column, Damper, Sensors, Table
+from common.plan.tables import Actuator, Column, Damper, Sensors, Table
 from models.labs import column_lab, noise, table_lab
 from models.transfer_systems import delay
 

@@ -12,14 +12,14 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from common.plan import Plan
+from common.plan.plan import Plan
+from common.plan.tables import Sensors
 from common.rig import ColumnCommand, TableCommand
-from common.tables import Sensors
 from master.rig import ColumnLab
-from models import substructure
-from models.closed_loop import MEASURED_A, MEASURED_B, Rollout, simulate
 from models.effects import CATALOGUE, lay
 from models.labs import noise, readings
+from models.loop import substructure
+from models.loop.closed_loop import MEASURED_A, MEASURED_B, Rollout, simulate
 from models.system import Effects, SensorEffects, System
 from slave.rig import TableLab
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from common.plan import Plan
-from models import indicators, substructure
-from models.closed_loop import Rollout, signals, simulate
+from common.plan.plan import Plan
+from models import indicators
 from models.effects import CATALOGUE, lay
 from models.effects.effect import Effect
-from models.labs import replay
+from models.loop import replay, substructure
+from models.loop.closed_loop import Rollout, signals, simulate
 from models.system import ColumnEffects, Effects, System
 from tests.models.effects.distinct import DISTINCT
 

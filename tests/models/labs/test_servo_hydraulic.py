@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from common.errors import InputError
-from common.plan import Plan, parse
-from common.tables import Actuator, Column, ServoHydraulics
-from models import closed_loop, substructure
+from common.plan.plan import Plan, parse
+from common.plan.tables import Actuator, Column, ServoHydraulics
 from models.effects import lay
-from models.labs import column_lab, replay
+from models.labs import column_lab
+from models.loop import closed_loop, replay, substructure
 from models.system import ActuatorEffects, ColumnEffects, System
 from models.transfer_systems import servo_hydraulic
 from tests.helpers import SERVO_PLAN, with_table

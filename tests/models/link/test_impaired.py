@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.errors import InputError
-from common.mailbox import Mailbox, PerfectLink
-from models.closed_loop import on_time
+from common.link.mailbox import Mailbox, PerfectLink
 from models.link.exchange import exchange
 from models.link.impaired import ImpairedLink
+from models.loop.closed_loop import on_time
 
 MESSAGES = 40_000
 INTERVAL = 0.002

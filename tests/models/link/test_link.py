@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.errors import InputError
-from common.mailbox import Mailbox
-from models.closed_loop import on_time
+from common.link.mailbox import Mailbox
 from models.link.exchange import exchange
 from models.link.impaired import ImpairedLink
+from models.loop.closed_loop import on_time
 
 DT = 0.002
 TICKS = 60_000

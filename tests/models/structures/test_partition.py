@@ -11,10 +11,10 @@ import pytest
 from scipy.optimize import root
 
 from common.errors import InputError
-from common.plan import Plan, parse
-from common.tables import Experimental
+from common.plan.plan import Plan, parse
+from common.plan.tables import Experimental
 from models.indicators import FrequencyEvaluation
-from models.preflight import expected_delay
+from models.loop.preflight import expected_delay
 from models.registry import Array
 from models.structures import partition, shear_building
 from tests.helpers import SERVO_PLAN, with_table

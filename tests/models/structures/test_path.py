@@ -12,10 +12,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
 
-from common import plan as plans
-from common.plan import Plan
-from common.tables import Compensator
-from models import preflight
+from common.plan import plan as plans
+from common.plan.plan import Plan
+from common.plan.tables import Compensator
+from models.loop import preflight
 from models.structures import partition
 from models.structures.path import path_at
 from tests.helpers import with_table

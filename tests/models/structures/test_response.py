@@ -10,8 +10,8 @@ import pytest
 from scipy.linalg import expm
 
 from common.errors import InputError
-from common.plan import Plan, parse
-from models import substructure
+from common.plan.plan import Plan, parse
+from models.loop import substructure
 from models.registry import Array
 from models.structures.partition import matrices
 from models.structures.response import response

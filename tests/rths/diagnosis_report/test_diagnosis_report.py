@@ -10,11 +10,11 @@ from typing import Any
 import pytest
 
 from models.effects import CATALOGUE
-from rths.diagnosis_report import pictures, which, wording
-from rths.diagnosis_report.page import page
-from rths.diagnosis_report.schema import schema
-from rths.diagnosis_report.terminal import summary
-from rths.formats import (
+from report.gap import pictures, which, wording
+from report.gap.page import page
+from report.gap.schema import schema
+from report.gap.terminal import summary
+from report.text.formats import (
     axis_unit,
     nats,
     percent,

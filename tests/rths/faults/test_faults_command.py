@@ -8,11 +8,11 @@ import json
 import pytest
 
 from common.errors import InputError
-from rths import faults
 from rths.__main__ import parser_for
-from rths.faults import schedule, trial
-from rths.faults.invariants import Violation
-from rths.faults.lab import Simulation
+from rths.prove import faults
+from validation.faults import schedule, trial
+from validation.faults.invariants import Violation
+from validation.faults.lab import Simulation
 
 
 def parsed(*words: str) -> argparse.Namespace:

@@ -15,25 +15,26 @@ import hypothesis.strategies as st
 from hypothesis import settings
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
-from common import cli, messages
-from common.codec import MESSAGES
-from common.endpoint import Received
-from common.exchange import FINAL, TRANSITIONS, State
-from common.laboratory import Setting
-from common.messages import Message
-from common.plan import PROTOCOL_VERSION, Plan, load
-from common.reality import as_planned
+from common.lab.laboratory import Setting
+from common.link.endpoint import Received
+from common.plan.plan import PROTOCOL_VERSION, Plan, load
+from common.plan.reality import as_planned
+from common.protocol import messages
+from common.protocol.codec import MESSAGES
+from common.protocol.exchange import FINAL, TRANSITIONS, State
+from common.protocol.messages import Message
 from common.roles import MASTER, RECORDER, SLAVE
+from common.terminal import cli
 from master import assembly as master_assembly
 from master.loop import MasterLoop
-from rths.faults.hostile import command, feedback
-from rths.faults.invariants import LIMITED
-from rths.faults.lab import PROBED
-from rths.faults.rigs import Probe
-from rths.faults.world import World
 from slave import assembly as slave_assembly
 from slave.loop import SlaveLoop
 from tests.helpers import without_recorder
+from validation.faults.hostile import command, feedback
+from validation.faults.invariants import LIMITED
+from validation.faults.lab import PROBED
+from validation.faults.rigs import Probe
+from validation.faults.world import World
 
 SESSION, OTHER = 5, 6
 INSTANCE = 3

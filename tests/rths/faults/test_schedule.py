@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from common.errors import InputError
-from rths.faults.schedule import KINDS, Fault, Schedule, draw, parse
+from validation.faults.schedule import KINDS, Fault, Schedule, draw, parse
 
 MANY = 300
 

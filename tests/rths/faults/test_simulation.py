@@ -7,19 +7,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from common.codec import Reject
-from common.plan import Plan
-from common.reality import as_planned
+from common.plan.plan import Plan
+from common.plan.reality import as_planned
+from common.protocol.codec import Reject
 from common.recording.reader import read
 from common.roles import MASTER, SLAVE
-from rths.faults import invariants
-from rths.faults.apply import simulation_of
-from rths.faults.invariants import INVARIANTS, SAFETY, Violation, judge
-from rths.faults.lab import Simulation, Surrounding
-from rths.faults.rigs import COMPUTED, named
-from rths.faults.schedule import KINDS, parse
-from rths.faults.world import Drift
 from tests.helpers import without_recorder
+from validation.faults import invariants
+from validation.faults.apply import simulation_of
+from validation.faults.invariants import INVARIANTS, SAFETY, Violation, judge
+from validation.faults.lab import Simulation, Surrounding
+from validation.faults.rigs import COMPUTED, named
+from validation.faults.schedule import KINDS, parse
+from validation.faults.world import Drift
 
 HOLDING_NOW = tuple(one for one in INVARIANTS if one not in SAFETY)
 SOME = {  # values of a fault that shows

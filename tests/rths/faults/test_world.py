@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from rths.faults.world import Drift, Process, World
+from validation.faults.world import Drift, Process, World
 
 MS = 1_000_000
 

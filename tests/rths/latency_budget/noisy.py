@@ -9,7 +9,7 @@ import numpy as np
 
 from common.recording.reader import Run
 from common.roles import MASTER, name_of, slave_role
-from rths.latency_budget.limits import PERCENTILES
+from report.budget.limits import PERCENTILES
 
 INTERVAL = 2e-3
 SPIKES = {"ordinary": 0.008, "fifo": 0.0005}  # share of waits in which another process runs first

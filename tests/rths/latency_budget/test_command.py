@@ -10,10 +10,10 @@ from typing import Any
 
 import pytest
 
-from common import reality
-from common.plan import Plan
-from rths import virtual
+from common.plan import reality
+from common.plan.plan import Plan
 from rths.__main__ import main
+from simulation import virtual
 from tests.helpers import ROOT
 
 LINK = """

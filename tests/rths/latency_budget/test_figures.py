@@ -13,10 +13,10 @@ from common import signals
 from common.errors import InputError
 from common.recording.reader import Run, read
 from common.recording.writer import Recording
-from rths.latency_budget.checks import longest_run
-from rths.latency_budget.figures import Bare, bare_loop, figures, measured
-from rths.latency_budget.judge import percentiles
-from rths.latency_budget.limits import PERCENTILES
+from report.budget.checks import longest_run
+from report.budget.figures import Bare, bare_loop, figures, measured
+from report.budget.judge import percentiles
+from report.budget.limits import PERCENTILES
 from tests.rths.latency_budget import noisy
 
 times = st.floats(0.0, 0.1)

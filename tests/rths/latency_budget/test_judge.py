@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from common.errors import InputError
 from common.recording.reader import Run
-from rths.latency_budget.checks import Check
-from rths.latency_budget.figures import figures
-from rths.latency_budget.judge import Report, judge
-from rths.latency_budget.limits import from_tables, load
+from report.budget.checks import Check
+from report.budget.figures import figures
+from report.budget.judge import Report, judge
+from report.budget.limits import from_tables, load
 from tests.rths.latency_budget import noisy
 
 QUIET = {

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from common.errors import PlanError
-from rths.latency_budget.limits import DEFAULT, WAITS, from_tables, load
+from report.budget.limits import DEFAULT, WAITS, from_tables, load
 
 
 def test_the_budget_that_ships_limits_both_directions_and_late_ticks() -> None:

@@ -11,11 +11,11 @@ from typing import Any
 
 import pytest
 
-from common.plan import Plan
-from rths.ending import Ending
-from rths.live.child import READY, View
-from rths.run import follow
-from rths.terminal import Progress
+from common.plan.plan import Plan
+from report.text.terminal import Progress
+from rths.perform.ending import Ending
+from rths.perform.live_child import READY, View
+from rths.perform.run import follow
 
 
 def told(view: View, seconds: float = 40.0) -> str:

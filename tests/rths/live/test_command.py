@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 
 from common.recording.tail import length
+from report.live.feed import Feed
 from rths.__main__ import main
-from rths.live.feed import Feed
 from tests.helpers import ROOT
 
 
@@ -69,7 +69,7 @@ def test_a_finished_recording_is_shown_whole_unless_a_window_is_given(
 
     monkeypatch.setattr("os.nice", lambda _more: 0)
     monkeypatch.setattr(signal, "signal", lambda *_: None)
-    monkeypatch.setattr("rths.live.server.Server", Server)
+    monkeypatch.setattr("report.live.server.Server", Server)
     assert rths(monkeypatch, "live", virtual_recording, "--no-browser", *options) == 0
     assert [feed.whole for feed in shown] == [whole]
     assert shown[0].window == pytest.approx(window, abs=0.5)

@@ -14,20 +14,20 @@ import numpy as np
 import pytest
 from bokeh.document import Document
 
-from common import reality
-from common.clock import VirtualClock
 from common.errors import EmergencyStopError
-from common.plan import Plan, load
+from common.host.clock import VirtualClock
+from common.plan import reality
+from common.plan.plan import Plan, load
 from common.recording.reader import Run, read
 from common.recording.tail import Tail, length
 from common.recording.writer import Recording
 from common.signals import TOPICS
-from rths import virtual
-from rths.live.feed import EDGES, POINTS, POINTS_WHOLE, SILENT_NS, Feed
-from rths.live.page import Page
-from rths.live.standing import Standing
-from rths.live.status import heading, listing, row
-from rths.live.stream import FACTORS
+from report.live.feed import EDGES, POINTS, POINTS_WHOLE, SILENT_NS, Feed
+from report.live.page import Page
+from report.live.standing import Standing
+from report.live.status import heading, listing, row
+from report.live.stream import FACTORS
+from simulation import virtual
 from tests.helpers import ROOT
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rths.live.trace import Trace, extremes, largest
+from report.live.trace import Trace, extremes, largest
 
 TICKS = np.arange(1000)
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from common.recording.reader import CLOCK, Run
 from common.roles import SLAVE
-from rths.circumstances import REAL
-from rths.summary import SEGMENTS
+from report.facts.circumstances import REAL
+from report.facts.summary import SEGMENTS
 
 RECORD = "El Centro 1940 NS (1,559-point version after a zero at t = 0), dt 0.02 s, 1560 points, PGA 0.3188 g"
 INTERVAL = 2e-3

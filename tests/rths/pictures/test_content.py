@@ -11,10 +11,10 @@ import pytest
 
 from common.recording.reader import Run
 from common.roles import SLAVE
-from rths import plot
-from rths.figure import COLOURS
-from rths.pictures import PICTURES, curves, hysteresis, spectra
-from rths.summary import SEGMENTS, tracking
+from report.facts.summary import SEGMENTS, tracking
+from report.pictures import PICTURES, curves, hysteresis, spectra
+from report.pictures.figure import COLOURS
+from rths.examine import plot
 from tests.rths.pictures.made_up import INTERVAL, made_up, sinusoid, with_latency
 
 

@@ -13,8 +13,8 @@ import pytest
 
 from common.recording.reader import Run, read
 from common.roles import SLAVE
-from rths import figure, plot
-from rths.pictures import PICTURES
+from report.pictures import PICTURES, figure
+from rths.examine import plot
 from tests.rths.pictures.axes import check_axes, hidden, texts
 from tests.rths.pictures.made_up import made_up, with_latency
 

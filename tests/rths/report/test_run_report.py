@@ -12,18 +12,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common import reality
-from common.plan import from_tables
+from common.plan import reality
+from common.plan.plan import from_tables
 from common.recording.reader import Run, read
-from common.telling import untold
-from rths import virtual
-from rths.diagnosis_report.page import page as diagnosis_page
-from rths.formats import reading
-from rths.page import numeric
-from rths.pictures import PICTURES
-from rths.run_report import drawing, verdict
-from rths.run_report.page import page
-from rths.summary import summarize
+from common.terminal.telling import untold
+from report.facts.summary import summarize
+from report.gap.page import page as diagnosis_page
+from report.page import numeric
+from report.pictures import PICTURES
+from report.run import drawing, verdict
+from report.run.page import page
+from report.text.formats import reading
+from simulation import virtual
 from tests.rths.diagnosis_report.reports import fresh
 from tests.rths.report.pages import check_alone, check_in_browser
 

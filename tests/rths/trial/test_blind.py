@@ -16,17 +16,17 @@ from typing import Any
 
 import pytest
 
-from common import cli
 from common.errors import InputError
 from common.recording.reader import read
+from common.terminal import cli
 from models.effects import CATALOGUE
-from rths import blind
-from rths.trial import library as libraries
-from rths.trial.draw import Case, draw
-from rths.trial.judge import diagnose_all
-from rths.trial.library import Library
-from rths.trial.record import record, record_all
-from rths.trial.spread import spread
+from rths.prove import blind
+from validation.blind import library as libraries
+from validation.blind.draw import Case, draw
+from validation.blind.judge import diagnose_all
+from validation.blind.library import Library
+from validation.blind.record import record, record_all
+from validation.spread import spread
 
 HERE = "tests.rths.trial.test_blind"
 LIBRARY = Library(
@@ -186,7 +186,7 @@ def test_a_missing_package_is_one_sentence(
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("rths.trial.spread.importlib.import_module", without(package))
+    monkeypatch.setattr("validation.spread.importlib.import_module", without(package))
     assert command(*words, "-o", str(tmp_path)) == 2
     assert capsys.readouterr().err == (
         f"rths: {words[0]} needs the package {package}: install it, or leave the option out.\n"

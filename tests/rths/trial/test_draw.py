@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from common import plan as plans
-from common import reality as realities
 from common.errors import InputError
+from common.plan import plan as plans
+from common.plan import reality as realities
 from models.effects.damper_friction import EFFECT as FRICTION
 from models.effects.effect import Effect, Parameter
 from models.system import System
-from rths.trial.draw import (
+from validation.blind.draw import (
     KINDS,
     NOISE,
     SHARES,
@@ -26,7 +26,7 @@ from rths.trial.draw import (
     draw_parameter,
     peak_drift,
 )
-from rths.trial.library import UNDRAWN, Library, Stranger, family, laboratory, shipped, site_of
+from validation.blind.library import UNDRAWN, Library, Stranger, family, laboratory, shipped, site_of
 
 
 def softer(system: System, factor: float) -> System:
@@ -142,7 +142,7 @@ def test_unknown_names_and_empty_choices_are_refused() -> None:
 
 
 def test_nothing_is_found_where_there_is_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rths.trial.draw.PATIENCE", 200)
+    monkeypatch.setattr("validation.blind.draw.PATIENCE", 200)
     with pytest.raises(InputError, match="There is no case of kind clean with damper"):
         draw(1, 0, "judge", only=["clean"], effects=["damper.friction"], library=LIBRARY)
 

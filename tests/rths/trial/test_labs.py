@@ -18,7 +18,8 @@ from common.errors import InputError
 from common.recording.reader import read
 from common.rig import ColumnCommand, TableCommand
 from rths.__main__ import main
-from rths.trial.labs import (
+from tests.helpers import ROOT
+from validation.blind.labs import (
     FORMULAS,
     PLAIN,
     SIGNALS,
@@ -28,9 +29,8 @@ from rths.trial.labs import (
     sensors,
     table_effects,
 )
-from rths.trial.labs.column_lab import ColumnLab
-from rths.trial.labs.table_lab import TableLab
-from tests.helpers import ROOT
+from validation.blind.labs.column_lab import ColumnLab
+from validation.blind.labs.table_lab import TableLab
 
 DT = 0.002
 Trace = NDArray[np.float64]
@@ -482,7 +482,7 @@ effects = [{{ name = "x.table.pitch", parameters = {{ coupling = 0.1, frequency 
 def test_a_virtual_run_is_played_in_them(
     by_file: bool, monkeypatch: Any, capsys: Any, tmp_path: Path, virtual_recording: Path
 ) -> None:
-    place = f"{ROOT}/rths/trial/labs/{{}}.py" if by_file else "rths.trial.labs.{}"
+    place = f"{ROOT}/validation/blind/labs/{{}}.py" if by_file else "validation.blind.labs.{}"
     reality, path = tmp_path / "reality.toml", tmp_path / "real.mcap"
     reality.write_text(
         REALITY.format(
@@ -506,8 +506,8 @@ def test_a_virtual_run_in_clean_laboratories_has_no_gap(
 ) -> None:
     reality, path = tmp_path / "reality.toml", tmp_path / "real.mcap"
     reality.write_text(
-        '[master.rig]\nclass = "rths.trial.labs.column_lab:ColumnLab"\n'
-        '[slave.rig]\nclass = "rths.trial.labs.table_lab:TableLab"\n'
+        '[master.rig]\nclass = "validation.blind.labs.column_lab:ColumnLab"\n'
+        '[slave.rig]\nclass = "validation.blind.labs.table_lab:TableLab"\n'
     )
     words = ["run", "--virtual", "--duration", "4", "--reality", str(reality), "-o", str(path)]
     monkeypatch.setattr(sys, "argv", ["rths", *words])

@@ -9,10 +9,11 @@ from typing import Any
 
 import pytest
 
-from diagnosis.calibration import clopper_pearson
-from rths.trial.draw import Case, Laid
-from rths.trial.judge import Answer
-from rths.trial.measures import (
+from diagnosis.findings.calibration import clopper_pearson
+from tests.rths.report.pages import check_alone, check_in_browser
+from validation.blind.draw import Case, Laid
+from validation.blind.judge import Answer
+from validation.blind.measures import (
     binned,
     by_size,
     calibration_bounds,
@@ -25,10 +26,9 @@ from rths.trial.measures import (
     reliability,
     results,
 )
-from rths.trial.page import page
-from rths.trial.record import Recorded
-from rths.trial.scoring import Outcome, judge, judge_all, same
-from tests.rths.report.pages import check_alone, check_in_browser
+from validation.blind.page import page
+from validation.blind.record import Recorded
+from validation.blind.scoring import Outcome, judge, judge_all, same
 
 SLIP = Laid("column.slip", "column", {"gap": 2e-4}, {"gap": 0.0})
 SOFT = Laid("column.stiffness", "column", {"factor": 0.9}, {"factor": 1.0})

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from common.telling import untold
-from rths.yardstick import evidence, figures, page, text
-from rths.yardstick.evidence import Evidence
-from rths.yardstick.problem import SETTINGS
+from common.terminal.telling import untold
+from validation.benchmark2020 import evidence, figures, page, text
+from validation.benchmark2020.evidence import Evidence
+from validation.benchmark2020.problem import SETTINGS
 
 
 class Played(NamedTuple):

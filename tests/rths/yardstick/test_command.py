@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from common import plan as plans
-from rths.yardstick.problem import CASES, EL_CENTRO, SETTINGS, planned, with_compensator
+from common.plan import plan as plans
+from validation.benchmark2020.problem import CASES, EL_CENTRO, SETTINGS, planned, with_compensator
 
 
 @pytest.mark.parametrize(

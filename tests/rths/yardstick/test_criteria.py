@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from models.registry import Array
-from rths.yardstick.criteria import MEANINGS, Criteria, criteria
+from validation.benchmark2020.criteria import MEANINGS, Criteria, criteria
 
 INTERVAL = 1.0 / 4096.0
 T = np.arange(8192) * INTERVAL

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from models import preflight
 from models.compensators import COMPENSATORS
+from models.loop import preflight
 from models.structures import partition, shear_building
-from rths.yardstick.problem import (
+from validation.benchmark2020.problem import (
     CASES,
     EL_CENTRO,
     SETTINGS,

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from rths.yardstick.evidence import compensator_check
-from rths.yardstick.problem import CASES, FORCE, MOTIONS
-from rths.yardstick.published import CRITICAL_DELAYS, TABLE_3
-from rths.yardstick.runs import on_el_centro
-from rths.yardstick.tables import tables
+from validation.benchmark2020.evidence import compensator_check
+from validation.benchmark2020.problem import CASES, FORCE, MOTIONS
+from validation.benchmark2020.published import CRITICAL_DELAYS, TABLE_3
+from validation.benchmark2020.runs import on_el_centro
+from validation.benchmark2020.tables import tables
 
 if TYPE_CHECKING:
     from tests.rths.yardstick.conftest import Played
@@ -106,8 +106,8 @@ def test_tables_have_a_cell_for_every_column(played: Played) -> None:
 
 
 def test_the_same_seed_gives_the_same_numbers(played: Played) -> None:
-    from rths.yardstick.problem import SETTINGS, with_compensator
-    from rths.yardstick.runs import play
+    from validation.benchmark2020.problem import SETTINGS, with_compensator
+    from validation.benchmark2020.runs import play
 
     on = played.evidence.stages[0]
     again, _ = play(on, "amb", with_compensator(on.plants[1], SETTINGS["amb"]), 1)

@@ -19,10 +19,10 @@ from typing import Any, NamedTuple, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from common import plan as plans
-from common.plan import Plan
+from common.link.zenoh_link import listenable
+from common.plan import plan as plans
+from common.plan.plan import Plan
 from common.recording.reader import Run, read
-from common.zenoh_link import listenable
 from tests.faults.rows import motion_bound
 from tests.processes import environment, tied
 from tests.system.faults.rigs import Log, Wish

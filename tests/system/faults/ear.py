@@ -7,10 +7,10 @@ import sys
 import time
 from pathlib import Path
 
-from common import plan as plans
+from common.link.transport import CONTROL, Packet
+from common.link.zenoh_link import ZenohLink
+from common.plan import plan as plans
 from common.roles import OBSERVER
-from common.transport import CONTROL, Packet
-from common.zenoh_link import ZenohLink
 
 
 def main() -> None:

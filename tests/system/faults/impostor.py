@@ -6,13 +6,13 @@ import sys
 import time
 from pathlib import Path
 
-from common import codec
-from common import plan as plans
-from common.messages import Command, Message, Register, Stop, Trip
-from common.plan import PROTOCOL_VERSION
+from common.link.transport import CONTROL, TICK, Route
+from common.link.zenoh_link import configuration, key, reach, unrefused
+from common.plan import plan as plans
+from common.plan.plan import PROTOCOL_VERSION
+from common.protocol import codec
+from common.protocol.messages import Command, Message, Register, Stop, Trip
 from common.roles import MASTER, SLAVE
-from common.transport import CONTROL, TICK, Route
-from common.zenoh_link import configuration, key, reach, unrefused
 
 SESSION, SECONDS, EVERY = 4711, 1.5, 0.002
 FAR = 0.3  # m, where it would have the table

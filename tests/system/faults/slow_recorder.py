@@ -6,7 +6,7 @@ import sys
 import time
 from typing import Any
 
-from common import process
+from common.lab import process
 from recorder.__main__ import add_arguments, run
 from recorder.sink import FileSink
 

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from common.codec import KINDS
-from common.messages import Stop
-from common.zenoh_link import LEASE_MS
+from common.link.zenoh_link import LEASE_MS
+from common.protocol.codec import KINDS
+from common.protocol.messages import Stop
 from tests.faults.rows import Row, passed
 from tests.system.faults.bench import (
     INTERVAL,

@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from common.cli import text_report
-from common.endpoint import FrameEndpoint
-from common.messages import Answer, Operator
-from common.operation import EMERGENCY, RESET
-from common.process import join
+from common.lab.operation import EMERGENCY, RESET
+from common.lab.process import join
+from common.link.endpoint import FrameEndpoint
+from common.protocol.messages import Answer, Operator
 from common.roles import OPERATOR
+from common.terminal.cli import text_report
 from tests.faults.rows import Row, motion_bound, passed
 from tests.system.faults.bench import (
     INTERVAL,

@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from common.outlet import kept_seconds
+from common.lab.outlet import kept_seconds
 from common.recording.reader import Run
 from tests.faults.rows import Row, passed
 from tests.helpers import JUMPS

@@ -11,10 +11,10 @@ from queue import Queue
 import pytest
 import zenoh
 
-from common.codec import MOST_FRAME
-from common.security import Identity
-from common.transport import CONTROL, Packet, Route
-from common.zenoh_link import MOST_MESSAGE, ZenohLink, key, listenable
+from common.link.security import Identity
+from common.link.transport import CONTROL, Packet, Route
+from common.link.zenoh_link import MOST_MESSAGE, ZenohLink, key, listenable
+from common.protocol.codec import MOST_FRAME
 from tests.certificates import identity, made
 from tests.system.faults.hostile import Stranger
 

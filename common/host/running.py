@@ -1,0 +1,152 @@
+"""Tests that run on this machine in real time: a small file each, so that commands find them, and none joins another.
+
+A user's files lie in a folder of his own. Their names, which say the test and the process, can be read by everybody:
+other users' tests disturb one as much as one's own. What is in them is for their owner alone.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from common.errors import InputError
+from common.host.machine import began
+from common.plan.plan import Plan
+
+FOLDER = (
+    "RTHS_RUNNING"  # environment variable: another place for the folders, for tests side by side on purpose
+)
+RUN = "run"  # the role of one that is a whole test
+STARTED_LATER_S = 2.0  # a process younger than a file by more has taken the number of the one that wrote it
+
+
+class Running(NamedTuple):
+    """A test that runs here: its name, where its master listens, and its plan as TOML."""
+
+    test: str
+    endpoint: str
+    folder: str  # of the plan's relative paths
+    plan: str
+    role: str = RUN  # `run`, or that of a laboratory that was started by itself
+
+
+class Neighbour(NamedTuple):
+    """What everybody may know of a test that runs here."""
+
+    test: str
+    process: int
+    user: int
+    since: float  # Unix time, s
+
+
+def home() -> Path:
+    """The folder in which each user has his own."""
+    return Path(os.environ.get(FOLDER) or tempfile.gettempdir())
+
+
+def place() -> Path:
+    """The folder of this user's files."""
+    return home() / f"rths-{os.getuid()}"
+
+
+@contextlib.contextmanager
+def announced(plan: Plan, endpoint: str, role: str = RUN) -> Iterator[None]:
+    """While the context lasts, the test can be found; where nothing can be written it cannot, and runs all the same."""
+    folder = place()
+    path = folder / f"{plan.test.name}-{os.getpid()}.json"
+    entry = Running(plan.test.name, endpoint, str(plan.base.resolve()), plan.toml(), role)
+    with contextlib.suppress(OSError):
+        folder.mkdir(parents=True, exist_ok=True)
+        folder.chmod(0o755)
+        with os.fdopen(
+            os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600), "w", encoding="utf-8"
+        ) as file:
+            file.write(json.dumps(entry._asdict()))
+    try:
+        yield
+    finally:
+        with contextlib.suppress(OSError):
+            path.unlink(missing_ok=True)
+
+
+def found() -> list[Running]:
+    """The whole tests of this user whose process is alive, files of dead ones cleared away."""
+    entries = []
+    for path in sorted(place().glob("*-*.json")):
+        try:
+            one = neighbour(path)
+            if one is None:
+                path.unlink(missing_ok=True)
+            if one is None or one.user != os.getuid():
+                continue
+            entries.append(Running(**json.loads(path.read_text(encoding="utf-8"))))
+        except (OSError, ValueError, TypeError):
+            continue
+    return [entry for entry in entries if entry.role == RUN]
+
+
+def neighbours() -> list[Neighbour]:
+    """Tests of all users of this machine but that of this process and of the one that has started it, oldest first."""
+    seen = (neighbour(path) for path in home().glob("rths-*/*-*.json"))
+    family = (os.getpid(), os.getppid())
+    return sorted((one for one in seen if one and one.process not in family), key=lambda one: one.since)
+
+
+def neighbour(path: Path) -> Neighbour | None:
+    """The test behind a file; None where its process has ended, or where the file is none of ours."""
+    test, _, number = path.stem.rpartition("-")
+    try:
+        facts, process = path.stat(), int(number)
+        start = began(process)
+    except (OSError, ValueError):
+        return None
+    if start is None or start > facts.st_mtime + STARTED_LATER_S:
+        return None
+    return Neighbour(test, process, facts.st_uid, facts.st_mtime)
+
+
+def alone() -> None:
+    """Raise InputError where a test runs on this machine that began before that of this process."""
+    own = next(iter(place().glob(f"*-{os.getpid()}.json")), None)
+    since = own.stat().st_mtime if own else time.time()
+    earlier = [one for one in neighbours() if (one.since, one.process) < (since, os.getpid())]
+    if not earlier:
+        return
+    first = earlier[0]
+    whose = "" if first.user == os.getuid() else f" of another user (uid {first.user})"
+    when = time.strftime("%H:%M:%S", time.localtime(first.since))
+    raise InputError(
+        f"The test '{first.test}'{whose} runs on this machine since {when} (process {first.process}), and two tests "
+        "at once disturb each other: wait for its end or stop it (`rths stop`), or give --beside to run all the same."
+    )
+
+
+def announced_already() -> bool:
+    """Whether the process that has started this one has announced the test."""
+    return any(place().glob(f"*-{os.getppid()}.json"))
+
+
+def only(name: str | None = None) -> Running:
+    """The one test that runs here, or the one of that name.
+
+    Raises:
+        InputError: there is none, or more than one.
+    """
+    entries = [entry for entry in found() if name in (None, entry.test)]
+    if not entries:
+        what = f"named '{name}' " if name else ""
+        raise InputError(
+            f"No test {what}runs on this machine: give the plan and where its master listens, with --connect."
+        )
+    if len(entries) > 1:
+        names = ", ".join(sorted({entry.test for entry in entries}))
+        raise InputError(
+            f"{len(entries)} tests run on this machine ({names}): say which with PLAN --connect."
+        )
+    return entries[0]

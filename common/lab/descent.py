@@ -1,0 +1,138 @@
+"""A rig on its way to rest: read, move on along a ramp, write, until it is at rest and has settled."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
+
+from common.errors import EmergencyStopError, RigError
+from common.lab.laboratory import Laboratory
+from common.protocol.exchange import Event
+from common.rig import GuardedRig
+from common.roles import ramp_topic
+
+Command = TypeVar("Command", bound=tuple[float, ...])
+Command_co = TypeVar("Command_co", bound=tuple[float, ...], covariant=True)
+
+
+class Resting(NamedTuple):
+    """How far a rig is on its way to rest."""
+
+    left: float  # s at most, where no interval is left out
+    text: str  # what it does, and how long at most
+
+
+class Ramp(Protocol[Command_co]):
+    """Commands that bring a rig to rest."""
+
+    def step(self, measured: Any | None) -> Command_co:
+        """The command for the coming interval; `measured` is what the rig reads, None where it gives nothing."""
+
+    @property
+    def done(self) -> bool:
+        """Whether the commands are at rest."""
+
+    @property
+    def travel(self) -> float:
+        """How far apart the displacement commands have been, m."""
+
+    @property
+    def left(self) -> float:
+        """How long it takes at most from here on, s."""
+
+    def doing(self, measured: Any | None) -> str:
+        """What it does, in words, with what is left by a measurement."""
+
+
+class Descent(Generic[Command]):
+    """Knows the last two commands written, from which `begin` makes a ramp when the rig is to come to rest."""
+
+    def __init__(
+        self,
+        lab: Laboratory,
+        rig: GuardedRig,
+        begin: Callable[[Command, Command], Ramp[Command]],
+        zero: Command,
+        readings: int,
+    ) -> None:
+        self._lab = lab
+        self._rig = rig
+        self._make = begin
+        self._last = self._before = zero
+        self._blank = (math.nan,) * readings
+        self._ramp: Ramp[Command] | None = None
+        self._begun = 0
+        self._settling = 0  # intervals at rest
+        self._measured: tuple[float, ...] | None = None
+
+    def wrote(self, command: Command) -> None:
+        """A command went to the rig."""
+        self._before, self._last = self._last, command
+
+    @property
+    def resting(self) -> Resting:
+        """How far the rig is on its way to rest."""
+        safety, interval = self._lab.plan.safety, self._lab.plan.test.interval
+        left = max(safety.settle - self._settling * interval, 0.0) + interval
+        doing = "beginning the way to rest"
+        if self._ramp is not None:
+            doing = (
+                "waiting for the transfer system to settle"
+                if self._ramp.done
+                else self._ramp.doing(self._measured)
+            )
+            left += self._ramp.left
+        return Resting(left, f"{doing}, at most {left:.1f} s more")
+
+    @property
+    def last(self) -> Command:
+        """The last command before the ramp."""
+        return self._last
+
+    def ease(self, tick: int) -> None:
+        """One interval: read, move on, write; raises EmergencyStopError where the rig says so."""
+        try:
+            measured = self._rig.read()
+        except EmergencyStopError:
+            raise
+        except RigError as error:  # it comes to a hold without measurements
+            self._failed(error, tick)
+            measured = None
+        self.step(tick, measured)
+
+    def step(self, tick: int, measured: tuple[float, ...] | None) -> None:
+        """One interval of which the measurement is known, None where the rig gives none."""
+        ramp = self._ramp or self._begin(tick)
+        command = ramp.step(measured)
+        self._measured = measured
+        over = self._written(command, tick)
+        self._settling += ramp.done
+        if over or self._settling > self._lab.plan.safety.settle / self._lab.plan.test.interval:
+            duration = (tick + 1 - self._begun - max(self._settling - 1, 0)) * self._lab.plan.test.interval
+            values = {"duration": duration, "travel": ramp.travel}
+            self._lab.come_to_rest(tick, values | command._asdict())  # type: ignore[attr-defined]
+        self._lab.sample_ramp(ramp_topic(self._lab.name), tick, *command, *(measured or self._blank))
+
+    def _written(self, command: Command, tick: int) -> bool:
+        """Write a command; whether the rig takes no more, and rests where it is."""
+        try:
+            self._rig.write(command)
+        except EmergencyStopError:
+            raise
+        except RigError as error:
+            self._lab.note("ramp", str(error), level="warning", tick=tick)
+            self._lab.explain(error, tick=tick)
+            self._failed(error, tick)
+            return True
+        return False
+
+    def _failed(self, error: RigError, tick: int) -> None:
+        """After an orderly end a rig's failure is the cause that latches; after a trip the first cause stays."""
+        if self._lab.safety.cause is None:
+            self._lab.fail(Event.TRIP, error, code="rig", tick=tick)
+
+    def _begin(self, tick: int) -> Ramp[Command]:
+        self._begun = tick
+        self._ramp = self._make(self._last, self._before)
+        return self._ramp

@@ -1,0 +1,243 @@
+"""A laboratory's loop in real time: fetch messages, wait, tick, and leave in order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Protocol
+
+from common.host.realtime import freeze
+from common.host.waited import Waited
+from common.lab.descent import Resting
+from common.lab.laboratory import Laboratory
+from common.lab.surroundings import Surroundings
+from common.link.endpoint import Received
+from common.plan.plan import Plan
+from common.protocol.exchange import State
+from common.safety.longest import resting
+from common.safety.modes import Mode
+
+IDLE_NS = 5_000_000  # how often the handshake looks after itself
+LEAVE_NS = 5_000_000_000  # how long the last words may take where the recorder is not waited for
+PROGRESS_NS = 200_000_000
+RESTING_NS = (
+    500_000_000  # between two reports of the way to rest: the user is not kept waiting for the next one
+)
+
+
+class Loop(Protocol):
+    """What the master's and the slave's loop have in common."""
+
+    lab: Laboratory
+    ticks: int
+
+    def take(self, received: Received) -> None:
+        """Act on a message of a role."""
+
+    def poll(self) -> None:
+        """Move the handshake on."""
+
+    def earliest(self, tick: int) -> int:
+        """When a tick may begin, ns."""
+
+    def latest(self, tick: int) -> int:
+        """When it begins whether its message has come or not, ns."""
+
+    def heard(self, tick: int) -> bool:
+        """Whether its message has come."""
+
+    def nominal(self, tick: int) -> int:
+        """When a tick begins if nothing is late, ns."""
+
+    def tick(self, tick: int) -> None:
+        """One control interval."""
+
+    def ease(self, tick: int) -> None:
+        """One interval on the way to rest."""
+
+    def tell(self) -> None:
+        """Tell the other laboratories of the end, again and again; may be called at any time."""
+
+    def finish(self) -> None:
+        """All ticks are done."""
+
+    def stop(self, reason: str) -> None:
+        """Somebody wants the test to end."""
+
+    def stop_rig(self) -> None:
+        """Disarm the rig, once."""
+
+    def disarm(self) -> None:
+        """Bring the rig to a stop."""
+
+    def leave(self, *, last: bool = False) -> None:
+        """Last words, again after a while; `last` where nothing follows them."""
+
+    @property
+    def left(self) -> bool:
+        """Whether the last words have been received."""
+
+    @property
+    def completed(self) -> bool:
+        """Whether the test had all its ticks."""
+
+    @property
+    def needed(self) -> bool:
+        """Whether other laboratories that have not left yet are reached through this one alone."""
+
+    @property
+    def awaited(self) -> str:
+        """Who has not joined the test yet, empty where all have."""
+
+    @property
+    def progress(self) -> Mapping[str, float]:
+        """What a user watches."""
+
+    @property
+    def resting(self) -> Resting:
+        """How far the rig is on its way to rest."""
+
+
+def drive(loop: Loop, stopping: Callable[[], str], surroundings: Surroundings) -> None:
+    """Run a test to its end; `stopping` gives the reason to end it early, empty while there is none."""
+    try:
+        handshake(loop, stopping)
+        if loop.lab.running:
+            surroundings.begin()
+        freeze()
+        following = run(loop, stopping)
+        over = loop.lab.clock.now()
+        if loop.lab.running:
+            loop.finish()
+        come_to_rest(loop, following)
+        if loop.lab.safety.mode is Mode.EMERGENCY_STOP:
+            loop.stop_rig()
+        stay(loop, stopping)
+    except Exception:  # whatever goes wrong in this program, the rig does not stay armed
+        loop.disarm()
+        raise
+    loop.disarm()
+    surroundings.end(loop.ticks)
+    depart(loop, over)
+
+
+def handshake(loop: Loop, stopping: Callable[[], str]) -> None:
+    """Until the start is agreed or the test is over."""
+    lab = loop.lab
+    waited = Waited(lab.clock.now())
+    while lab.exchange.state in (State.IDLE, State.REGISTERED, State.ARMED) and not stopping():
+        loop.poll()
+        if text := waited.news(loop.awaited, lab.plan.link.connect_timeout, lab.clock.now()):
+            lab.report("waiting", {"lab": lab.name, "text": text})
+        fetch(loop, lab.clock.now() + IDLE_NS)
+
+
+def run(loop: Loop, stopping: Callable[[], str]) -> int:
+    """All ticks, fewer where the test ends before the last; the one that would come next."""
+    lab = loop.lab
+    reported = 0
+    for tick in range(lab.plan.ticks):
+        wait(loop, tick)
+        if reason := stopping():
+            loop.stop(reason)
+        if not lab.running:
+            return tick
+        loop.tick(tick)
+        lab.tell_news(tick)
+        lab.send_samples()
+        if lab.clock.now() - reported >= PROGRESS_NS:
+            reported = lab.clock.now()
+            lab.report("progress", {"tick": tick, "t": tick * lab.plan.test.interval, **loop.progress})
+    wait(loop, lab.plan.ticks)
+    return lab.plan.ticks
+
+
+def come_to_rest(loop: Loop, tick: int) -> None:
+    """The ramp to rest from a tick on, an interval at a time; those that were missed are left out, never caught up.
+
+    A tick that is late by more than a part is left out too: two commands in quick succession would be a step.
+    """
+    lab = loop.lab
+    late = lab.interval_ns // 4
+    reported = -RESTING_NS
+    while lab.safety.mode is Mode.RAMPING:
+        tick += max(-((loop.nominal(tick) + late - lab.clock.now()) // lab.interval_ns), 0)
+        lab.clock.sleep_until(loop.nominal(tick))
+        while fetch(loop, 0):
+            pass
+        if lab.safety.mode is Mode.RAMPING:  # a message may have stopped the rig at once
+            loop.ease(tick)
+        loop.tell()
+        lab.send_samples()
+        if lab.safety.mode is Mode.RAMPING and lab.clock.now() - reported >= RESTING_NS:
+            reported = lab.clock.now()
+            lab.report("resting", {"lab": lab.name, **loop.resting._asdict()})
+        tick += 1
+
+
+def stay(loop: Loop, stopping: Callable[[], str]) -> None:
+    """Where the plan wants it, a latched laboratory stays until an operator resets it, the master until all are."""
+    lab = loop.lab
+    while lab.plan.safety.wait_for_reset and (lab.safety.latched or loop.needed) and not stopping():
+        fetch(loop, lab.clock.now() + IDLE_NS)
+        loop.tell()
+        lab.send_samples()
+
+
+def wait(loop: Loop, tick: int) -> None:
+    """Sleep until the time of a tick, take what has come, and wait for its message as long as it may be waited for.
+
+    A laboratory that was held up itself reports that first, before it reads how the others have reacted.
+    """
+    lab = loop.lab
+    lab.clock.sleep_until(loop.earliest(tick))
+    if lab.running and tick < lab.plan.ticks and lab.overrun(lab.clock.now() - loop.nominal(tick), tick):
+        return
+    while fetch(loop, 0):
+        pass
+    while not loop.heard(tick) and lab.running and lab.clock.now() < loop.latest(tick):
+        fetch(loop, loop.latest(tick))
+
+
+def fetch(loop: Loop, deadline: int) -> bool:
+    """Take one message that comes before the deadline; whether there was one."""
+    received = loop.lab.endpoint.receive(max(deadline - loop.lab.clock.now(), 0) * 1e-9)
+    if received is None:
+        return False
+    loop.take(received)
+    return True
+
+
+def depart(loop: Loop, over: int) -> None:
+    """Send the last words until they are received, for a bounded time; the recorder may still ask for what it lacks.
+
+    A recorder that is held up is waited for as long as during the test, counted from when it was last heard, and then
+    has as long as any other to come back to the link and to ask. A laboratory that routes for others stays while they
+    come to rest, at most for the longest way to rest after the ticks were `over`; the recorder's time counts from
+    then.
+    """
+    lab = loop.lab
+    begun, patience = lab.clock.now(), round(lab.plan.recording.patience * 1e9)
+    rest = over + round(resting(lab.plan) * 1e9) if lab.start_ns else begun
+    while (routes := coming_to_rest(loop, rest)) or not loop.left:
+        if routes:
+            begun = lab.clock.now()
+        heard = lab.recorder_heard_ns if lab.recorded else begun - patience
+        if lab.clock.now() >= max(begun, min(heard, begun) + patience) + LEAVE_NS:
+            break
+        loop.leave()
+        fetch(loop, lab.clock.now() + IDLE_NS)
+    loop.leave(last=True)
+
+
+def coming_to_rest(loop: Loop, rest: int) -> bool:
+    """Whether other laboratories may still be on their way to rest, which ends at `rest` (ns) at the latest.
+
+    After a trip they repeat their reason; in an orderly end they send nothing before they are at rest.
+    """
+    lab = loop.lab
+    return (loop.needed or lab.exchange.state is State.STOPPING) and lab.clock.now() < rest
+
+
+def longest_leave(plan: Plan) -> float:
+    """How long the last words of a laboratory may take at most, s."""
+    return LEAVE_NS * 1e-9 + plan.recording.patience

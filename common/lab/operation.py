@@ -1,0 +1,63 @@
+"""What a laboratory does when an operator asks for it: stop, stop at once, reset."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from common.errors import EmergencyStopError
+from common.lab.laboratory import Laboratory
+from common.protocol.messages import Answer, Operator
+
+STOP, EMERGENCY, RESET = "stop", "emergency", "reset"
+WORDS = (STOP, EMERGENCY, RESET)
+
+
+class Operated(Protocol):
+    """A laboratory's loop as an operator sees it."""
+
+    lab: Laboratory
+
+    def wind_down(self, reason: str) -> None:
+        """End the test in order."""
+
+    def emergency(self, error: EmergencyStopError) -> None:
+        """Stop the rig at once."""
+
+    def standing(self) -> str:
+        """Why the cause of a latched state persists, empty where it is gone."""
+
+
+def obey(loop: Operated, wish: Operator) -> None:
+    """Do what an operator of this test wants, once per press, and answer every time it is asked."""
+    lab = loop.lab
+    if wish.plan != lab.plan.digest() or wish.word not in WORDS:
+        return
+    if lab.safety.pressed(wish.press):
+        lab.answers[wish.press] = _done(loop, wish)
+        lab.note("operator", f"{wish.word}: {lab.answers[wish.press][1]}", tick=lab.tick)
+    accepted, text = lab.answers[wish.press]
+    lab.endpoint.send(Answer(0, wish.press, int(accepted), text))
+
+
+def _done(loop: Operated, wish: Operator) -> tuple[bool, str]:
+    """Whether it was done, and a sentence."""
+    lab, reason = loop.lab, wish.reason or "no reason given"
+    if wish.word == RESET:
+        return _reset(loop)
+    if wish.word == EMERGENCY:
+        loop.emergency(EmergencyStopError(f"emergency stop by the operator: {reason}."))
+        return True, f"{lab.safety.mode.value}."
+    if lab.exchange.ended:
+        return False, "The test is over already."
+    loop.wind_down(f"stopped by the operator: {reason}.")
+    return True, f"{lab.safety.mode.value}."
+
+
+def _reset(loop: Operated) -> tuple[bool, str]:
+    safety = loop.lab.safety
+    if not safety.latched:
+        return False, f"There is nothing to reset: the laboratory is {safety.mode.value}."
+    if standing := loop.standing():
+        return False, f"The cause is not gone: {standing}"
+    safety.reset()
+    return True, "The laboratory is idle."

@@ -1,0 +1,192 @@
+"""A laboratory's stream to the recorder: items in order, sent in pieces, kept for sending again.
+
+An item is `[topic, log_ns, publish_ns, values…]`; the pieces are sent between ticks, so that nothing is
+written in the loop and a slow recorder costs it nothing. What is kept is bounded by the plan, so that every laboratory
+is full after the same time of test and grows no more, however long that is.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+import msgpack
+
+from common.plan.plan import Plan
+from common.protocol.messages import Finished, Message, Resend, Samples
+from common.roles import MASTER
+
+PIECE = 10  # items; at 500 ticks per second a piece leaves every 10 to 20 ms
+AT_ONCE = "event"  # the topic that fills no piece first: a laboratory that has stopped adds no more items to fill one
+PATIENCES = 6  # of the plan's with its recorder are kept for sending again: at the default a minute
+KEPT_BYTES = 64 << 20  # of them at most, which tall buildings with many slaves reach
+EARLY = 4_000  # pieces that wait for one before them; what comes beyond is asked for again
+EARLY_BYTES = 32 << 20  # of them
+BURST = 5  # pieces sent again at one request: they leave between ticks, and each costs some 50 µs
+
+
+def kept_seconds(plan: Plan) -> float:
+    """How much of a test a laboratory keeps for sending again, s."""
+    return PATIENCES * plan.recording.patience
+
+
+def kept_items(plan: Plan, lab: str) -> float:
+    """The items of that time: each tick gives one of the laboratory's own, and the master's one more per slave."""
+    per_tick = 1 + len(plan.roles) if lab == MASTER else 1
+    return kept_seconds(plan) / plan.test.interval * per_tick
+
+
+class Outlet:
+    """Sending end of one laboratory's stream; its newest `kept` items can be sent again, up to `KEPT_BYTES`."""
+
+    def __init__(self, session: int, lab: str, kept: float) -> None:
+        self._session = session
+        self._lab = lab
+        self._kept = kept
+        self._pending: list[list[Any]] = []
+        self._sent: deque[Samples] = deque()  # one joining the other
+        self._sent_bytes = 0
+        self._hurry = False
+        self.total = 0
+
+    def add(self, topic: str, log_ns: int, publish_ns: int, values: tuple[Any, ...]) -> None:
+        """Queue one item."""
+        self._pending.append([topic, log_ns, publish_ns, *values])
+        self._hurry = self._hurry or topic == AT_ONCE
+        self.total += 1
+
+    def pieces(self, *, everything: bool = False) -> list[Message]:
+        """The messages to send now: whole pieces, or `everything` that waits, as where an event is among it."""
+        everything, self._hurry = everything or self._hurry, False
+        messages: list[Message] = []
+        while len(self._pending) >= PIECE or (everything and self._pending):
+            items, self._pending = self._pending[:PIECE], self._pending[PIECE:]
+            first = self.total - len(self._pending) - len(items)
+            piece = Samples(self._session, self._lab, first, msgpack.packb(items))
+            self._keep(piece)
+            messages.append(piece)
+        return messages
+
+    def _keep(self, piece: Samples) -> None:
+        sent = self._sent
+        sent.append(piece)
+        self._sent_bytes += len(piece.items)
+        while len(sent) > 1 and (piece.first - sent[1].first >= self._kept or self._sent_bytes > KEPT_BYTES):
+            self._sent_bytes -= len(sent.popleft().items)
+
+    def again(self, request: Resend) -> list[Message]:
+        """The first pieces, at most `BURST`, that hold items asked for, as far as they are still kept."""
+        if not 0 <= request.first <= request.last < self.total:
+            return []
+        sent = self._sent
+        begin = max(bisect_right(sent, request.first, key=lambda piece: piece.first) - 1, 0)
+        pieces = [sent[place] for place in range(begin, min(begin + BURST, len(sent)))]
+        return [piece for piece in pieces if piece.first <= request.last]
+
+    def finished(self) -> Finished:
+        """The message that says how long the stream is."""
+        return Finished(self._session, self._lab, self.total)
+
+
+def pack_nexts(nexts: Mapping[str, int]) -> bytes:
+    """How far the recorder is with each stream, as its message carries it."""
+    packed: bytes = msgpack.packb(dict(nexts))
+    return packed
+
+
+def next_of(packed: bytes, lab: str) -> int:
+    """The item of a stream that the recorder waits for, 0 where its message does not say."""
+    try:
+        found = msgpack.unpackb(packed)
+    except (ValueError, msgpack.UnpackException):
+        return 0
+    there = found.get(lab) if isinstance(found, dict) else None
+    return there if isinstance(there, int) else 0
+
+
+class Inlet:
+    """Receiving end of one stream: hands items on in order, and says which are missing.
+
+    `unpack` gives the items of a piece, None where it holds what cannot be recorded: such a piece is counted and
+    counts as missing. `most` bounds the stream's items, so that no number in a message makes it go on for ever.
+    """
+
+    def __init__(
+        self, unpack: Callable[[bytes], list[list[Any]] | None] = msgpack.unpackb, most: int = 2**62
+    ) -> None:
+        self.next = 0
+        self.total: int | None = None
+        self.lost = 0
+        self.rejected = 0
+        self._unpack = unpack
+        self._most = most
+        self._early: dict[int, tuple[list[list[Any]], int]] = {}  # items, and bytes they came in
+        self._held = 0
+
+    def take(self, piece: Samples) -> list[list[Any]]:
+        """The items that are now complete and in order; repeated pieces give none."""
+        if piece.first < self.next or piece.first in self._early:
+            return []
+        items = self._unpack(piece.items) if piece.first < self._most else None
+        if items is None:
+            self.rejected += 1
+            return []
+        if piece.first == self.next:
+            self.next += len(items)
+            return items + self._ready()
+        if len(self._early) < EARLY and self._held + len(piece.items) <= EARLY_BYTES:
+            self._early[piece.first] = (items, len(piece.items))
+            self._held += len(piece.items)
+        return []
+
+    def end(self, finished: Finished) -> None:
+        """The stream ends after so many items."""
+        if finished.total <= self._most:
+            self.total = finished.total
+        else:
+            self.rejected += 1
+
+    def _ready(self) -> list[list[Any]]:
+        items: list[list[Any]] = []
+        while (found := self._early.pop(self.next, None)) is not None:
+            new, size = found
+            self._held -= size
+            self.next += len(new)
+            items += new
+        self._forget()
+        return items
+
+    def _forget(self) -> None:
+        """Pieces that begin within others that were handed on are none of this stream."""
+        for first in [first for first in self._early if first < self.next]:
+            self._held -= self._early.pop(first)[1]
+
+    def missing(self) -> tuple[int, int] | None:
+        """First and last item of the first hole, None where there is none."""
+        return next(iter(self.holes()), None)
+
+    def holes(self) -> Iterator[tuple[int, int]]:
+        """First and last item of every hole, in order."""
+        expected = self.next
+        for first in sorted(self._early):
+            if first > expected:
+                yield expected, first - 1
+            expected = first + len(self._early[first][0])
+        if self.total is not None and expected < self.total:
+            yield expected, self.total - 1
+
+    def give_up(self) -> list[list[Any]]:
+        """Count the first hole as lost and hand on what follows it."""
+        hole = self.missing()
+        if hole is None:
+            return []
+        self.lost += hole[1] + 1 - hole[0]
+        self.next = hole[1] + 1
+        return self._ready()
+
+    @property
+    def complete(self) -> bool:
+        """Whether the stream has ended and all of it, but what is lost, was handed on."""
+        return self.total is not None and self.next >= self.total

@@ -1,0 +1,248 @@
+"""What must hold before anything moves: risks by name, who takes them, and what sensors and link must pass.
+
+The partition and the simulated peaks are judged in `models/loop/preflight.py`, the disk by the recorder.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+from common.errors import InputError, RigError
+from common.lab.laboratory import Laboratory, Setting
+from common.plan.patience import strict
+from common.plan.plan import Plan
+from common.plan.schema import nearest
+
+NAMES = ("partition", "peaks", "sensors", "link", "disk")
+
+# codes of the recording's events
+PASSED, SENSORS, LINK, ACCEPTED = "preflight", "sensors", "link", "accepted_risk"
+
+NOISE_FACTOR = 10.0  # noise over the plan's rms: more of it points to a wrong range or a loose cable
+OFFSET_SHARE = 0.1  # share of the limit that a rig at rest may read: a zeroed sensor stays far below it
+
+NO_NOISE: Mapping[str, float] = {}
+
+SENSORS_PASSED = "Sensor check at rest: passed"
+
+
+class Risk(NamedTuple):
+    """One reason not to move; the sentence says what, with which figures, and what to do."""
+
+    name: str
+    sentence: str
+
+
+class Check(NamedTuple):
+    """What was looked at, in words with its figures, and the risk that was found."""
+
+    text: str
+    risk: Risk | None = None
+
+
+class RefusedError(RigError):
+    """A test that must not begin, for a risk that nobody has accepted by name (exit 3)."""
+
+
+def check(risks: Iterable[Risk], accepted: Collection[str]) -> tuple[list[Risk], list[Risk]]:
+    """Risks that refuse the test, and those that are overruled because their name was accepted."""
+    found = list(risks)
+    return (
+        [risk for risk in found if risk.name not in accepted],
+        [risk for risk in found if risk.name in accepted],
+    )
+
+
+def refusal(risks: Sequence[Risk]) -> RefusedError:
+    """The refusal for risks that nobody has accepted, as one sentence; `risks` is not empty."""
+    names = dict.fromkeys(risk.name for risk in risks)
+    options = " ".join(f"--accept-risk {name}" for name in names)
+    return RefusedError(
+        f"Pre-flight refuses the test: {'; '.join(risk.sentence for risk in risks)}; "
+        f"to run it all the same, give {options}."
+    )
+
+
+def known(names: Iterable[str]) -> tuple[str, ...]:
+    """The names of risks that somebody accepts, each once.
+
+    Raises:
+        InputError: there is no such risk.
+    """
+    for name in names:
+        if name not in NAMES:
+            raise InputError(f"There is no risk '{name}' to accept: {nearest(name, NAMES)}")
+    return tuple(dict.fromkeys(names))
+
+
+class Gate:
+    """What one laboratory must pass before it moves, and what came of it.
+
+    `accepted` are the names of the risks that are taken. What was overruled and what was passed stays here until it
+    can be told the recording, once the start is agreed.
+    """
+
+    def __init__(self, accepted: Collection[str] = ()) -> None:
+        self.accepted = known(accepted)
+        self.overruled: list[Risk] = []
+        self.passed: list[tuple[str, str]] = []  # code of the event, and its text
+
+    def judge(self, checks: Iterable[Check], code: str = PASSED) -> None:
+        """Let checks pass or overrule their risks; raises RefusedError where one is not accepted."""
+        made = list(checks)
+        refusing, overruled = check([one.risk for one in made if one.risk], self.accepted)
+        if refusing:
+            raise refusal(refusing)
+        self.overruled += overruled
+        self.passed += [(code, f"pre-flight: {one.text}.") for one in made if one.risk is None]
+
+    def note(self, lab: Laboratory) -> None:
+        """Record and report what was passed and what was overruled; once."""
+        for code, text in self.passed:
+            lab.note(code, text)
+        for risk in self.overruled:
+            lab.note(ACCEPTED, f"risk '{risk.name}' accepted: {risk.sentence}.", level="warning")
+        self.passed, self.overruled = [], []
+
+
+# -- link -----------------------------------------------------------------------------------------
+
+
+def link_risk(round_trips_s: Sequence[float], lost: int, plan: Plan) -> Risk | None:
+    """The risk of a link that loses exchanges, or brings too many later than the interval; None where it serves.
+
+    `round_trips_s` are those of the exchanges that came back, s.
+    """
+    interval, share = plan.test.interval, plan.preflight.late_share
+    late = sum(trip > interval for trip in round_trips_s)
+    if not round_trips_s:
+        return Risk(
+            "link", f"none of {lost} exchanges over the link came back, so check network and firewall"
+        )
+    if lost <= plan.preflight.lost and late <= share * len(round_trips_s):
+        return None
+    return Risk(
+        "link",
+        f"of {len(round_trips_s) + lost} exchanges over the link {lost} were lost and {late} took longer than the "
+        f"interval of {interval * 1e3:g} ms ({share:.0%} of them may), {quantiles(round_trips_s)}, so quieten "
+        "network and machines (`rths doctor` says what they lack) or lengthen interval in [test]",
+    )
+
+
+def link_text(round_trips_s: Sequence[float], lost: int, plan: Plan) -> str:
+    """What a link has passed, in words."""
+    late = sum(trip > plan.test.interval for trip in round_trips_s)
+    return f"Link check: {len(round_trips_s)} exchanges, {lost or 'none'} lost, {late} late, {quantiles(round_trips_s)}"
+
+
+def link_check(round_trips_s: Sequence[float], lost: int, plan: Plan) -> Check:
+    """The link's check, for a gate."""
+    risk = link_risk(round_trips_s, lost, plan)
+    return Check("" if risk else link_text(round_trips_s, lost, plan), risk)
+
+
+def quantiles(round_trips_s: Sequence[float]) -> str:
+    """Median and 99th percentile of round trips in words: the smallest that as many do not exceed."""
+    ranked = sorted(round_trips_s)
+    p50, p99 = (ranked[math.ceil(part * len(ranked)) - 1] for part in (0.5, 0.99))
+    return f"round trip p50 {p50 * 1e3:.2f} ms, p99 {p99 * 1e3:.2f} ms"
+
+
+# -- sensors --------------------------------------------------------------------------------------
+
+
+def sensor_risk(
+    readings: Sequence[Sequence[float]],
+    names: Sequence[str],
+    limits: Mapping[str, float],
+    noise: Mapping[str, float] = NO_NOISE,
+    *,
+    hidden: bool = False,
+    lab: str = "the laboratory",
+) -> Risk | None:
+    """The risk of the first channel that does not read like a sound sensor of a rig at rest; None where all do.
+
+    `readings` (n, channels) at rest, `limits` by name, `noise` the plan's rms by name; all in the channels' units.
+    Figures of a `hidden` rig are kept back.
+    """
+    for place, name in enumerate(names):
+        values = [float(row[place]) for row in readings]
+        complaint = unsound(values, limits.get(name, math.inf), noise.get(name, 0.0))
+        if complaint:
+            what, figures, remedy = complaint
+            shown = "" if hidden else f" ({figures})"
+            return Risk("sensors", f"{name} of {lab} {what}{shown} while nothing moves, so {remedy}")
+    return None
+
+
+def unsound(values: Sequence[float], limit: float, rms: float) -> tuple[str, str, str] | None:
+    """What is wrong with one channel at rest, its figures and the remedy; None where nothing is."""
+    if not all(map(math.isfinite, values)):
+        return "is not finite", f"{values}"[:80], "look at its cable and its driver"
+    offset, spread = mean_and_rms(values)
+    largest = max(map(abs, values))
+    if largest > limit:
+        return "is beyond its limit", f"{largest:.6g} of {limit:g}", "unload the rig or zero the sensor"
+    if rms > 0.0 and min(values) == max(values) and len(values) > 1:
+        return (
+            "is frozen",
+            f"{len(values)} readings of {values[0]:.6g}, nominal noise {rms:g} rms",
+            "look at its cable and its driver, or set its noise in [sensors] to 0",
+        )
+    if rms > 0.0 and spread > NOISE_FACTOR * rms:
+        return (
+            f"is noisier than {NOISE_FACTOR:g} × its nominal noise",
+            f"{spread:.3g} of {rms:g} rms",
+            "look at its cable and its range, or correct its noise in [sensors]",
+        )
+    if abs(offset) > OFFSET_SHARE * limit:
+        return (
+            f"is off zero by more than {OFFSET_SHARE:.0%} of its limit",
+            f"{offset:.6g} of {limit:g}",
+            "bring the rig to zero or zero the sensor",
+        )
+    return None
+
+
+def mean_and_rms(values: Sequence[float]) -> tuple[float, float]:
+    """Mean, and rms about it."""
+    mean = math.fsum(values) / len(values)
+    return mean, math.sqrt(math.fsum((value - mean) ** 2 for value in values) / len(values))
+
+
+class SensorsAtRest:
+    """Judges the sensors of a laboratory's rig as it is armed."""
+
+    def __init__(self, gate: Gate, setting: Setting) -> None:
+        self._gate = gate
+        self._plan = setting.plan
+        self._clock = setting.clock
+
+    def judge(
+        self,
+        read: Callable[[], Sequence[float]],
+        names: Sequence[str],
+        lab: str,
+        *,
+        hidden: bool,
+        paced: bool,
+    ) -> None:
+        """Read as often as the plan says, an interval apart where `paced`; raises RigError where unsound."""
+        plan, readings = self._plan, []
+        for _ in range(plan.preflight.readings):
+            if paced:
+                self._clock.sleep_until(self._clock.now() + round(plan.test.interval * 1e9))
+            readings.append(read())
+        limits = vars(strict(plan).limits)  # what is off zero is so beside an emulation too
+        risk = sensor_risk(readings, names, limits, vars(plan.sensors), hidden=hidden, lab=lab)
+        self._gate.judge([Check(SENSORS_PASSED, risk)], SENSORS)
+
+    def skip(self, kind: str, *, hidden: bool) -> None:
+        """Take note of a rig of the class `kind` that cannot be read at rest.
+
+        A hidden rig, one of a reality, is reported like one whose check passed, so that nothing tells the two apart.
+        """
+        skipped = f"Sensor check skipped: class {kind} does not set idle_readings = True"
+        self._gate.judge([Check(SENSORS_PASSED if hidden else skipped)], SENSORS)

@@ -1,0 +1,71 @@
+"""Rejected frames: counted by reason, and reported while the test runs."""
+
+from __future__ import annotations
+
+import threading
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from common.protocol.codec import Reject
+
+NEWS_NS = 1_000_000_000  # between two reports
+UNTOLD = frozenset({Reject.UNREGISTERED.value})  # a process in no test hears those of others
+
+
+class Seen(NamedTuple):
+    """The rejections for one reason: when they began, the last one, and as which role its sender spoke."""
+
+    first_ns: int
+    last_ns: int
+    role: str
+
+
+class Rejections:
+    """Counts rejected frames; `add` may be called from any thread, `news` from one."""
+
+    def __init__(self) -> None:
+        self.counts: Counter[str] = Counter()
+        self.seen: dict[str, Seen] = {}
+        self._lock = threading.Lock()
+        self._told: dict[str, int] = {}
+        self._told_ns = -NEWS_NS
+        self._fresh = False
+
+    def add(self, reason: Reject, role: str, now_ns: int) -> None:
+        """Count one rejected frame, whose sender claims this role."""
+        name = reason.value
+        with self._lock:
+            first_ns = self.seen[name].first_ns if name in self.seen else now_ns
+            self.seen[name] = Seen(first_ns, now_ns, role)
+            self.counts[name] += 1  # last: `news` looks for who was seen
+        self._fresh = self._fresh or name not in UNTOLD
+
+    def news(self, now_ns: int) -> dict[str, Any] | None:
+        """An event on what was rejected since the last one; at most one a second, None where there is nothing new.
+
+        `code`, `level` and `text` are those of an event; its `values` the counts of the whole test by reason.
+        """
+        if not self._fresh or now_ns - self._told_ns < NEWS_NS:
+            return None
+        self._fresh = False
+        self._told_ns = now_ns
+        counts = told(self.counts)
+        fresh = {name: count - self._told.get(name, 0) for name, count in counts.items()}
+        self._told = counts
+        new = ", ".join(
+            f"{count} by {name} (last from the {self.seen[name].role})"
+            for name, count in fresh.items()
+            if count
+        )
+        return {
+            "code": "rejected",
+            "level": "warning",
+            "text": f"Frames were rejected: {new}.",
+            "values": {name: float(count) for name, count in counts.items()},
+        }
+
+
+def told(counts: Mapping[str, int]) -> dict[str, int]:
+    """The counts that a test's events tell, by reason."""
+    return {name: count for name, count in sorted(counts.items()) if name not in UNTOLD}

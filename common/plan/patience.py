@@ -1,0 +1,117 @@
+"""Safety figures of a test whose laboratories are all emulated: the machine's pauses must not end it.
+
+A rig of a user's must be at rest within milliseconds of a message that stays away. Emulated laboratories can hurt
+nobody, and they run on laptops and in containers that pause a process for tens of milliseconds. So where the plan
+names no rig, the figures that it does not write out take the values below. They follow from the plan alone, because
+every process of a test derives them for itself and their digests are compared.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from common.plan.plan import Plan
+
+# s. Pauses of 50 ms are to be borne; beside other load they were seen to reach 0.5 s, and four such may coincide.
+PATIENCE = 2.0
+NOTICED = (
+    0.1  # s; a shorter silence is a pause that the contract expects, and is not worth a change of the mode
+)
+LOST_SHARE = (
+    0.01  # of the exchanges: one that a pause held up for 100 ms is asked again, and may count as lost
+)
+SHOCK = 10.0  # on the table's acceleration: a target that is 50 ms ahead was seen to take 53 m/s², 100 ms the double
+
+OVERRUN = "safety.overrun"
+
+Figure = Callable[["Plan"], float]
+
+
+def intervals(seconds: float) -> Figure:
+    """So many intervals as a time has."""
+    return lambda plan: math.ceil(seconds / plan.test.interval - 1e-9)
+
+
+# A table whose commands were held up moves to the newest one within an interval: its rates then show the pause.
+FIGURES: Mapping[str, Figure] = {
+    "link.loss_timeout": lambda _: 2.5 * PATIENCE,  # beyond a silence and a pause of one's own together
+    "safety.hold_after": intervals(NOTICED),
+    "safety.ramp_after": intervals(PATIENCE),
+    OVERRUN: intervals(PATIENCE),
+    "safety.message_age": lambda _: (
+        PATIENCE
+    ),  # a laboratory that is behind by `overrun` sends messages as old
+    "preflight.lost": lambda plan: math.ceil(LOST_SHARE * plan.preflight.exchanges),
+    "preflight.late_share": lambda _: 1.0,  # late ticks are reported while the test runs
+    "limits.table_velocity": lambda _: math.inf,
+    "limits.table_step": lambda _: math.inf,
+    "limits.table_error": lambda _: math.inf,
+    "limits.damper_step": lambda _: math.inf,
+    "limits.table_acceleration": lambda plan: SHOCK * plan.limits.table_acceleration,
+}
+TABLES = tuple(dict.fromkeys(name.partition(".")[0] for name in FIGURES))
+TOGETHER = {"safety.hold_after", "safety.ramp_after"}  # each must suit the other
+
+
+def eased(plan: Plan, given: Mapping[str, Any]) -> Plan:
+    """The plan with patient figures for those that `given`, the tables of its file, does not write out.
+
+    A figure is never made stricter than it is with a rig, and a plan that names a rig stays as it is.
+    """
+    if not plan.emulated:
+        return plan
+    written = {f"{table}.{key}" for table in TABLES for key in given.get(table, {})}
+    if written & TOGETHER:
+        written |= TOGETHER
+    found = {name: FIGURES[name](plan) for name in FIGURES if name not in written}
+    found = {name: value for name, value in found.items() if value > figure(plan, name)}
+    return replace(with_figures(plan, found), eased=tuple(found))
+
+
+def strict(plan: Plan) -> Plan:
+    """The plan with the figures that hold beside a rig, in place of those that were eased."""
+    return replace(with_figures(plan, {name: standard(name) for name in plan.eased}), eased=())
+
+
+def standard(name: str) -> float:
+    """A figure that is not written out, as it holds beside a rig."""
+    from common.plan.plan import Plan
+
+    return figure(Plan, name)
+
+
+def figure(plan: Plan | type[Plan], name: str) -> float:
+    """A figure of a plan by the name of its table and its own."""
+    table, _, key = name.partition(".")
+    return float(getattr(getattr(plan, table), key))
+
+
+def with_figures(plan: Plan, figures: Mapping[str, float]) -> Plan:
+    """The plan with some figures in place of its own; a count stays a whole number."""
+    parts: dict[str, dict[str, float]] = {}
+    for name, value in figures.items():
+        table, _, key = name.partition(".")
+        whole = isinstance(getattr(getattr(plan, table), key), int)
+        parts.setdefault(table, {})[key] = round(value) if whole else value
+    return replace(
+        plan, **{table: replace(getattr(plan, table), **values) for table, values in parts.items()}
+    )
+
+
+def sentence(plan: Plan) -> str:
+    """Which figures were eased, their values beside those with a rig, and why."""
+    figures = (f"{name.partition('.')[2]} {figure(plan, name):g} ({standard(name):g})" for name in plan.eased)
+    return (
+        "All laboratories are emulated, so a pause of this machine does no harm and does not end the test. "
+        f"Figures that the plan does not set are larger than beside a rig (in brackets): {', '.join(figures)}. "
+        "A late tick is made up for and counted."
+    )
+
+
+def values(plan: Plan) -> dict[str, float]:
+    """The eased figures by name."""
+    return {name: figure(plan, name) for name in plan.eased}

@@ -1,0 +1,376 @@
+"""The plan: one TOML file that describes a test, loaded alike by both laboratories."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import tomllib
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from common.errors import InputError, PlanError
+from common.plan import building, patience
+from common.plan.schema import fill, nearest, plain
+from common.plan.tables import (
+    Actuator,
+    Column,
+    Compensator,
+    Control,
+    Damper,
+    GroundMotion,
+    Laboratory,
+    Limits,
+    Link,
+    Preflight,
+    Recording,
+    Rig,
+    Safety,
+    Sensors,
+    SlaveLaboratory,
+    Structure,
+    Table,
+    Test,
+    Tolerances,
+)
+from common.roles import name_of, slave_role
+
+PROTOCOL_VERSION = 5
+MOST_SLAVES = 16
+FOLLOWS_IN = "table.compensator"
+SLAVE_NAME = re.compile(r"[a-z][a-z0-9_]*")
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A test, fully described; `base` is the folder that its relative paths start from.
+
+    `slaves` holds the slaves by name in the order of the file; it is empty where there is one without a name.
+    `follows_in` is the table of the file that the table's compensator comes from, for sentences about it.
+    `eased` names the figures that the file does not write out and that are patient because all laboratories are
+    emulated (common/plan/patience.py).
+    """
+
+    test: Test = Test()
+    ground_motion: GroundMotion = GroundMotion()
+    structure: Structure = Structure()
+    column: Column = Column()
+    actuator: Actuator = Actuator()
+    compensator: Compensator = Compensator()
+    table: Table = Table()
+    damper: Damper = Damper()
+    control: Control = Control()
+    sensors: Sensors = Sensors()
+    link: Link = Link()
+    safety: Safety = Safety()
+    preflight: Preflight = Preflight()
+    limits: Limits = Limits()
+    tolerances: Tolerances = Tolerances()
+    master: Laboratory = Laboratory()
+    slave: Laboratory = Laboratory()
+    recording: Recording = Recording()
+    slaves: dict[str, SlaveLaboratory] = field(default_factory=dict)
+    base: Path = Path()
+    follows_in: str = field(default=FOLLOWS_IN, compare=False)
+    eased: tuple[str, ...] = field(default=(), compare=False)
+
+    @property
+    def emulated(self) -> bool:
+        """Whether no laboratory of the plan has a rig of the user's."""
+        rigs = [self.master.rig, self.slave.rig, *(lab.rig for lab in self.slaves.values())]
+        return not any(rig.class_ for rig in rigs)
+
+    @property
+    def makes_good(self) -> bool:
+        """Whether a tick that comes late is made up for: an emulated rig knows no time but its ticks."""
+        return patience.OVERRUN in self.eased
+
+    @property
+    def storeys(self) -> int:
+        """Number of storeys."""
+        return len(self.structure.mass)
+
+    @property
+    def ticks(self) -> int:
+        """Number of control intervals of the whole test."""
+        return round(self.test.duration / self.test.interval)
+
+    def tick_ns(self, tick: int) -> int:
+        """Nominal time of a tick after the first, ns; rounded for each tick, so that nothing adds up."""
+        return round(tick * (self.test.interval * 1e9))
+
+    @property
+    def window(self) -> int:
+        """Intervals by which a message may be late or ahead and still be fresh."""
+        return max(round(self.safety.message_age / self.test.interval), 1)
+
+    @property
+    def roles(self) -> tuple[str, ...]:
+        """The role of every slave, in the order of the file."""
+        return tuple(map(slave_role, self.slaves or [""]))
+
+    def of(self, role: str) -> Plan:
+        """The plan as one slave sees it: its own table, damper, control and rig in the usual places.
+
+        Raises:
+            InputError: the plan has no such slave.
+        """
+        self.slave_role(name_of(role))
+        if not self.slaves:
+            return self
+        lab = self.slaves[name_of(role)]
+        parts = {name: getattr(lab, name) for name in INTERFACE}
+        own = lab.table.compensator != self.table.compensator
+        follows_in = f"{role}.{FOLLOWS_IN}" if own else FOLLOWS_IN
+        return replace(self, slave=Laboratory(lab.rig), slaves={}, follows_in=follows_in, **parts)
+
+    def slave_role(self, name: str) -> str:
+        """The role of the slave of that name, empty for the one without.
+
+        Raises:
+            InputError: the plan has no such slave.
+        """
+        known = ", ".join(self.slaves)
+        if self.slaves and not name:
+            raise InputError(f"The plan names its slaves: say which one this is with --name ({known}).")
+        if not self.slaves and name:
+            raise InputError(f"The plan has one slave without a name: leave out --name {name}.")
+        if name and name not in self.slaves:
+            raise InputError(f"The plan names no slave '{name}': {nearest(name, self.slaves)}")
+        return slave_role(name)
+
+    def everywhere(self, **parts: Any) -> Plan:
+        """The plan with a table, damper or control in place of its own and of every slave's."""
+        slaves = {name: replace(lab, **parts) for name, lab in self.slaves.items()}
+        return replace(self, slaves=slaves, **parts)
+
+    def with_ticks(self, ticks: int) -> Plan:
+        """The plan over another number of control intervals."""
+        test = replace(self.test, duration=ticks * self.test.interval)
+        return replace(self, test=test)
+
+    def tables(self) -> dict[str, Any]:
+        """The plan as nested plain values, all defaults written out."""
+        tables = {name: plain(getattr(self, name)) for name in TABLES}
+        if self.slaves:
+            tables["slave"] = {name: plain(lab) for name, lab in self.slaves.items()}
+        return tables
+
+    def written(self) -> dict[str, Any]:
+        """As `tables`, without the figures that were eased: beside a rig they are strict again."""
+        tables = self.tables()
+        for name in self.eased:
+            table, _, key = name.partition(".")
+            del tables[table][key]
+        return tables
+
+    def toml(self) -> str:
+        """The plan as TOML text, all defaults written out but those that hold for emulated laboratories alone."""
+        return tomli_w.dumps(self.written())
+
+    def digest(self) -> str:
+        """Sixteen hex digits that agree where two plans describe the same test; the recording's folder is free."""
+        tables = {name: table for name, table in self.tables().items() if name != "recording"}
+        if self.slaves:
+            tables["order"] = list(self.slaves)  # their place decides on the order of recorded values
+        text = json.dumps(tables, sort_keys=True)
+        return hashlib.blake2b(text.encode(), digest_size=8).hexdigest()
+
+    def with_test(
+        self, *, duration: float | None = None, scale: float | None = None, seed: int | None = None
+    ) -> Plan:
+        """The plan with command-line values in place of its own, checked like those of a file."""
+        tables = self.written()
+        for table, name, value in (
+            ("test", "duration", duration),
+            ("ground_motion", "scale", scale),
+            ("test", "seed", seed),
+        ):
+            if value is not None:
+                tables[table][name] = value
+        return replace(from_tables(tables, self.base), follows_in=self.follows_in)
+
+
+BESIDE = ("slaves", "base", "follows_in", "eased")  # no tables of a file
+TABLES = tuple(name for name in Plan.__dataclass_fields__ if name not in BESIDE)
+INTERFACE = ("table", "damper", "control")  # what a named slave may have of its own
+
+
+def load(path: Path) -> Plan:
+    """The plan in a TOML file.
+
+    Raises:
+        PlanError: the file cannot be read, is no TOML, or holds what no plan can.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
+        raise PlanError(f"Cannot read the plan {path}: {reason}; give the path of a TOML file.") from None
+    return parse(text, path.parent, str(path))
+
+
+def parse(text: str, base: Path, name: str = "the plan") -> Plan:
+    """The plan in a TOML text; relative paths start from `base`; `name` stands in errors."""
+    try:
+        tables = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise PlanError(f"{name} is not valid TOML: {error}.") from None
+    except RecursionError:
+        raise PlanError(f"{name} is no plan: its values are nested too deeply.") from None
+    try:
+        return from_tables(tables, base)
+    except PlanError as error:
+        raise PlanError(f"{name}: {error}") from None
+
+
+def from_tables(tables: dict[str, Any], base: Path) -> Plan:
+    """The plan of nested plain values."""
+    for name in tables:
+        if name not in TABLES:
+            raise PlanError(f"Unknown table [{name}]: {nearest(name, TABLES)}")
+    types = {name: type(getattr(Plan, name)) for name in TABLES}
+    slaves = named_slaves(tables.get("slave", {}))
+    given = {name: fill(types[name], tables[name], name) for name in tables if name != "slave" or not slaves}
+    if "structure" in given:
+        given["structure"] = building.with_modal_damping(given["structure"], tables["structure"])
+    plan = Plan(base=base, **given)
+    plan = replace(plan, slaves={name: slave_laboratory(plan, name, slaves[name]) for name in slaves})
+    building.check(plan)
+    if plan.ticks < 1:
+        raise PlanError(f"duration in [test] is {plan.test.duration} s, shorter than one interval.")
+    check_tolerances(plan)
+    plan = patience.eased(plan, tables)
+    check_safety(plan)
+    return plan
+
+
+def named_slaves(given: object) -> dict[str, dict[str, Any]]:
+    """The slaves that [slave] names, none where it holds the rig of the only one.
+
+    Raises:
+        PlanError: names and a rig are mixed, a name is none, or there are too many.
+    """
+    if not isinstance(given, dict) or given.keys() <= {"rig"}:
+        return {}
+    for name, table in given.items():
+        if not isinstance(table, dict):
+            raise PlanError(
+                f"{name} in [slave] is {table!r}: give [slave.rig], or tables [slave.NAME.rig] for several slaves."
+            )
+        if not SLAVE_NAME.fullmatch(name):
+            raise PlanError(
+                f"The slave's name '{name}' in [slave.{name}] must begin with a letter and have "
+                "small letters, digits and _ only."
+            )
+    if "rig" in given:
+        names = ", ".join(name for name in given if name != "rig")
+        raise PlanError(
+            f"[slave] holds a rig beside the slaves {names}: name that one too, as [slave.NAME.rig]."
+        )
+    if len(given) > MOST_SLAVES:
+        raise PlanError(f"[slave] names {len(given)} slaves, but there may be at most {MOST_SLAVES}.")
+    return given
+
+
+def slave_laboratory(plan: Plan, name: str, given: dict[str, Any]) -> SlaveLaboratory:
+    """The laboratory of a named slave, on top of the plan's own tables."""
+    where = f"slave.{name}"
+    known = (*INTERFACE, "rig")
+    for entry in given:
+        if entry not in known:
+            raise PlanError(f"Unknown key '{entry}' in [{where}]: {nearest(entry, known)}")
+    parts: dict[str, Any] = {}
+    for part in INTERFACE:
+        own, common = given.get(part, {}), getattr(plan, part)
+        merged = plain(common) | own if isinstance(own, dict) else own
+        parts[part] = fill(type(common), merged, f"{where}.{part}")
+    return SlaveLaboratory(rig=fill(Rig, given.get("rig", {}), f"{where}.rig"), **parts)
+
+
+def check_tolerances(plan: Plan) -> None:
+    """Every tolerance must name a nominal parameter and be a share between 0 and 1."""
+    tables = plan.tables()
+    tables["actuator"] = building.parameters(plan.actuator)
+    known = [name for table in NOMINAL for name in uncertain(table, tables[table])]
+    chosen = plan.actuator.model
+    other = "fopdt" if chosen == "servo_hydraulic" else "servo_hydraulic"
+    foreign = uncertain("actuator", building.parameters(replace(plan.actuator, model=other)))
+    for name, value in plan.tolerances.parameters.items():
+        if name in foreign:
+            raise PlanError(
+                f"'{name}' in [tolerances] is of the actuator's model '{other}', but '{chosen}' is chosen in "
+                "[actuator]: leave it out."
+            )
+        if name not in known:
+            raise PlanError(f"Unknown parameter '{name}' in [tolerances]: {nearest(name, known)}")
+        if not 0.0 <= value <= 1.0:
+            raise PlanError(f"'{name}' in [tolerances] is {value}, but must be at least 0 and at most 1.")
+
+
+def uncertain(where: str, table: dict[str, Any]) -> list[str]:
+    """The parameters of a table that nobody knows exactly: its numbers without those that somebody chose."""
+    names = []
+    for key, value in table.items():
+        name = f"{where}.{key}"
+        if name in CHOSEN:
+            continue
+        if isinstance(value, dict):
+            names += uncertain(name, value)
+        elif isinstance(value, int | float | list):
+            names.append(name)
+    return names
+
+
+def check_safety(plan: Plan) -> None:
+    """A laboratory holds before it ramps."""
+    safety = plan.safety
+    if safety.hold_after >= safety.ramp_after:
+        raise PlanError(
+            f"hold_after in [safety] is {safety.hold_after}, but must be below ramp_after, {safety.ramp_after}."
+        )
+
+
+NOMINAL = ("structure", "column", "actuator", "table", "damper", "sensors")
+CHOSEN = (
+    "structure.rho_infinity",
+    "structure.columns",
+    "structure.experimental",
+    "column.storey",
+    "column.columns_per_storey",
+    "column.represents",
+)
+
+
+def resolve(plan: Plan, path: str) -> Path:
+    """A path of the plan, relative to the plan's own folder."""
+    return plan.base / path
+
+
+def safe_name(text: str) -> str:
+    """`text` as part of a file name."""
+    return re.sub(r"[^A-Za-z0-9_.-]+", "-", text)
+
+
+def ideal(plan: Plan) -> Plan:
+    """The plan with transfer systems that follow at once, and no compensation.
+
+    The compensator's `[compensator.force]` goes with it, its unit delay too, and the actuator's command is a ramp even
+    where the plan holds it. The ramp brings the specimen to its target at the interval's end at the interval's mean
+    velocity, so that its dashpot is felt half an interval late and its mass a whole one; its spring is not late.
+    Tolerances of servo-hydraulics that the ideal actuator does not have are left out.
+    """
+    kept = {
+        name: value
+        for name, value in plan.tolerances.parameters.items()
+        if not name.startswith("actuator.servo.")
+    }
+    return replace(
+        plan.everywhere(table=Table(frequency=float("inf"), damping_ratio=1.0, delay=0.0)),
+        actuator=Actuator(gain=1.0, delay=0.0, time_constant=0.0),
+        compensator=Compensator(kind="none", parameters={}),
+        tolerances=replace(plan.tolerances, parameters=kept),
+    )

@@ -1,0 +1,235 @@
+"""The reality: what the laboratories really do where it is not what the plan says.
+
+It is given to the laboratories only. Nothing of it, its name included, reaches a recording, a log or a
+report.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from common.errors import PlanError
+from common.plan.building import OF_FOPDT
+from common.plan.plan import Plan, from_tables
+from common.plan.schema import fill, nearest
+from common.plan.tables import Rig
+from common.roles import MASTER, SLAVE, slave_role
+
+Entry = tuple[str, Mapping[str, float]]  # name of an effect of the catalogue, and its parameters
+
+TRUE_TABLES = ("ground_motion", "structure", "column", "actuator", "table", "damper", "sensors")
+MERGED = ("experimental", "servo")
+KNOWN = ("seed", "master", "slave", "link", "effect", *TRUE_TABLES)
+
+
+@dataclass(frozen=True)
+class Reality:
+    """What differs from the plan; the plan itself where nothing does.
+
+    `role` and `place` (of all slaves, from 0) say whose reality it is where it is that of one slave alone.
+    """
+
+    plan: Plan  # with the true parameters in place of the nominal ones
+    seed: int
+    master: Rig
+    slave: Rig
+    link: Rig = field(default_factory=Rig)
+    base: Path = Path()
+    hidden: frozenset[str] = frozenset()  # roles whose rig no recording may name
+    effects: tuple[Entry, ...] = ()  # laid over the emulated laboratories, in this order
+    only: tuple[str, ...] = ()  # the role of the slave that each effect is laid over alone, empty for all
+    slaves: dict[str, Rig] = field(default_factory=dict)  # by role, where the plan names them
+    role: str = SLAVE
+    place: int = 0
+
+    def of(self, role: str) -> Reality:
+        """The reality of one slave, as of a plan with no other; raises InputError where there is none such."""
+        plan = self.plan.of(role)
+        if not self.slaves:
+            return self
+        only = self.only or ("",) * len(self.effects)
+        kept = [
+            (entry, alone) for entry, alone in zip(self.effects, only, strict=True) if alone in ("", role)
+        ]
+        return replace(
+            self,
+            plan=plan,
+            slave=self.slaves[role],
+            slaves={},
+            effects=tuple(entry for entry, _ in kept),
+            only=tuple(alone for _, alone in kept),
+            role=role,
+            place=list(self.slaves).index(role),
+        )
+
+
+def as_planned(plan: Plan) -> Reality:
+    """The laboratories are what the plan says."""
+    slaves = {slave_role(name): lab.rig for name, lab in plan.slaves.items()}
+    return Reality(plan, plan.test.seed, plan.master.rig, plan.slave.rig, base=plan.base, slaves=slaves)
+
+
+def load(path: Path, plan: Plan) -> Reality:
+    """The reality in a TOML file, on top of a plan.
+
+    Raises:
+        PlanError: the file cannot be read, is no TOML, or holds what no reality can.
+    """
+    try:
+        tables = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise PlanError(f"Cannot read the reality {path}: {error.strerror}.") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise PlanError(f"The reality {path} is not valid TOML: {error}.") from None
+    try:
+        return from_reality(tables, plan, path.parent)
+    except PlanError as error:
+        raise PlanError(f"The reality {path}: {error}") from None
+
+
+def from_reality(tables: dict[str, Any], plan: Plan, base: Path) -> Reality:
+    """The reality of nested plain values; paths of plug-ins start from `base`."""
+    for name in tables:
+        if name not in KNOWN:
+            raise PlanError(f"Unknown entry '{name}': {nearest(name, KNOWN)}")
+    seed = tables.get("seed", plan.test.seed)
+    if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
+        raise PlanError(f"seed is {seed!r}, but must be a whole number of at least 0.")
+    labs = laboratories(tables, plan)
+    planned = {MASTER: plan.master.rig} | {role: plan.of(role).slave.rig for role in plan.roles}
+    rigs = {role: rig(labs[role], role, planned[role], plan.base, base) for role in planned}
+    effects = tables.get("effect", [])
+    return Reality(
+        plan=true_plan(tables, plan),
+        seed=seed,
+        master=rigs.pop(MASTER),
+        slave=rigs.get(SLAVE, Rig()),
+        link=rig({"rig": tables.get("link", {})}, "link", Rig(), plan.base, base),
+        base=base,
+        hidden=frozenset(role for role, lab in labs.items() if "rig" in lab),
+        effects=entries(effects),
+        only=tuple(alone(entry, plan) for entry in effects),
+        slaves=rigs if plan.slaves else {},
+    )
+
+
+def laboratories(tables: dict[str, Any], plan: Plan) -> dict[str, dict[str, Any]]:
+    """What the reality says of master and slaves, by role.
+
+    Raises:
+        PlanError: it is no table, or names a slave that the plan does not.
+    """
+    slaves = tables.get("slave", {})
+    if plan.slaves and isinstance(slaves, dict):
+        for name in slaves:
+            if name not in plan.slaves:
+                raise PlanError(f"The plan names no slave '{name}': {nearest(name, plan.slaves)}")
+        slaves = {slave_role(name): slaves.get(name, {}) for name in plan.slaves}
+    else:
+        slaves = {SLAVE: slaves}
+    labs = {MASTER: tables.get("master", {})} | slaves
+    for role, lab in labs.items():
+        known = ("rig", "table", "damper") if role in slaves and plan.slaves else ("rig",)
+        if not isinstance(lab, dict):
+            raise PlanError(f"[{role}] must be a table, not {lab!r}.")
+        for name in lab:
+            if name not in known:
+                raise PlanError(f"Unknown key '{name}' in [{role}]: {nearest(name, known)}")
+    return labs
+
+
+def alone(entry: Mapping[str, Any], plan: Plan) -> str:
+    """The role of the slave that an effect names, empty where it holds for all; raises PlanError for another."""
+    name = entry.get("slave", "")
+    if name == "":
+        return ""
+    if not isinstance(name, str) or name not in plan.slaves:
+        hint = nearest(str(name), plan.slaves) if plan.slaves else "leave slave out."
+        raise PlanError(
+            f"slave of [[effect]] '{entry['name']}' is {name!r}, which the plan does not name: {hint}"
+        )
+    return slave_role(name)
+
+
+def entries(given: object) -> tuple[Entry, ...]:
+    """The effects of `[[effect]]` tables: a name and numbers; whether the catalogue knows them is seen later."""
+    if not isinstance(given, list) or not all(isinstance(entry, dict) for entry in given):
+        raise PlanError("effects are given as [[effect]] tables with a name and parameters.")
+    result = []
+    for entry in given:
+        name = entry.get("name")
+        if not isinstance(name, str):
+            raise PlanError(f"an [[effect]] has the name {name!r}: give a name of the catalogue.")
+        values = {key: value for key, value in entry.items() if key not in ("name", "slave")}
+        for key, value in values.items():
+            if not isinstance(value, int | float) or isinstance(value, bool):
+                raise PlanError(f"{key} of [[effect]] '{name}' is {value!r}, but must be a number.")
+        result.append((name, {key: float(value) for key, value in values.items()}))
+    return tuple(result)
+
+
+def true_plan(tables: dict[str, Any], plan: Plan) -> Plan:
+    """The plan with the reality's parameters in place of its own; what holds for all slaves before a slave's own.
+
+    Its tolerances are the plan's, whose nominal parameters they are of.
+    """
+    merged = plan.tables()
+    del merged["tolerances"]
+    for name in TRUE_TABLES:
+        given = table_of(tables, name, name)
+        planned = replaced(name, merged[name], given)
+        merged[name] = planned | within(planned, given)
+    for slave in plan.slaves:
+        own = tables.get("slave", {}).get(slave, {})
+        for name in ("table", "damper"):
+            merged["slave"][slave][name] |= table_of(tables, name, name)
+            merged["slave"][slave][name] |= table_of(own, name, f"slave.{slave}.{name}")
+    return replace(from_tables(merged, plan.base), tolerances=plan.tolerances)
+
+
+def replaced(name: str, planned: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    """What stays of a planned table beside what a reality gives of it.
+
+    Parameters of the planned actuator do not where its model is another; dashpots and a damping ratio stand in
+    each other's place where one of them is given.
+    """
+    gone: tuple[str, ...] = ()
+    if name == "actuator" and given.get("model", planned["model"]) != planned["model"]:
+        gone = (*OF_FOPDT, "servo")
+    if name == "structure" and "damping" in given and "damping_ratio" not in given:
+        gone = ("damping_ratio",)
+    if name == "structure" and given.get("damping_ratio", 0.0) != 0.0 and "damping" not in given:
+        gone = ("damping",)
+    return {key: value for key, value in planned.items() if key not in gone}
+
+
+def within(planned: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    """What a reality gives of one table; a table within it whose keys are fixed keeps what is not given."""
+    return {
+        name: planned[name] | value
+        if name in MERGED and isinstance(value, dict) and name in planned
+        else value
+        for name, value in given.items()
+    }
+
+
+def table_of(tables: Mapping[str, Any], name: str, where: str) -> dict[str, Any]:
+    """One table of several, empty where it is not given; raises PlanError where it is none."""
+    table = tables.get(name, {})
+    if not isinstance(table, dict):
+        raise PlanError(f"[{where}] must be a table, not {table!r}.")
+    return table
+
+
+def rig(entry: dict[str, Any], lab: str, planned: Rig, plan_base: Path, base: Path) -> Rig:
+    """The rig of a laboratory, with the path of its class made absolute."""
+    chosen, start = (planned, plan_base)
+    if "rig" in entry:
+        chosen, start = fill(Rig, entry["rig"], f"{lab}.rig"), base
+    if ".py:" in chosen.class_:
+        return Rig(class_=str(start.resolve() / chosen.class_), options=chosen.options)
+    return chosen

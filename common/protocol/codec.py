@@ -1,0 +1,278 @@
+"""Messages to bytes and back: msgpack arrays of fixed fields behind a keyed 64-bit check.
+
+A frame is `msgpack([kind, field, …]) + check`. Messages of numbers alone, those of a tick among them, have each number
+in its widest form (int 64, float 64), so that all frames of such a kind have one layout. What does not have exactly the
+fields, types and ranges of a known message, or whose check fails, is rejected with a reason and reaches nobody. A
+frame's size is bounded before anything else is done with it; what msgpack makes of hostile content within that size
+takes at most some sixty bytes of memory per byte of the frame, until it is thrown away.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import struct
+from collections.abc import Callable, Container, Sequence
+from enum import Enum
+from math import isfinite
+from operator import itemgetter
+from typing import Any, Protocol, get_args, get_type_hints
+
+import msgpack
+
+from common.protocol.messages import Message
+
+CHECK_SIZE = 8
+MOST = 2**62  # of a whole number; in ns a century and a half
+MOST_TEXT = 4_000  # characters of a text
+MOST_FRAME = 1 << 20  # bytes of a frame on any channel
+LEAST = {"shift_ns": -MOST, "command_seq": -1, "heard_seq": -1}  # of these whole numbers; 0 of all others
+
+MESSAGES: tuple[type[Any], ...] = get_args(Message)
+KINDS = {message: kind for kind, message in enumerate(MESSAGES)}
+
+
+class Reject(Enum):
+    """Why a frame was rejected; `docs/reference/rejections.md` says what each means and what to do."""
+
+    LENGTH = "length"
+    CHECK = "check"
+    UNREGISTERED = "unregistered"
+    OPEN_KEY = "open_key"
+    FORMAT = "format"
+    KIND = "kind"
+    KIND_NOT_ALLOWED = "kind_not_allowed"
+    FIELDS = "fields"
+    TYPE = "type"
+    VALUE = "value"
+    SENDER = "sender"
+
+
+class RejectedFrame(ValueError):  # noqa: N818 - it is a finding about a frame, counted rather than shown
+    """A frame that is no valid message."""
+
+    def __init__(self, reason: Reject) -> None:
+        super().__init__(reason.value)
+        self.reason = reason
+
+
+NUMBERS = {
+    int: (0xD3, "q"),
+    float: (0xCB, "d"),
+}  # msgpack's int 64 and float 64: their marks, and struct's letters
+ARRAY = 0x90  # msgpack's mark of an array of up to 15 items, plus their count
+
+
+def checker(message: type[Any]) -> Callable[..., bool]:
+    """A function that tells whether the items of a message of numbers, its kind first, are in their ranges.
+
+    It is written out as one expression: after a wake-up the caches hold other things, and each further call costs
+    more than the comparisons do.
+    """
+    hints = get_type_hints(message)
+    names = message._fields
+    whole = [f"{LEAST.get(name, 0)} <= {name} <= {MOST}" for name in names if hints[name] is int]
+    floats = [name for name in names if hints[name] is float]
+    finite = [f"isfinite({' + '.join(floats)})"] if floats else []
+    source = f"lambda _kind, {', '.join(names)}: {' and '.join(whole + finite)}"
+    admits: Callable[..., bool] = eval(source, {"isfinite": isfinite})  # noqa: S307 - of the fields' names alone
+    return admits
+
+
+class _Layout:
+    """The payload of a message that holds numbers only: two bytes for array and kind, then a mark and eight bytes each.
+
+    It is msgpack like any other, read and written by `struct`, which takes a third of the time.
+    """
+
+    def __init__(self, message: type[Any], types: Sequence[type]) -> None:
+        fields = [NUMBERS[kind] for kind in types[1:]]
+        self.marks = bytes(mark for mark, _ in fields)
+        self.size = 2 + 9 * len(fields)
+        self.admits = checker(message)
+        self._write = struct.Struct(">BB" + "".join(f"B{letter}" for _, letter in fields)).pack
+        self.read = struct.Struct(">xB" + "".join(f"x{letter}" for _, letter in fields)).unpack
+        # the loop's thread alone encodes; the numbers of a message take their places among the marks
+        self._slots: list[Any] = [ARRAY + len(types), 0, *(item for mark in self.marks for item in (mark, 0))]
+
+    def pack(self, kind: int, message: Message) -> bytes:
+        """The payload of a message of this kind."""
+        slots = self._slots
+        slots[1] = kind
+        slots[3::2] = message
+        return self._write(*slots)
+
+
+class _Shape:
+    """What the items of one frame must be: exact types, whole numbers and texts in range, floats finite.
+
+    The first item is the kind of the message. Checks are calls into C wherever they can be: they run twice a tick.
+    """
+
+    def __init__(self, message: type[Any]) -> None:
+        hints = get_type_hints(message)
+        self.message = message
+        self.types = (int, *(hints[name] for name in message._fields))
+        self._numbers = self._items(message, int)
+        self._counts = self._items(message, int, but=LEAST)
+        self._floats = self._items(message, float)
+        self._signed = [
+            (place, LEAST[name]) for place, name in enumerate(message._fields, start=1) if name in LEAST
+        ]
+        self.texts = [place for place, kind in enumerate(self.types) if kind is str]
+        self.layout = _Layout(message, self.types) if set(self.types) <= NUMBERS.keys() else None
+
+    def _items(
+        self, message: type[Any], kind: type, *, but: Container[str] = ()
+    ) -> Callable[[Sequence[Any]], tuple[Any, ...]]:
+        """What takes the items of a type out of a frame's, but for those of these names."""
+        places = [
+            place
+            for place, name in enumerate(message._fields, start=1)
+            if self.types[place] is kind and name not in but
+        ]
+        first, *_ = places or [0]
+        # the getter of a single place gives no tuple; the kind, a small count, is a harmless second
+        return itemgetter(*places, *[first] * (2 - len(places)))
+
+    def admits(self, items: Sequence[Any]) -> bool:
+        """Whether items of the right types have values that a message may have."""
+        if min(self._counts(items)) < 0 or max(self._numbers(items)) > MOST:
+            return False
+        for place, least in self._signed:
+            if items[place] < least:
+                return False
+        for place in self.texts:
+            if not is_text(items[place]):
+                return False
+        return isfinite(sum(self._floats(items)))
+
+
+def is_text(text: str) -> bool:
+    """Whether a message may hold a text: not too long, and nothing in it that moves a terminal's cursor."""
+    return len(text) <= MOST_TEXT and text.isprintable()
+
+
+def as_text(text: str) -> str:
+    """A text as a message may hold it: clipped, a space in place of what cannot be printed."""
+    return text if is_text(text) else "".join(c if c.isprintable() else " " for c in text[:MOST_TEXT])
+
+
+# `msgpack.packb` allocates and frees a buffer of a megabyte with every call; this one is the loop's thread's alone
+PACKER = msgpack.Packer()
+REPACKER = msgpack.Packer()  # the link's threads', which hold the interpreter's lock while they pack
+
+SHAPES = tuple(_Shape(message) for message in MESSAGES)
+LAYOUTS = {
+    bytes((ARRAY + len(shape.types), kind)): (shape, shape.layout)
+    for kind, shape in enumerate(SHAPES)
+    if shape.layout is not None
+}  # by the first two bytes
+
+
+class Key(Protocol):
+    """A keyed hash that has taken nothing in yet."""
+
+    def copy(self) -> Key:
+        """Another one like it."""
+
+    def update(self, data: bytes, /) -> None:
+        """Take in some bytes."""
+
+    def digest(self) -> bytes:
+        """The check of what was taken in."""
+
+
+def session_key(session: int, plan_digest: str) -> Key:
+    """Key of the check within a session; before one is agreed, session 0 gives a key that all share."""
+    text = f"{session}:{plan_digest}" if session else "unregistered"
+    secret = hashlib.blake2b(text.encode(), digest_size=32).digest()
+    return hashlib.blake2b(digest_size=CHECK_SIZE, key=secret)
+
+
+def _check(key: Key, payload: bytes) -> bytes:
+    keyed = key.copy()
+    keyed.update(payload)
+    return keyed.digest()
+
+
+def encode(message: Message, key: Key) -> bytes:
+    """The frame of a message."""
+    kind = KINDS[type(message)]
+    layout = SHAPES[kind].layout
+    payload: bytes = layout.pack(kind, message) if layout else PACKER.pack((kind, *message))
+    return payload + _check(key, payload)
+
+
+def fit(message: Message) -> Message:
+    """A message with its texts as a frame may hold them: a rig's own words may be long, or of several lines."""
+    texts = SHAPES[KINDS[type(message)]].texts
+    fields: list[Any] = list(message)
+    if all(is_text(fields[place - 1]) for place in texts):
+        return message
+    for place in texts:
+        fields[place - 1] = as_text(fields[place - 1])
+    fitting: Message = type(message)(*fields)
+    return fitting
+
+
+def genuine(frame: bytes, key: Key) -> bool:
+    """Whether a frame's check is that of a key."""
+    return _check(key, frame[:-CHECK_SIZE]) == frame[-CHECK_SIZE:]
+
+
+def decode(frame: bytes, key: Key, *, allowed: Container[type] = KINDS, largest: int = MOST_FRAME) -> Message:
+    """The message of a frame; raises RejectedFrame with the reason if it is not valid.
+
+    `allowed` are the kinds that may come this way, `largest` bounds the frame's bytes. A message has exactly one
+    valid frame: one that is packed in another way than by `encode` is rejected.
+    """
+    if not CHECK_SIZE < len(frame) <= largest:
+        raise RejectedFrame(Reject.LENGTH)
+    payload = frame[:-CHECK_SIZE]
+    if _check(key, payload) != frame[-CHECK_SIZE:]:
+        raise RejectedFrame(Reject.CHECK)
+    shape, layout = LAYOUTS.get(payload[:2], NO_LAYOUT)
+    if layout and shape and len(payload) == layout.size and payload[2::9] == layout.marks:
+        items: Sequence[Any] = layout.read(payload)
+        if shape.message not in allowed:
+            raise RejectedFrame(Reject.KIND_NOT_ALLOWED)
+        if not layout.admits(*items):
+            raise RejectedFrame(Reject.VALUE)
+    else:
+        shape, items = _unpacked(payload, allowed)
+    message: Message = tuple.__new__(shape.message, items[1:])
+    return message
+
+
+NO_LAYOUT: tuple[_Shape | None, _Layout | None] = (None, None)
+
+
+def _unpacked(payload: bytes, allowed: Container[type]) -> tuple[_Shape, list[Any]]:
+    """Shape and items of a payload that has no layout of its own; raises RejectedFrame where it is no message's."""
+    try:
+        items = msgpack.unpackb(payload)
+    except (ValueError, msgpack.UnpackException):
+        raise RejectedFrame(Reject.FORMAT) from None
+    if type(items) is not list or not items:
+        raise RejectedFrame(Reject.FORMAT)
+    shape = _shape(items, allowed)
+    if shape.layout or REPACKER.pack(items) != payload:
+        raise RejectedFrame(Reject.FORMAT)
+    return shape, items
+
+
+def _shape(items: list[Any], allowed: Container[type]) -> _Shape:
+    """The shape that the items of a frame have; raises RejectedFrame where they have none."""
+    kind = items[0]
+    if type(kind) is not int or not 0 <= kind < len(MESSAGES):
+        raise RejectedFrame(Reject.KIND)
+    shape = SHAPES[kind]
+    if shape.message not in allowed:
+        raise RejectedFrame(Reject.KIND_NOT_ALLOWED)
+    if len(items) != len(shape.types):
+        raise RejectedFrame(Reject.FIELDS)
+    if tuple(map(type, items)) != shape.types:
+        raise RejectedFrame(Reject.TYPE)
+    if not shape.admits(items):
+        raise RejectedFrame(Reject.VALUE)
+    return shape

@@ -1,0 +1,218 @@
+"""Every message between the processes of a test, as frozen records of plain values.
+
+Times are integers in ns on the sender's monotonic clock unless the name says otherwise. `session` is
+the random number under which the master registered the slave; 0 before that.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Register(NamedTuple):
+    """Master to slave: take part in this test."""
+
+    session: int
+    protocol: int
+    plan: str  # digest, and the keys that are not at their defaults: common/plan/plan_difference.py
+
+
+class Waiting(NamedTuple):
+    """Slave to master, while it belongs to no test: a process is here; `instance` tells it from others of its name."""
+
+    session: int
+    instance: int
+
+
+class Registered(NamedTuple):
+    """Slave to master: ready to be armed."""
+
+    session: int
+    instance: int
+
+
+class Refused(NamedTuple):
+    """Slave to master: will not take part, and why."""
+
+    session: int
+    reason: str
+
+
+class Arm(NamedTuple):
+    """Master to slave: the process of this `instance` shall make its rig ready; any other is superfluous."""
+
+    session: int
+    instance: int
+
+
+class Armed(NamedTuple):
+    """Slave to master: the rig is ready."""
+
+    session: int
+
+
+class Sync(NamedTuple):
+    """Master to slave: one exchange of clock readings."""
+
+    session: int
+    seq: int
+    sent_ns: int
+
+
+class SyncReply(NamedTuple):
+    """Slave to master: the answer, with the slave's own readings."""
+
+    session: int
+    seq: int
+    received_ns: int
+    sent_ns: int
+
+
+class Start(NamedTuple):
+    """Master to slave: tick 0 is at this time of the slave's clock."""
+
+    session: int
+    start_ns: int
+    epoch_ns: int  # Unix time of tick 0, master's wall clock
+
+
+class Scheduled(NamedTuple):
+    """Slave to master: the start is agreed."""
+
+    session: int
+
+
+class Command(NamedTuple):
+    """Master to slave, one per tick: the targets of the interval's end."""
+
+    session: int
+    seq: int
+    sent_ns: int
+    shift_ns: int  # how far the slave's clock has drifted from the master's since the start, estimated
+    heard_seq: int  # newest feedback that came over the wire, in use or not yet; -1 for none
+    table_target: float
+    damper_command: float
+    table_target_velocity: float
+    table_target_acceleration: float
+    table_target_jerk: float
+
+
+class Feedback(NamedTuple):
+    """Slave to master, one per tick: the measurements at the tick, and the command they answer."""
+
+    session: int
+    seq: int
+    command_seq: int  # in force
+    command_received_ns: int  # when it came, delay of a link plug-in included; told once, 0 afterwards
+    heard_seq: int  # newest command that came over the wire, in force or not yet; -1 for none
+    heard_ns: int  # when that one came
+    started_ns: int  # start of the tick: the measurements are of this moment
+    sent_ns: int
+    table_displacement: float
+    table_acceleration: float
+    damper_stroke: float
+    damper_force: float
+
+
+class Stop(NamedTuple):
+    """Master to slave: the test ends after this many ticks."""
+
+    session: int
+    ticks: int
+    reason: str
+
+
+class Stopped(NamedTuple):
+    """Slave to master: the rig is disarmed; after a trip it is the last word."""
+
+    session: int
+    ticks: int
+
+
+class Trip(NamedTuple):
+    """Either way: this laboratory has stopped its rig, and why."""
+
+    session: int
+    lab: str
+    code: str
+    text: str
+
+
+class Operator(NamedTuple):
+    """Operator to the laboratories: stop, stop at once, or reset; `press` tells one press from its repetitions."""
+
+    session: int
+    plan: str  # digest
+    word: str  # stop, emergency, reset
+    press: int
+    reason: str
+
+
+class Answer(NamedTuple):
+    """Laboratory to operator: what a press has led to."""
+
+    session: int
+    press: int
+    accepted: int  # 1 or 0
+    text: str
+
+
+class Samples(NamedTuple):
+    """Laboratory to recorder: a piece of its stream, items numbered from `first`."""
+
+    session: int
+    lab: str
+    first: int
+    items: bytes
+
+
+class Finished(NamedTuple):
+    """Laboratory to recorder: its stream ends after this many items."""
+
+    session: int
+    lab: str
+    total: int
+
+
+class Recorder(NamedTuple):
+    """Recorder to the laboratories, ten times a second: its state, and how far it has each stream."""
+
+    session: int
+    state: str  # ready, recording, stopping, failed, done
+    plan: str  # as in Register
+    reason: str
+    nexts: bytes  # by role, the item that comes next
+
+
+class Resend(NamedTuple):
+    """Recorder to a laboratory: send these items again."""
+
+    session: int
+    lab: str
+    first: int
+    last: int
+
+
+Message = (
+    Register
+    | Waiting
+    | Registered
+    | Refused
+    | Arm
+    | Armed
+    | Sync
+    | SyncReply
+    | Start
+    | Scheduled
+    | Command
+    | Feedback
+    | Stop
+    | Stopped
+    | Trip
+    | Operator
+    | Answer
+    | Samples
+    | Finished
+    | Recorder
+    | Resend
+)

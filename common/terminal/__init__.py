@@ -1,0 +1,1 @@
+"""What every command shares: options, errors as one sentence, files that it writes, safe text."""

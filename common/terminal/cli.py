@@ -1,0 +1,226 @@
+"""What the three processes share at their command lines: options, reports, errors as one sentence."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, NoReturn
+
+from common.errors import InputError, RthsError
+from common.host import realtime
+from common.lab import preflight
+from common.lab.laboratory import Report
+from common.plan import plan as plans
+from common.plan import reality as realities
+from common.plan.plan import Plan
+from common.plan.reality import Reality
+from common.terminal.plain_report import PlainReport, plain, say
+from common.terminal.printable import escaping, shown
+
+SHIPPED = ("benchmark2020", "default", "paper", "rc_column", "two_dampers")
+DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser that puts a wrong command line into one sentence."""
+
+    def error(self, message: str) -> NoReturn:
+        """Say what is wrong and where help is; exit code 2."""
+        self.exit(2, f"rths: {shown(message)}; see {self.prog} --help.\n")
+
+
+def plan_arguments(parser: argparse.ArgumentParser, *, optional: bool = False) -> None:
+    """PLAN and the options that change it."""
+    if optional:
+        parser.add_argument(
+            "plan", nargs="?", metavar="PLAN", help="TOML file of the test (default: the default test)"
+        )
+    else:
+        parser.add_argument(
+            "plan", metavar="PLAN", help=f"TOML file of the test; {', '.join(SHIPPED)} for those that ship"
+        )
+    parser.add_argument("--duration", type=float, metavar="S", help="length of the test in seconds")
+    parser.add_argument("--scale", type=float, metavar="X", help="factor on the ground motion")
+    parser.add_argument("--seed", type=int, metavar="N", help="seed of every random draw")
+
+
+def reality_argument(parser: argparse.ArgumentParser) -> None:
+    """The option that says what the laboratory really does."""
+    parser.add_argument(
+        "--reality", type=Path, metavar="FILE", help="what the laboratories really do (stays secret)"
+    )
+
+
+def connect_argument(parser: argparse.ArgumentParser) -> None:
+    """The option that says where the master is."""
+    parser.add_argument(
+        "--connect",
+        default=DEFAULT_ENDPOINT,
+        metavar="ENDPOINT",
+        help=f"where the master listens (default: {DEFAULT_ENDPOINT})",
+    )
+
+
+def rt_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of a laboratory's process: how real time it shall be."""
+    parser.add_argument(
+        "--rt",
+        choices=realtime.MODES,
+        default="auto",
+        help="real-time priority, locked memory, own processor: what can be had (auto), all or refuse (on), none (off)",
+    )
+
+
+def processor_argument(parser: argparse.ArgumentParser) -> None:
+    """The option that binds a laboratory's process."""
+    parser.add_argument(
+        "--processor", type=int, metavar="N", help="the one processor to run on (default: any)"
+    )
+
+
+def json_argument(parser: argparse.ArgumentParser, text: str) -> None:
+    """The option for machine-readable output."""
+    parser.add_argument("--json", action="store_true", help=text)
+
+
+def force_argument(parser: argparse.ArgumentParser) -> None:
+    """The option without which no file is replaced."""
+    parser.add_argument(
+        "--force", action="store_true", help="replace what exists under the name of an output"
+    )
+
+
+def accept_argument(parser: argparse.ArgumentParser) -> None:
+    """The option that takes a risk by its name; `accepted_risks` reads it."""
+    parser.add_argument(
+        "--accept-risk",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help=f"run although pre-flight names this risk ({', '.join(preflight.NAMES)}); may be repeated, is recorded",
+    )
+
+
+def accepted_risks(args: argparse.Namespace) -> tuple[str, ...]:
+    """Names of the risks that the command line accepts; raises InputError for an unknown name."""
+    return preflight.known(args.accept_risk)
+
+
+def load_plan(args: argparse.Namespace) -> Plan:
+    """The plan that the command line asks for; raises PlanError."""
+    return plans.load(plan_path(args.plan)).with_test(
+        duration=args.duration, scale=args.scale, seed=args.seed
+    )
+
+
+def plan_path(name: str | None) -> Path:
+    """The file behind the name of a plan that ships, or the path itself."""
+    if name is None or (name in SHIPPED and not Path(name).exists()):
+        return Path(__file__).resolve().parents[2] / "rths" / "plans" / f"{name or 'default'}.toml"
+    return Path(name)
+
+
+def load_reality(path: Path | None, plan: Plan) -> Reality:
+    """The reality of the command line, the plan itself where there is none; raises PlanError."""
+    return realities.load(path, plan) if path else realities.as_planned(plan)
+
+
+def json_report(kind: str, data: Mapping[str, Any]) -> None:
+    """One JSON object per line on standard output; a test goes on where its reader has gone."""
+    with contextlib.suppress(OSError):
+        sys.stdout.write(json.dumps({"kind": kind, **data}) + "\n")
+        sys.stdout.flush()
+
+
+def text_report(kind: str, data: Mapping[str, Any]) -> None:
+    """Plain lines on standard error."""
+    if line := plain(kind, data):
+        say(line)
+
+
+def reporter(as_json: bool, duration: float) -> Report:
+    """The report that the command line asks for, of a test of `duration` s."""
+    return json_report if as_json else PlainReport(duration)
+
+
+def guarded(main: Callable[[], int]) -> int:
+    """Run a command; a user's mistake becomes one sentence on standard error and an exit code."""
+    try:
+        with interruptible(), escaping():
+            return answered(main)
+    except BrokenPipeError:
+        unread()
+        return 0
+    except KeyboardInterrupt:
+        sys.stderr.write("rths: stopped by the user.\n")
+        return 3
+
+
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C as a class of its own: a KeyboardInterrupt in `exec` makes Python end by the signal, whatever the code."""
+
+
+def interrupt(*_: object) -> NoReturn:
+    """Handle a SIGINT."""
+    raise Interrupted
+
+
+@contextlib.contextmanager
+def interruptible() -> Iterator[None]:
+    """Within the context Ctrl-C raises Interrupted, unless a handler of its own is set."""
+    ours = threading.current_thread() is threading.main_thread()
+    ours = ours and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    if ours:
+        signal.signal(signal.SIGINT, interrupt)
+    try:
+        yield
+    finally:
+        if ours and signal.getsignal(signal.SIGINT) is interrupt:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def answered(main: Callable[[], int]) -> int:
+    """Run a command and write out all its output, so that a closed pipe is noticed here and not at exit.
+
+    Where an error ends the command, its exit code stays, although the reader of the output has gone.
+    """
+    try:
+        return main()
+    except RthsError as error:
+        return error.exit_code if error.said else complained(str(error), error.exit_code)
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        if error.filename is None:
+            raise
+        return complained(f"Cannot use {error.filename}: {error.strerror}.", InputError.exit_code)
+    finally:
+        drain()
+
+
+def complained(text: str, code: int) -> int:
+    """Say an error after all that was printed before it; its exit code."""
+    drain()
+    with contextlib.suppress(OSError):  # a terminal that was closed
+        sys.stderr.write(f"rths: {shown(text)}\n")
+    return code
+
+
+def drain() -> None:
+    """Write what standard output still holds; nowhere, where its reader has gone."""
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        unread()
+
+
+def unread() -> None:
+    """The reader of standard output has gone: discard what is still to be written."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

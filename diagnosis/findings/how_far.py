@@ -1,0 +1,355 @@
+"""How far the gap shrinks once the effects are added, judged on data that no fit has seen."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from diagnosis import link, loop
+from diagnosis.findings import where
+from diagnosis.findings.where import Trace
+from diagnosis.fits import fitting
+from diagnosis.loop import RESPONSE, UNIT, Loop, closed_share, overall
+from models.effects import CATALOGUE
+from models.registry import Array
+
+if TYPE_CHECKING:
+    from diagnosis.diagnose import Diagnosis
+    from diagnosis.record import Mask, Record
+
+QUIET = 0.2  # noise over a signal's rms from which on a part alone is not judged by it
+PLAYERS = 6  # sites among which shares are computed exactly
+DRAWS = 200  # of the bootstrap
+
+
+@dataclass(frozen=True)
+class HowFar:
+    """The response gap before and after, and each site's part in it."""
+
+    gap: dict[str, Any]
+    summary: dict[str, Any]
+    traces: list[Trace]
+    shares: dict[str, tuple[float, float, float]]
+    loop_shares: list[dict[str, Any]]
+    waterfall: list[dict[str, Any]]
+    histories: list[dict[str, Any]]
+
+
+class Judge:
+    """Gaps of one recording under the hypotheses found in another, or in the same."""
+
+    def __init__(self, found: Diagnosis, record: Record, mask: Mask) -> None:
+        self.found, self.record, self.mask = found, record, mask
+        names = tuple(name for name in RESPONSE if record.has(name))
+        self.loop: Loop | None = None
+        if record.ground is not None and record.has("displacement", "table_target") and names:
+            exchange = link.exchange_of(record.run, record.ticks) if found.link else None
+            self.loop = Loop(record, record.ground, exchange, names)
+
+    def signals(self, sites: frozenset[str] | None) -> Mapping[str, Array] | None:
+        """Simulated response with the effects of some sites, of all where None."""
+        system = self.found.system(sites, self.record.plan)
+        if self.loop is not None:
+            linked = bool(self.found.link) and (sites is None or "link" in sites)
+            moved = loop.noised(system, {}) if system.plan is self.record.plan else system
+            return self.loop.simulate(moved, linked=linked)
+        return self.open(sites)
+
+    def open(self, sites: frozenset[str] | None) -> Mapping[str, Array]:
+        """Each part's own prediction, where no loop was recorded."""
+        system = self.found.system(sites)
+        result: dict[str, Array] = {}
+        for verdict in self.found.verdicts:
+            part = verdict.search.data.part
+            if not part.exact:
+                result |= dict(zip(part.signals, part.predict(system).T, strict=True))
+        return result
+
+    def gap(self, simulated: Mapping[str, Array] | None, mask: Mask | None = None) -> dict[str, float]:
+        """Gap per response signal."""
+        chosen = self.mask if mask is None else mask
+        if self.loop is not None:
+            return self.loop.gap(simulated, chosen)
+        known = simulated or {}
+        names = [name for name in RESPONSE if name in known and self.record.has(name) and self.moves(name)]
+        result = {}
+        for name in names or [name for name in known if self.record.has(name)]:
+            there = self.record.present[name] & chosen
+            recorded = self.record.signals[name][there]
+            error = recorded - known[name][there]
+            level = float(np.mean(recorded**2))
+            result[name] = float(np.sqrt(np.mean(error**2) / level)) if level > 0.0 else 0.0
+        return result
+
+    def moves(self, name: str) -> bool:
+        """Whether a signal stands well out of its noise."""
+        level = float(np.sqrt(np.mean(self.record.signals[name] ** 2)))
+        return level > 0.0 and self.found.white.get(name, 0.0) < QUIET * level
+
+    def floor(self) -> dict[str, float]:
+        """Gap that noise alone makes."""
+        if self.loop is not None:
+            system = self.found.system(plan=self.record.plan, noisy=False)
+            return self.loop.floor(system, self.found.white, self.mask)
+        result = {}
+        for name, white in self.found.white.items():
+            there = self.record.present[name] & self.mask
+            level = float(np.mean(self.record.signals[name][there] ** 2)) if there.any() else 0.0
+            result[name] = white / float(np.sqrt(level)) if level > 0.0 else 0.0
+        return result
+
+
+def judge(found: Diagnosis, validation: Sequence[Record]) -> HowFar:
+    """Gap before and after, shares of the sites."""
+    record = found.record
+    held = held_out(record)
+    own = Judge(found, record, held)
+    nominal = bare(found, own)
+    before, after = own.signals(frozenset()), own.signals(None)
+    floors = own.floor()
+    gap_before, gap_after = own.gap(before), own.gap(after)
+    floor = overall({name: floors.get(name, 0.0) for name in gap_after})
+    traces = all_traces(found)
+    summary = {
+        "nominal": overall(own.gap(nominal)),
+        "before": overall(gap_before),
+        "after": overall(gap_after),
+        "closed": closed_share(overall(gap_before), overall(gap_after), floor),
+        "closed_interval": closed_interval(own, before, after, floor),
+        "noise_floor": floor,
+        "judged_on": "held-out time windows",
+    }
+    if validation:
+        summary |= validated(found, validation)
+    share, rows = shares(own, traces)
+    return HowFar(
+        gap_entry(record, own, nominal, floors),
+        summary,
+        traces,
+        share,
+        rows,
+        waterfall(own, traces, summary),
+        histories(own, before, after),
+    )
+
+
+def waterfall(own: Judge, traces: Sequence[Trace], summary: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The overall gap on withheld time after each step: nominal, tolerances, site by site, noise."""
+    steps = [
+        {"label": "nominal models", "value": summary["nominal"]},
+        {"label": "parameters within tolerances", "value": summary["before"]},
+    ]
+    taken: set[str] = set()
+    for trace in sorted(traces, key=lambda item: -item.ratio):
+        names = own.found.named(trace.site)
+        if names:
+            taken.add(trace.site)
+            value = overall(own.gap(own.signals(frozenset(taken))))
+            steps.append({"label": "+ " + ", ".join(names), "value": value})
+    return [*steps, {"label": "noise floor", "value": summary["noise_floor"]}]
+
+
+def histories(
+    own: Judge, before: Mapping[str, Array] | None, after: Mapping[str, Array] | None
+) -> list[dict[str, Any]]:
+    """Response signals recorded and simulated, in the seconds in which they differ most."""
+    from diagnosis.findings.details import UNITS, numbers, strongest
+
+    if before is None or after is None:
+        return []
+    result = []
+    for name in own.gap(after):
+        recorded = own.record.signals[name]
+        shown = strongest(recorded - before[name], own.record.plan.test.interval)
+        result.append(
+            {
+                "signal": name,
+                "unit": UNITS.get(name, ""),
+                "t": numbers(own.record.time[shown]),
+                "recorded": numbers(recorded[shown]),
+                "before": numbers(before[name][shown]),
+                "after": numbers(after[name][shown]),
+            }
+        )
+    return result
+
+
+def held_out(record: Record) -> Mask:
+    """Ticks that no fit has seen."""
+    return fitting.withheld_ticks(record.ticks, record.plan.test.interval)
+
+
+def bare(found: Diagnosis, own: Judge) -> Mapping[str, Array] | None:
+    """Response of the nominal models."""
+    from models.system import System
+
+    if own.loop is not None:
+        return own.loop.simulate(System(own.record.plan), linked=False)
+    return {
+        name: series
+        for verdict in found.verdicts
+        if not verdict.search.data.part.exact
+        for name, series in zip(
+            verdict.search.data.part.signals,
+            verdict.search.data.part.predict(System(found.record.plan)).T,
+            strict=True,
+        )
+    }
+
+
+def gap_entry(
+    record: Record, own: Judge, nominal: Mapping[str, Array] | None, floors: Mapping[str, float]
+) -> dict[str, Any]:
+    """The gap between recording and nominal simulation, per signal and overall."""
+    everywhere = np.ones(record.ticks, dtype=bool)
+    gaps = own.gap(nominal, everywhere)
+    signals = {}
+    for name, value in gaps.items():
+        peak = None
+        if nominal is not None:
+            peak = float(np.max(np.abs(record.signals[name] - nominal[name])[record.present[name]]))
+        signals[name] = {
+            "nrmse": value,
+            "noise_floor": floors.get(name, 0.0),
+            "peak_error": peak,
+            "unit": UNIT.get(name, "m"),
+        }
+    floor = overall({name: floors.get(name, 0.0) for name in gaps})
+    return {"signals": signals, "overall": overall(gaps), "overall_noise_floor": floor}
+
+
+def closed_interval(
+    own: Judge, before: Mapping[str, Array] | None, after: Mapping[str, Array] | None, floor: float
+) -> list[float]:
+    """90 % interval of the share closed, by drawing blocks of the withheld time anew."""
+    interval = own.record.plan.test.interval
+    length = max(1, round(2.0 / interval))
+    places = np.arange(own.record.ticks) // length
+    ids = np.unique(places[own.mask])
+    energy = []
+    for block in ids:
+        mask = own.mask & (places == block)
+        row = []
+        for simulated in (before, after):
+            errors = [
+                own.record.signals[name][mask] - simulated[name][mask]
+                if simulated is not None
+                else own.record.signals[name][mask] * loop.DIVERGED
+                for name in own.gap(simulated)
+            ]
+            row += [float(np.sum(error**2)) for error in errors]
+        row += [float(np.sum(own.record.signals[name][mask] ** 2)) for name in own.gap(after)]
+        energy.append(row)
+    table = np.array(energy)
+    random = np.random.default_rng(0)
+    values = []
+    count = table.shape[1] // 3
+    for _ in range(DRAWS):
+        sums = table[random.integers(0, len(table), len(table))].sum(axis=0)
+        scale = np.maximum(sums[2 * count :], 1e-300)
+        b, a = (float(np.sqrt(np.mean(sums[i * count : (i + 1) * count] / scale))) for i in (0, 1))
+        values.append(closed_share(b, a, floor))
+    return [float(np.percentile(values, 5)), float(np.percentile(values, 95))]
+
+
+def validated(found: Diagnosis, validation: Sequence[Record]) -> dict[str, Any]:
+    """The same on other recordings of the laboratories."""
+    before, after, floor = [], [], []
+    for record in validation:
+        judge_ = Judge(found, record, np.ones(record.ticks, dtype=bool))
+        if judge_.loop is None:
+            continue
+        before.append(overall(judge_.gap(judge_.signals(frozenset()))))
+        after.append(overall(judge_.gap(judge_.signals(None))))
+        floor.append(overall(judge_.floor()))
+    if not before:
+        found.warnings.append("The recordings given for validation hold no closed loop to judge by.")
+        return {}
+    b, a, f = (float(np.mean(values)) for values in (before, after, floor))
+    spread = [closed_share(*item) for item in zip(before, after, floor, strict=True)]
+    return {
+        "before": b,
+        "after": a,
+        "closed": closed_share(b, a, f),
+        "closed_interval": [min(spread), max(spread)],
+        "noise_floor": f,
+        "judged_on": "recordings given",
+    }
+
+
+def all_traces(found: Diagnosis) -> list[Trace]:
+    """What every site with a gap does, in σ."""
+    result: list[Trace] = []
+    for verdict in found.verdicts:
+        result += where.traces(verdict.search.data, verdict.search.chosen)
+        if verdict.outcome in ("unknown", "partly"):
+            extra = where.unexplained(verdict.search.data, verdict.search.chosen)
+            result = [*(item for item in result if item.site != extra.site), extra]
+    for reading in found.readings:
+        site = CATALOGUE[reading.effect].site
+        result = [
+            *(item for item in result if item.site != site),
+            Trace(site, np.zeros(0), reading.ratio, "", 1.0),
+        ]
+    for name, share in found.held.items():
+        site = f"sensor.{name}"
+        result = [
+            *(item for item in result if item.site not in (site, "damper", "column", "table")),
+            Trace(site, np.zeros(0), share, "", 1.0),
+        ]
+    if found.link:
+        result.append(Trace("link", np.zeros(0), max(item.z for item in found.link), "", 1.0))
+    return result
+
+
+def shares(
+    own: Judge, traces: Sequence[Trace]
+) -> tuple[dict[str, tuple[float, float, float]], list[dict[str, Any]]]:
+    """Share of the response gap each site is responsible for, with an interval from thirds of the time.
+
+    Beside it the exact Shapley values, what each site takes away first, and what it takes away last.
+    """
+    sites = [trace.site for trace in sorted(traces, key=lambda item: -item.ratio)]
+    if len(sites) < 2:
+        return dict.fromkeys(sites, (1.0, 1.0, 1.0)), []
+    players = sites[:PLAYERS]
+    simulated: dict[frozenset[str], Mapping[str, Array] | None] = {}
+
+    def value(mask: Mask, subset: frozenset[str]) -> float:
+        if subset not in simulated:
+            simulated[subset] = own.signals(subset)
+        return -overall(own.gap(simulated[subset], mask))
+
+    ticks = np.arange(own.record.ticks)
+    masks = [ticks >= 0, *(ticks * 3 // own.record.ticks == third for third in range(3))]
+    found = [where.shapley(players, functools.partial(value, mask)) for mask in masks]
+    weights = [normalised(item, traces) for item in found]
+    result = {}
+    for site in sites:
+        drawn = [item.get(site, 0.0) for item in weights]
+        result[site] = (drawn[0], min(drawn), max(drawn))
+    rows = [
+        {
+            "site": site,
+            "shapley": values[0],
+            "interval": [min(item[site][0] for item in found), max(item[site][0] for item in found)],
+            "first_in": values[1],
+            "last_out": values[2],
+        }
+        for site, values in found[0].items()
+    ]
+    return result, rows
+
+
+def normalised(found: Mapping[str, tuple[float, float, float]], traces: Sequence[Trace]) -> dict[str, float]:
+    """Shares that sum to one; where the response does not show a site, its trace in its own part decides."""
+    sizes = {site: max(share, 0.0) for site, (share, _, _) in found.items()}
+    ratios = {trace.site: trace.ratio for trace in traces}
+    if sum(sizes.values()) <= 1e-4:
+        sizes = {site: ratios[site] for site in found}
+    total = sum(sizes.values()) or 1.0
+    return {site: size / total for site, size in sizes.items()}

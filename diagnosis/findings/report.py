@@ -1,0 +1,105 @@
+"""The report of a diagnosis as plain values (contract, section 8)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from common.terminal.telling import Tell, untold
+from diagnosis.findings import details, how_far, next_test, where
+from diagnosis.findings.which import which
+from diagnosis.fits import exercise
+
+if TYPE_CHECKING:
+    from diagnosis.diagnose import Diagnosis
+    from diagnosis.record import Record
+
+VERSION = 1
+STILL = 5.0  # rms of a signal over its noise below which it hardly moved
+
+
+def build(found: Diagnosis, validation: Sequence[Record], tell: Tell = untold) -> dict[str, Any]:
+    """The whole report."""
+    tell("how far the gap closes", 0, 0)
+    far = how_far.judge(found, validation)
+    status = status_of(found)
+    sites = sites_of(found, far)
+    entries = which(found)
+    tell("the next test", 0, 0)
+    tests = next_test.choices(found)
+    evidence = details.details(found, far, entries)
+    evidence["next"] = [
+        {"test": item.test, "separation": item.separation, "pair": list(item.pair), "why": ""}
+        for item in tests[:5]
+    ]
+    return {
+        "version": VERSION,
+        "status": status,
+        "tolerances": tolerances(found),
+        "gap": far.gap,
+        "where": sites,
+        "which": entries,
+        "equivalent": [list(names) for verdict in found.verdicts for names in verdict.equivalent],
+        "how_far": far.summary,
+        "not_exercised": exercise.not_exercised(found),
+        "next_test": next_test.sentence(tests),
+        "warnings": found.warnings,
+        "details": evidence,
+    }
+
+
+def status_of(found: Diagnosis) -> str:
+    """The status in one word."""
+    if not found.verdicts or not moved(found):
+        return "not_enough_data"
+    outcomes = {verdict.outcome for verdict in found.verdicts}
+    named = any(verdict.effects for verdict in found.verdicts) or found.readings or found.link
+    if "unknown" in outcomes or found.held:
+        return "unknown_effect"
+    if "partly" in outcomes:
+        return "partly_explained"
+    if not named:
+        return "no_gap"
+    if any(verdict.effects and verdict.probability < 0.5 for verdict in found.verdicts):
+        return "ambiguous"
+    return "explained"
+
+
+def moved(found: Diagnosis) -> bool:
+    """Whether any part's readings stand out of their noise."""
+    for verdict in found.verdicts:
+        data = verdict.search.data
+        level = np.sqrt(np.mean(np.square(data.part.measured), axis=0))
+        if not data.part.exact and np.any(level > STILL * np.maximum(data.white, 1e-12)):
+            return True
+    return False
+
+
+def tolerances(found: Diagnosis) -> dict[str, dict[str, float]]:
+    """How far each nominal parameter was moved."""
+    result = {}
+    for verdict in found.verdicts:
+        fit = verdict.search.chosen
+        for nuisance, z in zip(verdict.search.data.part.nuisances, fit.z, strict=True):
+            result[nuisance.name] = {"factor": 1.0 + float(z) * nuisance.tolerance, "z": float(z)}
+    return result
+
+
+def sites_of(found: Diagnosis, far: how_far.HowFar) -> list[dict[str, Any]]:
+    """Where the gap lies, the largest share first."""
+    entries: list[dict[str, Any]] = []
+    for trace in far.traces:
+        entries.append(
+            {
+                "site": trace.site,
+                "residual_to_noise": trace.ratio,
+                "when": where.when(trace, found.record) if trace.series.size else [],
+                "frequency_band": where.frequencies(trace, found.record) if trace.series.size else [0.0, 0.0],
+            }
+        )
+    for entry in entries:
+        share, low, high = far.shares[entry["site"]]
+        entry |= {"share": share, "share_interval": [low, high]}
+    return sorted(entries, key=lambda entry: -entry["share"])

@@ -1,0 +1,177 @@
+"""What a search in one part says: how well it is explained, by what, how sure, and what it cannot tell apart."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from diagnosis.fits.fitting import Fit, Problem
+from diagnosis.fits.search import DATA_GAIN, PRIOR_GAIN, Search, exchanged_pair, gaps, tied
+from models.registry import Array
+
+Outcome = Literal["none", "explained", "partly", "unknown"]
+
+LEFT, WELL, HALF = (
+    0.5,
+    0.15,
+    0.5,
+)  # residual over noise, share of a signal's that is left, of energy explained
+SMALL = 0.05  # of a signal's rms that may be left where a gap is called explained
+TEMPERATURE = 3.0  # by which score differences are divided before they are odds
+DOUBT = {"explained": 0.02, "partly": 0.12, "unknown": 0.9}  # that it is none of the catalogue
+CORRELATED = 2.0  # s, longer than what a model leaves is correlated
+COVER = 1.96  # standard deviations of an interval
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A parameter with its interval."""
+
+    value: float
+    low: float
+    high: float
+    unit: str
+    on_bound: bool
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What one part says."""
+
+    search: Search
+    outcome: Outcome
+    probability: float  # of the chosen effects, or those tied with them
+    others: tuple[tuple[Fit, float], ...]  # alternatives with their probability
+    equivalent: tuple[tuple[str, ...], ...]
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """The chosen effects."""
+        return self.search.chosen.names
+
+
+def judge(search: Search) -> Verdict:
+    """The verdict on a part."""
+    if not search.chosen.names:
+        outcome: Outcome = "unknown" if search.left > MISSED else "none"
+        return Verdict(search, outcome, 1.0, (), ())
+    outcome = how_well(search)
+    if outcome == "unknown":
+        return unnamed(search)
+    chosen = search.chosen
+    noise = max(1.0, chosen.chi / chosen.reduced.size)
+    odds = [
+        math.exp(-min(max((other.cost - chosen.cost) / noise, 0.0) / (2.0 * TEMPERATURE), 700.0))
+        for other in search.alternatives
+    ]
+    same = [tied(search, other) for other in search.alternatives]
+    whole = 1.0 + sum(odds)
+    named = (1.0 + sum(value for value, yes in zip(odds, same, strict=True) if yes)) / whole
+    sure = (1.0 - DOUBT[outcome]) * certainty(search)
+    others = tuple(
+        (other, sure * value / whole)
+        for other, value, yes in zip(search.alternatives, odds, same, strict=True)
+        if not yes
+    )
+    return Verdict(search, outcome, sure * named, others, equivalents(search))
+
+
+def unnamed(search: Search) -> Verdict:
+    """A gap that no effect explains by half: nothing is named, the nearest are listed."""
+    near = (search.chosen, *search.alternatives)
+    costs = np.array([fit.cost for fit in near])
+    odds = np.exp(
+        -np.clip(
+            (costs - costs.min()) / max(1.0, costs.min() / search.chosen.reduced.size) / (2.0 * TEMPERATURE),
+            0.0,
+            700.0,
+        )
+    )
+    chances = (1.0 - DOUBT["unknown"]) * odds / odds.sum()
+    bare = replace(search, chosen=search.commissioned)
+    return Verdict(bare, "unknown", DOUBT["unknown"], tuple(zip(near, map(float, chances), strict=True)), ())
+
+
+MISSED = 0.3  # systematic residual over noise that is unknown where no effect was found
+
+
+def how_well(search: Search) -> Outcome:
+    """How much of the gap the chosen effects explain, in the signal in which they explain least."""
+    if search.left < LEFT:
+        return "explained"
+    group = search.data.group
+    before, after = gaps(search.commissioned, group), gaps(search.chosen, group)
+    worst = max(
+        new.ratio / max(old.ratio, LEFT) for old, new in zip(before, after, strict=True) if new.ratio >= LEFT
+    )
+    level = np.sqrt(np.mean(np.square(search.data.part.measured), axis=0))
+    left = max(
+        new.ratio * sigma / size
+        for new, sigma, size in zip(after, search.data.sigma, level, strict=True)
+        if size > 0.0
+    )
+    if worst < WELL and left < SMALL:
+        return "explained"
+    return "partly" if search.explained > HALF else "unknown"
+
+
+def certainty(search: Search) -> float:
+    """How sure it is that there is an effect at all, beyond tolerances and chance."""
+    before, after = search.commissioned, search.chosen
+    margin = max(before.prior - after.prior, 0.0) / PRIOR_GAIN + max(before.chi - after.chi, 0.0) / DATA_GAIN
+    return 1.0 - 0.5 * math.exp(-(margin - 1.0))
+
+
+def equivalents(search: Search) -> tuple[tuple[str, ...], ...]:
+    """Sets of effects that the data cannot tell apart, one per chosen effect that has others beside it."""
+    sets: dict[str, list[str]] = {}
+    for other in search.alternatives:
+        pair = exchanged_pair(search.chosen, other)
+        if pair is not None and tied(search, other):
+            sets.setdefault(pair[0], [pair[0]]).append(pair[1])
+    return tuple(tuple(names) for names in sets.values())
+
+
+def scatter(fit: Fit) -> Array:
+    """How much the gradient varies beyond white noise, from its sums over blocks (White 1980, Newey and West 1987).
+
+    What a model leaves comes and goes slowly, so samples are no independent witnesses.
+    """
+    groups, signals = fit.reduced.shape
+    block = max(1, round(CORRELATED / (fit.data.system.plan.test.interval * fit.data.group)))
+    count = groups // block
+    if count < 4:
+        return fit.jacobian.T @ fit.jacobian
+    slopes = fit.jacobian.reshape(groups, signals, -1)[: count * block]
+    steps = np.einsum("gs,gsp->gp", fit.reduced[: count * block], slopes)
+    sums = steps.reshape(count, block, -1).sum(axis=1)
+    seen: Array = sums.T @ sums - fit.jacobian.T @ fit.jacobian
+    values, vectors = np.linalg.eigh(0.5 * (seen + seen.T))
+    return (vectors * np.maximum(values, 0.0)) @ vectors.T
+
+
+def intervals(fit: Fit) -> dict[str, dict[str, Interval]]:
+    """Parameters of a fit's effects with their 95 % intervals, from the curvature of its cost."""
+    count = fit.z.size
+    problem = Problem(fit.data, fit.values)
+    size = count + len(problem.frees)
+    information = fit.jacobian.T @ fit.jacobian
+    information[:count, :count] += np.eye(count)
+    inverse = np.linalg.pinv(information + 1e-12 * np.trace(information) * np.eye(size))
+    covariance = inverse + inverse @ scatter(fit) @ inverse
+    result: dict[str, dict[str, Interval]] = {}
+    low, high = problem.bounds()
+    place = problem.place(fit.values, fit.z)
+    for i, item in enumerate(problem.frees, start=count):
+        wide = COVER * math.sqrt(max(covariance[i, i], 0.0))
+        ends = [item.outward(float(np.clip(place[i] + side * wide, low[i], high[i]))) for side in (-1, 1)]
+        value = fit.values[item.effect][item.parameter.name]
+        edge = 1e-6 * (high[i] - low[i])
+        bound = not low[i] + edge < place[i] < high[i] - edge
+        result.setdefault(item.effect, {})[item.parameter.name] = Interval(
+            value, min(ends), max(ends), item.parameter.unit, bound
+        )
+    return result

@@ -1,0 +1,172 @@
+"""Where a gap lies: sites of the effects found, and of what no effect explains."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagnosis.fits import fitting
+from diagnosis.fits.fitting import Data, Fit
+from diagnosis.fits.search import gap
+from diagnosis.parts import LaboratoryB
+from diagnosis.record import Record
+from diagnosis.signals import windows
+from models.effects import CATALOGUE
+from models.registry import Array
+
+CONSISTENT = 0.35  # share of a residual that another signal's must show to have the same cause
+
+
+@dataclass(frozen=True)
+class Trace:
+    """What one site does to a part's signals, in σ."""
+
+    site: str
+    series: Array  # (ticks,) of the signal that shows it most
+    ratio: float  # its rms
+    signal: str
+    sigma: float
+
+
+def traces(data: Data, fit: Fit) -> list[Trace]:
+    """What each site's effects do to the signals: the prediction with all effects against that without them."""
+    whole = data.part.predict(fitting.lay(data, fit.z, fit.values))
+    sites: dict[str, list[str]] = {}
+    for name in fit.names:
+        sites.setdefault(CATALOGUE[name].site, []).append(name)
+    result = []
+    for site, names in sites.items():
+        less = {name: values for name, values in fit.values.items() if name not in names}
+        change = (whole - data.part.predict(fitting.lay(data, fit.z, less))) / data.sigma
+        change[~data.part.present] = 0.0
+        result.append(shown(site, data, change))
+    return result
+
+
+def shown(site: str, data: Data, change: Array) -> Trace:
+    """The trace of a site from changes (ticks, signals) in σ."""
+    ratios = np.sqrt(np.mean(change**2, axis=0))
+    place = int(np.argmax(ratios))
+    return Trace(
+        site, change[:, place], float(ratios[place]), data.part.signals[place], float(data.sigma[place])
+    )
+
+
+def unexplained(data: Data, fit: Fit) -> Trace:
+    """What a fit leaves, at the site where it most likely arises."""
+    residual = data.residual(fitting.lay(data, fit.z, fit.values)) / data.sigma
+    left = [gap(column, data.group).ratio for column in fit.reduced.T]
+    site = culprit(data, residual, left)
+    kept = residual[:, int(np.argmax(left))]
+    return Trace(
+        site,
+        kept,
+        max(left),
+        data.part.signals[int(np.argmax(left))],
+        float(data.sigma[int(np.argmax(left))]),
+    )
+
+
+def culprit(data: Data, residual: Array, left: Sequence[float]) -> str:
+    """The site that residuals (ticks, signals) in σ speak for, by which signals show them and which do not."""
+    if data.part.name in ("ground", "structure", "column"):
+        return data.part.name
+    amount = dict(zip(data.part.signals, left, strict=True))
+    if isinstance(data.part, LaboratoryB):
+        return culprit_b(data, residual, amount)
+    return culprit_a(data, residual, amount)
+
+
+def culprit_a(data: Data, residual: Array, amount: dict[str, float]) -> str:
+    """Laboratory A: the actuator moves displacement and force together, the column the force alone."""
+    displacement, force = amount["column_displacement"], amount["column_force"]
+    if not data.part.present[:, 1].any():
+        return "actuator"
+    stiffness = data.system.plan.column.stiffness
+    implied = (
+        stiffness * residual[:, 0] * data.sigma[0] / data.sigma[1]
+    )  # force that a true motion would make
+    level = math.sqrt(float(np.mean(implied**2)))
+    if displacement < SEEN:
+        return "column"
+    with_it = residual[:, 1] - implied
+    alone = math.sqrt(
+        max(float(np.mean(with_it**2)) - 1.0 - (stiffness * data.sigma[0] / data.sigma[1]) ** 2, 0.0)
+    )
+    if force < SEEN and level > 2.0:
+        return "sensor.column_displacement"
+    return "actuator" if alone < max(force, displacement) else "column"
+
+
+SEEN = 0.3  # systematic residual over noise that counts as seen
+
+
+def culprit_b(data: Data, residual: Array, amount: dict[str, float]) -> str:
+    """Laboratory B: the table moves everything, the damper its stroke and force; one alone is a sensor's."""
+    seen = {name for name, value in amount.items() if value > SEEN}
+    if "table_displacement" in seen:
+        return "table"
+    if seen == {"table_acceleration"}:
+        return "table" if hidden_in_displacement(data, residual) else "sensor.table_acceleration"
+    if seen == {"damper_force"}:  # a true force would have moved the mass, which is seen far more sharply
+        return "sensor.damper_force" if data.part.present[:, 2].any() else "damper"
+    table = amount.get("table_acceleration", 0.0)
+    damper = max(amount.get("damper_stroke", 0.0), amount.get("damper_force", 0.0))
+    return "table" if table > damper else "damper"
+
+
+def hidden_in_displacement(data: Data, residual: Array) -> bool:
+    """Whether the motion behind an acceleration's residual would be too small for the displacement sensor."""
+    interval = data.system.plan.test.interval
+    series = residual[:, 1] * data.sigma[1]
+    spectrum = np.fft.rfft(series)
+    omega = 2.0 * np.pi * np.fft.rfftfreq(series.size, interval)
+    slow = omega > 2.0 * np.pi * 0.5
+    motion = np.zeros_like(spectrum)
+    motion[slow] = spectrum[slow] / omega[slow] ** 2
+    implied = np.fft.irfft(motion, series.size)
+    return float(np.sqrt(np.mean(implied**2))) < data.sigma[0] * 0.5
+
+
+def shapley(
+    players: Sequence[str], value: Callable[[frozenset[str]], float]
+) -> dict[str, tuple[float, float, float]]:
+    """Shares of `value(all) − value(none)` per player: exact Shapley value, first in, last out.
+
+    Over all subsets (Shapley 1953); for at most a few players.
+    """
+    known = {
+        frozenset(subset): value(frozenset(subset))
+        for size in range(len(players) + 1)
+        for subset in itertools.combinations(players, size)
+    }
+    count, everyone, nobody = len(players), frozenset(players), frozenset[str]()
+    result = {}
+    for player in players:
+        share = 0.0
+        for subset, worth in known.items():
+            if player in subset:
+                continue
+            weight = math.factorial(len(subset)) * math.factorial(count - len(subset) - 1)
+            share += weight / math.factorial(count) * (known[subset | {player}] - worth)
+        first = known[frozenset({player})] - known[nobody]
+        last = known[everyone] - known[everyone - {player}]
+        result[player] = (share, first, last)
+    return result
+
+
+def when(trace: Trace, record: Record, threshold: float = 1.0) -> list[list[float]]:
+    """Windows of time in which a site's trace stands out of the noise."""
+    parts = windows.windows(trace.series, 1.0, record.plan.test.interval)
+    level = max(threshold, 0.25 * float(np.max(parts.ratio, initial=0.0)))
+    return windows.intervals(parts, min(level, 0.9 * float(np.max(parts.ratio, initial=0.0))))
+
+
+def frequencies(trace: Trace, record: Record) -> list[float]:
+    """Band that holds most of a site's trace, Hz."""
+    low, high = windows.band(trace.series, 0.0, record.plan.test.interval)
+    return [float(low), float(high)]

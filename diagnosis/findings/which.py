@@ -1,0 +1,123 @@
+"""The candidates of a report: the verdict and what else might be, with parameters and probabilities."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from diagnosis.findings.verdict import Verdict, intervals
+from diagnosis.fits.fitting import Values
+from diagnosis.fits.search import MATERIAL, PRIOR_GAIN, gaps
+from models.effects import CATALOGUE
+
+if TYPE_CHECKING:
+    from diagnosis.diagnose import Diagnosis
+
+MOST_OTHERS = 5  # alternatives listed
+
+Parameters = dict[str, dict[str, dict[str, Any]]]
+
+
+def which(found: Diagnosis) -> list[dict[str, Any]]:
+    """The verdict first, then the alternatives by probability."""
+    named = [verdict for verdict in found.verdicts if verdict.effects]
+    effects = [name for verdict in named for name in verdict.effects]
+    effects += [reading.effect for reading in found.readings] + [item.effect for item in found.link]
+    probability = float(np.prod([verdict.probability for verdict in found.verdicts]))
+    if not effects:
+        probability = min(probability, nothing(found))
+    parameters = fitted(found, named) | seen(found)
+    others = [
+        item for verdict in found.verdicts for item in alternatives(verdict, effects, parameters, probability)
+    ]
+    others.sort(key=lambda item: -item["probability"])
+    return [entry(effects, probability, parameters, 0.0), *others[:MOST_OTHERS]]
+
+
+def fitted(found: Diagnosis, named: list[Verdict]) -> Parameters:
+    """Parameters of effects found by fits, with intervals; one at the end of its range is said so."""
+    result: Parameters = {}
+    for verdict in named:
+        for name, values in intervals(verdict.search.chosen).items():
+            shapes = {item.name for item in CATALOGUE[name].parameters if item.shape}
+            result[name] = {
+                key: value(item.value, item.low, item.high, item.unit) for key, item in values.items()
+            }
+            found.warnings += [
+                f"{key} of {name} lies at the end of its range."
+                for key, item in values.items()
+                if item.on_bound and key not in shapes
+            ]
+    return result
+
+
+def seen(found: Diagnosis) -> Parameters:
+    """Parameters of effects that were read off samples and message numbers."""
+    result: Parameters = {}
+    for reading in found.readings:
+        unit = unit_of(reading.effect, reading.parameter)
+        result[reading.effect] = {reading.parameter: value(reading.value, *reading.interval, unit)}
+    for item in found.link:
+        result[item.effect] = {
+            key: value(size, *bounds, unit_of(item.effect, key))
+            for key, (size, bounds) in item.parameters.items()
+        }
+    return result
+
+
+def alternatives(
+    verdict: Verdict, effects: list[str], parameters: Parameters, probability: float
+) -> list[dict[str, Any]]:
+    """Entries in which one part's effects are others."""
+    rest = [name for name in effects if name not in verdict.effects]
+    result = []
+    for other, chance in verdict.others:
+        share = chance
+        if verdict.effects and verdict.probability > 0.0:
+            share = probability / verdict.probability * chance
+        kept = {name: parameters[name] for name in rest}
+        worse = 0.5 * (other.cost - verdict.search.chosen.cost) if verdict.effects else 0.0
+        result.append(entry([*other.names, *rest], share, kept | bare(other.values), worse))
+    return result
+
+
+def bare(values: Values) -> Parameters:
+    """Parameters without intervals."""
+    return {
+        name: {key: value(size, None, None, unit_of(name, key)) for key, size in given.items()}
+        for name, given in values.items()
+    }
+
+
+def value(size: float, low: float | None, high: float | None, unit: str) -> dict[str, Any]:
+    """A parameter as the report holds it; what is not finite is null."""
+    ends = [None if end is None or not math.isfinite(end) else end for end in (low, high)]
+    return {"value": size, "interval": ends, "unit": unit}
+
+
+def unit_of(effect: str, parameter: str) -> str:
+    """Unit of an effect's parameter."""
+    return next(item.unit for item in CATALOGUE[effect].parameters if item.name == parameter)
+
+
+def nothing(found: Diagnosis) -> float:
+    """How sure it is that nothing is there: the nearer to what would be named, the less."""
+    worst = 0.0
+    for verdict in found.verdicts:
+        fit = verdict.search.chosen
+        sizes = np.abs(fit.z) / math.sqrt(PRIOR_GAIN)
+        left = [item.ratio / MATERIAL for item in gaps(fit, fit.data.group)]
+        worst = max([worst, *map(float, sizes), *left])
+    return float(1.0 - 0.3 * min(worst, 1.0) ** 4)
+
+
+def entry(effects: list[str], probability: float, parameters: Parameters, score: float) -> dict[str, Any]:
+    """One line of `which`."""
+    return {
+        "effects": effects,
+        "probability": probability,
+        "parameters": parameters,
+        "held_out_score": score,
+    }

@@ -1,0 +1,129 @@
+"""The best that any model of a part could explain, against the catalogue; and what the rest depends on."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from common.errors import InputError
+from common.plan.limits import UNITS
+from diagnosis.findings import where
+from diagnosis.fits import fitting
+from diagnosis.fits.search import Search, gaps
+from diagnosis.parts import LaboratoryA, LaboratoryB
+from diagnosis.signals import windows
+from diagnosis.signals.ceiling import ceiling, depends_on
+from models.registry import Array
+
+if TYPE_CHECKING:
+    from diagnosis.diagnose import Diagnosis
+
+COORDINATE = {
+    "column_displacement": "displacement",
+    "column_force": "force",
+    "table_displacement": "displacement",
+    "table_acceleration": "acceleration",
+    "damper_stroke": "displacement",
+    "damper_force": "force",
+    "actuator_command": "command",
+    "table_command": "command",
+    "damper_command": "command",
+}
+SMOOTH = 0.008  # s, over which rates are taken
+
+
+def worst(search: Search, fit: fitting.Fit) -> int:
+    """The signal in which a fit leaves most."""
+    return int(np.argmax([item.ratio for item in gaps(fit, search.data.group)]))
+
+
+def inputs_of(found: Diagnosis, search: Search) -> dict[str, Array]:
+    """Commands of a part, and its readings as predicted without effects."""
+    part = search.data.part
+    result: dict[str, Array] = {}
+    if isinstance(part, LaboratoryA | LaboratoryB):
+        result |= {name: values for name, values in part.inputs.items() if np.ptp(values) > 0.0}
+    predicted = part.predict(fitting.lay(search.data, search.chosen.z, {}))
+    for name, values in zip(part.signals, predicted.T, strict=True):
+        if np.ptp(values) > 0.0:
+            result[f"predicted {name}"] = values
+    return result
+
+
+def ceilings(found: Diagnosis) -> list[dict[str, Any]]:
+    """Per part with a gap: what a flexible model explains of its residual on withheld time, and the catalogue."""
+    result = []
+    for verdict in found.verdicts:
+        search = verdict.search
+        if verdict.outcome == "none" or search.data.part.exact:
+            continue
+        flexible = flexible_share(found, search)
+        if flexible is not None:
+            site = where.unexplained(search.data, search.chosen).site
+            if verdict.effects:
+                site = where.traces(search.data, search.chosen)[0].site
+            result.append({"site": site, "flexible": flexible, "catalogue": max(0.0, search.explained)})
+    return result
+
+
+def flexible_share(found: Diagnosis, search: Search) -> float | None:
+    """Share of the commissioned residual's energy that a flexible model reaches, None where it cannot be told."""
+    interval = found.record.plan.test.interval
+    place = worst(search, search.commissioned)
+    residual = search.data.residual(fitting.lay(search.data, search.commissioned.z, {}))[:, place]
+    columns = inputs_of(found, search)
+    if not columns:
+        return None
+    held = fitting.withheld_ticks(residual.size, interval)
+    try:
+        return ceiling(
+            np.column_stack(list(columns.values())),
+            residual,
+            ~held,
+            held,
+            float(search.data.sigma[place]),
+            interval,
+        )
+    except InputError:
+        return None
+
+
+def unknown(found: Diagnosis) -> dict[str, Any]:
+    """What can be said of a residual that no effect of the catalogue explains; empty where there is none."""
+    for verdict in found.verdicts:
+        search = verdict.search
+        if verdict.outcome not in ("unknown", "partly"):
+            continue
+        data = search.data
+        place = worst(search, search.chosen)
+        residual = data.residual(fitting.lay(data, search.chosen.z, search.chosen.values))[:, place]
+        interval = found.record.plan.test.interval
+        shares = dependence(found, search, residual, float(data.sigma[place]))
+        spectrum = windows.bands(residual, float(data.white[place]), interval)
+        peak = int(np.argmax(spectrum.residual[1:])) + 1 if spectrum.residual.size > 1 else 0
+        return {
+            "site": where.unexplained(data, search.chosen).site,
+            "depends_on": [{"on": name, "share": share} for name, share in shares if share > 0.02],
+            "frequency": float(spectrum.frequency[peak]),
+            "amplitude": float(np.sqrt(2.0 * np.mean(residual**2))),
+            "unit": UNITS.get(data.part.signals[place], ""),
+        }
+    return {}
+
+
+def dependence(found: Diagnosis, search: Search, residual: Array, noise: float) -> list[tuple[str, float]]:
+    """How much of a residual a function of one coordinate alone explains."""
+    interval = found.record.plan.test.interval
+    step = max(1, round(SMOOTH / interval))
+    coordinates: dict[str, Array] = {"time": found.record.time}
+    for name, values in inputs_of(found, search).items():
+        short = COORDINATE.get(name.removeprefix("predicted "), "")
+        if short and short not in coordinates:
+            coordinates[short] = values
+        if short == "displacement" and "velocity" not in coordinates:
+            coordinates["velocity"] = np.gradient(values, interval * step)
+    try:
+        return depends_on(coordinates, residual, noise)
+    except InputError:
+        return []

@@ -1,0 +1,38 @@
+"""Effects that a recording could not have shown, because it never came near them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from common.errors import InputError
+from diagnosis.fits import fitting
+
+if TYPE_CHECKING:
+    from diagnosis.diagnose import Diagnosis
+
+FAINT = 0.3  # rms of an effect's trace over noise below which it could hide
+
+
+def not_exercised(found: Diagnosis) -> list[str]:
+    """Catalogue effects that even at their strongest usual size would have hidden in the noise."""
+    result = []
+    for verdict in found.verdicts:
+        data, fit = verdict.search.data, verdict.search.chosen
+        whole = data.part.predict(fitting.lay(data, fit.z, fit.values))
+        for effect in data.part.candidates:
+            strength = [item for item in effect.parameters if not item.shape]
+            if effect.name in fit.names or len(strength) != 1:
+                continue
+            shapes = {item.name: item.default for item in effect.parameters if item.default is not None}
+            values = {**shapes, strength[0].name: strength[0].sizes[-1]}
+            try:
+                more = data.part.predict(fitting.lay(data, fit.z, fit.values | {effect.name: values}))
+            except InputError:
+                result.append(effect.name)
+                continue
+            change = np.where(data.part.present, (more - whole) / data.sigma, 0.0)
+            if float(np.max(np.sqrt(np.mean(change**2, axis=0)))) < FAINT:
+                result.append(effect.name)
+    return result

@@ -1,0 +1,98 @@
+"""What an effect could gain over a hypothesis, read off a bounded linear projection, before anything is fitted."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import lsq_linear
+
+from diagnosis.fits import fitting
+from diagnosis.fits.fitting import Fit
+from diagnosis.fits.scales import Scales
+from models.effects.effect import Effect
+from models.registry import Array
+
+WORKERS = 2  # threads: kernels release the interpreter's lock
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect at the size where it promises most, over a present hypothesis."""
+
+    effect: Effect
+    values: dict[str, float]
+    gain: float
+
+
+class Plane:
+    """A fit's residuals as a linear function of its parameters, the nominal ones inside their bounds."""
+
+    def __init__(self, fit: Fit) -> None:
+        self.fit = fit
+        count, size = fit.z.size, fit.jacobian.shape[1]
+        self._basis, self._slopes = np.linalg.qr(fit.jacobian)
+        rest = fit.reduced.ravel()
+        self._here = self._basis.T @ rest
+        self._off = rest - self._basis @ self._here
+        self._prior = np.eye(count, size)
+        room = np.full(size, np.inf)
+        room[:count] = fitting.TOLERANCES + 1e-6
+        at = np.concatenate([fit.z, np.zeros(size - count)])
+        self._low, self._high = -room - at, room - at
+        self._alone = self._cost(np.zeros(size), 0.0, 0.0, (0.0, 1e-12))[0] if size else float(fit.cost)
+
+    def gain(self, change: Array, stretch: tuple[float, float]) -> tuple[float, float]:
+        """What residuals that move by a share of `change` (groups·signals,) gain at best, and that share."""
+        inside = self._basis.T @ change
+        outside = change - self._basis @ inside
+        size = float(np.linalg.norm(outside))
+        if size**2 < 1e-6 and float(inside @ inside) < 1e-6:
+            return -math.inf, 0.0
+        along = float(outside @ self._off) / size if size > 0.0 else 0.0
+        cost, share = self._cost(inside, size, along, stretch)
+        return self._alone - cost, share
+
+    def _cost(
+        self, inside: Array, size: float, along: float, stretch: tuple[float, float]
+    ) -> tuple[float, float]:
+        """Least cost over parameters and share, by a bounded linear fit of a few unknowns."""
+        count = self.fit.z.size
+        rows = [
+            np.column_stack([self._slopes, inside]),
+            np.append(np.zeros(inside.size), size)[None, :],
+            np.column_stack([self._prior, np.zeros(count)]),
+        ]
+        rest = np.concatenate([self._here, [along], self.fit.z])
+        low, high = np.append(self._low, stretch[0]), np.append(self._high, stretch[1])
+        found = lsq_linear(np.concatenate(rows), -rest, bounds=(low, high), method="bvls")
+        off = float(self._off @ self._off) - along**2
+        return 2.0 * float(found.cost) + off, float(found.x[-1])
+
+
+def screen(fit: Fit, effects: Iterable[Effect], scales: Scales) -> list[Candidate]:
+    """What each effect could gain over a fit, best first."""
+    plane = Plane(fit)
+
+    with ThreadPoolExecutor(WORKERS) as pool:
+        found = [
+            item for items in pool.map(lambda effect: look(effect, plane, scales), effects) for item in items
+        ]
+    return sorted(found, key=lambda item: -item.gain)
+
+
+def look(effect: Effect, plane: Plane, scales: Scales) -> list[Candidate]:
+    """Of every form of an effect the size that promises most; none of one that is there already."""
+    fit = plane.fit
+    if effect.name in fit.names:
+        return []
+    best: dict[tuple[float, ...], Candidate] = {}
+    for form, values in scales.starts(effect):
+        moved = fit.data.reduced(fitting.lay(fit.data, fit.z, fit.values | {effect.name: values}))
+        gain, share = plane.gain((moved - fit.reduced).ravel(), scales.stretch(effect))
+        if form not in best or gain > best[form].gain:
+            best[form] = Candidate(effect, scales.stretched(effect, values, share), gain)
+    return list(best.values())

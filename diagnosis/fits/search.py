@@ -1,0 +1,279 @@
+"""Which effects of the catalogue explain a part's gap: forward selection, exchange, pruning.
+
+Every effect is first laid over the present hypothesis at a few sizes, and what it could gain once the
+nominal parameters give way is read off a linear projection; the most promising are then fitted in full.
+"""
+
+from __future__ import annotations
+
+import math
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from diagnosis.fits import contact, fitting
+from diagnosis.fits.fitting import Data, Fit, Values, excess
+from diagnosis.fits.scales import Scales
+from diagnosis.fits.screening import WORKERS, Candidate, screen
+from models.effects import CATALOGUE
+from models.registry import Array
+
+FITTED = 6  # candidates that are fitted in full at every step
+MOST = 3  # effects of one part
+LEVELS = (1, 4, 16)  # how many averaged samples are taken together to see what is slow
+MATERIAL = 0.12  # systematic residual over noise below which nobody would look for a cause
+PRIOR_GAIN, DATA_GAIN = 6.25, 25.0  # what an effect must save: of tolerances, of residuals
+REST = 0.85  # share of what is left that a further effect must explain,
+SUSPICIOUS = 8.0  # of Σ z²: nominal parameters that are all off together stand in for an effect
+TRACE = 2e-4  # and more than this share of the whole gap,
+LOUD, STEP_OF_REST, STEP_OF_WHOLE = 10.0, 0.4, 0.01  # the same where much more than noise is left
+HALF, SHARE = 0.5, 0.03  # or this share of what is left and this of the whole gap
+NEAR = 1.0  # tolerances from the nominal value where fits begin: what is further away stands in for an effect
+STEPS = 6  # steps between two weightings of a further fit
+LAST = 5  # steps over the whole test after those over its beginning
+MOSTLY = 0.7  # share of what a fit leaves that a beginning must hold
+ROUGH = 4  # steps of a first fit
+LOST = 100.0  # mean square residual in σ² from which on fitted nominal parameters mean nothing
+FINE = 3  # candidates fitted to their end,
+HOPELESS = 30.0  # as long as they leave no more than this times what the best one leaves
+SEEN = 0.3  # trace over noise that an effect must leave to be named
+CANCELLED = 4.0  # times the gap that one of several effects may make without being a makeshift
+TIED = 9.0  # cost by which hypotheses must differ to be told apart
+
+
+class Gap(NamedTuple):
+    """What is systematic in one signal's residual."""
+
+    ratio: float  # rms of the systematic part over that of the noise
+    significance: float  # standard deviations above white noise
+
+
+def gap(reduced: Array, group: int) -> Gap:
+    """Systematic part of averaged residuals (groups,) in σ: what their sums over time exceed noise by."""
+    ratio, significance = 0.0, 0.0
+    for level in LEVELS:
+        count = reduced.size // level
+        if count < 8:
+            continue
+        sums = reduced[: count * level].reshape(count, level).sum(axis=1) / math.sqrt(level)
+        excess, error = float(np.mean(sums**2)) - 1.0, math.sqrt(2.0 / count)
+        significance = max(significance, excess / error)
+        ratio = max(ratio, math.sqrt(max(0.0, excess - 3.0 * error) / (level * group)))
+    return Gap(ratio, significance)
+
+
+def gaps(fit: Fit, group: int) -> list[Gap]:
+    """Of every signal."""
+    return [gap(column, group) for column in fit.reduced.T]
+
+
+def remaining(fit: Fit) -> float:
+    """Largest systematic residual over noise that a fit leaves."""
+    return max((item.ratio for item in gaps(fit, fit.data.group)), default=0.0)
+
+
+@dataclass(frozen=True)
+class Search:
+    """What was found in one part."""
+
+    data: Data
+    commissioned: Fit  # no effect, parameters inside their tolerances
+    chosen: Fit
+    alternatives: tuple[Fit, ...]  # one effect exchanged for another each, best first
+
+    @property
+    def left(self) -> float:
+        """Largest systematic residual over noise that the chosen effects leave."""
+        return remaining(self.chosen)
+
+    @property
+    def explained(self) -> float:
+        """Share of the gap's energy that the chosen effects explain."""
+        before = excess(self.commissioned)
+        return 1.0 - excess(self.chosen) / before if before > 0.0 else 0.0
+
+
+class Searcher:
+    """The search in one part."""
+
+    def __init__(self, data: Data, scales: Scales) -> None:
+        self.data, self.scales = data, scales
+
+    def run(self) -> Search:
+        """Commission, select, exchange, prune, and fit what else might be."""
+        commissioned = fitting.fit(self.data, {})
+        if not self.is_gap(commissioned):
+            return Search(self.data, commissioned, commissioned, ())
+        first = self.extended(commissioned)
+        chosen, better = commissioned, first
+        while better and self.worth(commissioned, chosen, better[0]):
+            chosen = self.exchanged(better[0]) if len(better[0].names) > 1 else better[0]
+            if (data := fitting.sharpened(chosen)) is not None:
+                self.data = data
+                commissioned, chosen, *first = (
+                    fitting.at(data, fit.values, fit.z) for fit in (commissioned, chosen, *first)
+                )
+            if len(chosen.names) >= MOST or self.enough(commissioned, chosen):
+                break
+            better = self.extended(chosen)
+        chosen = self.pruned(commissioned, chosen)
+        return physical(Search(self.data, commissioned, chosen, self.alternatives(chosen, first)))
+
+    def enough(self, bare: Fit, fit: Fit) -> bool:
+        """Whether nothing is left that a further effect could earn its place by."""
+        return not self.is_gap(fit) or (excess(fit) < TRACE * excess(bare) and fit.prior <= SUSPICIOUS)
+
+    def is_gap(self, fit: Fit) -> bool:
+        """Whether a fit leaves anything to explain: beyond noise, or beyond its tolerances."""
+        found = gaps(fit, self.data.group)
+        visible = any(item.ratio > MATERIAL and item.significance > 5.0 for item in found)
+        return (
+            visible or fit.prior > SUSPICIOUS or float(np.max(np.abs(fit.z), initial=0.0)) ** 2 > PRIOR_GAIN
+        )
+
+    def worth(self, bare: Fit, before: Fit, after: Fit) -> bool:
+        """Whether one more effect earns its place."""
+        noise = max(1.0, after.chi / after.reduced.size)
+        prior, data = before.prior - after.prior, (before.chi - after.chi) / noise
+        if max(prior, 0.0) / PRIOR_GAIN + max(data, 0.0) / DATA_GAIN < 1.0 or prior + data <= 0.0:
+            return False
+        if before is bare or self.idle(after):
+            return not self.idle(after)
+        if prior > PRIOR_GAIN and data > -1.0 and remaining(before) < MATERIAL:
+            return True
+        return not self.cancelling(bare, after) and refines(bare, before, after)
+
+    def idle(self, fit: Fit) -> bool:
+        """Whether an effect of a fit does nothing that could be seen."""
+        return any(float(np.max(size)) < SEEN**2 * self.data.group for size in self.changes(fit))
+
+    def changes(self, fit: Fit) -> list[Array]:
+        """Mean square change (signals,) of the residuals without each effect, the rest as it is."""
+        result = []
+        for name in fit.names:
+            rest = {key: values for key, values in fit.values.items() if key != name}
+            change = fitting.at(self.data, rest, fit.z).reduced - fit.reduced
+            result.append(np.mean(np.square(change), axis=0))
+        return result
+
+    def cancelling(self, bare: Fit, fit: Fit) -> bool:
+        """Whether effects of a fit do far more than the gap they explain, and undo each other."""
+        gap = max(float(np.max(np.mean(np.square(bare.reduced), axis=0))), 1.0)
+        return any(float(np.max(size)) > CANCELLED**2 * gap for size in self.changes(fit))
+
+    def start(self, fit: Fit) -> Fit:
+        """A fit over the beginning of the test that holds most of what it leaves, nominal parameters moved back.
+
+        Parameters that are far away stand in for an effect that is missing.
+        """
+        missed = float(np.max(np.mean(np.square(fit.reduced), axis=0)))
+        z = np.zeros(fit.z.size) if missed > LOST else np.clip(fit.z, -NEAR, NEAR)
+        return fitting.at(fitting.beginning(self.data, fit, MOSTLY), fit.values, z)
+
+    def extended(self, fit: Fit, count: int = FITTED) -> list[Fit]:
+        """Fits with one effect more, best first: all a few steps over a beginning, the best of them to their end."""
+        near = self.start(fit)
+        promising = screen(near, self.data.part.candidates, self.scales)[:count]
+        slopes = near.jacobian[:, : fit.z.size]
+
+        def rough(candidate: Candidate) -> Fit:
+            start: Values = {**fit.values, candidate.effect.name: candidate.values}
+            return fitting.fit(near.data, start, near.z, ROUGH, slopes, rounds=1)
+
+        def fine(item: Fit) -> Fit:
+            z = np.clip(item.z, -NEAR, NEAR)
+            if self.data.part.exact:  # cheap, and free of noise: fits go to their end
+                return fitting.fit(self.data, item.values, z, rounds=8)
+            better = fitting.fit(near.data, item.values, z, STEPS, rounds=2)
+            return fitting.fit(self.data, better.values, better.z, LAST, rounds=1)
+
+        with ThreadPoolExecutor(WORKERS) as pool:
+            fits = sorted(pool.map(rough, promising), key=lambda item: item.cost)
+            hopeful = [item for item in fits if excess(item) <= HOPELESS * excess(fits[0])][:FINE]
+            hopeful = fits if self.data.part.exact else hopeful
+            rest = [fitting.at(self.data, item.values, item.z) for item in fits[len(hopeful) :]]
+            fits = sorted([*pool.map(fine, hopeful), *rest], key=lambda item: item.cost)
+        if fits and remaining(fits[0]) > MATERIAL:
+            fits[0] = fitting.fit(self.data, fits[0].values, fits[0].z, STEPS, rounds=3)
+        return self.with_stop(fit, fits)
+
+    def with_stop(self, fit: Fit, fits: list[Fit]) -> list[Fit]:
+        """The fits, and one with an end stop where all the others miss loudly."""
+        known = {effect.name for effect in self.data.part.candidates}
+        if (
+            not fits
+            or remaining(fits[0]) < LOUD
+            or contact.EFFECT in fit.names
+            or contact.EFFECT not in known
+        ):
+            return fits
+        found = contact.stopped(self.data, fit)
+        rest = [item for item in fits if contact.EFFECT not in item.names]
+        if found is None or found.cost > min(item.cost for item in fits):
+            return fits
+        return sorted([found, *rest], key=lambda item: item.cost)
+
+    def without(self, fit: Fit, name: str) -> Fit:
+        """The fit again with one effect taken away."""
+        return fitting.fit(self.data, {key: value for key, value in fit.values.items() if key != name}, fit.z)
+
+    def exchanged(self, fit: Fit) -> Fit:
+        """A better fit with one effect exchanged for another, if there is any."""
+        for name in fit.names[:-1]:
+            others = self.extended(self.without(fit, name), count=3)
+            if others and others[0].cost < fit.cost - TIED:
+                fit = others[0]
+        return fit
+
+    def pruned(self, bare: Fit, fit: Fit) -> Fit:
+        """The fit without effects that do not pay."""
+        for name in fit.names:
+            if len(fit.names) < 2:
+                break
+            less = self.without(fit, name)
+            if not self.worth(bare, less, fit):
+                fit = less
+        return fit
+
+    def alternatives(self, fit: Fit, first: list[Fit]) -> tuple[Fit, ...]:
+        """Fits in which one effect is exchanged for another, best first; `first` are those with one only."""
+        if len(fit.names) < 2:
+            return tuple(item for item in first if item.names != fit.names)
+        result: list[Fit] = []
+        for name in fit.names:
+            base = self.without(fit, name)
+            result += [other for other in self.extended(base) if set(other.names) != set(fit.names)]
+        return tuple(sorted(result, key=lambda item: item.cost))
+
+
+def refines(bare: Fit, before: Fit, after: Fit) -> bool:
+    """Whether a further effect takes away enough of what is left, and of the whole gap."""
+    left, saved, whole = excess(before), excess(before) - excess(after), excess(bare)
+    if remaining(before) > LOUD:  # far from any noise a model may well be refined in small steps
+        return saved > STEP_OF_REST * left and saved > STEP_OF_WHOLE * whole
+    return (saved > REST * left and saved > TRACE * whole) or (saved > HALF * left and saved > SHARE * whole)
+
+
+def tied(search: Search, other: Fit) -> bool:
+    """Whether the data cannot tell another fit from the chosen one."""
+    noise = max(1.0, search.chosen.chi / search.chosen.reduced.size)
+    return (other.cost - search.chosen.cost) / noise < TIED
+
+
+def physical(search: Search) -> Search:
+    """The search with a machine's effect in front where the data cannot tell it from a sensor's."""
+    measured = sum(CATALOGUE[name].kind == "measurement" for name in search.chosen.names)
+    for other in search.alternatives:
+        artefacts = sum(CATALOGUE[name].kind == "measurement" for name in other.names)
+        if artefacts < measured and len(other.names) == len(search.chosen.names) and tied(search, other):
+            rest = [search.chosen, *(item for item in search.alternatives if item is not other)]
+            return replace(search, chosen=other, alternatives=tuple(rest))
+    return search
+
+
+def exchanged_pair(chosen: Fit, other: Fit) -> tuple[str, str] | None:
+    """The effect that was taken away and the one that came for it."""
+    gone, come = set(chosen.names) - set(other.names), set(other.names) - set(chosen.names)
+    return (gone.pop(), come.pop()) if len(gone) == len(come) == 1 else None

@@ -1,0 +1,37 @@
+"""A programme of motion followed tick by tick behind a compensator: on the bench, and before a test."""
+
+from __future__ import annotations
+
+from common.plan.tables import Compensator, TableCompensator
+from models import compensators
+from models.compiled import plain
+from models.excitation import ACCELERATION, JERK, POSITION, RATE, Programme
+
+
+class Follower:
+    """A programme behind a compensator; `table` of the plan is where that stands, for errors."""
+
+    def __init__(
+        self,
+        chosen: Compensator | TableCompensator,
+        programme: Programme,
+        interval: float,
+        table: str = "compensator",
+    ) -> None:
+        self._motion = programme.motion
+        self._interval = interval
+        still, self._built = (
+            plain(compensators.build(chosen.kind, chosen.parameters, interval, table)) for _ in range(2)
+        )
+        compensators.enter(still, *compensators.STILL, interval)  # compiled before a rig is armed
+
+    def wanted(self, tick: int) -> float:
+        """The programme's value at a tick."""
+        return float(self._motion[POSITION, tick])
+
+    def __call__(self, tick: int, measured: float) -> tuple[float, float]:
+        """The target at t_k, and the command for the interval's end."""
+        ahead, present = self._motion[:, tick + 1], self.wanted(tick)
+        rates = float(ahead[RATE]), float(ahead[ACCELERATION]), float(ahead[JERK])
+        wanted = float(ahead[POSITION]), *rates, present, measured
+        return present, float(compensators.enter(self._built, *wanted, self._interval))

@@ -1,0 +1,43 @@
+"""What a reality says the laboratories are."""
+
+from __future__ import annotations
+
+from common.errors import InputError
+from common.plan.reality import Reality
+from common.roles import SLAVE
+from models.effects import CATALOGUE, lay
+from models.system import System
+
+LABORATORY = {"actuator": "master", "column": "master", "table": "slave", "damper": "slave"}
+SIGNALS = {"column_displacement": "master", "column_force": "master"}  # of the others the slave reads
+
+
+def true_system(reality: Reality) -> System:
+    """The plan's parameters as they really are, with the effects laid over them.
+
+    Raises:
+        InputError: an effect that the catalogue does not know, parameters it cannot have, an effect on a
+            laboratory whose rig is a plug-in: it brings its own physics, or one that names a slave and is none of
+            a slave's.
+    """
+    only = reality.only or ("",) * len(reality.effects)
+    for (name, _), alone in zip(reality.effects, only, strict=True):
+        site = CATALOGUE[name].site if name in CATALOGUE else ""
+        lab = laboratory(site)
+        if lab and getattr(reality, lab).class_:
+            raise InputError(
+                f"The effect '{name}' cannot be laid over the plug-in in "
+                f"[{reality.role if lab == SLAVE else lab}.rig]: "
+                "put it into that rig, or leave the rig out of the reality and the plan."
+            )
+        if alone and site != "link" and lab != SLAVE:
+            raise InputError(f"The effect '{name}' is none of one slave's: leave out its slave.")
+    return lay(System(reality.plan), reality.effects)
+
+
+def laboratory(site: str) -> str:
+    """Who stands beside a site of the catalogue: master, slave, or nobody."""
+    part, _, signal = site.partition(".")
+    if part == "sensor":
+        return SIGNALS.get(signal, "slave")
+    return LABORATORY.get(part, "")

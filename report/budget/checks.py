@@ -1,0 +1,121 @@
+"""One check per limit of a budget.
+
+A check is `ok`, `over`, in `doubt` (over, but the bare loop was late in as many ticks) or `short` (too few values lie
+beyond the percentile to tell it from the maximum).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import groupby
+
+import numpy as np
+from numpy.typing import NDArray
+
+from report.budget.figures import Bare, Exchange, measured
+from report.budget.limits import PERCENTILES, WAITS, Budget, Late, Machine
+
+OK, OVER, DOUBT, SHORT = "ok", "over", "doubt", "short"
+WAKE, SUM = "wake_lateness", "round_trip"
+LEAST_BEYOND = 5  # values that must lie beyond a percentile, or it is next to a maximum
+EPSILON = 1e-9  # s or values: rounding is no excess
+
+
+@dataclass(frozen=True)
+class Check:
+    """One limit and what was found: s, a share or ticks; `bare` is the bare loop's own, None where none ran.
+
+    `calm` says that, over its limit, it was judged without the ticks in which the master stood still.
+    """
+
+    name: str
+    unit: str
+    value: float
+    bare: float | None
+    limit: float
+    allowed: float
+    verdict: str
+    calm: bool = False
+
+
+def checks_of(item: Exchange, budget: Budget, bare: Bare | None) -> Iterator[Check]:
+    """The checks of the master's ticks with one slave."""
+    for segment, limits in budget.segments.items():
+        if segment in item.segments:
+            for name, limit in limits.items():
+                yield percentile_check(item, segment, name, limit, bare, budget.machine)
+    yield from late_checks(item, budget.late, bare, budget.machine)
+
+
+def late_checks(item: Exchange, late: Late, bare: Bare | None, machine: Machine) -> Iterator[Check]:
+    """The checks of late and missed ticks; what was not recorded is not judged.
+
+    Two waits of half an interval make a tick late, one of an interval makes the master miss it.
+    """
+    if item.late is not None:
+        own = bare.late_share + bare.share_beyond(bare.interval / 2.0) if bare else None
+        yield from share_check(item.label("late share"), item.late, late.share, own, WAITS[SUM], machine)
+    if item.missed is not None:
+        own = bare.late_share if bare else None
+        yield from share_check(item.label("missed share"), item.missed, late.missed_share, own, 1, machine)
+    if item.late is not None and np.isfinite(late.longest_gap):
+        gap, stall = longest_run(item.late), bare.longest_gap if bare else None
+        allowed = late.longest_gap + (stall or 0)
+        verdict = OVER if gap > allowed else OK
+        yield Check(item.label("longest gap"), "ticks", gap, stall, late.longest_gap, allowed, verdict)
+
+
+def percentile_check(
+    item: Exchange, segment: str, name: str, limit: float, bare: Bare | None, machine: Machine
+) -> Check:
+    """A percentile of one segment against its limit, with what the bare loop adds for its waits."""
+    values = measured(item.segments[segment])
+    value, admitted = float(np.percentile(values, PERCENTILES[name])), 1.0 - PERCENTILES[name] / 100.0
+    own = bare.percentiles[name] if bare else None
+    allowed = limit + min(WAITS[segment] * (own or 0.0), machine.lateness)
+    verdict = OK
+    if values.size * admitted < LEAST_BEYOND - EPSILON:
+        verdict = SHORT
+    elif value > allowed + EPSILON:
+        verdict = DOUBT if bare and explained(item, segment, limit, allowed, admitted, bare) else OVER
+    calm = bare is not None and segment != WAKE
+    return Check(item.label(f"{segment} {name}"), "s", value, own, limit, allowed, verdict, calm)
+
+
+def explained(
+    item: Exchange, segment: str, limit: float, allowed: float, admitted: float, bare: Bare
+) -> bool:
+    """Whether the machine may have taken so many ticks beyond what is allowed that the rest are no more than admitted.
+
+    A wait does so where it is longer than what is left between the segment's usual need and what is allowed; over
+    the round trip two of half of that. Shares of independent causes add up, as percentiles do not. While a process
+    stands still the messages to it wait too: in both loops ticks that passed meanwhile are left to [late].
+    """
+    values, waits = item.segments[segment], WAITS[segment]
+    need = max(float(np.nanmedian(values)) - waits * bare.percentiles["p50"], 0.0)
+    noise = waits * bare.share_beyond((allowed - need) / (2.0 if segment == SUM else 1.0))
+    if segment == WAKE:
+        noise += bare.late_share
+    else:
+        values = values[item.calm(bare.interval)]
+    values = measured(values)
+    beyond = float(np.mean(values > allowed)) if values.size else 0.0
+    return need <= limit and beyond - noise <= admitted
+
+
+def share_check(
+    label: str, flags: NDArray[np.bool_], limit: float, own: float | None, waits: int, machine: Machine
+) -> Iterator[Check]:
+    """A share of ticks against its limit, with the bare loop's own share per wait; no check where there is no limit."""
+    if not np.isfinite(limit):
+        return
+    value, noise = float(np.mean(flags)), waits * (own or 0.0)
+    allowed = limit + min(noise, machine.share)
+    verdict = OK if value <= allowed else DOUBT if value <= limit + noise else OVER
+    yield Check(label, "share", value, own, limit, allowed, verdict)
+
+
+def longest_run(flags: NDArray[np.bool_]) -> int:
+    """Length of the longest run of true values."""
+    return max((sum(1 for _ in run) for flag, run in groupby(flags.tolist()) if flag), default=0)

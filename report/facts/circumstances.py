@@ -1,0 +1,76 @@
+"""Under what circumstances a recording was made: whose clock, and which rigs as far as the plan says.
+
+What a laboratory really was stands in no recording, because a hidden reality may have put another rig in place of the
+plan's. So only the plan is asked, and the sentence says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from common.plan.plan import Plan
+from common.recording.reader import CLOCK, Run
+from common.roles import LATENCY, MASTER, SLAVE, kind_of, title
+
+VIRTUAL, REAL, SIMULATION, IMPORT, UNKNOWN = "virtual", "real", "simulation", "import", ""
+SENTENCES = {
+    VIRTUAL: "Virtual time in one process, where nothing takes time and no latency is measured",
+    REAL: "Real time, each laboratory in a process of its own on the network",
+    SIMULATION: "A simulation of the nominal models, in which no laboratory took part",
+    IMPORT: "Imported data, which no test of rths recorded",
+}
+NO_LATENCY = "The test ran in virtual time, where no latency is measured"
+BENCH_PARTS = {"column": MASTER, "actuator": MASTER, "table": SLAVE, "damper": SLAVE}
+
+
+def clock_of(run: Run) -> str:
+    """What kept the time of a recording; of one that does not say it, what its latencies show, else UNKNOWN.
+
+    In real time some tick takes longer than nothing to compute; in virtual time none does, whatever the link delays.
+    """
+    if "import" in run.metadata:
+        return IMPORT
+    if run.metadata.get("summary", {}).get("outcome") == "simulation":
+        return SIMULATION
+    said = run.metadata.get(CLOCK, {}).get("kind", UNKNOWN)
+    if said in (VIRTUAL, REAL):
+        return said
+    tables = (columns for topic, columns in run.columns.items() if kind_of(topic) == LATENCY)
+    times = [columns["compute_time"] for columns in tables if "compute_time" in columns]
+    known = np.concatenate([values[np.isfinite(values)] for values in times]) if times else np.array([])
+    if not known.size:
+        return UNKNOWN
+    return REAL if known.max() > 0.0 else VIRTUAL
+
+
+def sentence(run: Run, plan: Plan | None) -> str:
+    """Whose clock and which rigs, as a sentence; empty where the recording does not say."""
+    clock = clock_of(run)
+    part = run.metadata.get("bench", {}).get("part", "")
+    if clock == REAL and part:
+        return f"Real time in one process; {rigs(plan, part)}." if plan else "Real time in one process."
+    if clock == UNKNOWN:
+        return ""
+    rigged = plan is not None and clock in (VIRTUAL, REAL)
+    return SENTENCES[clock] + (f"; {rigs(plan, part)}." if rigged and plan else ".")
+
+
+def rigs(plan: Plan, part: str = "") -> str:
+    """The rigs that the plan names; of a bench test that of the part."""
+    of = dict(classes(plan))
+    if part in BENCH_PARTS:
+        role = next(name for name in of if kind_of(name) == BENCH_PARTS[part])
+        return f"the plan's rig of the {part}: {of[role] or 'emulated'}"
+    if not any(of.values()):
+        return "by the plan " + ("both" if len(of) == 2 else f"all {len(of)}") + " laboratories are emulated"
+    named = (f"{title(role)} {name or 'emulated'}" for role, name in of.items())
+    return f"the plan's rigs: {', '.join(named)}"
+
+
+def classes(plan: Plan) -> Iterator[tuple[str, str]]:
+    """Every laboratory and the class that the plan names for its rig, empty for the emulated one."""
+    yield MASTER, plan.master.rig.class_
+    for role in plan.roles:
+        yield role, plan.of(role).slave.rig.class_

@@ -1,0 +1,48 @@
+"""How many ticks were due: all of the plan where a test was completed, else those until it ended."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from common import signals
+from common.plan.plan import Plan
+from common.recording.outcome import outcome
+from common.recording.reader import Run
+from common.roles import LATENCY, MASTER, kind_of
+from common.safety.modes import Mode
+
+MOVING = tuple(float(list(Mode).index(mode)) for mode in (Mode.RUNNING, Mode.HOLDING))
+WHOLE = ("completed", "imported")
+
+
+def due(run: Run, plan: Plan | None) -> dict[str, int]:
+    """Ticks due by topic.
+
+    Of a test that ended early a laboratory's ticks were due until it left them for its way to rest, which its event
+    says and no row may be later than; where it said nothing, as one that was killed, until the last laboratory did.
+    """
+    topics = [topic for topic in run.columns if kind_of(topic) in signals.TICK_TOPICS]
+    begun = {topic: int(run.sequences[topic].max(initial=-1)) + 1 for topic in topics}
+    if plan is None:
+        return begun
+    if outcome(run.metadata.get("summary", {})) in WHOLE:
+        return dict.fromkeys(topics, plan.ticks)
+    said = endings(run, plan.test.interval)
+    left = {topic: max(begun[topic], said[lab]) for topic in topics if (lab := laboratory(topic)) in said}
+    last = max([*begun.values(), *left.values()], default=0)
+    return {topic: min(left.get(topic, last), plan.ticks) for topic in topics}
+
+
+def laboratory(topic: str) -> str:
+    """The laboratory whose ticks a topic counts; latency is the master's account."""
+    return MASTER if kind_of(topic) == LATENCY else topic
+
+
+def endings(run: Run, interval: float) -> Mapping[str, int]:
+    """The tick at which each laboratory began its way to rest, of those that said so; `interval` in s."""
+    found: dict[str, int] = {}
+    for event in run.events:
+        before, after = event["values"].get("from"), event["values"].get("mode")
+        if event["code"] == "mode" and before in MOVING and after not in MOVING:
+            found.setdefault(event["lab"], round(event["t"] / interval))
+    return found

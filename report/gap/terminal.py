@@ -1,0 +1,172 @@
+"""A diagnosis in one look on the terminal."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+
+from report.gap import wording
+from report.gap.wording import Report
+from report.text.formats import as_float, known, percent, percent_interval, probability, span, times
+
+WIDTH = 100
+LABEL = 12
+BAR = 16
+MOST = 25  # lines of the whole
+
+
+def summary(report: Report) -> str:
+    """What a person understands in one look, at most 25 lines."""
+    lines = [
+        *verdict(report),
+        *gap(report),
+        *where(report),
+        *row("force path", wording.force_path(report)),
+        *which(report),
+        *how_far(report),
+        *tolerances(report),
+        *equivalents(report),
+        *not_exercised(report),
+        *row("next test", report.get("next_test") or "", 2),
+        *warnings(report),
+    ]
+    return "\n".join(lines[:MOST])
+
+
+def row(label: str, text: str, most: int = 1) -> list[str]:
+    """A labelled text of at most so many lines; nothing where there is no text."""
+    if not text:
+        return []
+    lines = textwrap.wrap(
+        text, WIDTH - LABEL, max_lines=most, placeholder=" …", break_long_words=True, break_on_hyphens=False
+    )
+    return [(label if place == 0 else "").ljust(LABEL) + line for place, line in enumerate(lines)]
+
+
+def rows(label: str, texts: Sequence[str]) -> list[str]:
+    """One line per text, the label before the first."""
+    return [(label if place == 0 else "").ljust(LABEL) + text for place, text in enumerate(texts) if text]
+
+
+def verdict(report: Report) -> list[str]:
+    """Status and sentence."""
+    status = wording.STATUS.get(str(report.get("status")), str(report.get("status")))
+    text = f"{status.upper()}: {wording.verdict(report)}"
+    return textwrap.wrap(text, WIDTH, max_lines=3, placeholder=" …")
+
+
+def gap(report: Report) -> list[str]:
+    """Overall gap and the signals farthest above their noise, each beside its floor."""
+    found = report.get("gap") or {}
+    signals = sorted((found.get("signals") or {}).items(), key=lambda item: -wording.above_floor(item[1]))
+    entries = [("overall", found.get("overall"), found.get("overall_noise_floor"))]
+    entries += [
+        (wording.plain(name), item.get("nrmse"), item.get("noise_floor")) for name, item in signals[:4]
+    ]
+    lines = [
+        f"{name:<22} {percent(value):>7}   noise floor {percent(floor)}"
+        for name, value, floor in entries
+        if known(value)
+    ]
+    return rows("gap", lines or ["not determined"])
+
+
+def bar(share: float) -> str:
+    """A share as a bar."""
+    filled = round(BAR * min(max(share, 0.0), 1.0))
+    return "█" * filled + "·" * (BAR - filled)
+
+
+def where(report: Report) -> list[str]:
+    """The foremost sites with their shares."""
+    lines = []
+    for item in (report.get("where") or [])[:3]:
+        facts = [
+            f"{times(item.get('residual_to_noise'))} noise" if known(item.get("residual_to_noise")) else ""
+        ]
+        facts += [span(window, "s") for window in (item.get("when") or [])[:2]]
+        facts.append(span(item.get("frequency_band"), "Hz"))
+        share = item.get("share")
+        interval = percent_interval(item.get("share_interval"))
+        head = f"{wording.site(item['site']):<22} {bar(share or 0.0)} {percent(share)}"
+        lines.append(
+            head + (f" ({interval})" if interval else "") + "".join(f"  {fact}" for fact in facts if fact)
+        )
+    return rows(
+        "where", lines or ["no site has a gap beyond its noise" if placed(report) else "not determined"]
+    )
+
+
+def placed(report: Report) -> bool:
+    """Whether an empty list of sites means that there is no gap."""
+    return report.get("status") == "no_gap"
+
+
+def which(report: Report) -> list[str]:
+    """The foremost candidates with probability and parameters."""
+    lines: list[str] = []
+    for item in wording.once(report.get("which") or [])[:3]:
+        found = wording.parameters(item)
+        several = len(item.get("effects") or []) > 1
+        texts = [setting(*each, several=several) for each in found]
+        head = f"{probability(item.get('probability')):>6}  {wording.effects(item.get('effects') or [])}"
+        text = head + (": " + ", ".join(texts) if texts else "")
+        lines += textwrap.wrap(
+            text,
+            WIDTH - LABEL,
+            max_lines=2,
+            placeholder=" …",
+            subsequent_indent=" " * 8,
+            drop_whitespace=True,
+            initial_indent="",
+        )
+    return rows("which", lines) if lines else row("which", "no effect of the catalogue is named")
+
+
+def setting(name: str, parameter: str, value: str, *, several: bool) -> str:
+    """A parameter's value behind the names of a candidate's effects, with its own effect where they are `several`."""
+    own = wording.effect(name) if several else ""
+    return " ".join(filter(None, (own, wording.called(own or wording.effect(name), parameter), value)))
+
+
+def how_far(report: Report) -> list[str]:
+    """Gap before and after, the closed share, and what it was judged on."""
+    found = report.get("how_far") or {}
+    if not known(found.get("before")) or not known(found.get("after")):
+        return row("how far", "not determined")
+    text = f"{percent(found['before'])} → {percent(found['after'])}"
+    closed = wording.closed(report)
+    text += f", closed {closed}" if closed else ""
+    text += f", noise floor {percent(found.get('noise_floor'))}"
+    nominal = wording.nominal_gap(report)
+    text += f"; {percent(nominal)} before tolerances" if known(nominal) else ""
+    text += f"; judged on {found['judged_on']}" if found.get("judged_on") else ""
+    return row("how far", text, 2)
+
+
+def tolerances(report: Report) -> list[str]:
+    """Parameters that moved notably inside their tolerances."""
+    moved = [
+        f"{name} ×{as_float(item.get('factor')):.4g} (z {as_float(item.get('z')):+.1f})"
+        for name, item in wording.notable(report)
+    ]
+    return row("tolerances", ", ".join(moved[:4]) + (f", {len(moved) - 4} more" if len(moved) > 4 else ""), 2)
+
+
+def equivalents(report: Report) -> list[str]:
+    """What these signals cannot tell apart, in words."""
+    found = wording.sets(report)
+    return row("equivalent", " ".join(map(wording.equivalent, found)), 2)
+
+
+def not_exercised(report: Report) -> list[str]:
+    """Effects that the recording could not have shown."""
+    names = list(dict.fromkeys(map(wording.effect, report.get("not_exercised") or [])))
+    return row("not shown", f"could not have appeared here: {', '.join(names)}" if names else "", 2)
+
+
+def warnings(report: Report) -> list[str]:
+    """The first warnings."""
+    found = list(report.get("warnings") or [])
+    shown = [line for text in found[:2] for line in row("warning", text, 1)]
+    return shown + ([" " * LABEL + f"{len(found) - 2} more in the report"] if len(found) > 2 else [])

@@ -1,0 +1,85 @@
+"""Plots of streams: curves over time, or of one signal over another."""
+
+from __future__ import annotations
+
+from typing import Any, Literal, NamedTuple
+
+from bokeh.models import DataRange1d
+from bokeh.models.annotations import Legend, LegendItem
+from bokeh.plotting import figure
+
+from report.live.stream import Stream
+
+HEIGHT = 230  # px
+TOOLS = "pan,box_zoom,reset,save"
+Scale = Literal["linear", "log"]
+
+
+class Curve(NamedTuple):
+    """A signal in a plot: what the legend calls it, its colour, and how its line is drawn."""
+
+    signal: str
+    label: str
+    colour: str
+    dash: str = "solid"
+    width: float = 1.5
+
+
+def plot(title: str, across: str, up: str, scales: tuple[Scale, Scale], **options: Any) -> Any:
+    """An empty plot as wide as its place, without tools that would catch the scrolling of a page."""
+    found = figure(
+        title=title,
+        height=HEIGHT,
+        sizing_mode="stretch_width",
+        x_axis_label=across,
+        y_axis_label=up,
+        x_axis_type=scales[0],
+        y_axis_type=scales[1],
+        min_border_left=60,
+        tools=TOOLS,
+        active_drag=None,
+        **options,
+    )
+    found.toolbar.autohide = True
+    found.toolbar.logo = None
+    return found
+
+
+def history(
+    title: str,
+    up: str,
+    stream: Stream,
+    curves: tuple[Curve, ...],
+    window: float | None,
+    *,
+    scale: Scale = "linear",
+    **options: Any,
+) -> Any:
+    """Curves over the last `window` s, or all; `up` is the label of their axis, with the unit."""
+    latest: dict[str, Any] = {} if window is None else {"follow": "end", "follow_interval": window}
+    across = DataRange1d(range_padding=0.0, **latest)
+    found = plot(title, "time, s", up, ("linear", scale), x_range=across, **options)
+    draw(found, stream, "t", curves)
+    return found
+
+
+def draw(where: Any, stream: Stream, over: str, curves: tuple[Curve, ...]) -> None:
+    """Draw the curves of a stream over one of its signals, with a legend above where there are several."""
+    items = [
+        LegendItem(
+            label=curve.label,
+            renderers=[
+                where.line(
+                    over,
+                    curve.signal,
+                    source=stream.source,
+                    color=curve.colour,
+                    line_dash=curve.dash,
+                    line_width=curve.width,
+                )
+            ],
+        )
+        for curve in curves
+    ]
+    if len(curves) > 1:
+        where.add_layout(Legend(items=items, orientation="horizontal", click_policy="hide"), "above")

@@ -1,0 +1,125 @@
+"""The page of a live view: one document per reader, all fed by the same recording."""
+
+from __future__ import annotations
+
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from bokeh.document import Document
+from bokeh.events import ConnectionLost
+from bokeh.models.callbacks import CustomJS
+from bokeh.models.widgets import Div, Select
+from bokeh.themes import Theme
+from jinja2 import Template
+
+from common.roles import name_of
+from report.live.feed import Feed
+from report.live.latency import Latency
+from report.live.motion import motions
+from report.live.status import ORANGE, Status
+from report.live.stream import Streams
+
+TEMPLATE = Path(__file__).with_name("page.html")
+TEXT = {"text_font_size": "12px"}
+THEME = Theme(
+    json={
+        "attrs": {
+            "Plot": {"outline_line_color": None},
+            "Title": TEXT,
+            "Axis": {
+                "axis_label_text_font_style": "normal",
+                "axis_label_text_font_size": "12px",
+                "major_label_text_font_size": "12px",
+                "minor_tick_line_color": None,
+            },
+            "Grid": {"grid_line_alpha": 0.5},
+            "Legend": {
+                "border_line_color": None,
+                "label_text_font_size": "12px",
+                "padding": 0,
+                "margin": 0,
+                "spacing": 16,
+            },
+        }
+    }
+)
+
+
+def parting(feed: Feed) -> Div:
+    """The sentence that the page shows by itself when the server has ended."""
+    text = f"The view has ended. Again: <code>rths live {escape(str(feed.path))}</code>"
+    style: dict[str, str | None] = {"color": ORANGE, "font-size": "14px", "overflow-wrap": "anywhere"}
+    return Div(text=text, visible=False, sizing_mode="stretch_width", styles=style, name="parting")
+
+
+class Page:
+    """All views in a document, and the choice of the slave where there are several."""
+
+    def __init__(self, document: Document, feed: Feed) -> None:
+        self._document = document
+        self._feed = feed
+        self.streams = Streams()
+        self.status = Status()
+        window = None if feed.whole else feed.window
+        self.latency = Latency(self.streams, window)
+        self.plots = motions(self.streams, window) | self.latency.parts
+        self._heading = Div(sizing_mode="stretch_width", name="heading")
+        self._parting = parting(feed)
+        self.slave = Select(title="slave", options=[], visible=False, width=200, name="slave")
+        for name, each in self.plots.items():
+            each.name = name
+        texts = (
+            self._heading,
+            self._parting,
+            self.status.banner,
+            self.status.tiles,
+            self.slave,
+            self.status.events,
+        )
+        for root in (*texts, *self.plots.values()):
+            document.add_root(root)
+        self._set_up(document)
+        self.update()
+
+    def _set_up(self, document: Document) -> None:
+        document.config.update(reconnect_session=False, notify_connection_status=False)
+        document.js_on_event(
+            ConnectionLost,
+            CustomJS(args={"text": self._parting}, code="text.visible = true; window.heard = 0"),
+        )
+        self.status.tiles.js_on_change("tags", CustomJS(code="window.heard = Date.now()"))
+        document.theme = THEME
+        document.template = Template(TEMPLATE.read_text(encoding="utf-8"))
+        document.template_variables["plots"] = list(self.plots)
+        for model in document.models:  # the ranges that a reader chooses in the browser stay as they are
+            model.syncable = model is self.slave
+
+    def update(self) -> None:
+        """Bring everything up to date, in one message to the browser."""
+        self._document.hold("collect")
+        try:
+            self._update(self._feed)
+        finally:
+            self._document.unhold()
+
+    def _update(self, feed: Feed) -> None:
+        self._head(feed)
+        self.status.tiles.tags = [feed.beat]  # lets the page say for how long it has heard nothing
+        if len(feed.roles) > 1 and not self.slave.visible:
+            options: Any = [(role, name_of(role)) for role in feed.roles]
+            self.slave.update(options=options, value=feed.roles[0], visible=True)
+        chosen = str(self.slave.value) if self.slave.visible else feed.roles[0]
+        self.streams.follow(feed, chosen)
+        self.latency.update(feed, chosen)
+        self.status.update(feed, chosen)
+
+    def _head(self, feed: Feed) -> None:
+        test = feed.test or feed.path.stem
+        title = f"{test}: {'ended' if feed.ended else 'live'}"
+        if title != self._document.title:
+            self._document.title = title
+        self._heading.text = (
+            f"<h1 style='font-size:20px;margin:0'>{escape(test)}</h1>"
+            f"<div style='font-size:13px;color:#595959;overflow-wrap:anywhere'>{escape(str(feed.path))}</div>"
+        )

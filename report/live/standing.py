@@ -1,0 +1,85 @@
+"""The newest known state of every laboratory, how old that is, and what stopped the test."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from common.host.clock import Clock
+from common.roles import RECORDER
+from common.safety.modes import LATCHED, Mode
+from recorder.loop import CONSEQUENCE
+
+MODES = [mode.value for mode in Mode]
+GRAVEST = (  # the first of these modes that a laboratory is in says how the test stands
+    Mode.EMERGENCY_STOP,
+    Mode.SAFE,
+    Mode.RAMPING,
+    Mode.HOLDING,
+    Mode.RUNNING,
+    Mode.ARMED,
+    Mode.CONFIGURED,
+    Mode.IDLE,
+)
+
+
+class Stop(NamedTuple):
+    """Why a laboratory stopped the test, and when (test time, s)."""
+
+    lab: str
+    t: float
+    code: str
+    text: str
+
+
+class Standing:
+    """Modes, ages and causes of the laboratories, from their rows and events.
+
+    A row's age is the time since it was measured. The test's clock and this process's differ by a constant that nobody
+    knows; the smallest difference ever seen between a row's time and its arrival stands for it, so that an age counts
+    what a row waited anywhere beyond the shortest wait.
+    """
+
+    def __init__(self, clock: Clock) -> None:
+        self.modes: dict[str, str] = {}
+        self.stops: list[Stop] = []  # causes of their own; where there are none, those that followed another
+        self._clock = clock
+        self._t: dict[str, float] = {}  # newest time of each laboratory
+        self._shift = math.inf  # s
+
+    def row(self, lab: str, t: float) -> None:
+        """The newest row of a laboratory was measured at a test time."""
+        self._t[lab] = max(t, self._t.get(lab, 0.0))
+        if t > 0.0:
+            self._shift = min(self._shift, self._clock.now() * 1e-9 - t)
+
+    def event(self, event: Mapping[str, Any]) -> None:
+        """Something has happened."""
+        lab, t, values = str(event["lab"]), float(event["t"]), event["values"]
+        self._t[lab] = max(t, self._t.get(lab, 0.0))
+        if event["code"] == "mode" and 0 <= values.get("mode", -1) < len(MODES):
+            self.modes[lab] = MODES[int(values["mode"])]
+        if event["level"] == "error" and lab != RECORDER:
+            self.stops.append(Stop(lab, t, str(event["code"]), str(event["text"])))
+            own = [stop for stop in self.stops if stop.code != CONSEQUENCE]
+            self.stops = own or self.stops
+
+    def last(self, lab: str) -> float | None:
+        """Test time of a laboratory's newest row or event, s; None before the first row."""
+        return self._t.get(lab) if math.isfinite(self._shift) else None
+
+    def age(self, lab: str) -> float:
+        """Seconds since then."""
+        return max(self._clock.now() * 1e-9 - self._shift - self._t.get(lab, 0.0), 0.0)
+
+    @property
+    def latched(self) -> bool:
+        """Whether a laboratory waits for an operator's reset."""
+        return any(Mode(mode) in LATCHED for mode in self.modes.values())
+
+    @property
+    def gravest(self) -> str:
+        """The mode of the laboratory that is farthest from running, empty while none is known."""
+        found = [mode.value for mode in GRAVEST if mode.value in self.modes.values()]
+        return found[0] if found else ""

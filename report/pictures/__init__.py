@@ -1,0 +1,95 @@
+"""The pictures of a recording, one module each: what `rths plot` can draw."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from common.recording.reader import Run
+from report.facts.circumstances import VIRTUAL, clock_of
+from report.pictures import histories, hysteresis, latency, spectra, synchronisation, tracking
+from report.pictures.figure import DOUBLE, SINGLE
+
+
+class Picture(NamedTuple):
+    """One picture: `draw` takes a recording as one of one slave, and an empty figure of a size of the two.
+
+    It returns False, and leaves the figure empty, where the recording lacks its signals; where it has a part of them
+    the figure shrinks to these.
+    """
+
+    name: str
+    text: str  # what it shows, and what to look for
+    needs: str  # the signals without which there is none
+    size: tuple[float, float]  # inches, for one column
+    double: tuple[float, float]  # inches, across two columns
+    draw: Callable[[Run, Any], bool]
+
+    def on(self, recording: Run, canvas: Any) -> bool:
+        """Draw; False where the recording lacks the signals, or holds numbers of which no picture can be made."""
+        try:
+            return self.draw(recording, canvas)
+        except (ValueError, ArithmeticError, MemoryError):
+            return False
+
+
+def needs(recording: Run, picture: Picture) -> str:
+    """The signals that a picture needs, and why a test in virtual time has no latency."""
+    virtual = picture.name == "latency" and clock_of(recording) == VIRTUAL
+    return picture.needs + (", and this one ran in virtual time" if virtual else "")
+
+
+_ALL = (
+    Picture(
+        "histories",
+        "ground, column, floors and damper over time: drift that grows, clipped peaks, holes",
+        "any of ground, column, floor or damper motion or force",
+        (SINGLE, 5.6),
+        (DOUBLE, 6.0),
+        histories.draw,
+    ),
+    Picture(
+        "hysteresis",
+        "force over deformation of column and damper, with the energy absorbed: a loop that turns the other way "
+        "puts energy in",
+        "column_displacement and column_force, or damper_stroke and damper_force",
+        (SINGLE, 4.6),
+        (DOUBLE, 2.9),
+        hysteresis.draw,
+    ),
+    Picture(
+        "synchronisation",
+        "measured over target of each transfer system: a delay opens the line to a loop, an amplitude error tilts it",
+        "column_target and column_displacement, or table_target and table_displacement",
+        (SINGLE, 6.2),
+        (DOUBLE, 3.8),
+        synchronisation.draw,
+    ),
+    Picture(
+        "tracking",
+        "target, measurement and error around the strongest motion: an error shaped like velocity means delay; "
+        "shaped like the target, wrong amplitude",
+        "column_target and column_displacement, or table_target and table_displacement",
+        (SINGLE, 5.2),
+        (DOUBLE, 3.6),
+        tracking.draw,
+    ),
+    Picture(
+        "spectra",
+        "amplitude density of ground, table, column and tracking errors over frequency: errors beside the natural "
+        "frequency, peaks that no model has",
+        "ground_acceleration, table or column motion over 64 ticks or more",
+        (SINGLE, 4.6),
+        (DOUBLE, 4.6),
+        spectra.draw,
+    ),
+    Picture(
+        "latency",
+        "percentiles of every part of a tick, and the round trip over the test: what comes near the interval",
+        "latency of a test in real time",
+        (SINGLE, 4.8),
+        (DOUBLE, 4.8),
+        latency.draw,
+    ),
+)
+PICTURES: dict[str, Picture] = {picture.name: picture for picture in _ALL}

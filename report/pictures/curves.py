@@ -1,0 +1,122 @@
+"""What pictures show of a recording: signals over time, and each transfer system beside what was asked of it."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from common import signals
+from common.errors import InputError
+from common.recording.reader import Run
+from report.text.formats import milliseconds
+
+Values = NDArray[np.float64]
+
+STRONGEST = 1.5  # s before and behind the largest target
+COMMANDS = {"actuator": "actuator_command", "table": "table_command"}
+LATE = 1  # ticks by which a command stands before the measurement at which it is to be reached
+LABELS = {"actuator": "column deformation", "table": "table displacement"}
+
+
+class Curve(NamedTuple):
+    """A signal over test time."""
+
+    t: Values  # (n,) s
+    values: Values  # (n,) or (n, storeys), SI
+
+
+class Pair(NamedTuple):
+    """A transfer system's measurement beside what it was to be at that moment."""
+
+    label: str
+    word: str  # what was asked: the target, or the command where no target is recorded
+    t: Values  # (n,) s, of the measurement
+    wanted: Values  # (n,) m
+    got: Values  # (n,) m
+
+    @property
+    def error(self) -> Values:
+        """Measured less wanted, (n,) m."""
+        return self.got - self.wanted
+
+    def strongest(self) -> NDArray[np.bool_]:
+        """The ticks around the largest target, (n,)."""
+        middle = self.t[int(np.nanargmax(np.abs(self.wanted)))]
+        return np.asarray(np.abs(self.t - middle) <= STRONGEST)
+
+
+def curve(recording: Run, name: str) -> Curve | None:
+    """A signal from the laboratory that knows it at first hand; None where it has no value over time."""
+    order = ("slave", "master") if name in signals.MEASURED["slave"] else ("master", "slave")
+    for topic in order:
+        columns = recording.columns.get(topic, {})
+        if name in columns and "t" in columns and np.isfinite(columns[name]).any():
+            return Curve(columns["t"], columns[name])
+    return None
+
+
+def moving(recording: Run, name: str) -> Curve | None:
+    """A signal that does not stand still all the time."""
+    found = curve(recording, name)
+    return found if found is not None and np.nanmax(found.values) > np.nanmin(found.values) else None
+
+
+def pairs(recording: Run) -> list[Pair]:
+    """The transfer systems that a recording shows, at most one each of laboratory A and of B."""
+    from report.facts.summary import PATHS
+
+    found = []
+    for topic, part, target, measured, late in PATHS:
+        options = ((target, "target", late), (COMMANDS[part], "command", LATE))
+        made = (matched(recording, topic, LABELS[part], measured, option) for option in options)
+        found += [pair for pair in made if pair is not None][:1]
+    return found
+
+
+def matched(
+    recording: Run, topic: str, label: str, measured: str, asked: tuple[str, str, int]
+) -> Pair | None:
+    """A measurement beside what was asked of it so many ticks before; None where either is lacking or still."""
+    columns, (name, word, late) = recording.columns.get(topic, {}), asked
+    if not {"t", name, measured} <= columns.keys():
+        return None
+    seq = recording.sequences[topic]
+    _, before, after = np.intersect1d(seq + late, seq, return_indices=True)
+    pair = Pair(label, word, columns["t"][after], columns[name][before], columns[measured][after])
+    known = np.isfinite(pair.wanted) & np.isfinite(pair.got)
+    if not known.any() or not np.ptp(pair.wanted[known]) or not np.ptp(pair.got[known]):
+        return None
+    return pair
+
+
+def quality(pair: Pair) -> str:
+    """Delay, amplitude and error of a transfer system in words, as `inspect` has them; empty where undefined."""
+    from models import indicators
+    from report.facts.summary import LEAST_TICKS, following
+
+    if pair.t.size < LEAST_TICKS:
+        return ""
+    try:
+        error = indicators.nrmse(pair.wanted, pair.got)
+    except InputError:
+        return ""
+    path = following(pair.wanted, pair.got, interval(pair.t))
+    size = "" if path["delay"] is None else f"\namplitude {path['amplitude']:.3f}"
+    return f"delay {milliseconds(path['delay'])}{size}\nNRMSE {100.0 * error:.1f} %"
+
+
+def interval(t: Values) -> float:
+    """The usual distance of two ticks, s; NaN for a single one."""
+    return float(np.median(np.diff(t))) if t.size > 1 else float("nan")
+
+
+def plan_of(recording: Run) -> Any:
+    """The plan inside a recording, None where there is none that can be read."""
+    from report.facts import summary
+
+    try:
+        return summary.plan_of(recording)
+    except InputError:
+        return None

@@ -1,0 +1,98 @@
+"""Force against deformation of the column, and against stroke of the damper."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from common.recording.reader import Run
+from report.pictures.curves import Values, moving, plan_of
+from report.pictures.figure import SMALL
+from report.pictures.layout import panels
+from report.text.formats import axis_scale, fixed, scale
+
+
+class Loop(NamedTuple):
+    """A deformation, the force that resists it, and how both are shown."""
+
+    deformation: str
+    force: str
+    x_label: str
+    y_label: str
+
+
+COLUMN = Loop("column_displacement", "column_force", "column deformation", "column force")
+DAMPER = Loop("damper_stroke", "damper_force", "damper stroke", "damper force")
+LOOPS = (COLUMN, DAMPER)
+LEAST = 10  # ticks
+
+
+def draw(recording: Run, canvas: Any) -> bool:
+    """Loops with the energy that they absorb, the column's beside its planned stiffness; False where there is none."""
+    found = ((loop, moving(recording, loop.deformation), moving(recording, loop.force)) for loop in LOOPS)
+    present = [
+        (loop, x.values, y.values)
+        for loop, x, y in found
+        if x is not None and y is not None and x.values.shape == y.values.shape
+    ]
+    if not present:
+        return False
+    for axis, (loop, x, y) in zip(panels(canvas, len(present), 2), present, strict=True):
+        (along, length), (up, force) = (
+            axis_scale(float(np.nanmax(np.abs(v))), u) for v, u in ((x, "m"), (y, "N"))
+        )
+        axis.plot(along * x, up * y, linewidth=0.5)
+        axis.set(xlabel=f"{loop.x_label}, {length}", ylabel=f"{loop.y_label}, {force}")
+        planned = planned_stiffness(axis, recording, (along, up), x, y) if loop is COLUMN else ""
+        axis.set_title(work(x, y) + planned, loc="left", fontsize=SMALL)
+    return True
+
+
+def work(deformation: Values, force: Values) -> str:
+    """The energy that a loop absorbs, to the place that noise leaves, of at most four."""
+    energy, doubt = absorbed(deformation, force)
+    factor, unit = scale(max(abs(energy), doubt), "J")
+    energy, doubt = factor * energy, factor * doubt
+    least = max(doubt, 1e-3 * abs(energy))
+    places = max(0, -math.floor(math.log10(least))) if least > 0.0 else 0
+    return f"∫ F dx = {fixed(energy, places)} ± {fixed(doubt, places)} {unit}".replace("-", "−")
+
+
+def absorbed(deformation: Values, force: Values) -> tuple[float, float]:
+    """Work (J) that a deformation (n,) m does against a force (n,) N, `∫ F dx`, and what noise can add to it.
+
+    The sum over known ticks by trapezia, and two standard deviations for white noise in both: with noise a_k of the
+    force and b_k of the deformation it has the terms ½·(a_{k−1}·b_k − a_k·b_{k−1}) and ½·(F_{k−1} − F_{k+1})·b_k, and
+    likewise a_k.
+    """
+    known = np.isfinite(deformation) & np.isfinite(force)
+    x, f = deformation[known], force[known]
+    of_x, of_f = noise(x), noise(f)
+    with_noise = sum((0.5 * own) ** 2 * slopes(other) for own, other in ((of_x, f), (of_f, x)))
+    variance = with_noise - 0.5 * x.size * (of_x * of_f) ** 2  # noise by noise is in both sums
+    return float(np.trapezoid(f, x)), 2.0 * math.sqrt(max(variance, 0.0))
+
+
+def slopes(values: Values) -> float:
+    """Sum of the squared differences of a signal (n,) over two ticks."""
+    return float(np.sum((values[2:] - values[:-2]) ** 2))
+
+
+def noise(values: Values) -> float:
+    """Standard deviation of white noise over a smooth signal (n,), from its second differences."""
+    return float(np.std(np.diff(values, 2))) / math.sqrt(6.0) if values.size > LEAST else 0.0
+
+
+def planned_stiffness(axis: Any, recording: Run, factors: tuple[float, float], x: Values, y: Values) -> str:
+    """The line of the plan's elastic stiffness, as far as forces were recorded, and what the title says of it."""
+    plan = plan_of(recording)
+    if plan is None or not plan.column.stiffness:
+        return ""
+    stiffness, reach = plan.column.stiffness, float(np.nanmax(np.abs(y)))
+    ends = np.clip(np.array([np.nanmin(x), np.nanmax(x)]), -reach / stiffness, reach / stiffness)
+    axis.plot(
+        factors[0] * ends, factors[1] * stiffness * ends, linestyle=(0, (4, 3)), color="black", linewidth=0.8
+    )
+    return f"\ndashed: planned {1e-6 * stiffness:.3g} kN/mm"

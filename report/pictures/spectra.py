@@ -1,0 +1,167 @@
+"""Amplitude density over frequency: of the ground motion, the response and the tracking errors.
+
+The density is the square root of the power spectral density by Welch's method (The use of fast Fourier transform for
+the estimation of power spectra, IEEE Trans. Audio Electroacoust. 15, 1967), one-sided, so that the integral of its
+square is the mean square over the whole test.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from common.recording.reader import Run
+from report.pictures.curves import Curve, Values, curve, interval, moving, pairs, plan_of
+from report.pictures.figure import COLOURS
+from report.pictures.layout import bound, decades, legend_above, shrink
+
+SEGMENT = 10.0  # s: lines 0.1 Hz apart, half the width of a peak at 2 Hz with 5 % of damping
+LEAST = 64  # ticks
+HOLES = 4  # ticks that may be missing for one that is there
+RANGE = 1e6  # of the ordinate: below lies rounding
+BANDS = 24  # a decade: 10 % wide, as wide as a peak with 5 % of damping
+MODES = 3
+DASHED = (0, (4, 2))
+DOTTED = (0, (1, 1))
+
+
+class Line(NamedTuple):
+    """One spectrum and how it looks."""
+
+    label: str
+    found: Curve
+    factor: float
+    colour: str
+    style: Any
+
+
+def draw(recording: Run, canvas: Any) -> bool:
+    """Accelerations above, displacements and tracking errors below; False where all are lacking or too short."""
+    groups = [
+        ("acceleration\nm/s²/√Hz", accelerations(recording)),
+        ("displacement\nmm/√Hz", displacements(recording)),
+    ]
+    present = [(label, lines) for label, lines in groups if lines]
+    if not present:
+        return False
+    natural = natural_frequencies(recording)
+    shrink(canvas, len(present), len(groups))
+    axes = canvas.subplots(len(present), 1, sharex=True, squeeze=False)[:, 0]
+    for axis, (label, lines) in zip(axes, present, strict=True):
+        densities(axis, lines)
+        axis.set_ylabel(label)
+        mark(axis, natural, with_label=axis is axes[0])
+        legend_above(axis)
+    axes[-1].set_xlabel("frequency, Hz")
+    decades(axes[-1].xaxis)
+    canvas.align_ylabels(axes)
+    return True
+
+
+def accelerations(recording: Run) -> list[Line]:
+    """Spectra of the ground's acceleration and of the floor's as the table imposed it."""
+    names = (
+        ("ground", "ground_acceleration", COLOURS[0], "-"),
+        ("table", "table_acceleration", COLOURS[1], DASHED),
+    )
+    found = [(label, moving(recording, name), colour, style) for label, name, colour, style in names]
+    return [
+        Line(label, item, 1.0, colour, style)
+        for label, item, colour, style in found
+        if item is not None and long_enough(item)
+    ]
+
+
+def displacements(recording: Run) -> list[Line]:
+    """As measured and, dotted in the same colour, by how much they missed what was wanted."""
+    lines = []
+    names = (("column", "column_displacement"), ("table", "table_displacement"))
+    for (label, name), colour, style in zip(names, COLOURS[:2], ("-", DASHED), strict=True):
+        item = moving(recording, name)
+        if item is not None and long_enough(item):
+            lines.append(Line(label, item, 1e3, colour, style))
+    for pair in pairs(recording):
+        label = pair.label.split()[0]
+        error = Curve(pair.t, pair.error)
+        if long_enough(error) and np.nanmax(np.abs(pair.error)) > 0.0:
+            colour = COLOURS[("column", "table").index(label)]
+            lines.append(Line(f"error of {label}", error, 1e3, colour, DOTTED))
+    return lines
+
+
+def long_enough(item: Curve) -> bool:
+    """Whether a signal has ticks enough for a spectrum."""
+    return bool(np.isfinite(item.values).sum() >= LEAST)
+
+
+def densities(axis: Any, lines: list[Line]) -> None:
+    """The spectra of an axis, over as many decades as mean something."""
+    top = 0.0
+    for line in lines:
+        frequency, density = averaged(*amplitude_density(line.found))
+        axis.loglog(
+            frequency,
+            line.factor * density,
+            linestyle=line.style,
+            color=line.colour,
+            linewidth=0.6,
+            label=line.label,
+        )
+        top = max(top, line.factor * float(density.max()))
+        axis.set_xlim(frequency[0], frequency[-1])
+    low, _ = axis.get_ylim()
+    axis.set_ylim(max(low, top / RANGE), 2.0 * top)
+    decades(axis.yaxis)
+
+
+def amplitude_density(item: Curve) -> tuple[Values, Values]:
+    """Frequency (m,) Hz and amplitude density (m,) in the signal's unit per √Hz, without the mean.
+
+    Unknown ticks are bridged by straight lines. Raises ValueError where times leap or stand still.
+    """
+    from scipy import signal
+
+    known = np.isfinite(item.values)
+    step = interval(item.t[known])
+    begin, end = item.t[known][[0, -1]]
+    if not 0.0 < end - begin <= HOLES * step * known.sum():
+        raise ValueError("the times of a signal are not those of regular ticks")
+    even = np.interp(
+        begin + step * np.arange(round((end - begin) / step) + 1), item.t[known], item.values[known]
+    )
+    length = min(even.size, round(SEGMENT / step))
+    frequency, power = signal.welch(even, 1.0 / step, "hann", length, detrend="constant")
+    return frequency[1:], np.sqrt(power[1:])
+
+
+def averaged(frequency: Values, density: Values) -> tuple[Values, Values]:
+    """Mean square densities over bands of equal width on a logarithmic axis, at the mean frequency of each.
+
+    Lines stand ever closer together there: each alone scatters by as much as its value, and all of them are a solid
+    area. Where a band holds one line only, it stays as it is.
+    """
+    band = np.floor(BANDS * np.log10(frequency)).astype(int)
+    starts = np.flatnonzero(np.diff(band, prepend=band[0] - 1))
+    count = np.diff(starts, append=frequency.size)
+    power = np.add.reduceat(density**2, starts) / count
+    return np.add.reduceat(frequency, starts) / count, np.sqrt(power)
+
+
+def natural_frequencies(recording: Run) -> list[float]:
+    """The first undamped ones of the planned building (Hz); none where the recording is not of one that shook."""
+    from models.structures import shear_building
+    from models.structures.partition import matrices
+
+    plan = plan_of(recording)
+    if plan is None or curve(recording, "ground_acceleration") is None:
+        return []
+    periods = shear_building.modes(*matrices(plan)).periods
+    return [1.0 / float(period) for period in periods[:MODES] if np.isfinite(period)]
+
+
+def mark(axis: Any, natural: list[float], *, with_label: bool) -> None:
+    """Upright lines at natural frequencies (Hz), the first of which stands for all in a legend."""
+    text = "natural " + ", ".join(f"{frequency:.2f}" for frequency in natural) + " Hz"
+    for place, frequency in enumerate(natural):
+        bound(axis, text if with_label and place == 0 else "", x=frequency)

@@ -1,0 +1,55 @@
+"""The classes that a plan would run, and where their code lies; none of it is imported here.
+
+A plan that names a class runs that class's code with the rights of whoever starts the test.
+"""
+
+from __future__ import annotations
+
+from importlib.machinery import PathFinder
+from pathlib import Path
+from typing import NamedTuple
+
+from common.plan.plan import Plan
+
+
+class Code(NamedTuple):
+    """One class that a plan names."""
+
+    where: str  # table of the plan
+    name: str  # as the plan has it
+    file: str  # empty where none is found
+
+
+def named(plan: Plan) -> list[Code]:
+    """The classes of a plan, in its order."""
+    rigs = {"master.rig": plan.master.rig}
+    rigs |= (
+        {f"slave.{name}.rig": lab.rig for name, lab in plan.slaves.items()}
+        if plan.slaves
+        else {"slave.rig": plan.slave.rig}
+    )
+    return [
+        Code(where, rig.class_, file_of(rig.class_, plan.base)) for where, rig in rigs.items() if rig.class_
+    ]
+
+
+def file_of(reference: str, base: Path) -> str:
+    """The file that holds a class, empty where it is not there."""
+    place = reference.rpartition(":")[0]
+    if place.endswith(".py"):
+        path = base / place
+        return str(path.resolve()) if path.is_file() else ""
+    return module_file(place)
+
+
+def module_file(name: str) -> str:
+    """The file of a module by its dotted name; packages are looked through, not imported."""
+    path: list[str] | None = None
+    found = None
+    for number in range(1, name.count(".") + 2):
+        full = ".".join(name.split(".")[:number])
+        found = PathFinder.find_spec(full, path)
+        if found is None:
+            return ""
+        path = list(found.submodule_search_locations or ())
+    return found.origin or "" if found else ""

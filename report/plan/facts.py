@@ -1,0 +1,148 @@
+"""The figures of `rths check` as plain values, from what pre-flight computes."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+from common.lab.preflight import Check
+from common.plan.plan import Plan
+from models.ground_motion import GroundMotion
+from models.loop import substructure
+from models.loop.preflight import LIMITS, Findings, expected_delay, findings
+from models.structures import shear_building
+from models.structures.partition import felt, matrices, taken_over
+from recorder import space
+from report.plan import classes, slips
+
+
+def facts(plan: Plan, file: Path) -> dict[str, Any]:
+    """What a plan describes; raises InputError where it cannot be used."""
+    motion = substructure.motion(plan)
+    found = findings(plan)
+    made = [*found.checks, space.check(plan, existing(Path(plan.recording.folder)))]
+    return {
+        "plan": str(file),
+        "test": plan.test.name,
+        "duration": plan.test.duration,
+        "interval": plan.test.interval,
+        "ticks": plan.ticks,
+        "ground_motion": ground(plan, motion),
+        "structure": structure(plan),
+        "transfer_systems": transfer_systems(plan),
+        "delay": delay(plan, found),
+        "stable": not found.unstable,
+        "peaks": peaks(plan, found),
+        "recording": {"bytes": round(space.need(plan)), "folder": plan.recording.folder},
+        "classes": [one._asdict() for one in classes.named(plan)],
+        "slips": [one._asdict() for one in slips.slips(plan, motion, found)],
+        "refused": [risk(one) for one in made if one.risk],
+        "ready": not any(one.risk for one in made),
+    }
+
+
+def risk(check: Check) -> dict[str, str]:
+    """A risk for which pre-flight would refuse."""
+    return check.risk._asdict() if check.risk else {}
+
+
+def existing(folder: Path) -> Path:
+    """The folder, or the nearest one above it that exists."""
+    return next(one for one in (folder.absolute(), *folder.absolute().parents) if one.is_dir())
+
+
+def finite(value: float) -> float | None:
+    """A number as JSON can hold it."""
+    return value if math.isfinite(value) else None
+
+
+def ground(plan: Plan, motion: GroundMotion) -> dict[str, Any]:
+    """The ground motion."""
+    scale = plan.ground_motion.scale
+    return {
+        "text": motion.describe(),
+        "scale": scale,
+        "peak": abs(scale) * motion.peak,
+        "duration": motion.duration,
+    }
+
+
+def structure(plan: Plan) -> dict[str, Any]:
+    """Modes of the whole building, and the specimen's part in it."""
+    modes = shear_building.modes(*matrices(plan))
+    pairs = zip(modes.periods.tolist(), modes.damping_ratios.tolist(), strict=True)
+    return {
+        "storeys": plan.storeys,
+        "modes": [mode(period, ratio) for period, ratio in pairs],
+        "specimen": {
+            "storey": plan.column.storey,
+            "stiffness_felt": felt(plan).stiffness,
+            "stiffness_left_to_it": taken_over(plan).stiffness,
+        },
+    }
+
+
+def mode(period: float, ratio: float) -> dict[str, Any]:
+    """One mode; a rigid one has no period."""
+    return {"period": finite(period), "frequency": 1.0 / period, "damping_ratio": finite(ratio)}
+
+
+def transfer_systems(plan: Plan) -> dict[str, Any]:
+    """What moves the specimens, and the dampers on their tables."""
+    actuator = plan.actuator
+    first: dict[str, Any] = {
+        "model": actuator.model,
+        "delay": actuator.delay,
+        "compensator": plan.compensator.kind,
+    }
+    if actuator.model == "servo_hydraulic":
+        first["delay"] = actuator.servo.delay
+    elif actuator.time_constant > 0.0:
+        first["corner_frequency"] = 1.0 / (2.0 * math.pi * actuator.time_constant)
+    return {"actuator": first} | {role: table(plan.of(role)) for role in plan.roles}
+
+
+def table(plan: Plan) -> dict[str, Any]:
+    """One laboratory B."""
+    damper, chosen = plan.damper, plan.table
+    own = math.sqrt(damper.stiffness / damper.mass)
+    return {
+        "table_frequency": finite(chosen.frequency),
+        "table_damping_ratio": chosen.damping_ratio,
+        "table_delay": chosen.delay,
+        "compensator": chosen.compensator.kind,
+        "damper_frequency": own / (2.0 * math.pi),
+        "damper_damping_ratio": damper.damping / (2.0 * damper.mass * own) if own > 0.0 else None,
+        "damper_on": plan.control.amd,
+    }
+
+
+def delay(plan: Plan, found: Findings) -> dict[str, Any]:
+    """The column's path: the delay to expect, what the loop bears, and the margin between; s."""
+    expected, critical = expected_delay(plan, found.partition), found.partition.critical_delay
+    return {
+        "frequency": found.partition.frequency,
+        "expected": finite(expected),
+        "critical": finite(critical),
+        "margin": finite(critical / expected) if 0.0 < expected < math.inf else None,
+        "margin_wanted": plan.preflight.delay_margin,
+        "damping_lost": finite(found.partition.damping_points),
+        "path_stable": found.partition.stable,
+    }
+
+
+def peaks(plan: Plan, found: Findings) -> dict[str, Any]:
+    """Peaks of the simulated test and their limits; none of a loop that is unstable."""
+    if found.unstable or found.peaks is None:
+        return {}
+    limits = vars(plan.limits)
+    return {
+        name: {
+            "peak": peak,
+            "limit": finite(limits[name]),
+            "share": peak / limits[name],
+            "unit": LIMITS[name].unit,
+        }
+        for name, peak in found.peaks.every.items()
+    }

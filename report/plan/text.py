@@ -1,0 +1,119 @@
+"""The figures of `rths check` for a reader."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from report.text.formats import quantity
+from report.text.terminal import table
+
+BAR = 20  # characters for a peak at its limit
+
+
+def show(facts: Mapping[str, Any]) -> None:
+    """Write what a plan describes."""
+    write = sys.stdout.write
+    write("\n".join(described(facts)) + "\n\n")
+    if facts["peaks"]:
+        rows = [["peaks expected", "peak", "limit", "", ""]]
+        rows += [peak_row(name, one) for name, one in facts["peaks"].items()]
+        table([[row[0], *row[1:4], row[4].ljust(BAR)] for row in rows])
+        write("\n")
+    else:
+        write("The simulated loop is unstable: its peaks mean nothing.\n\n")
+    for line in concerns(facts):
+        write(f"{line}\n")
+
+
+def described(facts: Mapping[str, Any]) -> Iterator[str]:
+    """Lines on the test, the building, the transfer systems, the delay and the recording."""
+    yield (
+        f"{facts['plan']}: test '{facts['test']}', {facts['duration']:g} s in {facts['ticks']} intervals of "
+        f"{facts['interval'] * 1e3:g} ms"
+    )
+    ground = facts["ground_motion"]
+    yield f"ground motion     {ground['text']}; × {ground['scale']:g}: peak {ground['peak']:.3g} m/s²"
+    for number, mode in enumerate(facts["structure"]["modes"], start=1):
+        yield f"mode {number}            {mode_text(mode)}"
+    specimen = facts["structure"]["specimen"]
+    yield (
+        f"specimen          storey {specimen['storey']}, felt as {specimen['stiffness_felt']:.4g} N/m; the building "
+        f"leaves {specimen['stiffness_left_to_it']:.4g} N/m to it"
+    )
+    for role, system in facts["transfer_systems"].items():
+        yield f"{role:<17} {actuator_text(system) if role == 'actuator' else table_text(system)}"
+    yield f"delay             {delay_text(facts['delay'])}"
+    yield f"recording         about {facts['recording']['bytes'] / 1e6:.1f} MB in {facts['recording']['folder']}"
+
+
+def mode_text(mode: Mapping[str, Any]) -> str:
+    """One mode of the building."""
+    if mode["period"] is None:
+        return "rigid"
+    return (
+        f"{mode['period']:.4g} s ({mode['frequency']:.3f} Hz), damping {mode['damping_ratio'] * 100.0:.2f} %"
+    )
+
+
+def actuator_text(system: Mapping[str, Any]) -> str:
+    """The actuator of laboratory A."""
+    corner = f"lag of {system['corner_frequency']:.2f} Hz, " if "corner_frequency" in system else ""
+    model = "servo-hydraulic, " if system["model"] == "servo_hydraulic" else ""
+    return f"{model}{corner}dead time {system['delay'] * 1e3:.1f} ms, compensator {system['compensator']}"
+
+
+def table_text(system: Mapping[str, Any]) -> str:
+    """The table of a laboratory B and its damper."""
+    frequency = system["table_frequency"]
+    speed = f"{frequency:.2f} Hz" if frequency else "ideal"
+    ratio = system["damper_damping_ratio"]
+    damped = f", damping {ratio * 100.0:.1f} %" if ratio is not None else ""
+    state = "" if system["damper_on"] else ", off"
+    return (
+        f"table {speed}, dead time {system['table_delay'] * 1e3:.1f} ms, compensator {system['compensator']}; "
+        f"damper {system['damper_frequency']:.3f} Hz{damped}{state}"
+    )
+
+
+def delay_text(delay: Mapping[str, Any]) -> str:
+    """The column's path."""
+    critical = (
+        f"critical {delay['critical'] * 1e3:.1f} ms"
+        if delay["critical"] is not None
+        else "stable at any delay"
+    )
+    if not delay["path_stable"]:
+        return f"{critical}; unstable: the actuator does not come to rest under its compensator"
+    text = f"expected {delay['expected'] * 1e3:.1f} ms at {delay['frequency']:.2f} Hz, {critical}"
+    if delay["margin"] is None:
+        return text
+    margin = f", margin {delay['margin']:.1f} of {delay['margin_wanted']:g} wanted"
+    return f"{text}{margin}{'; unstable' if delay['margin'] <= 1.0 else ''}"
+
+
+def peak_row(name: str, peak: Mapping[str, Any]) -> list[str]:
+    """A peak beside its limit, with a bar; the bar ends in an arrow where the limit is passed."""
+    share, unit = peak["share"], peak["unit"]
+    bar = "█" * round(BAR * min(share, 1.0)) + ("▶" if share > 1.0 else "")
+    limit = quantity(peak["limit"], unit) if peak["limit"] is not None else "none"
+    return [name, quantity(peak["peak"], unit), limit, f"{share:.0%}", bar]
+
+
+def concerns(facts: Mapping[str, Any]) -> Iterator[str]:
+    """What to look at before the test: classes, slips, refusals."""
+    for code in facts["classes"]:
+        place = code["file"] or "a file that is not there"
+        yield (
+            f"[{code['where']}] runs the class '{code['name']}' from {place}, with your rights: only run plans that "
+            "you trust."
+        )
+    if not facts["classes"]:
+        yield "No class of the plan's own would run: all laboratories are emulated."
+    for slip in facts["slips"]:
+        yield f"a slip of units? {slip['where']}: {slip['text']}"
+    for risk in facts["refused"]:
+        yield f"pre-flight would refuse ({risk['name']}): {risk['sentence']}."
+    if facts["ready"]:
+        yield "Pre-flight would let this test begin, as far as it can be judged without the laboratories."

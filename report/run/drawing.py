@@ -1,0 +1,71 @@
+"""The pictures of a recording as they stand inside its page."""
+
+from __future__ import annotations
+
+import io
+from typing import NamedTuple
+
+from common.recording.reader import Run
+from common.roles import name_of, title
+from common.terminal.telling import Tell
+from report.page import data_uri
+from report.pictures import PICTURES, Picture, figure, needs
+
+INCH = 96  # CSS pixels
+WIDE = ("histories",)  # their time is the whole test's, which two columns show better where there is room
+
+
+class Drawn(NamedTuple):
+    """A picture: an address that holds it, its CSS pixels, what it shows; `wide` for two columns, or empty."""
+
+    name: str
+    source: str
+    size: tuple[int, int]
+    alt: str
+    caption: str
+    wide: str = ""
+
+
+Pictures = dict[str, list[Drawn]]  # by the role of the slave that they concern
+
+
+def draw_all(run: Run, tell: Tell) -> tuple[Pictures, dict[str, str]]:
+    """Every picture that a recording has signals for, by slave; and those left out, with the signals they need."""
+    asked = [(role, picture) for role in run.roles for picture in PICTURES.values()]
+    found: Pictures = {role: [] for role in run.roles}
+    for place, (role, picture) in enumerate(asked):
+        tell(picture.name, place, len(asked))
+        if drawn := draw(run, role, picture):
+            found[role].append(drawn)
+    names = {drawn.name for several in found.values() for drawn in several}
+    return found, {name: needs(run, picture) for name, picture in PICTURES.items() if name not in names}
+
+
+def draw(run: Run, role: str, picture: Picture) -> Drawn | None:
+    """One picture of what concerns a slave; None where the recording lacks its signals."""
+    narrow = png(run, role, picture, picture.size)
+    if narrow is None:
+        return None
+    wide = png(run, role, picture, picture.double) if picture.name in WIDE else None
+    of = f" of the {title(role)}" if name_of(role) else ""
+    return Drawn(
+        picture.name,
+        data_uri(narrow[0]),
+        narrow[1],
+        f"{picture.name.capitalize()}{of}",
+        f"{picture.name.capitalize()}: {picture.text}.",
+        data_uri(wide[0]) if wide else "",
+    )
+
+
+def png(
+    run: Run, role: str, picture: Picture, size: tuple[float, float]
+) -> tuple[bytes, tuple[int, int]] | None:
+    """A picture's file and its CSS pixels; a grid of dots, because it stays small however long the test was."""
+    canvas = figure.figure(*size)
+    if not picture.on(run.of(role), canvas):
+        return None
+    stream = io.BytesIO()
+    canvas.savefig(stream, format="png", dpi=figure.DOTS, metadata=figure.STAMPS[".png"])
+    width, height = (round(INCH * float(inches)) for inches in canvas.get_size_inches())
+    return stream.getvalue(), (width, height)

@@ -1,0 +1,237 @@
+"""The figures of `rths inspect` as tables of the page, and what the recording says about itself."""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Mapping
+from importlib import metadata
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from common.plan.limits import UNITS
+from common.recording.outcome import outcome
+from common.recording.reader import CLOCK, GROUND, MACHINES, Run
+from common.roles import MASTER, name_of
+from report.facts.summary import plan_of
+from report.page import breakable
+from report.run.verdict import Margin, Summary, amount
+from report.text.formats import MISSING, milliseconds, reading, storey_rows, tracked
+
+EVENTS = 400  # rows of the page; JSON of rths inspect has all
+SHOWN = ("plan", CLOCK, GROUND, MACHINES)  # metadata that have a place of their own
+
+
+class Table(NamedTuple):
+    """A table with what stands over it."""
+
+    title: str
+    head: tuple[str, ...]
+    rows: list[list[str]]
+
+
+def facts(run: Run, summary: Summary) -> list[tuple[str, str]]:
+    """What was tested, under which motion, when."""
+    plan, motion = plan_of(run), summary["ground_motion"]
+    ended = summary["recorder"]
+    found = [
+        ("test", summary["test"]),
+        ("recording", Path(summary["file"]).name),
+        ("recorded", date(run)),
+        ("time and rigs", summary["circumstances"]),
+        ("ground motion", motion.get("record", "")),
+        ("scale", motion.get("scale", "")),
+        ("data", run.metadata.get("import", {}).get("data", "")),
+        ("duration", f"{plan.test.duration:g} s" if plan else ""),
+        ("interval", f"{plan.test.interval * 1e3:g} ms" if plan else ""),
+        ("storeys", str(plan.storeys) if plan else ""),
+        ("slaves", ", ".join(summary["slaves"])),
+        ("part tested", run.metadata.get("bench", {}).get("part", "")),
+        ("outcome", outcome(ended)),
+    ]
+    return [(name, text) for name, text in found if text]
+
+
+def date(run: Run) -> str:
+    """When the recording was begun, UTC; empty where it does not say."""
+    stamp = run.metadata.get("host", {}).get("recorded_unix_ns", "")
+    if not stamp.isdecimal():
+        return ""
+    try:
+        at = datetime.datetime(1970, 1, 1) + datetime.timedelta(microseconds=int(stamp) // 1000)
+    except (ValueError, OverflowError):
+        return ""
+    return f"{at:%Y-%m-%d %H:%M:%S} UTC"
+
+
+COUNTS = ("expected", "recorded", "missing", "repeated")
+
+
+def completeness(summary: Summary) -> Table:
+    """Ticks expected, recorded, missing."""
+    rows = [
+        [topic, *(str(found[name]) for name in COUNTS), holes(found)]
+        for topic, found in summary["topics"].items()
+    ]
+    return Table("", ("topic", *COUNTS, "holes (ticks)"), rows)
+
+
+def holes(found: Mapping[str, Any]) -> str:
+    """The first holes of a topic."""
+    return ", ".join(f"{first}…{last}" for first, last in found["holes"]) or "none"
+
+
+def exchange(summary: Summary) -> Table:
+    """The account of every message: sent = used + rejected + lost, and what came beside them where anything did."""
+    columns = {"sent": "sent", "used": "= used", "rejected": "+ rejected", "lost": "+ lost"}
+    if any(counts["foreign"] for counts in summary["exchange"].values()):
+        columns["foreign"] = "not sent by it, at least"
+    rows = [
+        [name.replace("/", ", "), *(str(counts[key]) for key in columns)]
+        for name, counts in summary["exchange"].items()
+    ]
+    return Table("", ("messages", *columns.values()), rows)
+
+
+def rejected(summary: Summary) -> Table:
+    """Frames that were rejected, by laboratory and reason."""
+    rows = [
+        [lab, reason, str(count)]
+        for lab, counts in summary["rejected"].items()
+        for reason, count in counts.items()
+    ]
+    return Table("Frames rejected", ("by", "reason", "frames"), rows)
+
+
+def peaks(summary: Summary) -> Table:
+    """Largest magnitudes."""
+    rows = [
+        [breakable(name), reading(found["peak"], found["unit"]), seconds(found["t"])]
+        for name, found in summary["peaks"].items()
+    ]
+    return Table("", ("signal", "peak", "at"), rows)
+
+
+def storeys(summary: Summary) -> Table:
+    """Peaks of every storey."""
+    if not summary["storeys"]:
+        return Table("", (), [])
+    head, *rows = storey_rows(summary["storeys"])
+    return Table("Building", tuple(head), rows)
+
+
+def seconds(t: float | None) -> str:
+    """A test time."""
+    return MISSING if t is None else f"{t:.3f} s"
+
+
+def limits(found: list[Margin]) -> Table:
+    """How near recorded signals came to the limits of the plan."""
+    rows = []
+    for item in found:
+        unit = UNITS[item.signal.partition("/")[2]]
+        peak, limit = reading(item.peak, unit), reading(item.limit, unit)
+        rows.append([breakable(item.signal), peak, limit, f"{100.0 * item.share:.1f} %"])
+    return Table("", ("signal", "peak", "limit", "share"), rows)
+
+
+def tracking(summary: Summary) -> Table:
+    """How the transfer systems followed their targets."""
+    rows = [[part, *tracked(found)] for part, found in summary["tracking"].items()]
+    head = ("part", "delay", "by correlation", "amplitude", "at", "NRMSE", "peak error")
+    return Table("", head, rows)
+
+
+def force_path(summary: Summary) -> Table:
+    """The column force against the plan's specimen at the measured displacement."""
+    found = summary["force_path"]
+    if found is None:
+        return Table("", (), [])
+    low, high = (milliseconds(end) for end in found["interval"])
+    row = [
+        milliseconds(found["delay"]),
+        f"{low} to {high}",
+        f"{found['gain']:.4f}",
+        f"{found['frequency']:.2f} Hz",
+    ]
+    return Table("Force path", ("delay", "95 %", "gain", "at"), [row])
+
+
+def latency(summary: Summary) -> list[Table]:
+    """Percentiles of the parts of a tick, a table per named slave."""
+    tables = summary["latency"] if summary["slaves"] else {"": summary["latency"]}
+    return [latency_of(name, segments) for name, segments in tables.items() if segments]
+
+
+def latency_of(slave: str, segments: Mapping[str, Mapping[str, float]]) -> Table:
+    """Percentiles in the exchange with one slave, µs."""
+    names = list(next(iter(segments.values())))
+    rows = [
+        [breakable(segment), *(f"{found[name] * 1e6:.0f}" for name in names)]
+        for segment, found in segments.items()
+    ]
+    return Table(f"Slave {slave}" if slave else "", ("µs", *names), rows)
+
+
+def machines(run: Run) -> Table:
+    """Real-time shape and load of the laboratories' machines, and the bare timing loop beside the test."""
+    recorded = run.metadata.get(MACHINES, {})
+    labs = (MASTER, *run.roles, "bare_loop")
+    found = {
+        lab: {
+            key.removeprefix(f"{lab}."): text for key, text in recorded.items() if key.startswith(f"{lab}.")
+        }
+        for lab in labs
+    }
+    kept = {lab: values for lab, values in found.items() if values}
+    names = dict.fromkeys(name for values in kept.values() for name in values)
+    rows = [[breakable(name), *(shortened(kept[lab].get(name, MISSING)) for lab in kept)] for name in names]
+    return Table("", ("", *(lab.replace("_", " ") for lab in kept)), rows)
+
+
+def shortened(text: str) -> str:
+    """A number in four digits, anything else as it stands."""
+    try:
+        return f"{float(text):.4g}"
+    except ValueError:
+        return text
+
+
+def events(run: Run, *codes: str) -> Table:
+    """What happened, in the order in which it was recorded: of these codes, or all."""
+    chosen = [event for event in run.events if not codes or event["code"] in codes]
+    rows = [[f"{event['t']:.3f} s", event["lab"], event["level"], event["text"]] for event in chosen[:EVENTS]]
+    if len(chosen) > EVENTS:
+        rows.append(["", "", "", f"and {len(chosen) - EVENTS} more: rths inspect --json lists all"])
+    return Table("", ("time", "from", "level", "what"), rows)
+
+
+def provenance(run: Run, summary: Summary) -> list[tuple[str, str]]:
+    """Where the numbers come from, and whether they can be relied on."""
+    versions = run.metadata.get("versions", {})
+    ground = run.attachments.get(GROUND, b"")
+    whole = summary["finished"] and not summary["damage"]
+    found = [
+        ("recorded by", f"rths {versions['rths']}" if "rths" in versions else ""),
+        ("this page by", f"rths {metadata.version('rths')}"),
+        ("file", "finished, without damage that its checksums would show" if whole else amount(summary)),
+        ("damage", summary["damage"]),
+        ("plan's digest", run.metadata.get("plan", {}).get("digest", "")),
+        ("ground motion", summary["ground_motion"].get("record", "")),
+        ("its samples", f"{len(ground) // 8} numbers inside the recording" if ground else ""),
+    ]
+    return [(name, text) for name, text in found if text]
+
+
+def kept(run: Run) -> list[tuple[str, str]]:
+    """Everything else that the recording says about itself, by title, as text."""
+    said = [
+        (name, "\n".join(f"{key} = {text}" for key, text in values.items()))
+        for name, values in run.metadata.items()
+        if name not in SHOWN
+    ]
+    return [(f"metadata: {name.replace('_', ' ')}", text) for name, text in said if text]
+
+
+def slave_title(role: str) -> str:
+    """What stands over the pictures that concern a slave; empty for the only one."""
+    return f"Slave {name_of(role)}" if name_of(role) else ""

@@ -1,0 +1,225 @@
+"""The verdict on a run in sentences with figures, and what of its recording is lost."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from common.plan.limits import UNITS
+from common.recording.reader import Run
+from common.roles import LATENCY, MASTER, SLAVE, kind_of, name_of, title
+from report.facts.summary import plan_of
+from report.text.formats import apart, milliseconds, quantity
+
+Summary = Mapping[str, Any]
+ENDS = {
+    "completed": "The test ran to its end.",
+    "imported": "The data were imported, not recorded by a test.",
+}
+NO_END = "The recording does not say how the test ended."
+
+
+class Margin(NamedTuple):
+    """How near a recorded signal came to its limit in the plan."""
+
+    signal: str
+    peak: float
+    limit: float
+
+    @property
+    def share(self) -> float:
+        """The peak over the limit."""
+        return self.peak / self.limit
+
+    @property
+    def words(self) -> str:
+        """The signal's name in words, and whose it is."""
+        topic, _, name = self.signal.partition("/")
+        return name.replace("_", " ") + (f" of the {title(topic)}" if name_of(topic) else "")
+
+
+def lost(summary: Summary) -> str:
+    """What is lost of a recording, and what to do, in a sentence; empty for a whole one."""
+    file = Path(summary["file"]).name
+    if summary["damage"]:
+        return (
+            f"This recording is damaged {summary['damage']}, so the page shows what was read before; "
+            f"rths recover {file} saves what is whole behind it. {amount(summary)}"
+        )
+    if not summary["finished"]:
+        return (
+            "This recording was cut off before its end, so the page shows what had reached the file; "
+            f"rths recover {file} makes a finished one of it. {amount(summary)}"
+        )
+    return ""
+
+
+def amount(summary: Summary) -> str:
+    """How many ticks of how many are there."""
+    planned, topics = summary["ticks_planned"], summary["topics"]
+    if not planned or not topics:
+        return "It does not say how many ticks there should be."
+    counts = ", ".join(f"{facts['recorded']} of the {topic}" for topic, facts in topics.items())
+    return f"Of the {planned} ticks planned it holds {counts}."
+
+
+def sentences(run: Run, summary: Summary) -> list[str]:
+    """The verdict, one sentence for each thing that a test is judged by, of those that the recording knows."""
+    found = [
+        outcome(summary),
+        *summary["warnings"],
+        completeness(summary),
+        *exchange(summary),
+        rejected(summary),
+        lateness(run, summary),
+        summary["patience"],
+        *tracking(summary),
+        force_path(summary),
+        energy(summary),
+        nearest(run, summary),
+    ]
+    return [text for text in found if text]
+
+
+def outcome(summary: Summary) -> str:
+    """How the test ended."""
+    ended = summary["recorder"]
+    cause = ended.get("cause") or ended.get("outcome")
+    if not cause:
+        return NO_END
+    return ENDS.get(cause, f"The test ended: {cause.rstrip('.')}.")
+
+
+def completeness(summary: Summary) -> str:
+    """Ticks recorded and missing."""
+    expected, planned, topics = summary["ticks_expected"], summary["ticks_planned"], summary["topics"]
+    if not planned or not topics:
+        return ""
+    begin = "The recording ends" if outcome(summary) == NO_END else "The test stopped"
+    gaps = {topic: facts["missing"] for topic, facts in topics.items() if facts["missing"]}
+    names = ", ".join(topics)
+    if not gaps:
+        if expected < planned:
+            return f"{begin} at tick {expected} of {planned}; all until then are recorded ({names})."
+        return f"All {expected} ticks are recorded ({names})."
+    counts = " and ".join(f"the {topic} lacks {count}" for topic, count in gaps.items())
+    if expected < planned:
+        return f"{begin} at tick {expected} of {planned}; until then {counts}."
+    return f"The test ran for all of its {planned} ticks; {counts}."
+
+
+def exchange(summary: Summary) -> list[str]:
+    """What became of the messages, by direction."""
+    return [
+        f"{name.replace('/', ', ').capitalize()}: {counts['sent']} sent, of which {counts['used']} used, "
+        f"{counts['rejected']} rejected as late or out of order, {counts['lost']} lost{apart(counts)}."
+        for name, counts in summary["exchange"].items()
+    ]
+
+
+def rejected(summary: Summary) -> str:
+    """How many frames were rejected: damaged ones, and those that do not belong to the test."""
+    counts = {lab: sum(reasons.values()) for lab, reasons in summary["rejected"].items()}
+    if not counts:
+        return ""
+    return "Frames rejected: " + ", ".join(f"{count} by the {lab}" for lab, count in counts.items()) + "."
+
+
+def lateness(run: Run, summary: Summary) -> str:
+    """Ticks in which a deadline was missed."""
+    late, missed = summary["late_ticks"], summary["missed_ticks"]
+    if late is None or (not late and not summary["latency"]):
+        return ""
+    ticks = max(run.ticks(topic) for topic in run.columns if kind_of(topic) == LATENCY)
+    return f"{late} of {ticks} ticks were late, {missed} of them missed altogether."
+
+
+def tracking(summary: Summary) -> list[str]:
+    """How the transfer systems followed their targets."""
+    return [followed(name.replace(".", " of slave "), facts) for name, facts in summary["tracking"].items()]
+
+
+def followed(name: str, facts: Mapping[str, Any]) -> str:
+    """How one transfer system followed its target."""
+    error = f"rms error {100.0 * facts['nrmse']:.2f} % of the target's rms"
+    if facts["delay"] is None:
+        return f"The delay of the {name} is not determined: {facts['undetermined']}; {error}."
+    return (
+        f"The {name} followed its target with a delay of {milliseconds(facts['delay'])} and "
+        f"{facts['amplitude']:.4f} of its amplitude at {facts['frequency']:.2f} Hz; {error}."
+    )
+
+
+def force_path(summary: Summary) -> str:
+    """How late the measured column force was; the tracking of displacements does not show it."""
+    found = summary["force_path"]
+    if found is None:
+        return ""
+    low, high = found["interval"]
+    return (
+        f"The measured force {beside(found['delay'])} (95 %: {between(low, high)}); "
+        f"amplitude {100.0 * (found['gain'] - 1.0):+.1f} %."
+    )
+
+
+def beside(delay: float) -> str:
+    """A force's delay (s) beside that of the planned specimen, in words; it leads where the delay is negative."""
+    return f"{'leads' if delay < 0.0 else 'lags behind'} the planned specimen's by {short(abs(delay))} ms"
+
+
+def between(low: float, high: float) -> str:
+    """An interval of delays (s) in ms: magnitudes where both have one sign, else both ends with their signs."""
+    if low < 0.0 < high:
+        return f"from {short(-low)} ms ahead to {short(high)} ms behind"
+    ends = sorted((abs(low), abs(high)))
+    return f"{short(ends[0])}–{short(ends[1])}"
+
+
+def short(delay: float) -> str:
+    """A positive delay (s) in ms with two digits where it is below 1 ms, else with one after the point."""
+    return f"{delay * 1e3:.2f}" if delay < 1e-3 else f"{delay * 1e3:.1f}"
+
+
+def energy(summary: Summary) -> str:
+    """What the errors of the column's transfer system did to the energy."""
+    share = summary["error_energy"]
+    if share is None:
+        return ""
+    did = "put in" if share > 0.0 else "took out"
+    return (
+        f"Tracking errors at the column {did} up to {abs(share) * 100.0:.2f} % of the energy that the "
+        "ground motion gave."
+    )
+
+
+def margins(run: Run, summary: Summary) -> list[Margin]:
+    """Recorded signals with a limit of their own, the nearest to it first."""
+    peaks = summary["peaks"]
+    of_slaves = {name.partition("/")[2] for name in peaks if name.startswith(SLAVE)}
+    found = []
+    for name, facts in peaks.items():
+        topic, _, signal = name.partition("/")
+        of_all_slaves = (
+            topic == MASTER and signal in of_slaves
+        )  # those of the master hold all slaves together
+        if signal not in UNITS or of_all_slaves or not math.isfinite(facts["peak"]):
+            continue
+        plan = plan_of(run.of(topic) if name_of(topic) else run)
+        if plan:
+            found.append(Margin(name, facts["peak"], getattr(plan.limits, signal)))
+    return sorted(found, key=lambda item: -item.share)
+
+
+def nearest(run: Run, summary: Summary) -> str:
+    """The signal that came nearest to its limit."""
+    found = margins(run, summary)
+    if not found:
+        return ""
+    first = found[0]
+    unit = UNITS[first.signal.partition("/")[2]]
+    return (
+        f"Nearest to its limit came the {first.words}: {quantity(first.peak, unit)} of {quantity(first.limit, unit)} "
+        f"({100.0 * first.share:.0f} %)."
+    )

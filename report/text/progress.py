@@ -1,0 +1,90 @@
+"""The progress of a command on standard error: a line rewritten in place on a terminal, plain lines elsewhere."""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+import sys
+import threading
+import time
+from types import TracebackType
+from typing import Self, TextIO
+
+from common.terminal.printable import behind, shown
+
+BAR = 24
+UNSAID = 2.0  # s that go by without a word
+REDRAW = 0.25  # s between two lines on a terminal,
+EVERY = 5.0  # at least between two elsewhere
+
+
+class Progress:
+    """The progress of a command, shown while the context lasts; nothing of one that ends within `UNSAID` seconds.
+
+    A thread writes the lines, so that `tell` costs nothing in a loop and time goes on while a kernel computes. On a
+    terminal the line is wiped when the work ends, and stays where an error or Ctrl-C ends it.
+    """
+
+    def __init__(self, doing: str, stream: TextIO | None = None, began: float | None = None) -> None:
+        self._doing = doing
+        self._stream = behind(stream or sys.stderr)
+        self._live = self._stream.isatty()
+        self._began = time.monotonic() if began is None else began
+        self._now: tuple[str, int, int] = ("", 0, 0)
+        self._said: tuple[str, int, int] | None = None
+        self._next = self._began + UNSAID
+        self._width = 0  # of the line that stands on the terminal
+        self._ended = threading.Event()
+        self._writer = threading.Thread(target=self._write, name="progress", daemon=True)
+
+    def __enter__(self) -> Self:
+        self._writer.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._ended.set()
+        self._writer.join()
+        with contextlib.suppress(OSError, ValueError):
+            self.leave(wipe=kind is None)
+
+    def tell(self, what: str, done: int = 0, total: int = 0) -> None:
+        """What is being done now: `done` of `total` of it, where a total is known."""
+        self._now = (what, done, total)
+
+    def look(self, now: float) -> None:
+        """Write what is due at a time of the monotonic clock, s."""
+        if now < self._next or (not self._live and self._now == self._said):
+            return
+        self._said = self._now
+        self._next = now + (REDRAW if self._live else EVERY)
+        text = shown(self.text(now - self._began))
+        if self._live:
+            text = text[: shutil.get_terminal_size().columns - 1]
+            self._stream.write("\r" + text.ljust(self._width))
+            self._width = len(text)
+        else:
+            self._stream.write(text + "\n")
+        self._stream.flush()
+
+    def text(self, spent: float) -> str:
+        """The line after so many seconds."""
+        what, done, total = self._now
+        counted = f"{done} of {total}" if total else ""
+        parts = ", ".join(part for part in (what, counted, f"{spent:.0f} s") if part)
+        filled = round(BAR * min(done / total, 1.0)) if total else 0
+        bar = f"[{'█' * filled}{'·' * (BAR - filled)}] " if self._live and total else ""
+        return f"{bar}{self._doing}: {parts}"
+
+    def leave(self, *, wipe: bool) -> None:
+        """Go from the terminal's line, which is empty then or stays."""
+        if self._width:
+            self._stream.write(f"\r{' ' * self._width}\r" if wipe else "\n")
+            self._stream.flush()
+            self._width = 0
+
+    def _write(self) -> None:
+        with contextlib.suppress(OSError, ValueError):  # the reader has gone: the work goes on
+            while not self._ended.wait(REDRAW):
+                self.look(time.monotonic())

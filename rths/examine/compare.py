@@ -1,0 +1,102 @@
+"""`rths compare`: two recordings or simulations, signal by signal."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from typing import TYPE_CHECKING, Any
+
+from common.errors import InputError
+from common.terminal import cli
+from common.terminal.printable import shown
+from report.text.progress import Progress
+
+if TYPE_CHECKING:
+    from simulation.source import Source
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of `compare`."""
+    parser.add_argument("a", metavar="A", help="a recording, or a plan whose simulation is meant")
+    parser.add_argument("b", metavar="B", help="the other one")
+    parser.add_argument(
+        "--tolerance", type=float, metavar="X", help="exit with 1 where an NRMSE exceeds this"
+    )
+    cli.json_argument(parser, "write the comparison as JSON on standard output")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Compare; 1 where a signal differs by more than the tolerance."""
+    if args.tolerance is not None and not args.tolerance >= 0.0:
+        raise InputError(f"--tolerance is {args.tolerance}, but must be at least 0.")
+    with Progress("comparing") as progress:
+        from simulation.source import columns
+
+        a, b = columns(args.a, progress.tell), columns(args.b, progress.tell)
+        result = compare(a, b)
+    result |= {"motion_a": a.motion, "motion_b": b.motion}
+    if not result["signals"]:
+        raise InputError(f"{args.a} and {args.b} have no tick and signal in common.")
+    beyond = [
+        name
+        for name, facts in result["signals"].items()
+        if args.tolerance is not None and not facts["nrmse"] <= args.tolerance
+    ]
+    result["beyond_tolerance"] = beyond
+    if args.json:
+        sys.stdout.write(json.dumps(result) + "\n")
+    else:
+        show(args, result)
+    return 1 if beyond else 0
+
+
+def compare(a: Source, b: Source) -> dict[str, Any]:
+    """Differences of every signal that both have, on the ticks that both have.
+
+    NRMSE is rms(a − b)/rms(a); `equal` says that all values agree to the last bit.
+    """
+    import numpy as np
+
+    from simulation.source import OF_THE_TICK
+
+    ticks, in_a, in_b = np.intersect1d(a.ticks, b.ticks, return_indices=True)
+    result = {}
+    for name in a.signals:
+        if name in OF_THE_TICK or name not in b.signals or not ticks.size:
+            continue
+        x, y = a.signals[name][in_a].astype(float), b.signals[name][in_b].astype(float)
+        if x.shape == y.shape:
+            result[name] = difference(x, y)
+    return {"ticks": int(ticks.size), "signals": result}
+
+
+def difference(x: Any, y: Any) -> dict[str, Any]:
+    """NRMSE, largest difference and equality of two columns."""
+    import numpy as np
+
+    error, size = float(np.sqrt(np.mean((x - y) ** 2))), float(np.sqrt(np.mean(x**2)))
+    nrmse = error / size if size else (0.0 if error == 0.0 else float("inf"))
+    return {
+        "nrmse": nrmse,
+        "largest": float(np.max(np.abs(x - y))),
+        "peak_a": float(np.max(np.abs(x))),
+        "peak_b": float(np.max(np.abs(y))),
+        "equal": bool(np.array_equal(x, y)),
+    }
+
+
+def show(args: argparse.Namespace, result: dict[str, Any]) -> None:
+    """The comparison as text."""
+    from report.text.terminal import table
+
+    rows = [["signal", "NRMSE", "largest", "peak A", "peak B", ""]]
+    for name, facts in result["signals"].items():
+        numbers = [f"{facts[key]:.4g}" for key in ("nrmse", "largest", "peak_a", "peak_b")]
+        rows.append([name, *numbers, "equal" if facts["equal"] else ""])
+    for name, source in (("A", args.a), ("B", args.b)):
+        sys.stdout.write(shown(f"{name} {source}: {result[f'motion_{name.lower()}']}") + "\n")
+    sys.stdout.write(f"{result['ticks']} ticks in common\n\n")
+    table(rows)
+    for name in result["beyond_tolerance"]:
+        sys.stdout.write(f"{shown(name)} differs by more than the tolerance {args.tolerance:g}\n")

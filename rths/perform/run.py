@@ -1,0 +1,364 @@
+"""`rths run`: the whole test on this machine, real time or virtual, with its summary."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from common.errors import InputError, RthsError
+from common.host import running
+from common.host.realtime import assign, freeze
+from common.host.stopping import Stopper, Stopping
+from common.lab.preflight import PASSED, Check, Gate
+from common.plan.plan import Plan
+from common.plan.reality import Reality
+from common.protocol.exchange import State
+from common.roles import MASTER, RECORDER, title
+from common.safety.modes import Mode
+from common.terminal import cli
+from report.text.progress import Progress as Working
+from report.text.terminal import Progress
+
+if TYPE_CHECKING:
+    from rths.perform.ending import Ending
+    from rths.perform.live_child import View
+    from rths.perform.processes import Processes, Said
+
+POLL_S = 0.1
+AGREED = State.SCHEDULED.value  # with which the master reports that all know the start
+UNSAID = (
+    "patience",
+    "machine",
+    "bare_loop",
+    "mode",
+    "exchange",
+    PASSED,
+)  # for the recording; what was passed, and what a machine lacks, is said before, patience in the summary
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of `run`."""
+    cli.plan_arguments(parser, optional=True)
+    cli.reality_argument(parser)
+    cli.rt_arguments(parser)
+    cli.accept_argument(parser)
+    clock = parser.add_mutually_exclusive_group()
+    clock.add_argument("--real-time", action="store_true", help="a process each, wall clock (default)")
+    clock.add_argument(
+        "--virtual", action="store_true", help="one process, virtual clock, as fast as it goes"
+    )
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help="the recording (default: runs/<test>-<time>.mcap)"
+    )
+    cli.force_argument(parser)
+    parser.add_argument("--live", action="store_true", help="show it in a browser page while it runs")
+    parser.add_argument(
+        "--live-port", type=int, default=0, metavar="N", help="of that page (default: a free one)"
+    )
+    parser.add_argument(
+        "--beside", action="store_true", help="run although another test runs on this machine"
+    )
+    cli.json_argument(parser, "write the summary as JSON on standard output")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run a test; its exit code."""
+    from recorder.files import reserved
+
+    gate = Gate(cli.accepted_risks(args))
+    if not 0 <= args.live_port <= 65535:
+        raise InputError(f"--live-port {args.live_port} must be from 1 to 65535, or 0 for a free one.")
+    if args.live and args.virtual:
+        raise InputError(
+            "--live shows a test in real time: leave out --virtual, or give its recording to rths live."
+        )
+    plan = cli.load_plan(args)
+    reality = cli.load_reality(args.reality, plan)
+    stopping = Stopper()
+    with reserved(args.output, plan, force=args.force) as output:
+        error = (
+            in_virtual_time(plan, reality, output, stopping, gate)
+            if args.virtual
+            else in_real_time(args, plan, reality, output, stopping, gate)
+        )
+        if output.is_file() and output.stat().st_size:
+            show(output, args.json)
+    if error is not None:
+        raise error
+    return 0
+
+
+def in_virtual_time(
+    plan: Plan, reality: Reality, output: Path, stopping: Stopper, gate: Gate
+) -> RthsError | None:
+    """The test in this process; the error that ended it."""
+    from simulation import virtual
+
+    said = before_the_start(plan, output, gate)
+    with Working("running") as working:
+        bench = virtual.assemble(plan, reality, output, partial(virtual_report, working), gate=gate)
+        sys.stderr.writelines(f"{line}\n" for line in said)
+        freeze()
+        started = time.monotonic()
+        error = virtual.run(bench, stopping, working.tell)
+    seconds = time.monotonic() - started
+    played = bench.master.ticks * plan.test.interval
+    sys.stderr.write(f"{played:g} s of test in {seconds:.1f} s of computing\n")
+    return error
+
+
+def before_the_start(plan: Plan, output: Path, gate: Gate) -> list[str]:
+    """Judge what can be judged before anything starts: what was passed and what is overruled, a line each.
+
+    Raises:
+        RefusedError: a risk that the gate does not accept.
+        InputError: a model or parameter of the plan cannot be.
+    """
+    made = checks(plan, output)
+    gate.judge(made)
+    said = (f"risk '{one.risk.name}' is accepted" if one.risk else one.text for one in made)
+    return [f"pre-flight: {text}." for text in said]
+
+
+def checks(plan: Plan, output: Path) -> list[Check]:
+    """What is judged before anything starts."""
+    from models.loop import preflight
+    from recorder import space
+
+    return [*preflight.checks(plan), space.check(plan, output.parent)]
+
+
+def virtual_report(working: Working, kind: str, data: Any) -> None:
+    """Events of a test in virtual time, on standard error."""
+    if (
+        kind == "event" and data["code"] not in UNSAID and data["level"] != "error"
+    ):  # the error is printed last
+        working.leave(wipe=True)
+        cli.text_report(kind, data)
+
+
+def in_real_time(
+    args: argparse.Namespace, plan: Plan, reality: Reality, output: Path, stopping: Stopper, gate: Gate
+) -> RthsError | None:
+    """The test in a process each; the error that ended it."""
+    from common.link.zenoh_link import listenable
+    from rths.perform.ending import Ending, verdict
+    from rths.perform.processes import Processes
+
+    check(reality)
+    processes = Processes()
+    progress = Progress(plan.test.duration)
+    endpoint = listenable()
+    view = None
+    ending = Ending(plan)
+    try:
+        with running.announced(plan, endpoint):
+            if not args.beside:
+                running.alone()
+            warm_up(progress)
+            for line in before_the_start(plan, output, gate):
+                progress.say(line)
+            progress.say(
+                f"{plan.test.name}: {plan.test.duration:g} s, starting master, {crew(plan)} and recorder"
+            )
+            start_all(processes, args, plan.roles, endpoint, output)
+            view = shown(output, args.live_port) if args.live else None
+            follow(processes, ending, progress, stopping, view)
+    finally:
+        wind_up(processes, ending)
+        processes.close()
+        progress.end()
+        if view is not None:
+            view.close()
+            if output.is_file() and output.stat().st_size:
+                progress.say(f"live view: {view.again} shows it again")
+    return verdict(processes, stopping())
+
+
+def shown(output: Path, port: int) -> View:
+    """A live view of the recording that begins."""
+    from rths.perform.live_child import View
+
+    return View(output, port)
+
+
+def crew(plan: Plan) -> str:
+    """The slaves of a test in words."""
+    return "slave" if not plan.slaves else f"slaves {', '.join(plan.slaves)}"
+
+
+def check(reality: Reality) -> None:
+    """Raise InputError where a laboratory could not be built or not show who it is, before any process starts."""
+    import master.assembly
+    import slave.assembly
+    from common.link.links import link_model
+
+    if reality.plan.link.security.folder:
+        from common.link import security
+
+        for role in (MASTER, *reality.plan.roles, RECORDER):
+            security.identity(reality.plan, role)
+    master.assembly.check(reality)
+    for role in reality.plan.roles:
+        slave.assembly.check(reality.of(role))
+        link_model(reality.of(role))
+
+
+def warm_up(progress: Progress) -> None:
+    """Compile the kernels before the processes start, where this machine has not done so yet."""
+    from models import cache
+
+    if not cache.warm():
+        progress.say("compiling the kernels, once on this machine (about half a minute)")
+        from models.warm import compile_all
+
+        compile_all()
+
+
+def start_all(
+    processes: Processes, args: argparse.Namespace, roles: Sequence[str], endpoint: str, output: Path
+) -> None:
+    """Start master, slaves and recorder with the plan's options; `roles` are those of the slaves."""
+    words = [str(cli.plan_path(args.plan))]
+    for option in ("duration", "scale", "seed"):
+        value = getattr(args, option)
+        if value is not None:
+            words += [f"--{option}", repr(value)]
+    for name in cli.accepted_risks(args):
+        words += ["--accept-risk", name]
+    secret = ["--reality", str(args.reality)] if args.reality else []
+    places = [real_time_words(args.rt, processor) for processor in assign(1 + len(roles))]
+    processes.start("master", [*words, *secret, *places[0], "--listen", endpoint])
+    for role, place in zip(roles, places[1:], strict=True):
+        processes.start(role, [*words, *secret, *place, "--connect", endpoint])
+    # the file is this command's already: it stands there empty, or the user wants it replaced
+    processes.start("recorder", [*words, "--connect", endpoint, "-o", str(output), "--force"])
+
+
+def real_time_words(mode: str, processor: int | None) -> list[str]:
+    """Options of a laboratory's process."""
+    place = [] if processor is None or mode == "off" else ["--processor", str(processor)]
+    return ["--rt", mode, *place]
+
+
+def follow(
+    processes: Processes,
+    ending: Ending,
+    progress: Progress,
+    stopping: Stopping,
+    view: View | None = None,
+) -> None:
+    """Show what the processes say, and stop them where it is time, until all have ended.
+
+    A second wish to stop changes nothing, and is answered by what they are at.
+    """
+    from rths.perform.ending import killed
+
+    answered = 1
+    doing: dict[str, str] = {}
+    while not processes.all_ended():
+        said = processes.said(POLL_S)
+        if said is not None:
+            tell(said, progress)
+            note(said, ending, doing)
+        if view is not None and (news := view.news()):
+            progress.say(news)
+        for name in stop(processes, ending, stopping()):
+            progress.say(killed(name))
+        if stopping.presses > answered:
+            answered = stopping.presses
+            progress.say(answer(processes, doing))
+
+
+def note(said: Said, ending: Ending, doing: dict[str, str]) -> None:
+    """Take note of what a report says about the end of a test; `doing` are laboratories that arm or come to rest."""
+    match said.data:
+        case {"kind": "state", "state": state} if said.process == MASTER and state == AGREED:
+            ending.agreed = True
+        case {"kind": "state", "state": State.REGISTERED.value}:
+            doing[said.process] = f"arming its rig, at most {ending.arming:g} s"
+            ending.arms(said.process, time.monotonic())
+        case {"kind": "state", "state": State.ARMED.value}:
+            doing.pop(said.process, None)
+            ending.armed(said.process, time.monotonic())
+        case {"kind": "mode", "mode": mode}:
+            doing.pop(said.process, None)
+            if mode == Mode.RAMPING.value:
+                doing[said.process] = "coming to rest"
+                ending.rests(said.process, time.monotonic())
+        case {"kind": "resting", "left": float(left), "text": text}:
+            doing[said.process] = str(text)
+            ending.rests(said.process, time.monotonic(), left)
+        case _:
+            pass
+
+
+def answer(processes: Processes, doing: Mapping[str, str]) -> str:
+    """The answer to a second wish to stop: what the processes are doing, which is not cut short."""
+    there = [name for name in processes.names if name not in processes.ended()]
+    if resting := [f"{title(name)}: {text}" for name, text in doing.items() if name in there]:
+        return f"already stopping, no laboratory is killed on its way to rest or as it arms ({'; '.join(resting)})"
+    return (
+        f"already stopping, and waiting for {' and '.join(map(title, there)) or 'nobody'} to leave in order"
+    )
+
+
+def wind_up(processes: Processes, ending: Ending) -> None:
+    """End the processes in order if this program has failed, so that no rig is left in mid-motion."""
+    doing: dict[str, str] = {}
+    while not processes.all_ended():
+        if (said := processes.said(POLL_S)) is not None:
+            note(said, ending, doing)
+        stop(processes, ending, "this program failed.")
+
+
+def tell(said: Said, progress: Progress) -> None:
+    """Show one report, where it is for the user."""
+    match said.data:
+        case {"kind": "progress"} if said.process == MASTER:
+            progress.show(said.data)
+        case {"kind": "mode", "lab": lab, "mode": mode}:
+            progress.mode(lab, mode)
+        case {"kind": "event", "code": "real_time", "missing": missing} if missing:
+            pass  # with a rig it was reported before; an emulation does not need it
+        case {"kind": "event", "level": "error", "code": code, "lab": lab}:
+            progress.say(f"{lab}: ends the test ({code})")  # the sentence is this command's last word
+        case {"kind": "event", "code": code, "lab": lab, "text": text} if code not in UNSAID:
+            progress.say(f"{lab}: {text}")
+        case {"kind": "text", "text": text}:
+            progress.say(f"{said.process}: {text}")
+        case _:
+            pass
+
+
+def stop(processes: Processes, ending: Ending, wish: str) -> list[str]:
+    """Ask and kill those whose time has come; who was killed."""
+    gone = []
+    now, ended = time.monotonic(), processes.ended()
+    ending.look(now, wish, processes.names, ended)
+    for name in processes.names:
+        if name not in ended and now >= ending.ask_at(name):
+            processes.ask(name)
+        if name not in ended and now >= ending.kill_at(name):
+            processes.kill(name)
+            gone.append(name)
+    return gone
+
+
+def show(path: Path, as_json: bool) -> None:
+    """Write the summary of a recording."""
+    from common.recording.reader import read
+    from report.facts.summary import summarize
+    from rths.examine.inspect import write_report
+
+    summary = summarize(read(path))
+    if as_json:
+        sys.stdout.write(json.dumps(summary) + "\n")
+    else:
+        write_report(summary)

@@ -1,0 +1,1 @@
+"""Commands before a test: plans, machine, keys, component tests and simulations."""

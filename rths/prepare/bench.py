@@ -1,0 +1,112 @@
+"""`rths bench`: a component test of one part, recorded like any run."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from common.errors import InputError
+from common.terminal import cli
+from common.terminal.telling import untold
+from report.text.progress import Progress
+
+if TYPE_CHECKING:
+    from simulation.benches import Result
+
+PARTS = ("column", "actuator", "table", "damper")
+OF_SLAVE = ("table", "damper")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of `bench`."""
+    parser.add_argument("part", choices=PARTS, metavar="PART", help=", ".join(PARTS))
+    parser.add_argument(
+        "plan", metavar="PLAN", help=f"TOML file of the test; {', '.join(cli.SHIPPED)} for those that ship"
+    )
+    parser.add_argument("--seed", type=int, metavar="N", help="seed of noise and random wave")
+    cli.reality_argument(parser)
+    parser.add_argument(
+        "--compensated", action="store_true", help="put the plan's compensator in front of the part"
+    )
+    parser.add_argument(
+        "--only",
+        action="append",
+        default=[],
+        metavar="PIECE",
+        help="only the pieces that begin so (step, sine, random, sweep, static); may be repeated",
+    )
+    parser.add_argument(
+        "--name", metavar="NAME", help="whose table or damper it is, where the plan names several slaves"
+    )
+    clock = parser.add_mutually_exclusive_group()
+    clock.add_argument("--virtual", action="store_true", help="virtual clock, as fast as it goes (default)")
+    clock.add_argument("--real-time", action="store_true", help="wall clock")
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="FILE",
+        help="the recording (default: runs/<test>-bench-<part>-<time>.mcap)",
+    )
+    cli.force_argument(parser)
+    cli.json_argument(parser, "write the summary as JSON on standard output")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Play the bench test of a part; its exit code."""
+    from common.host.stopping import Stopper
+    from common.plan import plan as plans
+
+    plan = plans.load(cli.plan_path(args.plan)).with_test(seed=args.seed)
+    # in real time nothing may run beside the loop
+    with contextlib.nullcontext() if args.real_time else Progress("bench test") as progress:
+        from recorder import files
+        from simulation import benches
+
+        order = benches.Order(args.part, args.compensated, tuple(args.only), args.real_time)
+        reality = cli.load_reality(args.reality, plan)
+        if args.part not in OF_SLAVE and args.name:
+            raise InputError(f"The {args.part} is the master's: leave out --name {args.name}.")
+        if args.part in OF_SLAVE:
+            role = plan.slave_role(args.name or "")
+            plan, reality = plan.of(role), reality.of(role)
+        tell = progress.tell if progress else untold
+        with files.reserved(args.output, plan, f"bench-{args.part}", force=args.force) as path:
+            result = benches.play(plan, reality, order, path, Stopper(), tell)
+    if args.json:
+        sys.stdout.write(json.dumps(summary(result)) + "\n")
+    else:
+        show(result)
+    if result.error is not None:
+        raise result.error
+    return 0
+
+
+def summary(result: Result) -> dict[str, Any]:
+    """What was done, as plain values."""
+    return {
+        "file": str(result.path),
+        "part": result.part,
+        "ticks": result.ticks,
+        "late_ticks": result.late,
+        "segments": [segment._asdict() for segment in result.segments],
+    }
+
+
+def show(result: Result) -> None:
+    """What was done, as text."""
+    from report.text.terminal import table
+
+    rows = [["piece", "from", "to"]]
+    interval = result.interval
+    rows += [
+        [segment.name, f"{segment.begin * interval:.3f} s", f"{segment.end * interval:.3f} s"]
+        for segment in result.segments
+    ]
+    table(rows)
+    sys.stdout.write(f"{result.ticks} ticks, {result.late} late, recorded in {result.path}\n")
+    sys.stdout.write(f"next: rths identify {result.path}\n")

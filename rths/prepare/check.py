@@ -1,0 +1,44 @@
+"""`rths check`: what a plan describes, before anything of it is run; it imports no class that the plan names."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from typing import Any
+
+from common.terminal import cli
+from report.text.progress import Progress
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of `check`."""
+    cli.plan_arguments(parser)
+    cli.json_argument(parser, "write what the plan describes as JSON on standard output")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Describe a plan; 1 where pre-flight would refuse it."""
+    plan = cli.load_plan(args)
+    with Progress("simulating the test"):
+        from report.plan.facts import facts
+
+        found = facts(plan, cli.plan_path(args.plan))
+    if args.json:
+        sys.stdout.write(json.dumps(printable(found)) + "\n")
+    else:
+        from report.plan.text import show
+
+        show(printable(found))
+    return 0 if found["ready"] else 1
+
+
+def printable(value: Any) -> Any:
+    """Plain values with texts that a terminal may be given: a plan's own words may hold escape sequences."""
+    if isinstance(value, dict):
+        return {name: printable(one) for name, one in value.items()}
+    if isinstance(value, list):
+        return [printable(one) for one in value]
+    if isinstance(value, str):
+        return "".join(letter if letter.isprintable() else "\N{REPLACEMENT CHARACTER}" for letter in value)
+    return value

@@ -1,0 +1,141 @@
+"""`rths identify`: a part's parameters from a bench recording, or from any that holds its in- and outputs."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from common.errors import InputError
+from common.roles import name_of
+from common.terminal import cli
+from common.terminal.printable import all_shown
+from common.terminal.telling import Tell
+from report.text.progress import Progress
+from rths.prepare.bench import OF_SLAVE
+
+PARTS = ("column", "actuator", "table", "damper")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of `identify`."""
+    parser.add_argument("file", type=Path, metavar="FILE", help="a recording (MCAP)")
+    parser.add_argument(
+        "--part",
+        choices=PARTS,
+        help="which part (default: the bench test's; all that are possible in any other recording)",
+    )
+    parser.add_argument(
+        "--fit", metavar="MODEL", help="fit this hysteretic model to the column too (clough, bwbn, …)"
+    )
+    cli.json_argument(parser, "write the report as JSON on standard output")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Identify, and report."""
+    with Progress("identifying") as progress:
+        reports = identified(args, progress.tell)
+    if args.json:
+        sys.stdout.write(json.dumps({"file": str(args.file), "parts": reports}) + "\n")
+    else:
+        for report in reports:
+            show(report)
+    return 0
+
+
+def identified(args: argparse.Namespace, tell: Tell) -> list[dict[str, Any]]:
+    """The reports on all parts that are asked for; raises InputError where there is none."""
+    from common.recording.reader import read
+    from report.facts.identification import identify, part_of, possible
+
+    recording = read(args.file)
+    tell(f"column, model {args.fit}" if args.fit else "", 0, 0)
+    models = [fitted(recording, args.fit)] if args.fit else []
+    reports = []
+    for role in recording.roles:
+        view = recording.of(role)
+        parts = [args.part or part_of(view)]
+        if not parts[0]:
+            parts = possible(view)
+        own = [part for part in parts if role == recording.roles[0] or part in OF_SLAVE]
+        for part in own:
+            tell(part, 0, 0)
+            reports.append(identify(view, part) | named(part, role))
+    if not reports:
+        raise InputError(f"{args.file} holds no part's in- and outputs: see rths inspect {args.file}.")
+    return reports + models
+
+
+def named(part: str, role: str) -> dict[str, str]:
+    """The part under the name of its slave, where that has one."""
+    return {"part": f"{part}.{name_of(role)}"} if name_of(role) and part in OF_SLAVE else {}
+
+
+def fitted(recording: Any, model: str) -> dict[str, Any]:
+    """A hysteretic model fitted to the column's force."""
+    from models.specimens.fit import fit
+
+    columns = recording.columns.get("master", {})
+    if not {"column_displacement", "column_force"} <= columns.keys():
+        raise InputError(f"{recording.path} has no column_displacement and column_force to fit '{model}' to.")
+    found = fit(model, columns["column_displacement"], columns["column_force"])
+    parameters = {
+        name: {"value": value, "low": found.intervals[name][0], "high": found.intervals[name][1], "unit": ""}
+        for name, value in found.parameters.items()
+    }
+    return {"part": f"column, model {model}", "parameters": parameters, "nrmse": found.nrmse}
+
+
+def show(report: dict[str, Any]) -> None:
+    """One part's report as text."""
+    report = all_shown(report)
+    from report.text.terminal import table
+
+    sys.stdout.write(f"\n{report['part']}\n")
+    rows = [["parameter", "value", "95 % interval", "unit", "by"]]
+    for method, key in (("least squares", "parameters"), ("tangent", "tangent")):
+        rows += [
+            [name, f"{item['value']:.6g}", f"{item['low']:.6g} to {item['high']:.6g}", item["unit"], method]
+            for name, item in report.get(key, {}).items()
+        ]
+    table(rows)
+    if "model" in report:
+        sys.stdout.write(f"parameters are those of the {report['model']}\n")
+    if "nrmse" in report:
+        sys.stdout.write(f"misfit (NRMSE): {misfit(report['nrmse'])}\n")
+    if "bandwidth" in report:
+        band = report["bandwidth"]
+        sys.stdout.write(
+            f"bandwidth: −3 dB at {band['half_power']:.2f} Hz, −90° at {band['quarter_turn']:.2f} Hz; "
+            f"delay at low frequency {band['delay'] * 1e3:.2f} ms\n"
+        )
+    if "cycles" in report:
+        show_cycles(report["cycles"])
+
+
+def misfit(value: Any) -> str:
+    """One misfit, or one per signal."""
+    if isinstance(value, dict):
+        return ", ".join(f"{name} {number:.4f}" for name, number in value.items())
+    return f"{value:.4f}"
+
+
+def show_cycles(cycles: list[dict[str, Any]]) -> None:
+    """Secant stiffness, dissipated energy and equivalent damping of every cycle."""
+    from report.text.terminal import table
+
+    rows = [["cycle", "amplitude, mm", "secant, N/m", "area, J", "equivalent damping, %"]]
+    rows += [
+        [
+            str(number),
+            f"{cycle['amplitude'] * 1e3:.3f}",
+            f"{cycle['stiffness']:.5g}",
+            f"{cycle['area']:.3f}",
+            f"{cycle['damping_ratio'] * 100:.3f}",
+        ]
+        for number, cycle in enumerate(cycles, 1)
+    ]
+    sys.stdout.write("\n")
+    table(rows)

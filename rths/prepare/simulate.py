@@ -1,0 +1,169 @@
+"""`rths simulate`: the closed loop of nominal models, without laboratories or network."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TextIO
+
+from common.errors import InterlockError
+from common.plan.plan import Plan, ideal
+from common.plan.tables import Compensator, Control
+from common.terminal import cli, outputs
+from common.terminal.telling import Tell
+from report.text.progress import Progress
+
+if TYPE_CHECKING:
+    from models.loop.closed_loop import Rollout
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of `simulate`."""
+    cli.plan_arguments(parser)
+    parser.add_argument(
+        "--ideal", action="store_true", help="transfer systems that follow at once, no compensation"
+    )
+    parser.add_argument("--uncompensated", action="store_true", help="the actuator without compensation")
+    parser.add_argument("--no-amd", action="store_true", help="the building without the damper")
+    parser.add_argument("--noise", action="store_true", help="with the sensors' noise, from the plan's seed")
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help="write the simulation as a recording"
+    )
+    cli.force_argument(parser)
+    cli.json_argument(parser, "write the summary as JSON on standard output")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Simulate; 1 where the loop left the plan's limits."""
+    plan = adapted(cli.load_plan(args), args)
+    if args.output:
+        outputs.checked(args.output, args.force, [cli.plan_path(args.plan)])
+    with Progress("simulating") as progress:
+        from models.loop import substructure
+
+        motion = substructure.motion(plan)
+        columns, beyond_limit = (
+            played(plan, args, progress.tell) if plan.slaves else rolled_out(plan, motion, args)
+        )
+    summary = summarize(plan, columns, beyond_limit) | {"ground_motion": motion.describe()}
+    if args.output:
+        summary["file"] = str(args.output)
+    stream = outputs.aside(args.output)
+    if args.json:
+        stream.write(json.dumps(summary) + "\n")
+    else:
+        show(plan, summary, stream)
+    return 1 if summary["beyond_limit"] else 0
+
+
+def rolled_out(plan: Plan, motion: Any, args: argparse.Namespace) -> tuple[dict[str, Any], str]:
+    """Signals of the compiled rollout, written where a file is wanted; the first value beyond the plan's limits."""
+    from models.loop import substructure
+    from models.loop.closed_loop import signals, simulate
+
+    ground = substructure.ground_rows(plan, motion)
+    rollout = simulate(plan, ground, seed=plan.test.seed if args.noise else None)
+    if args.output:
+        with outputs.writing(args.output, args.force) as path:
+            write(path, plan, rollout, motion, ground)
+    columns = signals(plan, rollout)
+    return columns, beyond(plan, columns, rollout.ticks)
+
+
+def played(plan: Plan, args: argparse.Namespace, tell: Tell) -> tuple[dict[str, Any], str]:
+    """The same of several slaves: the loops themselves in virtual time, which a limit stops."""
+    from simulation.source import recorded
+    from simulation.virtual import simulated
+
+    place = outputs.writing(args.output, args.force) if args.output else contextlib.nullcontext()
+    with place as path:
+        found, error = simulated(plan, path, noise=args.noise, tell=tell)
+    if error is not None and not isinstance(error, InterlockError):
+        raise error
+    return recorded(found).signals, str(error or "")
+
+
+def adapted(plan: Plan, args: argparse.Namespace) -> Plan:
+    """The plan with the options' changes."""
+    if args.ideal:
+        plan = ideal(plan)
+    if args.uncompensated:
+        plan = replace(plan, compensator=Compensator("none", {}))
+    if args.no_amd:
+        plan = plan.everywhere(control=Control(amd=False, gain=plan.control.gain))
+    return plan
+
+
+def summarize(plan: Plan, columns: dict[str, Any], beyond_limit: str) -> dict[str, Any]:
+    """Peaks, drift of the specimen's storey, and a sentence on the first value beyond a limit."""
+    import numpy as np
+
+    from common import signals
+
+    peaks = {}
+    for name, values in columns.items():
+        base = name.rpartition(".")[2]
+        row = signals.signal(signals.topic_of(base), base)
+        if row.unit not in ("", "s") and values.size:
+            peaks[name] = {"peak": float(np.max(np.abs(values))), "unit": row.unit}
+    drift = columns["column_target"] / plan.column.deformation_ratio
+    return {
+        "test": plan.test.name,
+        "ticks": len(columns["t"]),
+        "peak_drift": float(np.max(np.abs(drift), initial=0.0)),
+        "peaks": peaks,
+        "beyond_limit": beyond_limit,
+    }
+
+
+def beyond(plan: Plan, columns: dict[str, Any], ticks: int) -> str:
+    """A sentence on the first value beyond a limit of the plan, empty where there is none."""
+    import numpy as np
+
+    from models.loop import limited
+
+    first = (ticks, "")
+    for name, values in limited.magnitudes(plan, columns).items() if ticks else ():
+        most = getattr(plan.limits, name)
+        over = np.flatnonzero(~(values <= most))
+        if over.size and over[0] < first[0]:
+            t = over[0] * plan.test.interval
+            first = (
+                int(over[0]),
+                f"{name} is beyond its limit of {most:g} from t = {t:.3f} s on: the loop is unstable.",
+            )
+    if not first[1] and ticks < plan.ticks:
+        return f"the loop diverges: no finite number after t = {ticks * plan.test.interval:.3f} s."
+    return first[1]
+
+
+def show(plan: Plan, summary: dict[str, Any], stream: TextIO) -> None:
+    """The summary as text."""
+    from report.text.formats import reading
+    from report.text.terminal import table
+
+    stream.write(f"simulation of '{plan.test.name}', {summary['ticks']} ticks of {plan.test.interval:g} s\n")
+    stream.write(f"ground motion: {summary['ground_motion']}, scaled by {plan.ground_motion.scale:g}\n\n")
+    rows = [["signal", "peak"]]
+    rows += [[name, reading(facts["peak"], facts["unit"])] for name, facts in summary["peaks"].items()]
+    table(rows, stream)
+    stream.write(f"peak drift of the specimen's storey: {reading(summary['peak_drift'], 'm')}\n")
+    if summary["beyond_limit"]:
+        stream.write(summary["beyond_limit"][0].upper() + summary["beyond_limit"][1:] + "\n")
+    if "file" in summary:
+        stream.write(f"written to {summary['file']}\n")
+
+
+def write(path: Path, plan: Plan, rollout: Rollout, motion: Any, ground: Any) -> None:
+    """The simulation as a recording: the master's and the slave's topics."""
+    from models.loop.closed_loop import rows
+    from recorder import files
+
+    recording = files.begin(path, plan, motion, ground)
+    for topic, values in rows(plan, rollout):
+        at = plan.tick_ns(values[0])
+        recording.add(topic, at, at, values)
+    recording.close({"outcome": "simulation", "cause": "simulation of the nominal models"})

@@ -1,0 +1,1 @@
+"""Commands that check rths itself: blind trial, drawn faults, the public benchmark, the seed paper."""

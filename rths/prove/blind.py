@@ -1,0 +1,192 @@
+"""`rths blind`: the diagnosis on cases whose effect is withheld, scored."""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import json
+import sys
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from common.errors import InputError
+from common.terminal import cli, outputs
+from common.terminal.telling import Tell
+from report.text.progress import Progress
+from validation.blind.worker import DIAGNOSIS
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from validation.blind.draw import Case
+    from validation.blind.measures import Measure
+    from validation.blind.record import Recorded
+    from validation.blind.scoring import Outcome
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of `blind`."""
+    which = parser.add_argument_group("cases")
+    which.add_argument("--cases", type=int, default=300, metavar="N", help="how many (default: 300)")
+    which.add_argument(
+        "--set",
+        choices=("judge", "tune"),
+        default="judge",
+        help="judge: for judging only (default); tune: where thresholds are set",
+    )
+    which.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the set (default: 1)")
+    which.add_argument(
+        "--only", type=words, default=[], metavar="KIND,…", help="catalogue, formula, unknown, pair or clean"
+    )
+    which.add_argument("--effects", type=words, default=[], metavar="NAME,…", help="cases with these effects")
+    which.add_argument(
+        "--duration", type=float, default=30.0, metavar="S", help="length of each test (default: 30)"
+    )
+    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="processes; -1: all processors")
+    parser.add_argument(
+        "--dask", default="", metavar="ADDRESS", help="diagnose on a Dask cluster, same file system"
+    )
+    parser.add_argument(
+        "--diagnosis",
+        default=DIAGNOSIS,
+        metavar="MODULE:FUNCTION",
+        help="judge another diagnosis: a function from a recording's path to a report",
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        default=Path("runs/blind"),
+        metavar="FOLDER",
+        help="where the page and the results go (default: runs/blind)",
+    )
+    parser.add_argument("--keep", action="store_true", help="keep recordings, plans and realities there too")
+    cli.force_argument(parser)
+    cli.json_argument(parser, "write the results as JSON on standard output")
+
+
+def words(text: str) -> list[str]:
+    """A comma-separated list."""
+    return [word.strip() for word in text.split(",") if word.strip()]
+
+
+def run(args: argparse.Namespace) -> int:
+    """Draw, record, diagnose, score; 1 where a goal is missed, which a few cases cannot show."""
+    from validation.blind.draw import draw
+    from validation.blind.measures import measures
+    from validation.blind.scoring import judge_all
+
+    check(args)
+    cases = draw(
+        args.cases, args.seed, args.set, duration=args.duration, only=args.only, effects=args.effects
+    )
+    about = (
+        f"{len(cases)} cases of the set '{args.set}', seed {args.seed}, {args.duration:g} s each, "
+        f"{', '.join(args.only) or 'all kinds'}; diagnosis {args.diagnosis}."
+    )
+    with (
+        outputs.folder(args.output, args.force) as folder,
+        tempfile.TemporaryDirectory(prefix="rths-recordings-") as place,
+        Progress("blind trial") as progress,
+    ):
+        recorded = record_cases(cases, Path(place), args.jobs, progress.tell)
+        answers = diagnose_cases(Path(place), len(cases), args, progress.tell)
+        outcomes = judge_all(cases, recorded, answers)
+        if args.keep:
+            keep(cases, recorded, Path(place), folder)
+        found = write(folder, outcomes, about)
+    if args.json:
+        sys.stdout.write(json.dumps(found) + "\n")
+    else:
+        show(measures(outcomes), outcomes)
+        sys.stdout.write(f"page: {folder / 'index.html'}\n")
+    return 1 if any(item.passed is False for item in measures(outcomes)) else 0
+
+
+def check(args: argparse.Namespace) -> None:
+    """Raise InputError for values out of range and for missing parts, before any work is done."""
+    from validation.blind.judge import diagnose_all
+    from validation.spread import needed
+
+    for name, value, fits, wanted in (
+        ("--cases", args.cases, args.cases >= 1, "at least 1"),
+        ("--seed", args.seed, args.seed >= 0, "at least 0"),
+        ("--duration", args.duration, 1.0 <= args.duration <= 600.0, "between 1 and 600 s"),
+        ("--jobs", args.jobs, args.jobs >= 1 or args.jobs == -1, "at least 1, or -1 for all processors"),
+    ):
+        if not fits:
+            raise InputError(f"{name} is {value}, but must be {wanted}.")
+    if args.jobs != 1:
+        needed("joblib", "--jobs")
+    if args.dask:
+        needed("joblib", "--dask")
+        needed("dask.distributed", "--dask")
+    if args.diagnosis != DIAGNOSIS:
+        with tempfile.TemporaryDirectory(prefix="rths-nothing-") as folder:
+            diagnose_all(Path(folder), diagnosis=args.diagnosis)
+
+
+def record_cases(cases: Sequence[Case], folder: Path, jobs: int, tell: Tell) -> dict[int, Recorded]:
+    """Recordings by the number of the case."""
+    from validation.blind.record import record_all
+
+    recorded: dict[int, Recorded] = {}
+    tell("recorded", 0, len(cases))
+    for item in record_all(cases, folder, jobs):
+        recorded[item.index] = item
+        tell("recorded", len(recorded), len(cases))
+    return recorded
+
+
+def diagnose_cases(folder: Path, total: int, args: argparse.Namespace, tell: Tell) -> dict[str, Any]:
+    """Answers by the name of the recording."""
+    from validation.blind.judge import diagnose_all
+
+    count = itertools.count(1)
+    tell("diagnosed", 0, total)
+
+    def done(_name: str) -> None:
+        tell("diagnosed", next(count), total)
+
+    return dict(diagnose_all(folder, jobs=args.jobs, dask=args.dask, diagnosis=args.diagnosis, done=done))
+
+
+def keep(cases: Iterable[Case], recorded: dict[int, Recorded], place: Path, folder: Path) -> None:
+    """Recordings, plans and realities of all cases, once every diagnosis is done."""
+    import shutil
+
+    import tomli_w
+
+    for case in cases:
+        kept = folder / f"case-{case.index:05d}"
+        kept.mkdir(exist_ok=True)
+        shutil.copy(place / recorded[case.index].name, kept / "recording.mcap")
+        (kept / "plan.toml").write_text(tomli_w.dumps(case.plan), encoding="utf-8")
+        (kept / "reality.toml").write_text(tomli_w.dumps(case.reality()), encoding="utf-8")
+
+
+def write(folder: Path, outcomes: Sequence[Outcome], about: str) -> dict[str, Any]:
+    """The page and the results in a folder; the results."""
+    from validation.blind.measures import results
+    from validation.blind.page import page
+
+    found = {"version": 1, "about": about, **results(outcomes)}
+    (folder / "index.html").write_text(page(outcomes, about), encoding="utf-8")
+    (folder / "results.json").write_text(json.dumps(found, indent=1), encoding="utf-8")
+    return found
+
+
+def show(table: Sequence[Measure], outcomes: Sequence[Outcome]) -> None:
+    """The measures, then the cases that are not right."""
+    from report.text import terminal
+    from validation.blind.page import hidden, number
+
+    rows = [["measure", "value", "cases", "goal", ""]]
+    rows += [[item.name, item.text, str(item.count), item.goal, item.verdict] for item in table]
+    terminal.table(rows)
+    wrong = [item for item in outcomes if not item.right]
+    sys.stdout.write(f"\n{len(outcomes) - len(wrong)} of {len(outcomes)} cases right\n")
+    for item in wrong:
+        size = f", size {number(item.size)}" if item.truth else ""
+        sys.stdout.write(f"case {item.index} ({item.kind}{size}): {hidden(item)}: {item.why}\n")

@@ -1,0 +1,80 @@
+"""Signals to compare: those of a recording, or of the simulation of a plan."""
+
+from __future__ import annotations
+
+from functools import reduce
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from common.errors import InputError
+from common.plan import plan
+from common.recording.reader import Run, Values, read
+from common.roles import MASTER, name_of
+from common.terminal import cli
+from common.terminal.telling import Tell, untold
+
+OF_THE_TICK = ("seq", "t")
+
+
+class Source(NamedTuple):
+    """What there is to compare: tick numbers, signals by name, and a line on the ground motion.
+
+    The signals of a named slave are called `NAME.signal`.
+    """
+
+    ticks: Values
+    signals: dict[str, Values]
+    motion: str
+
+
+def columns(name: str, tell: Tell = untold) -> Source:
+    """What there is in a recording, or of the simulation of a plan (.toml, or the name of one that ships).
+
+    Raises:
+        InputError: it can be neither read nor simulated.
+    """
+    if name in cli.SHIPPED or name.endswith(".toml"):
+        return simulated(cli.plan_path(name), tell)
+    tell(f"reading {name}", 0, 0)
+    return recorded(read(Path(name)))
+
+
+def simulated(path: Path, tell: Tell = untold) -> Source:
+    """The simulation of a plan."""
+    from models.loop import substructure
+    from models.loop.closed_loop import signals, simulate
+
+    test = plan.load(path)
+    if test.slaves:
+        from simulation.virtual import simulated as played
+
+        return recorded(played(test, tell=tell)[0])
+    record = substructure.motion(test)
+    values = signals(test, simulate(test, substructure.ground_rows(test, record)))
+    ticks = (values["t"] / test.test.interval).round().astype(int)
+    return Source(ticks, values, f"{record.describe()}, scaled by {test.ground_motion.scale!r}")
+
+
+def recorded(run: Run) -> Source:
+    """The signals of a recording on the ticks that master and slaves have in common.
+
+    Raises:
+        InputError: it has neither a master's nor a slave's.
+    """
+    topics = [topic for topic in (MASTER, *run.roles) if run.has(topic)]
+    if not topics:
+        raise InputError(f"{run.path} holds no ticks of a master or a slave to compare.")
+    ticks = reduce(np.intersect1d, (run.sequences[topic] for topic in topics))
+    values: dict[str, Values] = {}
+    for topic in topics:
+        _, _, chosen = np.intersect1d(ticks, run.sequences[topic], return_indices=True)
+        for name, column in run.columns[topic].items():
+            if not name_of(topic):
+                values.setdefault(name, column[chosen])
+            elif name not in OF_THE_TICK:
+                values[f"{name_of(topic)}.{name}"] = column[chosen]
+    motion = run.metadata.get("ground_motion")
+    line = f"{motion['record']}, scaled by {motion['scale']}" if motion else "ground motion not recorded"
+    return Source(ticks, values, line)

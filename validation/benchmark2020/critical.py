@@ -1,0 +1,71 @@
+"""Critical delays of the force: by search for the delay at which the loop stops calming down, and by equation."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from common.plan.plan import Plan, ideal
+from models.loop import column_loop
+from models.registry import Array
+from models.structures.partition import critical_delay_of
+from models.system import Effects, SensorEffects
+from validation.benchmark2020.problem import CASES, EL_CENTRO, Case, planned
+
+LENGTH = 30.0  # s of free vibration after a jerk of the ground
+STEPS = 16  # halvings of the bracket
+SURE, TOO_MUCH = 0.5, 1.5  # of the equation's delay: stable below, unstable above
+
+
+class Critical(NamedTuple):
+    """The delay of the measured force at which a case loses its damping, s."""
+
+    case: int
+    searched: float
+    equation: float
+
+
+def critical_delays() -> list[Critical]:
+    """All cases."""
+    return [critical_delay(case) for case in CASES]
+
+
+def critical_delay(case: Case) -> Critical:
+    """A case's delay by bisection between calming and growing loops, and by the characteristic equation.
+
+    The transfer system is ideal and the sensors are free of noise. A force held over a step acts half an interval
+    late on average: that much is added to the delay of the force that was searched for.
+    """
+    plan = still(case)
+    equation = critical_delay_of(plan)
+    below, above = SURE * equation, TOO_MUCH * equation
+    for _ in range(STEPS):
+        middle = 0.5 * (below + above)
+        if growing(plan, middle):
+            above = middle
+        else:
+            below = middle
+    return Critical(case.number, 0.5 * (below + above) + 0.5 * plan.test.interval, equation)
+
+
+def still(case: Case) -> Plan:
+    """The case with an ideal transfer system and no delay of its own in the path of the force."""
+    plan = ideal(planned(case, EL_CENTRO))  # which has no unit delay of the force either
+    return plan.with_ticks(round(LENGTH / plan.test.interval))
+
+
+def growing(plan: Plan, delay: float) -> bool:
+    """Whether the free vibration with a delay (s) of the force is larger in its last fifth than in the one before."""
+    ground = np.zeros((2, plan.ticks + 1))
+    ground[0, 1] = 1.0
+    effects = Effects(sensors={"column_force": SensorEffects(delay=delay)})
+    rollout = column_loop.simulate(plan, ground, effects=effects)
+    fifth = plan.ticks // 5
+    last, before = rollout.target[-fifth:], rollout.target[-2 * fifth : -fifth]
+    return not rollout.finite or energy(last) > energy(before)
+
+
+def energy(values: Array) -> float:
+    """Sum of squares."""
+    return float(values @ values)

@@ -1,0 +1,182 @@
+"""Everything that the command computes, and how it judges it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple
+
+from common.plan.tables import Compensator
+from common.terminal.telling import Tell
+from report.text.formats import percent
+from validation.benchmark2020.critical import Critical, critical_delays
+from validation.benchmark2020.late_force import SETTING, Late, late_forces
+from validation.benchmark2020.problem import CASES, FORCE, MOTIONS, SETTINGS
+from validation.benchmark2020.published import CRITICAL_DELAYS, TABLE_3
+from validation.benchmark2020.runs import NOMINAL, Result, Stage, on_el_centro, stage, sweep
+
+SAMPLE = "sample"
+CELL, DELAY_CELL = 0.01, 0.3e-3  # by which a cell may differ: a point, s
+NOMINAL_GOAL, PLANTS_GOAL = 0.05, 0.06  # of J4
+CRITICAL_GOAL = 0.01
+JUDGED_DELAY, DELAY_GOAL = 2e-3, 0.2e-3  # s, of the late force
+
+
+class Summary(NamedTuple):
+    """A setting over all its tests; worst values, inf where one is unstable."""
+
+    setting: str
+    kind: str
+    tests: int
+    unstable: int
+    tracking: float  # J2, nominal plants
+    behind: float  # s, the two-sided delay of largest magnitude, nominal plants; nan where one is unstable
+    nominal: float  # J4, nominal plants
+    plants: float  # J4, drawn plants; nan without any
+    force: float  # N, where the reference itself needs no more than the limit
+
+    @property
+    def order(self) -> tuple[float, float, int]:
+        """By which settings stand in tables and pictures, the best first."""
+        return self.nominal, self.plants, self.unstable
+
+    @property
+    def meets(self) -> bool:
+        """Whether it reaches the goals: stable, near the reference on plants drawn too, within the limit of force."""
+        near = self.nominal <= NOMINAL_GOAL and self.plants <= PLANTS_GOAL
+        return not self.unstable and near and self.force <= FORCE
+
+
+class Check(NamedTuple):
+    """One goal: what was found, what is wanted."""
+
+    name: str
+    value: str
+    goal: str
+    passed: bool
+
+
+class Evidence(NamedTuple):
+    """What the tables, the page and the verdict are made of."""
+
+    plants: int
+    seed: int
+    stages: list[Stage]
+    results: list[Result]
+    summaries: list[Summary]
+    late: list[Late]
+    critical: list[Critical]
+
+
+def gather(settings: Mapping[str, Compensator], plants: int, seed: int, jobs: int, tell: Tell) -> Evidence:
+    """All tests of the benchmark, `jobs` at a time."""
+    tell("critical delays", 0, 0)
+    critical = critical_delays()
+    stages = []
+    for place, (case, motion) in enumerate((case, motion) for motion in MOTIONS for case in CASES):
+        tell("references", place, len(CASES) * len(MOTIONS))
+        stages.append(stage(case, motion, plants, seed))
+    late = late_forces(stages, tell)
+    results = sweep(stages, settings, jobs, tell, len(stages) * (1 + plants) * len(settings))
+    summaries = [
+        summary(name, chosen.kind, [item for item in results if item.setting == name], stages)
+        for name, chosen in settings.items()
+    ]
+    return Evidence(plants, seed, stages, results, summaries, late, critical)
+
+
+def summary(name: str, kind: str, results: list[Result], stages: Iterable[Stage]) -> Summary:
+    """The worst of a setting's tests."""
+    needed = {
+        (on.case.number, on.motion.title, plant): force
+        for on in stages
+        for plant, force in enumerate(on.needed)
+    }
+    nominal = [item for item in results if item.plant == NOMINAL]
+    drawn = [item for item in results if item.plant != NOMINAL]
+    within = [item for item in results if needed[item.case, item.motion, item.plant] <= FORCE]
+    stable = all(item.stable for item in nominal)
+    return Summary(
+        name,
+        kind,
+        len(results),
+        sum(not item.stable for item in results),
+        max(item.found.j2 if item.found else math.inf for item in nominal),
+        max((item.two_sided for item in nominal), key=abs) if stable else math.nan,
+        max(item.j4 for item in nominal),
+        max((item.j4 for item in drawn), default=math.nan),
+        max((item.force for item in within), default=math.nan),
+    )
+
+
+def checks(evidence: Evidence) -> list[Check]:
+    """The goals that the tests made can be held to."""
+    found = [critical_check(evidence.critical), late_check(evidence.late)]
+    if cells := sample_cells(evidence):
+        met = sum(abs(difference) <= most for difference, most in cells)
+        found.insert(
+            0,
+            Check(
+                "cells of Table 3 within 1 point, J1 within 0.3 ms",
+                f"{met} of {len(cells)}",
+                f"{len(cells)} of {len(cells)}",
+                met == len(cells),
+            ),
+        )
+    if evidence.plants and {item.setting for item in evidence.summaries} == set(SETTINGS):
+        found.append(compensator_check(evidence.summaries))
+    return found
+
+
+def compensator_check(summaries: list[Summary]) -> Check:
+    """One compensator at least reaches all goals; for all settings together, not for a choice of them."""
+    best = [item.setting for item in summaries if item.meets]
+    return Check(
+        f"a compensator with J4 ≤ {percent(NOMINAL_GOAL)} in all cases and motions, "
+        f"≤ {percent(PLANTS_GOAL)} on every plant, "
+        f"none unstable, force ≤ {FORCE:g} N where the reference's is",
+        ", ".join(best) or "none",
+        "at least one",
+        bool(best),
+    )
+
+
+def sample_cells(evidence: Evidence) -> list[tuple[float, float]]:
+    """Deviation from Table 3 and the largest that is allowed, cell by cell; empty without the sample controller."""
+    return [
+        (ours - theirs, CELL if place else DELAY_CELL)
+        for item in on_el_centro(evidence.results, SAMPLE)
+        for place, (ours, theirs) in enumerate(
+            zip(item.found or [math.inf] * 9, TABLE_3[item.case], strict=True)
+        )
+    ]
+
+
+def critical_check(found: list[Critical]) -> Check:
+    """Search, equation and the published delays agree."""
+    worst = max(
+        abs(value / CRITICAL_DELAYS[item.case] - 1.0)
+        for item in found
+        for value in (item.searched, item.equation)
+    )
+    return Check(
+        "critical delays of the force as published",
+        f"within {percent(worst)}",
+        f"within {percent(CRITICAL_GOAL)}",
+        worst <= CRITICAL_GOAL,
+    )
+
+
+def late_check(found: list[Late]) -> Check:
+    """The indicator sees the late force that J1 does not."""
+    judged = [item for item in found if item.delay == JUDGED_DELAY]
+    seen = [item.path.delay for item in judged if item.path]
+    quiet = all(item.result.found and item.result.found.j1 == 0.0 for item in judged)
+    near = len(seen) == len(judged) and all(abs(value - JUDGED_DELAY) <= DELAY_GOAL for value in seen)
+    read = ", ".join(f"{value * 1e3:.2f}" for value in seen) or "nothing"
+    return Check(
+        f"a force {JUDGED_DELAY * 1e3:g} ms late ({SETTING}): J1 reads 0, the indicator of the force's path that delay",
+        f"J1 {'0' if quiet else 'not 0'}, force path {read} ms",
+        f"J1 0, force path within {DELAY_GOAL * 1e3:g} ms",
+        quiet and near,
+    )

@@ -1,0 +1,168 @@
+"""Tests of the benchmark, many at once: every setting on every case, motion and plant."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import NamedTuple
+
+from threadpoolctl import threadpool_limits
+
+from common.plan.plan import Plan
+from common.plan.tables import Compensator
+from common.terminal.telling import Tell, untold
+from models import indicators
+from models.labs import noise, specimen
+from models.loop import column_loop, substructure
+from models.registry import Array
+from models.structures import response
+from models.system import Effects
+from validation.benchmark2020.criteria import Criteria, criteria, near, peak, rms
+from validation.benchmark2020.problem import (
+    EL_CENTRO,
+    Case,
+    Motion,
+    draw,
+    planned,
+    with_compensator,
+    with_plant,
+)
+
+RUNAWAY, ASTRAY = 10.0, 100.0  # times the reference's peak: targets and commands beyond are of unstable loops
+NOMINAL = 0  # the plant of the plan; 1, 2, … are drawn about it
+LEAD_MOST = 0.05  # s, of the two-sided delay
+
+
+class Stage(NamedTuple):
+    """What all tests of one case under one motion share."""
+
+    case: Case
+    motion: Motion
+    plants: Sequence[Plan]  # the nominal one first; with the sample controller
+    ground: Array
+    reference: Array  # (ticks, floors) m: the whole building computed
+    noise: Array  # (ticks, 2) of the readings
+    needed: Sequence[float]  # N, largest force that the reference's motion asks of each plant's specimen
+
+
+class Result(NamedTuple):
+    """One test: how near the reference it came, and the peaks that have limits; inf where the loop is unstable."""
+
+    setting: str
+    case: int
+    motion: str
+    plant: int
+    stable: bool
+    j4: float  # rms error of floor 1 as measured, over the reference's rms
+    found: Criteria | None  # of stable tests on the nominal plant
+    two_sided: float  # s, delay by correlation with either sign; nan without `found`
+    noise_floor: float  # J2 of the displacement sensor's noise alone; nan without `found`
+    force: float  # N, largest
+    stroke: float  # m, largest
+
+
+def stage(case: Case, motion: Motion, plants: int, seed: int) -> Stage:
+    """A case under a motion, its reference computed, its plants and its noise drawn."""
+    plan = planned(case, motion)
+    ground = substructure.ground_rows(plan, substructure.motion(plan))
+    levels = noise.levels_a(plan.sensors)
+    rows = noise.Noise(noise.lab_seed(plan.test.seed, noise.LAB_A), levels).rows(plan.ticks)
+    others = [with_plant(plan, plant) for plant in draw(plan, plants, seed)]
+    reference = response.response(plan, ground)
+    first = reference[:, plan.column.storey - 1]
+    all_plants = [plan, *others]
+    needed = [peak(specimen_force(one, first)) for one in all_plants]
+    return Stage(case, motion, all_plants, ground, reference, rows, needed)
+
+
+def specimen_force(plan: Plan, displacement: Array) -> Array:
+    """Force (n,) N of the linear specimen under a displacement (n,) m, by central differences."""
+    column = plan.column
+    return specimen.with_rates(column, column.stiffness * displacement, displacement, plan.test.interval)
+
+
+def play(
+    on: Stage, setting: str, chosen: Plan, plant: int = NOMINAL, effects: Effects | None = None
+) -> tuple[Result, column_loop.ColumnRollout]:
+    """One test on a stage, with the plan that has its plant and compensator."""
+    first = on.reference[:, chosen.column.storey - 1]
+    rollout = column_loop.simulate(
+        chosen, on.ground, effects=effects, noise=on.noise, farthest=ASTRAY * peak(first)
+    )
+    target, measured = rollout.target, rollout.displacement
+    if not rollout.finite or peak(target) > RUNAWAY * peak(first):
+        return unstable(on, setting, plant), rollout
+    nominal, interval = plant == NOMINAL, chosen.test.interval
+    result = Result(
+        setting,
+        on.case.number,
+        on.motion.title,
+        plant,
+        True,
+        near(measured, first),
+        criteria(target, measured, rollout.floors, on.reference, interval) if nominal else None,
+        indicators.correlation_delay(target, measured, interval, LEAD_MOST) if nominal else math.nan,
+        chosen.sensors.column_displacement / rms(target) if nominal else math.nan,
+        peak(rollout.force),
+        peak(measured),
+    )
+    return result, rollout
+
+
+def unstable(on: Stage, setting: str, plant: int) -> Result:
+    """The result of an unstable loop."""
+    none, worst = math.nan, math.inf
+    return Result(
+        setting,
+        on.case.number,
+        on.motion.title,
+        plant,
+        False,
+        worst,
+        None,
+        none,
+        none,
+        worst,
+        worst,
+    )
+
+
+def sweep(
+    stages: Iterable[Stage],
+    settings: Mapping[str, Compensator],
+    jobs: int,
+    tell: Tell = untold,
+    total: int = 0,
+) -> list[Result]:
+    """Every setting on every plant of every stage, `jobs` at once: kernels release the interpreter's lock."""
+    results: list[Result] = []
+    with threadpool_limits(1), ThreadPoolExecutor(jobs) as pool:
+        for on in stages:
+            tests = [(name, plant) for plant in range(len(on.plants)) for name in settings]
+            for result in pool.map(one_of(on, settings), tests):
+                results.append(result)
+                tell("tests", len(results), total)
+    return results
+
+
+def one_of(on: Stage, settings: Mapping[str, Compensator]) -> Callable[[tuple[str, int]], Result]:
+    """What plays a setting by name on a plant by number."""
+
+    def test(asked: tuple[str, int]) -> Result:
+        name, plant = asked
+        return play(on, name, with_compensator(on.plants[plant], settings[name]), plant)[0]
+
+    return test
+
+
+def on_el_centro(results: Iterable[Result], setting: str) -> list[Result]:
+    """The nominal tests of a setting under the motion of Table 3, by case."""
+    return sorted(
+        (
+            item
+            for item in results
+            if (item.setting, item.motion, item.plant) == (setting, EL_CENTRO.title, NOMINAL)
+        ),
+        key=lambda item: item.case,
+    )

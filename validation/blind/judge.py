@@ -1,0 +1,100 @@
+"""Diagnoses by another process, which is given a folder of recordings and nothing else."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from common.errors import InputError
+from validation.blind.worker import DIAGNOSIS
+
+HOME = Path(__file__).resolve().parents[2]
+KEPT = ("PATH", "HOME", "LANG", "LC_ALL", "TMPDIR", "NUMBA_CACHE_DIR", "SYSTEMROOT")
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+class Answer(NamedTuple):
+    """What a diagnosis said of one recording, and how long it took."""
+
+    report: dict[str, Any]
+    seconds: float
+
+
+GRACE = 3.0  # s, in which an interrupted process may end those that it started
+NONE = Answer({"status": "error", "error": "the diagnosis gave no answer"}, float("nan"))
+
+
+def diagnose_all(
+    folder: Path,
+    *,
+    jobs: int = 1,
+    dask: str = "",
+    diagnosis: str = DIAGNOSIS,
+    done: Callable[[str], None] = lambda _name: None,
+) -> dict[str, Answer]:
+    """Answers by the name of the recording; `done` hears of every one that is finished.
+
+    Raises:
+        InputError: the process could not do its work.
+    """
+    with tempfile.TemporaryDirectory(prefix="rths-blind-") as place:
+        out = Path(place) / "reports"
+        words = [str(folder), str(out), "--jobs", str(jobs), "--diagnosis", diagnosis]
+        words += ["--dask", dask] if dask else []
+        _work(words, Path(place), jobs, done)
+        return {f"{path.stem}.mcap": _answer(path) for path in sorted(out.glob("*.json"))}
+
+
+def _work(words: list[str], place: Path, jobs: int, done: Callable[[str], None]) -> None:
+    complaints = place / "complaints.txt"
+    with complaints.open("w") as stream:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "validation.blind.worker", *words],
+            cwd=place,
+            env=environment(jobs),
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=stream,
+            text=True,
+        )
+        with process:
+            assert process.stdout is not None  # noqa: S101 - it is a pipe
+            try:
+                for line in process.stdout:
+                    done(line.strip())
+            except BaseException:
+                _end(process)
+                raise
+    if process.returncode:
+        said = complaints.read_text(encoding="utf-8").strip().splitlines() or ["it ended without a word"]
+        raise InputError(f"The process that diagnoses failed: {said[-1].removeprefix('rths: ')}")
+
+
+def _end(process: subprocess.Popen[str]) -> None:
+    """End the process with those that it started; Ctrl-C on a terminal has told it already."""
+    for word in (None, signal.SIGINT, signal.SIGKILL):
+        if word is not None:
+            process.send_signal(word)
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(GRACE)
+            return
+
+
+def environment(jobs: int) -> dict[str, str]:
+    """What the diagnosing process may know of this one's environment: where programs are, no more."""
+    kept = {name: os.environ[name] for name in KEPT if name in os.environ}
+    threads = dict.fromkeys(THREADS, "1") if jobs != 1 else {}
+    return kept | threads | {"PYTHONPATH": str(HOME), "PYTHONHASHSEED": "0"}
+
+
+def _answer(path: Path) -> Answer:
+    data = json.loads(path.read_text(encoding="utf-8"))
+    return Answer(data["report"], float(data["seconds"]))

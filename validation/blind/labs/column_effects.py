@@ -1,0 +1,162 @@
+"""The effects that the independent laboratory A knows, on its values by the kernels' names."""
+
+from __future__ import annotations
+
+from validation.blind.labs.laying import PLAIN, Entry, Values
+from validation.blind.labs.parts import delay, friction, specimen, valve, yielding
+
+
+def servo_delay(values: Values, *, delay: float) -> None:
+    """Dead time beside the plan's; a rational approximation takes what is added, or all that is left."""
+    lengthen(values, delay)
+
+
+def lengthen(values: Values, more: float) -> None:
+    """Change the dead time `delay` by `more` s; the part in `pade` is approximated."""
+    total = max(values["delay"] + more, 0.0)
+    approximated = more if more > 0.0 else total
+    if more != 0.0 and approximated >= delay.SHORTEST:
+        values["pade"], values["delay"] = approximated, total - approximated
+    else:
+        values["delay"] = total
+
+
+def time_constant(values: Values, *, factor: float) -> None:
+    """Slower or faster servo loop: `factor·T`."""
+    values["time_constant"] *= factor
+
+
+def servo_gain(values: Values, *, factor: float) -> None:
+    """Calibration of the servo loop: `factor·K`."""
+    values["gain"] *= factor
+
+
+def velocity_limit(values: Values, *, velocity: float) -> None:
+    """Highest speed of the piston."""
+    values["velocity_limit"] = velocity
+
+
+def backlash(values: Values, *, width: float) -> None:
+    """Whole play of the clevis."""
+    values["backlash"] = width
+
+
+def compliance(values: Values, *, compliance: float) -> None:
+    """Displacement that the load takes, m/N."""
+    values["compliance"] = compliance
+
+
+def deadband(values: Values, *, width: float) -> None:
+    """Whole dead band of the valve, on the loop's error."""
+    values["deadband"] = width
+
+
+def stiffness(values: Values, *, factor: float) -> None:
+    """Softer or stiffer: `factor·k`."""
+    values["stiffness"] *= factor
+
+
+def yields(
+    values: Values, *, yield_displacement: float, hardening: float = 0.05, exponent: float = 2.0
+) -> None:
+    """Yielding from a deformation on; the exponent is how sharply, where the formula is smooth."""
+    values |= {"yield_displacement": yield_displacement, "hardening": hardening, "sharpness": exponent}
+
+
+def degradation(values: Values, *, rate: float) -> None:
+    """Share of the stiffness lost in the end."""
+    values["degradation"] = rate
+
+
+def pinching(values: Values, *, factor: float, hardening: float = 0.0, width: float = 1e-3) -> None:
+    """Share of the force missing at the origin, share added far out, m between the two."""
+    values |= {"pinched": factor, "pinched_hardening": hardening, "pinched_width": width}
+
+
+def rubbing(values: Values, *, force: float, presliding: float = 1e-5) -> None:
+    """Coulomb friction, and the deflection of the contact where the formula has bristles."""
+    values |= {"friction": force, "presliding": presliding}
+
+
+def viscous(values: Values, *, coefficient: float) -> None:
+    """Coefficient of the rate-dependent force at 20 mm/s."""
+    values["viscous"] = coefficient
+
+
+def inertia(values: Values, *, mass: float) -> None:
+    """Mass between specimen and load cell."""
+    values["inertia"] = mass
+
+
+def slip(values: Values, *, gap: float) -> None:
+    """Whole gap without force."""
+    values["slip"] = gap
+
+
+def ripple(values: Values, *, amplitude: float, frequency: float) -> None:
+    """Pulsation of the pump: the oil flow swings so that the piston does by `amplitude`."""
+    values |= {"ripple": amplitude, "ripple_frequency": frequency}
+
+
+def droop(values: Values, *, loss: float) -> None:
+    """Share of the flow gain lost while the accumulator is empty."""
+    values["droop"] = loss
+
+
+def valve_hysteresis(values: Values, *, width: float) -> None:
+    """Whole play of a spool that rubs, on the loop's error."""
+    values["hysteresis"] = width
+
+
+def hardening(values: Values, *, stiffness: float) -> None:
+    """Cubic force `stiffness·δ³`, N/m³."""
+    values["cubic"] = stiffness
+
+
+def creep(values: Values, *, share: float, relaxation_time: float) -> None:
+    """Maxwell element beside the column: its stiffness over k, its time constant."""
+    values |= {"creep": share, "relaxation": relaxation_time}
+
+
+def asymmetry(values: Values, *, share: float) -> None:
+    """Stiffness `k·(1 ± share)` against positive and negative deformation."""
+    values["asymmetry"] = share
+
+
+KNOWN = {
+    "actuator.delay": Entry(servo_delay, {"pade": 0}),
+    "actuator.time_constant": Entry(time_constant, PLAIN),
+    "actuator.gain": Entry(servo_gain, PLAIN),
+    "actuator.velocity_limit": Entry(
+        velocity_limit, {"smooth": valve.SMOOTH, "orifice": valve.ORIFICE}, "limiting"
+    ),
+    "actuator.backlash": Entry(backlash, {"spring": 0}),
+    "actuator.compliance": Entry(compliance, {"oil_column": 0}),
+    "actuator.deadband": Entry(deadband, {"smooth": 0}),
+    "column.stiffness": Entry(stiffness, PLAIN),
+    "column.yielding": Entry(
+        yields,
+        {
+            "menegotto_pinto": yielding.MENEGOTTO_PINTO,
+            "takeda": yielding.TAKEDA,
+            "ramberg_osgood": yielding.RAMBERG_OSGOOD,
+        },
+        "yielding",
+    ),
+    "column.degradation": Entry(
+        degradation, {"exponential": specimen.EXPONENTIAL, "linear": specimen.LINEAR}, "degrading"
+    ),
+    "column.pinching": Entry(pinching, {"lorentz": specimen.LORENTZ, "sech": specimen.SECH}, "pinching"),
+    "column.friction": Entry(
+        rubbing, {"tanh": friction.TANH, "dahl": friction.DAHL, "lugre": friction.LUGRE}, "rubbing"
+    ),
+    "column.viscous": Entry(viscous, {"power": 0}),
+    "column.inertia": Entry(inertia, PLAIN),
+    "column.slip": Entry(slip, {"smooth": 0}),
+    "x.actuator.ripple": Entry(ripple, PLAIN),
+    "x.actuator.droop": Entry(droop, PLAIN),
+    "x.actuator.valve_hysteresis": Entry(valve_hysteresis, PLAIN),
+    "x.column.hardening": Entry(hardening, PLAIN),
+    "x.column.creep": Entry(creep, PLAIN),
+    "x.column.asymmetry": Entry(asymmetry, PLAIN),
+}

@@ -1,0 +1,132 @@
+"""Laboratory A in short steps: servo loop of first order, clevis, column; classical Runge-Kutta.
+
+T·ẏ = K·u(t − L) − y
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from validation.blind.labs.parts import delay, filters, specimen, valve
+from validation.blind.labs.parts.compiled import Array, jit
+from validation.blind.labs.parts.specimen import Specimen
+
+CONTACT = 1e4  # stiffness of the clevis over the specimen's
+GREASE = 5e-3  # s, dashpot of the clevis over the specimen's stiffness
+
+# places in `state`
+COMMAND, PISTON, SPOOL, USED, TIME, DEFORMATION, FORCE, READING = range(8)
+STATE = 8
+
+
+class Servo(NamedTuple):
+    """True parameters of the actuator; zero is none of an effect."""
+
+    step: float  # s
+    steps: float  # of an interval
+    gain: float
+    delay: float  # s
+    time_constant: float  # s
+    pade: float = 0.0  # s, dead time that is approximated
+    limiting: float = 0.0  # formula
+    velocity_limit: float = 1.0  # m/s
+    backlash: float = 0.0  # m
+    compliance: float = 0.0  # m/N
+    deadband: float = 0.0  # m
+    hysteresis: float = 0.0  # m
+    droop: float = 0.0  # share of the flow gain
+    ripple: float = 0.0  # m
+    ripple_frequency: float = 10.0  # Hz
+
+
+@jit
+def velocity(p: Servo, stiffness: float, state: Array, wanted: float, piston: float, time: float) -> float:
+    """Velocity (m/s) of the piston at `piston` m under the command `wanted` m.
+
+    The load follows the specimen's first stiffness within a step. It takes the place of an error of the
+    loop where the oil column yields: `T·ẏ = K·u − y − c·f` (Merritt, Hydraulic Control Systems, Wiley 1967).
+    """
+    load = state[FORCE] + stiffness * (piston - state[PISTON])
+    error = p.gain * wanted - piston - p.compliance * load
+    error = valve.spool(state[SPOOL], error, p.hysteresis)
+    free = valve.overlap(error, p.deadband) / p.time_constant
+    free *= valve.supplied(p.droop, state[USED])
+    if p.ripple != 0.0:
+        omega = 2.0 * math.pi * p.ripple_frequency
+        free += p.ripple * omega * math.cos(omega * time)
+    return valve.flow(p.limiting, free, p.velocity_limit, load)
+
+
+@jit
+def drive(p: Servo, stiffness: float, state: Array, early: float, middle: float, late: float) -> float:
+    """Place of the piston (m) one step later under a command at its beginning, middle and end."""
+    h, y, t = p.step, state[PISTON], state[TIME]
+    a = velocity(p, stiffness, state, early, y, t)
+    b = velocity(p, stiffness, state, middle, y + 0.5 * h * a, t + 0.5 * h)
+    c = velocity(p, stiffness, state, middle, y + 0.5 * h * b, t + 0.5 * h)
+    d = velocity(p, stiffness, state, late, y + h * c, t + h)
+    moved = h * (a + 2.0 * b + 2.0 * c + d) / 6.0
+    error = p.gain * late - (y + moved) - p.compliance * (state[FORCE] + stiffness * moved)
+    state[SPOOL] = valve.spool(state[SPOOL], error, p.hysteresis)
+    state[USED] = (state[USED] + abs(moved)) / (1.0 + h / valve.REFILL)
+    state[TIME] = t + h
+    return float(y + moved)
+
+
+@jit
+def clevis(p: Servo, stiffness: float, state: Array, piston: float) -> float:
+    """Deformation (m) of the specimen behind a spring with a dead zone and a dashpot, by implicit Euler.
+
+        c·(ẏ − δ̇) + k_c·dead(y − δ, ±w/2) = f(δ)
+
+    M. Nordin, P.-O. Gutman, Controlling mechanical systems with backlash: a survey, Automatica 38 (2002)
+    1633-1649 (dead zone with a damped spring).
+    """
+    rate = stiffness * GREASE / p.step
+    contact = CONTACT * stiffness
+    half = 0.5 * p.backlash
+    before = state[PISTON] - state[DEFORMATION]
+    # with x = y − δ: rate·(x − before) + contact·dead(x) = force + stiffness·(y − x − δ)
+    push = rate * before + state[FORCE] + stiffness * (piston - state[DEFORMATION])
+    x = push / (rate + stiffness)
+    if abs(x) > half:
+        x = (push + math.copysign(contact * half, x)) / (rate + stiffness + contact)
+    return float(piston - x)
+
+
+@jit
+def advance(
+    p: Servo,
+    column: Specimen,
+    lags: Array,
+    state: Array,
+    past: Array,
+    approximation: Array,
+    memory: Array,
+    filtered: Array,
+    command: float,
+) -> tuple[float, float]:
+    """Displacement (m) and force (N) behind their filters one interval later, the command ramped."""
+    start = state[COMMAND]
+    back = p.delay / p.step
+    displacement, force = 0.0, 0.0
+    steps = int(p.steps)
+    late = delay.before(past, back)
+    if p.pade > 0.0:
+        late = delay.pade_output(approximation, p.pade)
+    for i in range(steps):
+        delay.push(past, start + (command - start) * (i + 1) / steps)
+        early, late = late, delay.before(past, back)
+        middle = delay.before(past, back + 0.5)
+        if p.pade > 0.0:
+            late = delay.pade(approximation, p.pade, late, p.step)
+            middle = 0.5 * (early + late)
+        piston = drive(p, column.stiffness, state, early, middle, late)
+        deformation = clevis(p, column.stiffness, state, piston) if p.backlash > 0.0 else piston
+        state[FORCE], state[READING] = specimen.force(column, memory, deformation, p.step)
+        state[PISTON], state[DEFORMATION] = piston, deformation
+        displacement = filters.step_filter(lags[0], filtered[0], deformation, p.step)
+        force = filters.step_filter(lags[1], filtered[1], state[READING], p.step)
+    state[COMMAND] = command
+    return displacement, force

@@ -1,0 +1,121 @@
+"""Laboratory A, written independently of `models`: the truth that the blind trial diagnoses."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from common.errors import InputError
+from common.plan import schema
+from common.plan.tables import Actuator, Column
+from common.plan.tables import Sensors as Levels
+from common.rig import ColumnCommand, ColumnMeasurement
+from validation.blind.labs import column_kernel, laying, sensors
+from validation.blind.labs.column_effects import KNOWN
+from validation.blind.labs.column_kernel import Servo
+from validation.blind.labs.parts import delay, filters, specimen
+from validation.blind.labs.parts.specimen import Specimen
+
+STEP = 0.1e-3  # s, longest
+SIGNALS = ColumnMeasurement._fields
+
+
+class ColumnLab:
+    """Servo loop, clevis and column in short steps; options are tables of true parameters, and effects.
+
+    An effect is `{name, formula, parameters}`; without a formula it is the first that the effect has.
+    """
+
+    def __init__(
+        self,
+        interval: float,
+        seed: int,
+        actuator: Mapping[str, Any] | None = None,
+        column: Mapping[str, Any] | None = None,
+        sensors: Mapping[str, Any] | None = None,
+        effects: Sequence[Mapping[str, Any]] = (),
+    ) -> None:
+        values = true_values(
+            schema.fill(Actuator, actuator or {}, "actuator"), schema.fill(Column, column or {}, "column")
+        )
+        levels = schema.plain(schema.fill(Levels, sensors or {}, "sensors"))
+        self._sensors, self._lags = readings(interval, seed, SIGNALS, levels, values, effects, KNOWN)
+        steps = math.ceil(interval / STEP - 1e-9)
+        values |= {"step": interval / steps, "steps": float(steps)}
+        self._servo = Servo(**{key: values[key] for key in Servo._fields if key in values})
+        self._column = Specimen(**{key: values[key] for key in Specimen._fields if key in values})
+        self._state = np.zeros(column_kernel.STATE)
+        self._past = delay.ring(self._servo.delay, self._servo.step)
+        self._approximation = np.zeros(3)
+        self._memory = np.zeros(specimen.SIZE)
+        self._filtered = np.zeros((len(SIGNALS), 3))
+        self._true: tuple[float, ...] = (0.0, 0.0)
+
+    def arm(self) -> None:
+        """An emulated laboratory is always ready."""
+
+    def read(self) -> ColumnMeasurement:
+        """Readings at the present tick."""
+        return ColumnMeasurement(*self._sensors.read(self._true))
+
+    def write(self, command: ColumnCommand) -> None:
+        """Move on by one interval, ramping to the command."""
+        self._true = column_kernel.advance(
+            self._servo,
+            self._column,
+            self._lags,
+            self._state,
+            self._past,
+            self._approximation,
+            self._memory,
+            self._filtered,
+            float(command[0]),
+        )
+
+    def disarm(self) -> None:
+        """The actuator stays where it is."""
+
+
+def true_values(actuator: Actuator, column: Column) -> laying.Values:
+    """The kernel's values without effects; raises InputError where this laboratory has no such part."""
+    if column.model != "linear":
+        raise InputError(
+            f"the column of this laboratory is linear, not '{column.model}': lay an effect over it."
+        )
+    if column.mass or column.damping:
+        raise InputError(
+            "the column of this laboratory has no mass or damping of its own: lay an effect over it."
+        )
+    if actuator.model != "fopdt" or actuator.command != "ramp":
+        raise InputError(
+            f"this laboratory has the actuator 'fopdt' on a ramped command, not '{actuator.model}' on one that is "
+            f"'{actuator.command}': give those in [actuator]."
+        )
+    if actuator.time_constant <= 0.0:
+        raise InputError("time_constant in [actuator] must be above 0 s in this laboratory.")
+    return {
+        "gain": actuator.gain,
+        "delay": actuator.delay,
+        "time_constant": actuator.time_constant,
+        "stiffness": column.stiffness,
+        "pade": 0.0,
+    }
+
+
+def readings(
+    interval: float,
+    seed: int,
+    names: Sequence[str],
+    levels: Mapping[str, float],
+    values: laying.Values,
+    effects: object,
+    known: Mapping[str, laying.Entry],
+) -> tuple[sensors.Sensors, Any]:
+    """The sensors of a laboratory and their filters; the effects are laid over `values`, too."""
+    values |= sensors.true_values(names, levels)
+    laying.lay(values, laying.check(effects), {**known, **sensors.known(names)})
+    read = sensors.Sensors(names, values, interval, seed)
+    return read, filters.bank(names, read.lags)

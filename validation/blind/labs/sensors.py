@@ -1,0 +1,150 @@
+"""The readings of a laboratory: `gain·value`, saturated, plus bias, drift and noise; held, rounded.
+
+Noise is white, from `default_rng(seed)`; samples get lost by a generator of their own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from validation.blind.labs.laying import PLAIN, Entry, Values
+
+BLOCK = 512  # rows of noise drawn at once
+LAGS = {"butterworth": 2, "first_order": 1}
+
+
+def true_values(names: Sequence[str], levels: Mapping[str, float]) -> Values:
+    """Perfect sensors with the noise given."""
+    values: Values = {}
+    for name in names:
+        perfect = {"noise": levels[name], "gain": 1.0, "bias": 0.0, "drift": 0.0, "step": 0.0}
+        perfect |= {"saturation": 0.0, "missing": 0.0, "lag": 0.0, "order": 0.0, "crosstalk": 0.0}
+        values |= {f"{name}.{key}": value for key, value in perfect.items()}
+    return values
+
+
+def gain(values: Values, *, signal: str, factor: float) -> None:
+    """Reading = factor·value."""
+    values[f"{signal}.gain"] *= factor
+
+
+def bias(values: Values, *, signal: str, offset: float) -> None:
+    """Reading = value + offset."""
+    values[f"{signal}.bias"] += offset
+
+
+def drift(values: Values, *, signal: str, rate: float) -> None:
+    """Reading = value + rate·t."""
+    values[f"{signal}.drift"] += rate
+
+
+def lag(values: Values, *, signal: str, time_constant: float) -> None:
+    """Low-pass whose slow signals lag by the time constant."""
+    values[f"{signal}.lag"] = time_constant
+
+
+def quantization(values: Values, *, signal: str, step: float) -> None:
+    """Reading = step·round(value/step)."""
+    values[f"{signal}.step"] = step
+
+
+def noise(values: Values, *, signal: str, rms: float) -> None:
+    """White noise beside the sensor's own."""
+    values[f"{signal}.noise"] = math.hypot(values[f"{signal}.noise"], rms)
+
+
+def saturation(values: Values, *, signal: str, limit: float) -> None:
+    """Reading = limit·tanh(value/limit)."""
+    values[f"{signal}.saturation"] = limit
+
+
+def missing(values: Values, *, signal: str, probability: float) -> None:
+    """A sample that is lost repeats the reading before it."""
+    values[f"{signal}.missing"] = probability
+
+
+def crosstalk(values: Values, *, signal: str, coefficient: float) -> None:
+    """Reading = value + coefficient·(last signal of the laboratory)."""
+    values[f"{signal}.crosstalk"] = coefficient
+
+
+FALSIFIED: tuple[Callable[..., None], ...] = (gain, bias, drift, quantization, noise)
+OUTSIDE: tuple[Callable[..., None], ...] = (saturation, missing, crosstalk)
+
+
+def known(names: Sequence[str]) -> dict[str, Entry]:
+    """The effects on a laboratory's readings."""
+    result: dict[str, Entry] = {}
+    for name in names:
+        for effect in FALSIFIED:
+            result[f"sensor.{name}.{effect.__name__}"] = Entry(partial(effect, signal=name), PLAIN)
+        result[f"sensor.{name}.lag"] = Entry(partial(lag, signal=name), LAGS, f"{name}.order")
+        for effect in OUTSIDE:
+            result[f"x.sensor.{name}.{effect.__name__}"] = Entry(partial(effect, signal=name), PLAIN)
+    return result
+
+
+@dataclass
+class Sensor:
+    """One sensor with effects."""
+
+    values: Values
+    generator: np.random.Generator
+    last: float = 0.0
+
+    def read(self, value: float, leak: float, error: float, t: float) -> float:
+        """Reading of a true value at `t` s; `leak` is the signal that may leak into it."""
+        v = self.values
+        result = v["gain"] * (value + v["crosstalk"] * leak)
+        if v["saturation"] > 0.0:
+            result = v["saturation"] * math.tanh(result / v["saturation"])
+        result += v["bias"] + v["drift"] * t + error
+        if v["step"] > 0.0:
+            result = v["step"] * math.floor(result / v["step"] + 0.5)
+        if v["missing"] > 0.0 and self.generator.random() < v["missing"]:
+            return self.last
+        self.last = result
+        return result
+
+
+class Sensors:
+    """The sensors of a laboratory."""
+
+    def __init__(self, names: Sequence[str], values: Values, interval: float, seed: int) -> None:
+        own = [{key: values[f"{name}.{key}"] for key in keys(name, values)} for name in names]
+        self._sensors = [Sensor(v, np.random.default_rng([seed, 1 + i])) for i, v in enumerate(own)]
+        self._changed = any(v != {**perfect(), "noise": v["noise"]} for v in own)
+        self._levels = np.array([v["noise"] for v in own])
+        self._noise = np.random.default_rng(seed)
+        self._block: list[list[float]] = []
+        self._interval, self._tick = interval, 0
+        self.lags = {name: (values[f"{name}.order"], values[f"{name}.lag"]) for name in names}
+
+    def read(self, true: Sequence[float]) -> Iterable[float]:
+        """Readings at the present tick."""
+        if not self._block:
+            rows = self._noise.standard_normal((BLOCK, self._levels.size)) * self._levels
+            self._block = rows[::-1].tolist()
+        errors = self._block.pop()
+        t = self._tick * self._interval
+        self._tick += 1
+        if not self._changed:
+            return [value + error for value, error in zip(true, errors, strict=True)]
+        pairs = zip(self._sensors, true, errors, strict=True)
+        return [sensor.read(value, true[-1], error, t) for sensor, value, error in pairs]
+
+
+def keys(name: str, values: Values) -> list[str]:
+    """What is known of one sensor."""
+    return [key.rpartition(".")[2] for key in values if key.startswith(f"{name}.")]
+
+
+def perfect() -> dict[str, Any]:
+    """A sensor without effects or noise."""
+    return {key.rpartition(".")[2]: value for key, value in true_values(["x"], {"x": 0.0}).items()}

@@ -1,0 +1,143 @@
+"""The effects that the independent laboratory B knows, on its values by the kernels' names."""
+
+from __future__ import annotations
+
+import math
+
+from validation.blind.labs.column_effects import lengthen
+from validation.blind.labs.laying import PLAIN, Entry, Values
+from validation.blind.labs.parts import friction, mechanics
+
+
+def table_delay(values: Values, *, delay: float) -> None:
+    """Dead time beside the plan's; a rational approximation takes what is added, or all that is left."""
+    lengthen(values, delay)
+
+
+def bandwidth(values: Values, *, factor: float) -> None:
+    """Slower or faster loop: `factor·ω`."""
+    values["omega"] *= factor
+
+
+def table_gain(values: Values, *, factor: float) -> None:
+    """Calibration of the loop: `factor·u`."""
+    values["table_gain"] *= factor
+
+
+def oil_column(values: Values, *, frequency: float, damping: float = 0.1) -> None:
+    """Resonance of the platform over the loop, Hz and ratio."""
+    values |= {"oil": 2.0 * math.pi * frequency, "oil_damping": damping}
+
+
+def payload(values: Values, *, compliance: float) -> None:
+    """Damper's force over the table's own mass and stiffness: `ÿ = … + ω²·c·F`."""
+    values["compliance"] = compliance
+
+
+def table_backlash(values: Values, *, width: float) -> None:
+    """Whole play between loop and platform."""
+    values["play"] = width
+
+
+def table_friction(values: Values, *, acceleration: float) -> None:
+    """Friction of the table's bearings over the moving mass."""
+    values["table_friction"] = acceleration
+
+
+def rail_friction(values: Values, *, force: float) -> None:
+    """Coulomb friction of the guide rail."""
+    values["friction"] = force
+
+
+def dashpot(values: Values, *, factor: float) -> None:
+    """Stronger or weaker dashpot: `factor·c`."""
+    values["dashpot"] *= factor
+
+
+def spring(values: Values, *, factor: float) -> None:
+    """Stiffer or softer spring: `factor·k`."""
+    values["stiffness"] *= factor
+
+
+def mass(values: Values, *, factor: float) -> None:
+    """Heavier or lighter mass: `factor·m`."""
+    values["mass"] *= factor
+
+
+def motor_gain(values: Values, *, factor: float) -> None:
+    """Motor constant: `factor·command`."""
+    values["motor_gain"] *= factor
+
+
+def motor_lag(values: Values, *, time_constant: float) -> None:
+    """Lag of the motor's force beside the plan's."""
+    values["motor_lag"] = max(values["motor_lag"] + time_constant, 0.0)
+
+
+def force_limit(values: Values, *, force: float) -> None:
+    """Largest force of the drive."""
+    values["force_limit"] = force
+
+
+def stroke_stop(values: Values, *, stroke: float, stiffness: float = 2000.0) -> None:
+    """Stops from the middle on, and their stiffness (at 2 mm of depth)."""
+    values |= {"stop_stroke": stroke, "stop_stiffness": stiffness}
+
+
+def pitch(values: Values, *, coupling: float, frequency: float) -> None:
+    """Rocking of the platform, felt by the accelerometer: `r̈ + 0.1·ω·ṙ + ω²·r = −coupling·ÿ`."""
+    values |= {"pitch": coupling, "pitch_omega": 2.0 * math.pi * frequency}
+
+
+def cam(values: Values, *, amplitude: float, period: float) -> None:
+    """Error of the drive's screw: `u + amplitude·sin(2π·u/period)`."""
+    values |= {"cam": amplitude, "cam_period": period}
+
+
+def cable_drag(values: Values, *, coefficient: float) -> None:
+    """Drag `coefficient·ṡ·|ṡ|`, N·s²/m²."""
+    values["drag"] = coefficient
+
+
+def motor_constant(values: Values, *, rise: float) -> None:
+    """Share that the motor's force gains at a stroke of 50 mm."""
+    values["motor_rise"] = rise
+
+
+def cubic_spring(values: Values, *, stiffness: float) -> None:
+    """Cubic force `stiffness·s³`, N/m³."""
+    values["cubic"] = stiffness
+
+
+def appendage(values: Values, *, mass: float, frequency: float) -> None:
+    """Loose part on the moving mass: kg, and Hz on its spring."""
+    values |= {"appendage": mass, "appendage_omega": 2.0 * math.pi * frequency}
+
+
+KNOWN = {
+    "table.delay": Entry(table_delay, {"pade": 0}),
+    "table.bandwidth": Entry(bandwidth, PLAIN),
+    "table.gain": Entry(table_gain, PLAIN),
+    "table.oil_column": Entry(oil_column, PLAIN),
+    "table.payload": Entry(payload, {"dynamic": 0}),
+    "table.backlash": Entry(table_backlash, {"contact": 0}),
+    "table.friction": Entry(table_friction, {"tanh": 0}),
+    "damper.friction": Entry(
+        rail_friction, {"tanh": friction.TANH, "dahl": friction.DAHL, "lugre": friction.LUGRE}, "rubbing"
+    ),
+    "damper.viscous": Entry(dashpot, PLAIN),
+    "damper.stiffness": Entry(spring, PLAIN),
+    "damper.mass": Entry(mass, PLAIN),
+    "damper.gain": Entry(motor_gain, PLAIN),
+    "damper.motor_lag": Entry(motor_lag, PLAIN),
+    "damper.force_limit": Entry(force_limit, {"smooth": 0}),
+    "damper.stroke_stop": Entry(
+        stroke_stop, {"hertz": mechanics.HERTZ, "linear": mechanics.LINEAR}, "stopping"
+    ),
+    "x.table.pitch": Entry(pitch, PLAIN),
+    "x.table.cam": Entry(cam, PLAIN),
+    "x.damper.cable_drag": Entry(cable_drag, PLAIN),
+    "x.damper.motor_constant": Entry(motor_constant, PLAIN),
+    "x.damper.cubic_spring": Entry(cubic_spring, PLAIN),
+    "x.damper.appendage": Entry(appendage, PLAIN),
+}

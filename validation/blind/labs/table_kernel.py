@@ -1,0 +1,202 @@
+"""Laboratory B in short steps: table loop, platform, damper and motor; classical Runge-Kutta.
+
+ÿ = ω²·(u(t − L) + c·F − y) − 2ζω·ẏ,    F = k·s + c·ṡ + rail − u_m
+m·(s̈ + ÿ) = −F,                          T_m·u̇_m + u_m = command
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from validation.blind.labs.parts import delay, filters, friction, mechanics
+from validation.blind.labs.parts.compiled import Array, jit
+
+RUBBING = 1e-3  # m/s, scale of the regularised friction, of rail and table
+STICKING = 5e-3  # m/s, scale of the rail's Stribeck effect
+PRESLIDING = 20e-6  # m, of the rail
+MICRO = 0.5e-3  # s, damping of the bristles over Coulomb friction, times their presliding
+PITCH_DAMPING, APPENDAGE_DAMPING = 0.05, 0.03  # ratios
+
+# places in `state`: table loop, stroke, motor, platform, pitch, appendage; each with its rate
+LOOP, LOOP_RATE, STROKE, STROKE_RATE, MOTOR, PLATE, PLATE_RATE = range(7)
+PITCH, PITCH_RATE, LOOSE, LOOSE_RATE = range(7, 11)
+MOVING = 11
+COMMAND, BRISTLE = 11, 12  # no states of the equations of motion
+STATE = 13
+DISPLACEMENT, ACCELERATION, STROKE_OUT, FORCE = range(4)  # places of the readings
+
+
+class Bench(NamedTuple):
+    """True parameters of table and damper; zero is none of an effect."""
+
+    step: float  # s
+    steps: float  # of an interval
+    omega: float  # rad/s
+    damping: float  # ratio
+    delay: float  # s
+    mass: float  # kg
+    stiffness: float  # N/m
+    dashpot: float  # N·s/m
+    motor_lag: float  # s
+    pade: float = 0.0  # s, dead time that is approximated
+    table_gain: float = 1.0
+    oil: float = 0.0  # rad/s
+    oil_damping: float = 0.1
+    compliance: float = 0.0  # m/N
+    play: float = 0.0  # m
+    table_friction: float = 0.0  # m/s²
+    cam: float = 0.0  # m
+    cam_period: float = 0.02  # m
+    pitch: float = 0.0  # coupling
+    pitch_omega: float = 100.0  # rad/s
+    motor_gain: float = 1.0
+    force_limit: float = 0.0  # N
+    rubbing: float = 0.0  # formula
+    friction: float = 0.0  # N
+    stopping: float = 0.0  # formula
+    stop_stroke: float = 1.0  # m
+    stop_stiffness: float = 0.0  # N/m
+    drag: float = 0.0  # N·s²/m²
+    motor_rise: float = 0.0
+    cubic: float = 0.0  # N/m³
+    appendage: float = 0.0  # kg
+    appendage_omega: float = 10.0  # rad/s
+
+
+@jit
+def rail(p: Bench, x: Array, bristle: float) -> float:
+    """Force (N) that guide rail, cable, spring and stops put between mass and table."""
+    s, w = x[STROKE], x[STROKE_RATE]
+    result = p.stiffness * s + p.dashpot * w + p.cubic * s**3 + p.drag * w * abs(w)
+    if p.friction > 0.0:
+        scale = RUBBING if p.rubbing == friction.TANH else STICKING
+        result += p.friction * friction.share(p.rubbing, bristle, w, PRESLIDING, scale, MICRO)
+    return float(result + mechanics.stop(p.stopping, s, w, p.stop_stroke, p.stop_stiffness))
+
+
+@jit
+def asked(p: Bench, command: float) -> float:
+    """Force (N) the motor settles at under a command."""
+    wanted = p.motor_gain * command
+    return mechanics.saturated(wanted, p.force_limit) if p.force_limit > 0.0 else wanted
+
+
+@jit
+def damper_force(p: Bench, x: Array, push: float, start: float, bristle: float) -> float:
+    """Force (N) on the table at a state; `start` is the stroke to which the bristles' deflection belongs."""
+    motor = x[MOTOR] if p.motor_lag > 0.0 else push
+    motor *= mechanics.motor_constant(p.motor_rise, x[STROKE])
+    if p.friction > 0.0:
+        bristle = bent(p, bristle, x[STROKE] - start, x[STROKE_RATE])
+    return float(rail(p, x, bristle) - motor)
+
+
+@jit
+def bent(p: Bench, bristle: float, moved: float, velocity: float) -> float:
+    """Deflection of the rail's bristles after a move."""
+    return friction.after(p.rubbing, bristle, moved, velocity, PRESLIDING, STICKING)
+
+
+@jit
+def platform(p: Bench, x: Array, loop: float) -> float:
+    """Acceleration (m/s²) of the platform over the loop's, that of the loop itself where nothing is between."""
+    if p.oil > 0.0:
+        return mechanics.oil_column(p.oil, p.oil_damping, x[LOOP], x[PLATE], x[PLATE_RATE])
+    if p.play > 0.0:
+        return mechanics.played(p.play, x[LOOP], x[LOOP_RATE], x[PLATE], x[PLATE_RATE])
+    return loop
+
+
+@jit
+def rates(p: Bench, x: Array, dx: Array, wanted: float, push: float, start: float, bristle: float) -> None:
+    """Rates `dx` of the state under a table command (m) and the force asked of the motor (N)."""
+    force = damper_force(p, x, push, start, bristle)
+    loop = p.omega**2 * (wanted + p.compliance * force - x[LOOP]) - 2.0 * p.damping * p.omega * x[LOOP_RATE]
+    if p.table_friction > 0.0:
+        loop -= p.table_friction * friction.regularised(x[LOOP_RATE], RUBBING)
+    plate = platform(p, x, loop)
+    loose = p.appendage_omega**2 * x[LOOSE] + 2.0 * APPENDAGE_DAMPING * p.appendage_omega * x[LOOSE_RATE]
+    mass = (p.appendage * loose - force) / p.mass  # absolute acceleration of the damper
+    dx[LOOP], dx[LOOP_RATE] = x[LOOP_RATE], loop
+    dx[PLATE], dx[PLATE_RATE] = (x[PLATE_RATE], plate) if p.oil + p.play > 0.0 else (x[LOOP_RATE], loop)
+    dx[STROKE], dx[STROKE_RATE] = x[STROKE_RATE], mass - plate
+    dx[MOTOR] = (push - x[MOTOR]) / p.motor_lag if p.motor_lag > 0.0 else 0.0
+    dx[PITCH] = x[PITCH_RATE]
+    dx[PITCH_RATE] = (
+        -p.pitch * plate - 2.0 * PITCH_DAMPING * p.pitch_omega * x[PITCH_RATE] - p.pitch_omega**2 * x[PITCH]
+    )
+    dx[LOOSE], dx[LOOSE_RATE] = x[LOOSE_RATE], -loose - mass
+
+
+@jit
+def move(p: Bench, state: Array, work: Array, early: float, middle: float, late: float, push: float) -> None:
+    """One step of the state under a table command at its beginning, middle and end."""
+    h, start, bristle = p.step, state[STROKE], state[BRISTLE]
+    rates(p, state, work[0], early, push, start, bristle)
+    for i in range(MOVING):
+        work[4, i] = state[i] + 0.5 * h * work[0, i]
+    rates(p, work[4], work[1], middle, push, start, bristle)
+    for i in range(MOVING):
+        work[4, i] = state[i] + 0.5 * h * work[1, i]
+    rates(p, work[4], work[2], middle, push, start, bristle)
+    for i in range(MOVING):
+        work[4, i] = state[i] + h * work[2, i]
+    rates(p, work[4], work[3], late, push, start, bristle)
+    for i in range(MOVING):
+        state[i] += h * (work[0, i] + 2.0 * work[1, i] + 2.0 * work[2, i] + work[3, i]) / 6.0
+    if p.friction > 0.0:
+        state[BRISTLE] = bent(p, bristle, state[STROKE] - start, state[STROKE_RATE])
+
+
+@jit
+def observe(p: Bench, state: Array, work: Array, out: Array, wanted: float, push: float) -> None:
+    """What the sensors stand before."""
+    rates(p, state, work[0], wanted, push, state[STROKE], state[BRISTLE])
+    out[DISPLACEMENT] = state[PLATE]
+    out[ACCELERATION] = work[0, PLATE_RATE] + work[0, PITCH_RATE]
+    out[STROKE_OUT] = state[STROKE]
+    out[FORCE] = damper_force(p, state, push, state[STROKE], state[BRISTLE])
+
+
+@jit
+def told(p: Bench, value: float) -> float:
+    """Command (m) of the table's loop behind its calibration and its screw."""
+    value *= p.table_gain
+    return mechanics.cam(value, p.cam, p.cam_period) if p.cam > 0.0 else value
+
+
+@jit
+def advance(
+    p: Bench,
+    lags: Array,
+    state: Array,
+    past: Array,
+    approximation: Array,
+    work: Array,
+    filtered: Array,
+    command: float,
+    motor_command: float,
+) -> tuple[float, float, float, float]:
+    """Table m and m/s², stroke m and force N behind their filters one interval later.
+
+    The table's command is ramped, the motor's is held.
+    """
+    begun, back, steps = state[COMMAND], p.delay / p.step, int(p.steps)
+    push = asked(p, motor_command)
+    out = work[5]
+    raw = delay.pade_output(approximation, p.pade) if p.pade > 0.0 else delay.before(past, back)
+    late = told(p, raw)
+    for i in range(steps):
+        delay.push(past, begun + (command - begun) * (i + 1) / steps)
+        before, raw, early = raw, delay.before(past, back), late
+        middle = delay.before(past, back + 0.5)
+        if p.pade > 0.0:
+            raw = delay.pade(approximation, p.pade, raw, p.step)
+            middle = 0.5 * (before + raw)
+        late = told(p, raw)
+        move(p, state, work, early, told(p, middle), late, push)
+        observe(p, state, work, out, late, push)
+        for k in range(4):
+            out[k] = filters.step_filter(lags[k], filtered[k], out[k], p.step)
+    state[COMMAND] = command
+    return out[DISPLACEMENT], out[ACCELERATION], out[STROKE_OUT], out[FORCE]

@@ -1,0 +1,62 @@
+"""Recording a case: what it hides stays in the memory of the process that asked."""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from common.errors import InputError, InterlockError
+from common.plan import plan as plans
+from common.plan import reality as realities
+from common.plan.reality import Reality
+from validation.blind.draw import Case, Laid
+from validation.spread import spread
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """Where a case was recorded, and how large what it hides is."""
+
+    index: int
+    name: str  # of the file; drawn at random, so that it reveals nothing
+    sizes: tuple[float, ...]  # residual to noise of every effect by itself
+    stopped: str  # why the test ended early, empty where it was completed
+
+
+def record_all(cases: Sequence[Case], folder: Path, jobs: int = 1) -> Iterator[Recorded]:
+    """Record every case into a folder, in an order that reveals nothing."""
+    order = np.random.default_rng(secrets.randbits(64)).permutation(len(cases))
+    yield from spread(partial(record, folder=folder), [cases[place] for place in order], jobs)
+
+
+def record(case: Case, folder: Path) -> Recorded:
+    """Play a case in virtual time; a test that a limit stops is kept up to there."""
+    from simulation import virtual
+    from validation.blind.size import sizes
+
+    plan = plans.from_tables(case.plan, Path())
+    path = folder / f"{secrets.token_hex(8)}.mcap"
+    try:
+        bench = virtual.assemble(plan, reality(case), path)
+    except InputError as error:
+        raise InputError(f"Case {case.index} ({truth(case)}) cannot be built: {error}") from None
+    ended = virtual.run(bench, lambda: "")
+    if ended is not None and not isinstance(ended, InterlockError):
+        raise InputError(f"Case {case.index} ({truth(case)}) cannot be recorded: {ended}")
+    return Recorded(case.index, path.name, sizes(case, path), str(ended or ""))
+
+
+def reality(case: Case, laid: tuple[Laid, ...] | None = None, *, silent: bool = False) -> Reality:
+    """The laboratories of a case, with other effects or without noise where asked for."""
+    plan = plans.from_tables(case.plan, Path())
+    return realities.from_reality(case.reality(laid, silent=silent), plan, Path())
+
+
+def truth(case: Case) -> str:
+    """What a case hides, in words."""
+    return " and ".join(item.name for item in case.laid) or "clean"

@@ -1,0 +1,91 @@
+"""Hostile frames on the link: noise, wrong keys, other sessions, and a peer who has all keys."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, get_type_hints
+
+import numpy as np
+
+from common.link.transport import TICK
+from common.plan.plan import PROTOCOL_VERSION, Plan
+from common.protocol import codec
+from common.protocol.messages import Arm, Command, Feedback, Message, Register, Start, Stop, Trip
+from common.roles import MASTER
+from validation.faults.wire import INSIDER, Direction, Letter
+
+LONGEST = 300  # bytes of noise
+OTHER_SESSION = 77
+FAR = 100_000  # numbers ahead
+
+
+def letter(message: Message, key: codec.Key, origin: str) -> Letter:
+    """A message as the frame of a process outside the test."""
+    return Letter(codec.encode(message, key), type(message).__name__, -1, 0, origin, intact=False)
+
+
+def garbage(count: int, chance: np.random.Generator) -> list[Letter]:
+    """Frames of random bytes."""
+    lengths = chance.integers(0, LONGEST, count).tolist()
+    return [Letter(chance.bytes(length), "garbage", -1, 0, "injected", intact=False) for length in lengths]
+
+
+def forged(direction: Direction, plan: Plan, session: int, count: int) -> list[Letter]:
+    """Messages of the test's session under the key of another plan."""
+    key = codec.session_key(session, plan.digest()[::-1] + "x")
+    return [letter(tick_message(direction, session, FAR + seq), key, "injected") for seq in range(count)]
+
+
+def foreign(direction: Direction, plan: Plan, count: int) -> list[Letter]:
+    """Messages of another session, as of a test that ran before."""
+    key = codec.session_key(OTHER_SESSION, plan.digest())
+    return [
+        letter(tick_message(direction, OTHER_SESSION, FAR + seq), key, "injected") for seq in range(count)
+    ]
+
+
+def tick_message(direction: Direction, session: int, seq: int, value: float = 0.01) -> Command | Feedback:
+    """A message of a tick for the direction, its first quantity of a given value."""
+    if direction.route.role == MASTER:
+        return command(session, seq, value)
+    return feedback(session, seq, table_displacement=value)
+
+
+def command(session: int, seq: int, target: float, force: float = 0.0) -> Command:
+    """A command of a target (m) and a motor's force (N), all else zero."""
+    given = {"session": session, "seq": seq, "table_target": target, "damper_command": force}
+    return Command(**blank(Command) | given)
+
+
+def feedback(session: int, seq: int, **measured: float) -> Feedback:
+    """A feedback that answers the command of its tick, all else zero."""
+    numbers = {"session": session, "seq": seq, "command_seq": seq, "heard_seq": seq}
+    return Feedback(**blank(Feedback) | numbers | measured)
+
+
+def blank(kind: type[Any]) -> dict[str, Any]:
+    """Fields of a message with the zero of their types."""
+    return {name: hint() for name, hint in get_type_hints(kind).items()}
+
+
+def insider(direction: Direction, plan: Plan, session: int, what: int) -> Letter | None:
+    """One message of a peer who knows session and keys, as it goes on this route; None where it has no such."""
+    role, on_tick = direction.route.role, direction.route.channel == TICK
+    newest = max(direction.ledger.numbers["sent"], default=0)
+    ticks: dict[int, Callable[[], Message]] = {
+        0: lambda: tick_message(direction, session, newest + 3, 10.0 * plan.limits.table_target),
+        1: lambda: tick_message(direction, session, newest + 3, 0.5 * plan.limits.table_target),
+        2: lambda: tick_message(direction, session, newest + FAR),
+    }
+    words: dict[int, Callable[[], Message]] = {
+        3: lambda: Stop(session, newest, "an insider's wish."),
+        4: lambda: Trip(session, role, "insider", "an insider's trip."),
+        5: lambda: Register(OTHER_SESSION, PROTOCOL_VERSION, plan.digest()),
+        6: lambda: Start(session, 0, 0),
+        7: lambda: Arm(session, OTHER_SESSION),
+    }
+    build = (ticks if on_tick else words).get(what)
+    if build is None:
+        return None
+    key = codec.session_key(session if on_tick else 0, plan.digest())
+    return letter(build(), key, INSIDER)

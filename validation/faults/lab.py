@@ -1,0 +1,168 @@
+"""A whole test on simulated machines: the real loops, drive, endpoints and codec on one world's time."""
+
+from __future__ import annotations
+
+import hashlib
+import struct
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple, cast
+
+from common.host.realtime import NOTHING
+from common.host.stopping import Stopper
+from common.lab.drive import Loop, drive, longest_leave
+from common.lab.laboratory import Report, Setting
+from common.lab.surroundings import Surroundings
+from common.plan.plan import Plan
+from common.plan.reality import Reality
+from common.plan.tables import Rig
+from common.roles import MASTER, RECORDER
+from master import assembly as master_assembly
+from master.loop import MasterLoop
+from models.loop import substructure
+from recorder import files
+from recorder.__main__ import receive
+from recorder.loop import RecorderLoop
+from recorder.sink import FileSink
+from slave import assembly as slave_assembly
+from slave.loop import SlaveLoop
+from validation.faults.rigs import Probe, ProbedRig
+from validation.faults.wire import CABLE, Conditions, Port, Wire, WireEndpoint
+from validation.faults.world import Drift, Process, World
+
+SESSION = 1  # simulated time knows one test, and the same test gives the same bits
+PROBED = Rig(class_=f"{ProbedRig.__module__}:{ProbedRig.__name__}")
+MASTER_STARTS = 1_000_000  # ns after the others
+
+
+class Surrounding(NamedTuple):
+    """What a test runs on: the seed of the link's draws, its condition at best, the clocks, a recording."""
+
+    seed: int = 0
+    base: Conditions = CABLE
+    drifts: Mapping[str, Drift] = {}
+    recording: Path | None = None
+
+
+CALM = Surrounding()
+
+
+class Nowhere(Surroundings):
+    """A machine that reports nothing of its real-time settings."""
+
+    def begin(self) -> None:
+        """Nothing is watched."""
+
+
+class Told(NamedTuple):
+    """An event that a laboratory reported, and when (world time, ns)."""
+
+    time: int
+    data: Mapping[str, Any]
+
+
+class Simulation:
+    """Master, slaves and, where there is a recording, a recorder; `run` plays the test to its end."""
+
+    def __init__(self, plan: Plan, reality: Reality, surrounding: Surrounding = CALM) -> None:
+        self.plan = plan
+        self.recording = surrounding.recording
+        timeout = plan.link.connect_timeout + plan.link.loss_timeout + plan.test.duration
+        self.world = World(round((timeout + 3.0 * longest_leave(plan)) * 1e9))
+        self.wire = Wire(self.world, plan.roles, surrounding.base, surrounding.seed)
+        self.events: dict[str, list[Told]] = {}
+        self.ports: dict[str, Port] = {}
+        self.endpoints: dict[str, WireEndpoint] = {}
+        self.probes: dict[str, Probe] = {}
+        self.loops: dict[str, MasterLoop | SlaveLoop] = {}
+        self.recorder: RecorderLoop | None = None
+        self.strangers: set[str] = set()  # roles that heard frames of a stranger who has the keys
+        self._drifts = surrounding.drifts
+        for place, role in enumerate(plan.roles):
+            self._add_slave(role, reality, place)
+        self._add_master(reality)
+        if self.recording is not None:
+            self._add_recorder(self.recording)
+
+    # -- assembly ---------------------------------------------------------------------------------
+
+    def _process(self, role: str) -> tuple[Process, Setting]:
+        process = self.world.process(role, self._drifts.get(role, Drift()))
+        port = self.ports[role] = self.wire.join(process)
+        endpoint = self.endpoints[role] = WireEndpoint(port, self.plan.digest())
+        return process, Setting(self.plan, endpoint, process, self._listening(role, process))
+
+    def _listening(self, role: str, process: Process) -> Report:
+        told = self.events.setdefault(role, [])
+
+        def report(kind: str, data: Mapping[str, Any]) -> None:
+            if kind == "event":
+                told.append(Told(process.time, dict(data)))
+
+        return report
+
+    def _add_slave(self, role: str, reality: Reality, place: int) -> None:
+        one = reality.of(role)
+        process, setting = self._process(role)
+        probe = Probe(slave_assembly.build_rig(one), process)
+        probed = replace(one, slave=replace(PROBED, options={"probe": probe}))
+        self._add(role, probe, slave_assembly.build_loop(setting, probed, instance=1 + place), 0)
+
+    def _add_master(self, reality: Reality) -> None:
+        process, setting = self._process(MASTER)
+        probe = Probe(master_assembly.build_rig(reality), process)
+        probed = replace(reality, master=replace(PROBED, options={"probe": probe}))
+        loop = master_assembly.build_loop(setting, probed, session=SESSION, epoch_ns=0)
+        self._add(MASTER, probe, loop, MASTER_STARTS)
+
+    def _add(self, role: str, probe: Probe, loop: MasterLoop | SlaveLoop, at: int) -> None:
+        process = probe.process
+        probe.loop = loop
+        probe.partners = list(getattr(loop, "partners", {}).values())
+        self.probes[role] = probe
+        self.loops[role] = loop
+        process.start(driving(loop, process, self.endpoints[role]), at)
+
+    def _add_recorder(self, path: Path) -> None:
+        process, setting = self._process(RECORDER)
+        motion = substructure.motion(self.plan)
+        file = files.begin(path, self.plan, motion, substructure.ground_rows(self.plan, motion))
+        loop = self.recorder = RecorderLoop(setting, FileSink(file, process))
+        stopping = cast("Stopper", process.stopping)  # all that is asked of one
+
+        def body() -> None:
+            try:
+                receive(loop, setting.endpoint, stopping)
+            finally:
+                if process.killed:
+                    file.abandon()  # what it had not handed over is gone
+                else:
+                    loop.close()
+
+        process.start(body)
+
+    # -- course -----------------------------------------------------------------------------------
+
+    def run(self) -> None:
+        """Play the test to its end; what comes out is in probes, events, ports and the wire's ledgers."""
+        self.world.run()
+
+    def digest(self) -> str:
+        """Sixteen hex digits of every command that reached a rig, and when."""
+        found = hashlib.blake2b(digest_size=8)
+        for role, probe in self.probes.items():
+            found.update(role.encode())
+            for time, command in zip(probe.log.times, probe.log.commands, strict=True):
+                found.update(struct.pack(f"<q{len(command)}d", time, *command))
+        return found.hexdigest()
+
+
+def driving(loop: Loop, process: Process, endpoint: WireEndpoint) -> Callable[[], None]:
+    """What a laboratory's process does."""
+
+    def body() -> None:
+        loop.lab.heard_ns = process.now()
+        drive(loop, process.stopping, Nowhere(loop.lab, NOTHING, endpoint.rejected, timed=False))
+
+    return body

@@ -1,0 +1,144 @@
+"""Rigs behind a probe, which keeps their commands with the world time and can falsify their readings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from enum import Enum
+from typing import Any, NamedTuple
+
+from common.errors import RigError
+from common.lab.drive import Loop
+from common.lab.laboratory import Laboratory
+from common.protocol.exchange import State
+from common.rig import GuardedRig
+from validation.faults.world import Process
+
+COMPUTED = 100_000  # ns that a tick takes between reading and writing
+PRESENT = {
+    State.IDLE: "IDLE",
+    State.REGISTERED: "CONFIGURED",
+    State.ARMED: "ARMED",
+    State.SCHEDULED: "ARMED",
+    State.RUNNING: "RUNNING",
+}
+
+
+def mode_of(lab: Laboratory) -> Enum:
+    """In which mode a laboratory is; its place in the protocol where it has no state machine of its own."""
+    safety: Any = getattr(lab, "safety", None)
+    mode: Enum = lab.exchange.state if safety is None else safety.mode
+    return mode
+
+
+def named(mode: Enum) -> str:
+    """The name of a mode; of a place in the protocol the name of the mode that it stands for."""
+    return PRESENT.get(mode, "SAFE") if isinstance(mode, State) else mode.name
+
+
+class Log:
+    """What reached a rig at each write: world time (ns), command, mode.
+
+    Of the master also what feedbacks it then used, and the storey drift of the tick before (m).
+    """
+
+    def __init__(self) -> None:
+        self.times: list[int] = []
+        self.commands: list[tuple[float, ...]] = []
+        self.modes: list[Enum] = []
+        self.used: list[tuple[int, ...]] = []
+        self.drifts: list[float] = []
+
+
+class Wrong(NamedTuple):
+    """How a reading is wrong: `nan`, `frozen`, `jump`, `beyond` or `raise`."""
+
+    kind: str
+    place: int
+    by: float
+
+
+class Probe:
+    """Observations of a rig that do not depend on loop and recording; the loop is given once it is built."""
+
+    def __init__(self, inner: GuardedRig, process: Process) -> None:
+        self.inner = inner
+        self.process = process
+        self.loop: Loop | None = None
+        self.partners: list[Any] = []  # of the master: what it knows of its slaves
+        self.log = Log()
+        self.wrong: dict[object, Wrong] = {}
+        self.disarmed: list[int] = []
+        self._frozen: dict[int, float] = {}
+
+    def read(self) -> Iterable[float]:
+        """Readings of the rig behind it, with what is wrong with them."""
+        self.process.spend(COMPUTED)
+        readings: Iterable[float] = self.inner.read()
+        return self._falsified(list(readings)) if self.wrong else readings
+
+    def _falsified(self, values: list[float]) -> list[float]:
+        for kind, given, by in self.wrong.values():
+            place = given % len(values)
+            match kind:
+                case "nan":
+                    values[place] = math.nan
+                case "frozen":
+                    values[place] = self._frozen.setdefault(place, values[place])
+                case "jump":
+                    values[place] += by
+                case "beyond":
+                    values[place] = by
+                case _:
+                    raise RigError("the rig does not answer.")
+        return values
+
+    def write(self, command: tuple[float, ...]) -> None:
+        """Keep a command and hand it on."""
+        loop = self.loop
+        assert loop is not None  # noqa: S101 - rigs move after their loop is built
+        log = self.log
+        log.times.append(self.process.time)
+        log.commands.append(command)
+        log.modes.append(mode_of(loop.lab))
+        if self.partners:
+            log.used.append(tuple([partner.used.seq for partner in self.partners]))
+            log.drifts.append(loop.progress["drift"])
+        self.inner.write(command)
+
+    def disarm(self) -> None:
+        """Note when, and hand on."""
+        self.disarmed.append(self.process.time)
+        self.inner.disarm()
+
+    def set_wrong(self, key: object, wrong: Wrong) -> None:
+        """From now on readings are wrong."""
+        self._frozen.clear()
+        self.wrong[key] = wrong
+
+    def set_right(self, key: object) -> None:
+        """A sensor works again."""
+        self.wrong.pop(key, None)
+
+
+class ProbedRig:
+    """The rig that a reality names, which is the one behind a probe."""
+
+    def __init__(self, interval: float, seed: int, probe: Probe) -> None:
+        self._probe = probe
+
+    def arm(self) -> None:
+        """Arm the rig behind it."""
+        self._probe.inner.arm()
+
+    def read(self) -> Iterable[float]:
+        """Readings as the probe gives them."""
+        return self._probe.read()
+
+    def write(self, command: Any) -> None:
+        """Apply a command."""
+        self._probe.write(command)
+
+    def disarm(self) -> None:
+        """Disarm."""
+        self._probe.disarm()

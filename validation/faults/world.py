@@ -1,0 +1,242 @@
+"""Many processes in one thread and in virtual time: a scheduler of events and the processes that wait for them.
+
+Every process is a greenlet. Where it would block it hands over to the scheduler, which takes the earliest event from
+a heap of (time, order, action): the same calls give the same order, whatever the machine does. World time is in ns
+and is known to no process; each process has a clock of its own, offset and drifting.
+"""
+
+from __future__ import annotations
+
+import gc
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from heapq import heappop, heappush
+from itertools import count
+from typing import Any, NamedTuple
+
+import greenlet
+
+PPB = 10**9
+FOREVER = 2**62
+
+
+Event = tuple[
+    int, int, Callable[..., None], tuple[Any, ...]
+]  # time, who is first of the same time, what happens
+
+
+class Drift(NamedTuple):
+    """How a process's clock differs from the world's: at time 0 by `offset` ns, then faster by `ppb` ns per second."""
+
+    offset: int = 0
+    ppb: int = 0
+
+
+NO_DRIFT = Drift()
+
+
+class World:
+    """Virtual time; `limit` (ns) is where it ends whatever still goes on."""
+
+    def __init__(self, limit: int) -> None:
+        self.time = 0
+        self.limit = limit
+        self.heap: list[Event] = []
+        self.processes: dict[str, Process] = {}
+        self.alive = 0  # processes that have begun and not ended
+        self._orders = count()
+        self._hub: greenlet.greenlet | None = None
+
+    def at(self, time: int, action: Callable[..., None], *arguments: Any) -> None:
+        """Let something happen at a time, or now where that has passed."""
+        heappush(self.heap, (max(time, self.time), next(self._orders), action, arguments))
+
+    def process(self, name: str, drift: Drift = NO_DRIFT) -> Process:
+        """A process of this world that does not run yet."""
+        return self.processes.setdefault(name, Process(self, name, drift))
+
+    def run(self) -> None:
+        """Let time pass until every process has ended, or to the limit; what a process raises is kept in it."""
+        self._hub = greenlet.getcurrent()
+        heap = self.heap
+        with _garbage_kept():
+            try:
+                while heap and heap[0][0] <= self.limit and self.alive:
+                    self.time, _, action, arguments = heappop(heap)
+                    action(*arguments)
+            finally:
+                for process in self.processes.values():
+                    process.discard()
+
+    def hand_over(self) -> None:
+        """Leave a process's greenlet for the scheduler."""
+        assert self._hub is not None  # noqa: S101 - only a running process comes here
+        self._hub.switch()
+
+
+class Process:
+    """A process and its clock: `now` and `sleep_until` are those of `common.host.clock.Clock`."""
+
+    def __init__(self, world: World, name: str, drift: Drift) -> None:
+        self.world = world
+        self.name = name
+        self._offset, self._ppb = drift
+        self.stalled_until = 0
+        self.killed = False
+        self.ended = False
+        self.reason = ""  # why somebody wants it to stop
+        self.error: Exception | None = None
+        self.ahead = 0  # ns that it has computed since it last waited
+        self._listening = False
+        self._token = 0  # of the newest wait: earlier ones are over
+        self._thread: greenlet.greenlet | None = None
+        self._woken: list[Callable[[], None]] = []
+
+    # -- the clock --------------------------------------------------------------------------------
+
+    @property
+    def time(self) -> int:
+        """World time of what it does now, what it has computed included, ns."""
+        return self.world.time + self.ahead
+
+    def now(self) -> int:
+        """Time on its own clock, ns."""
+        time = self.world.time + self.ahead
+        if not self._ppb:
+            return time + self._offset
+        return time + self._offset + time * self._ppb // PPB
+
+    def local(self, time: int) -> int:
+        """What its clock shows at a world time, ns."""
+        return time + self._offset + time * self._ppb // PPB
+
+    def reached(self, local: int) -> int:
+        """World time at which its clock shows a time, ns."""
+        if not self._ppb:
+            return local - self._offset
+        time = (local - self._offset) * PPB // (PPB + self._ppb)
+        while self.local(time) < local:
+            time += 1
+        return time
+
+    def sleep_until(self, deadline: int) -> None:
+        """Sleep until its own clock shows `deadline`, ns."""
+        self._wait(self.reached(deadline))
+
+    # -- what it does -----------------------------------------------------------------------------
+
+    def start(self, body: Callable[[], None], at: int = 0) -> None:
+        """Begin at a world time; an exception that leaves `body` is kept as `error`."""
+
+        def guarded() -> None:
+            try:
+                body()
+            except Exception as error:  # whatever the loops let through is a finding of the run
+                self.error = error
+            self._end()
+
+        self._thread = greenlet.greenlet(guarded)
+        self._token += 1
+        self.world.alive += 1
+        self.world.at(at, self._resume, self._token)
+
+    def _end(self) -> None:
+        self.world.alive -= not self.ended
+        self.ended = True
+
+    def spend(self, duration: int) -> None:
+        """Compute for some ns."""
+        self.ahead += duration
+
+    def listen(self, timeout: int) -> None:
+        """Wait for a message for at most `timeout` ns of its own clock."""
+        self._listening = True
+        time = self.time
+        self._wait(self.reached(self.local(time) + timeout) if self._ppb else time + timeout)
+        self._listening = False
+
+    def settle(self) -> None:
+        """Let world time catch up with the time it has spent computing, so that what came meanwhile is received."""
+        if self.ahead:
+            self._wait(self.time)
+
+    def _wait(self, until: int) -> None:
+        world = self.world
+        until, self.ahead = max(until, world.time + self.ahead), 0
+        heap = world.heap
+        if until <= world.limit and (not heap or heap[0][0] > until):
+            world.time = until  # nothing happens before: to switch would change nothing
+            return
+        self._token += 1
+        world.at(until, self._resume, self._token)
+        world.hand_over()
+
+    def wake(self) -> None:
+        """A message has come for it."""
+        if self._listening:
+            self._listening = False
+            self._resume(self._token)
+
+    def _resume(self, token: int) -> None:
+        if token != self._token or self.ended:
+            return
+        if self.world.time < self.stalled_until:
+            self.world.at(self.stalled_until, self._resume, token)
+            return
+        self._token += 1
+        assert self._thread is not None  # noqa: S101 - it was started
+        self._thread.switch()
+
+    # -- what happens to it -----------------------------------------------------------------------
+
+    @property
+    def stalled(self) -> bool:
+        """Whether it stands still, its link's threads with it."""
+        return self.world.time < self.stalled_until
+
+    def stall(self, duration: int) -> None:
+        """It does not run for some ns from now on: what should have run is late, what comes queues up."""
+        self.stalled_until = max(self.stalled_until, self.world.time + duration)
+        self.world.at(self.stalled_until, self._continue)
+
+    def when_woken(self, action: Callable[[], None]) -> None:
+        """Call something whenever it goes on after a stall, before it runs itself."""
+        self._woken.append(action)
+
+    def _continue(self) -> None:
+        if not self.stalled and not self.ended:
+            for action in self._woken:
+                action()
+
+    def kill(self) -> None:
+        """End it at once, as SIGKILL would."""
+        self.killed = not self.ended
+        self._end()
+
+    def stop(self, reason: str) -> None:
+        """Ask it to stop."""
+        self.reason = reason
+
+    def stopping(self) -> str:
+        """The reason to stop, empty while there is none."""
+        return self.reason
+
+    def discard(self) -> None:
+        """Leave nothing of its greenlet behind; the world is over."""
+        if self._thread is not None and not self._thread.dead:
+            self._thread.throw(greenlet.GreenletExit)
+
+
+@contextmanager
+def _garbage_kept() -> Iterator[None]:
+    """Undo at the end that the loops freeze the garbage collector, because all of them share this interpreter."""
+    enabled, interval = gc.isenabled(), sys.getswitchinterval()
+    gc.freeze()  # so that the loops' own collections find little to look at
+    try:
+        yield
+    finally:
+        gc.unfreeze()
+        sys.setswitchinterval(interval)
+        if enabled:
+            gc.enable()
