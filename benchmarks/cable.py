@@ -12,7 +12,7 @@ ADDRESSES = ("10.83.0.1", "10.83.0.2")
 
 
 class NoCableError(Exception):
-    """Namespaces are not to be had here, and why."""
+    """Network namespaces are not available here, and why."""
 
 
 def ip(*words: str) -> None:

@@ -74,7 +74,7 @@ def pieces_of(seed: int, seconds: float) -> list[Piece]:
 
 
 def piece(link: str, poor: Simulation, perfect: Array) -> Piece:
-    """What came of one piece."""
+    """The result of one piece."""
     plan, master = poor.plan, poor.loops[MASTER]
     tripped = any(loop.lab.error is not None for loop in poor.loops.values())
     holds = sum(

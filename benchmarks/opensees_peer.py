@@ -58,14 +58,14 @@ def ask(case: Case) -> Answer | str:
         return f"{PYTHON} cannot be run: {error.strerror}"
     except subprocess.TimeoutExpired:
         return f"no answer within {PATIENCE_S:g} s"
-    answers = [line for line in done.stdout.splitlines() if line.startswith("{")]  # OpenSees talks there too
+    answers = [line for line in done.stdout.splitlines() if line.startswith("{")]  # OpenSees prints there too
     if not answers:
         return reason(done.stderr)
     return Answer(**json.loads(answers[-1]))
 
 
 def reason(stderr: str) -> str:
-    """The error in a traceback: its last line, which OpenSees's own farewell may follow."""
+    """The error in a traceback: its last line, which OpenSees's own last line may follow."""
     lines = [line for line in stderr.splitlines() if "Error" in line]
     return lines[-1].partition(": ")[2] if lines else "it ended without an answer"
 

@@ -84,7 +84,7 @@ def run(*, quick: bool = False) -> list[Figure]:
 
 
 def memory_figures(sizes: dict[str, float]) -> list[Figure]:
-    """The memory of each process; the recorder's is nobody's concern while it keeps up."""
+    """The memory of each process; there is no target for the recorder's."""
     return [
         cost_figure(f"memory of the {name}", "MB", [size], most=200.0 if name != "recorder" else None)
         for name, size in sizes.items()

@@ -1,4 +1,4 @@
-"""Runs what the documents show: `python -m docs.console docs/tutorial.md` says where a page and its commands part.
+"""Runs the commands of a page: `python -m docs.console docs/tutorial.md` says where its text differs from their output.
 
 A fenced block of the language `console` holds commands after `$ ` (continued after `> `) and what they print. `…` in
 a line stands for anything within it, a line `…` for any lines. Its commands share one shell; one that fails is
@@ -55,7 +55,7 @@ class Command(NamedTuple):
 
 
 def blocks(markdown: str) -> Iterator[Block]:
-    """The blocks of a page in order; raises ValueError for a directive that stands before none."""
+    """The blocks of a page in order; raises ValueError for a directive without a block after it."""
     pending: tuple[str, str] | None = None
     for token in MarkdownIt("commonmark").parse(markdown):
         if token.type in ("fence", "code_block"):
@@ -72,7 +72,7 @@ def blocks(markdown: str) -> Iterator[Block]:
 
 
 def commands(text: str) -> list[Command]:
-    """The commands of a console block; raises ValueError where it begins with none."""
+    """The commands of a console block; raises ValueError where it begins with output."""
     found: list[Command] = []
     for line in text.splitlines():
         if line.startswith("$ "):

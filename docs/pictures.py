@@ -42,7 +42,7 @@ BOX = {"boxstyle": "round,pad=0.5", "fc": "#e8f1f8", "ec": "#1d4f73"}
 
 
 def tutorial() -> list[str]:
-    """Run the tutorial and keep the pictures that it draws; where the page and its commands part."""
+    """Run the tutorial and keep the pictures that it draws; where the page and its commands differ."""
     with tempfile.TemporaryDirectory() as folder:
         complaints = console.play(FOLDER / "tutorial.md", Path(folder))
         for name in TUTORIAL:
@@ -97,7 +97,7 @@ def modes() -> list[str]:
 
 
 def place(mode: Mode) -> tuple[float, float]:
-    """Where a mode stands."""
+    """The place of a mode in the picture."""
     column, row = PLACES[mode]
     return column * ACROSS, row * UP
 

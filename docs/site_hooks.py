@@ -1,4 +1,4 @@
-"""What the site shows otherwise than the pages themselves: the diagram that needs a script is the picture of it."""
+"""Where the site differs from the pages: a diagram that needs a script is replaced by a picture of it."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ class Wire:
     """A link on which nothing is sent."""
 
     def send(self, channel: str, frame: bytes, to: str = "") -> None:
-        """Nobody hears it."""
+        """Discard a frame."""
 
     def listen(self, heard: object) -> None:
         """Frames are handed to the endpoint itself."""

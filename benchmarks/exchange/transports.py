@@ -62,7 +62,7 @@ class Asking(Protocol):
 
 
 class StillTable:
-    """A laboratory that costs nothing: what the exchange does is all that is timed."""
+    """A laboratory that takes no time, so that only the exchange is timed."""
 
     def __init__(self, interval: float, seed: int) -> None:
         pass

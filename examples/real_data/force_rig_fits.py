@@ -1,4 +1,4 @@
-"""How far simple linear models follow the force rig, without the diagnosis: a yardstick for it.
+"""How far simple linear models follow the force rig: a comparison for the diagnosis, computed without it.
 
 python examples/real_data/force_rig_fits.py
 """

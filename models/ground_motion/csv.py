@@ -27,14 +27,14 @@ KINDS = {1: "acceleration alone", 2: "time and acceleration"}
 
 
 class Row(NamedTuple):
-    """One line of a file, parted."""
+    """One line of a file, split into cells."""
 
     line: int  # from 0
     cells: list[str]
 
 
 def read_csv(path: Path, dt: float = 0.0, unit: str = "") -> GroundMotion:
-    """A motion from one column or two, parted by commas, semicolons, tabs or blanks; it begins at its first line.
+    """A motion from one column or two, separated by commas, semicolons, tabs or blanks; it begins at its first line.
 
     `dt` (s) is the interval of a file without times, `unit` that of an acceleration whose header says none, which is
     m/s² otherwise. Where the file says either itself, it must be the same. Times must come in equal steps: a
@@ -71,7 +71,7 @@ def parted(source: Source) -> list[Row]:
 
 
 def separator(lines: list[str]) -> str:
-    """What parts the columns, judged by the first line of numbers; a blank stands for any number of blanks."""
+    """The separator of the columns, judged by the first line of numbers; a blank stands for any number of blanks."""
     line = next((line for line in lines if line[0] in "+-.0123456789"), lines[0])
     return next((mark for mark in ";\t," if mark in line), " ")
 
@@ -111,7 +111,7 @@ def split(source: Source, rows: list[Row]) -> tuple[Header, list[Row]]:
 
 
 def header_cells(line: str, count: int) -> list[str]:
-    """The names of a header whose names hold blanks, or that is parted otherwise than the data."""
+    """The names of a header whose names hold blanks, or that has another separator than the data."""
     if count == 1:
         return [line.strip()]
     for mark in (r"[;\t]", ",", r"\s{2,}", r"(?<=[)\]])\s+|\s+(?=[^\s(\[]+\s*(?:[(\[].*)?$)"):

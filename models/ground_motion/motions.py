@@ -80,7 +80,7 @@ def load(record: str, base: Path, dt: float = 0.0, unit: str = "") -> GroundMoti
 
 
 def check(path: Path, motion: GroundMotion) -> None:
-    """Raise InputError where a motion is none that could be computed with."""
+    """Raise InputError where a motion cannot be used in a computation."""
     if not LEAST_INTERVAL <= motion.interval < math.inf:
         raise InputError(
             f"The samples of {path} come every {motion.interval:g} s, which no record of an earthquake does: correct "

@@ -67,7 +67,7 @@ def number(word: str, where: str) -> float:
 
 
 def numbers(source: Source, start: int) -> NDArray[np.float64]:
-    """All values, parted by blanks, in the lines from index `start` on.
+    """All values, separated by blanks, in the lines from index `start` on.
 
     Raises:
         InputError: a value is not a finite number.

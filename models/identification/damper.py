@@ -194,7 +194,7 @@ def fit(
         last, weights = weights, [1.0 / max(pair) for pair in zip(left, least_left, strict=True)]
         if np.allclose(last, weights, rtol=0.1):
             break
-    # the Jacobian once more and sharper, so that what is not separable shows as such
+    # the Jacobian again with smaller steps, which shows parameters that cannot be separated
     result = optimize.least_squares(
         lambda x: residual(x, weights), x, bounds=(low, high), x_scale="jac", jac="3-point", max_nfev=1
     )

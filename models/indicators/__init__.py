@@ -1,4 +1,4 @@
-"""How well a test tracks, what that costs, and how near the loop is to instability: one room for all reports."""
+"""Indicators of a test for all reports: how well it tracks, what that costs, how near the loop is to instability."""
 
 from __future__ import annotations
 

@@ -136,7 +136,7 @@ def cross(expected: Spectra, measured: Spectra, interval: float) -> Cross:
     kept[[0, -1]] = False
     if not kept.any():
         raise InputError(
-            "The measured force has nothing to do with what the specimen's model gives, or only in a moment."
+            "The measured force is coherent with that of the specimen's model nowhere, or only for a moment."
         )
     omega = 2.0 * math.pi * np.fft.rfftfreq(2 * (kept.size - 1), interval)
     return Cross(np.asarray(omega[kept]), products[:, kept], powers[:, kept])

@@ -1,4 +1,4 @@
-"""Whether a motion that nothing drives dies away or grows."""
+"""Whether a free motion decays or grows."""
 
 from __future__ import annotations
 

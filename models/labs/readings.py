@@ -1,4 +1,4 @@
-"""What a sensor makes of a value: `gain·delayed(lagged(value)) + bias + drift·t + noise`, rounded to its step.
+"""The reading of a value: `gain·delayed(lagged(value)) + bias + drift·t + noise`, rounded to the sensor's step.
 
 The lag is of first order, `τ·ẏ + y = x`, for a value that moves on a straight line from tick to tick; so does what is
 delayed, by any part of an interval. Before its first tick a value counts as zero.

@@ -142,9 +142,7 @@ def advance(lab: TableLab, command: float, motor_command: float) -> tuple[float,
             for column in range(size + INPUTS):
                 value += matrices[i, row, column] * scratch[column]
             state[row] = value
-    if (
-        limits[IDEAL] > 0.0
-    ):  # its velocity steps; what an accelerometer sees of that is the mean over the interval
+    if limits[IDEAL] > 0.0:  # its velocity steps, and an accelerometer reads the mean over the interval
         velocity = (state[TABLE] - start) / limits[IDEAL]
         state[ACCELERATION] = (velocity - scratch[played + 1]) / limits[IDEAL]
         scratch[played + 1] = velocity

@@ -62,7 +62,7 @@ def simulate(
 
     Raises:
         InputError: the plan has a damper or names its slaves, both a seed and noise are given, the noise has another
-            shape, or a model, method or parameter is none that the registries know.
+            shape, or a model, method or parameter is unknown to the registries.
     """
     if plan.control.amd or plan.slaves:
         raise InputError("The loop of laboratory A alone knows no damper: set amd in [control] to false.")

@@ -1,4 +1,4 @@
-"""What nominal models say against a test: too little margin of delay, too little room below the limits."""
+"""Risks of a test that nominal models show: too little margin of delay, peaks too near to the limits."""
 
 from __future__ import annotations
 

@@ -31,12 +31,12 @@ def true_system(reality: Reality) -> System:
                 "put it into that rig, or leave the rig out of the reality and the plan."
             )
         if alone and site != "link" and lab != SLAVE:
-            raise InputError(f"The effect '{name}' is none of one slave's: leave out its slave.")
+            raise InputError(f"The effect '{name}' does not belong to one slave: leave out its slave.")
     return lay(System(reality.plan), reality.effects)
 
 
 def laboratory(site: str) -> str:
-    """Who stands beside a site of the catalogue: master, slave, or nobody."""
+    """The role whose laboratory holds a site of the catalogue: master, slave, or neither."""
     part, _, signal = site.partition(".")
     if part == "sensor":
         return SIGNALS.get(signal, "slave")

@@ -146,7 +146,7 @@ def critical_delay_of(plan: Plan) -> float:
     """Smallest delay (s) of the column's force that makes the linear loop unstable.
 
     Raises:
-        InputError: the numerical part is none that a specimen could stabilise.
+        InputError: no specimen could stabilise the numerical part.
     """
     part, specimen = numerical(plan), felt(plan)
     return indicators.critical_delay(

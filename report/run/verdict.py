@@ -201,9 +201,7 @@ def margins(run: Run, summary: Summary) -> list[Margin]:
     found = []
     for name, facts in peaks.items():
         topic, _, signal = name.partition("/")
-        of_all_slaves = (
-            topic == MASTER and signal in of_slaves
-        )  # those of the master hold all slaves together
+        of_all_slaves = topic == MASTER and signal in of_slaves  # one row for all slaves together
         if signal not in UNITS or of_all_slaves or not math.isfinite(facts["peak"]):
             continue
         plan = plan_of(run.of(topic) if name_of(topic) else run)

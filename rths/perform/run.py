@@ -136,9 +136,7 @@ def checks(plan: Plan, output: Path) -> list[Check]:
 
 def virtual_report(working: Working, kind: str, data: Any) -> None:
     """Events of a test in virtual time, on standard error."""
-    if (
-        kind == "event" and data["code"] not in UNSAID and data["level"] != "error"
-    ):  # the error is printed last
+    if kind == "event" and data["code"] not in UNSAID and data["level"] != "error":  # errors come last
         working.leave(wipe=True)
         cli.text_report(kind, data)
 

@@ -172,7 +172,9 @@ def test_an_effect_of_one_slave_is_laid_over_that_one_alone(recording: Run, tmp_
 def test_an_effect_on_the_building_belongs_to_no_slave(tmp_path: Path) -> None:
     path = tmp_path / "reality.toml"
     path.write_text("[[effect]]\nname = 'structure.mass'\nfactor = 1.1\nslave = 'roof'\n")
-    with pytest.raises(InputError, match=r"'structure.mass' is none of one slave's: leave out its slave"):
+    with pytest.raises(
+        InputError, match=r"'structure.mass' does not belong to one slave: leave out its slave"
+    ):
         virtual.assemble(TWO, reality.load(path, TWO), None)
 
 

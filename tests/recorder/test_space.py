@@ -68,7 +68,7 @@ def test_a_full_disk_is_said_with_folder_need_and_room(
     assert "\n" not in sentence
     assert risk_of(with_table(short_plan, "preflight", disk_factor=1.0), tmp_path) == ""
     monkeypatch.undo()
-    assert "nobody can see how much room" in risk_of(short_plan, tmp_path / "no")
+    assert "the free space of the folder" in risk_of(short_plan, tmp_path / "no")
 
 
 def test_a_run_in_virtual_time_is_refused_too_and_an_accepted_risk_is_recorded(
