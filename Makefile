@@ -5,7 +5,10 @@ READY := .venv/.ready
 FAULT_ROWS := runs/faults.jsonl
 FAULT_TESTS := tests/faults tests/system/faults tests/system/test_recording_faults.py tests/system/test_security.py
 
-.PHONY: setup run test check slow faults soak matrix opensees docs site benchmark blind clean
+# the tests start hundreds of interpreters, which find this checkout compiled, whatever the user's shell says of bytecode
+unexport PYTHONDONTWRITEBYTECODE
+
+.PHONY: setup run test tested check slow faults soak matrix opensees docs site benchmark blind clean
 
 setup: $(READY)
 
@@ -26,10 +29,12 @@ check: setup
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
-TESTED := -n 2 --dist worksteal -m "not slow and not faults and not soak"
+# the checks run beside the tests, which wait now and then
+test: setup
+	$(MAKE) --no-print-directory -j 2 check tested
 
-test: check
-	$(BIN)/pytest $(TESTED)
+tested: setup
+	$(BIN)/pytest -n 2 --dist worksteal -m "not slow and not faults and not soak"
 
 # what takes long or needs a machine that does little else; one worker: where a test hangs beyond reach the others get another
 slow: setup

@@ -54,20 +54,21 @@ def no_leaked_process() -> Iterator[None]:
 
 @pytest.fixture(autouse=True)
 def no_leaked_priority() -> Iterator[None]:
-    """A test that leaves its worker at real-time priority or bound to a processor fails, and both are taken back.
+    """A test that leaves its worker at another priority or bound to a processor fails, and both are taken back.
 
     All processes of later tests would inherit them.
     """
     if sys.platform != "linux":
         yield
         return
-    processors = os.sched_getaffinity(0)
+    before = os.sched_getscheduler(0), os.sched_getaffinity(0)
+    priority = os.sched_getparam(0)
     yield
-    policy, left = os.sched_getscheduler(0), os.sched_getaffinity(0)
-    if policy != os.SCHED_OTHER:
-        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
-    os.sched_setaffinity(0, processors)
-    assert (policy, left) == (os.SCHED_OTHER, processors)
+    left = os.sched_getscheduler(0), os.sched_getaffinity(0)
+    if left != before:
+        os.sched_setscheduler(0, before[0], priority)
+        os.sched_setaffinity(0, before[1])
+    assert left == before
 
 
 def below(before: set[int]) -> list[Left]:

@@ -58,7 +58,7 @@ def test_a_user_without_rights_completes_the_test_on_a_machine_that_pauses_it(tm
         "rths",
         "run",
         "--duration",
-        "5",
+        "3",
         "-o",
         str(tmp_path / "a.mcap"),
         "--json",

@@ -19,7 +19,6 @@ import pytest
 
 from common.plan import plan as plans
 from common.plan import reality
-from common.plan.plan import Plan
 from common.recording.reader import Run, read
 from simulation import virtual
 from tests.helpers import PATIENT, SLOW, patient
@@ -63,20 +62,18 @@ def plan_file(folder: Path, **link: float) -> Path:
 
 @pytest.fixture(scope="module")
 def real_run(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], Run]:
-    """Four seconds of the default test in real time: its summary and its recording."""
+    """Two seconds of the default test in real time: its summary and its recording."""
     path = tmp_path_factory.mktemp("real") / "real.mcap"
-    code, out, err = finish(start("run", patient(path.parent), "--duration", "4", "-o", path, "--json"))
+    code, out, err = finish(start("run", patient(path.parent), "--duration", "2", "-o", path, "--json"))
     assert code == 0, err
     return json.loads(out), read(path)
 
 
-def test_every_tick_of_a_real_test_is_recorded(
-    short_plan: Plan, real_run: tuple[dict[str, Any], Run]
-) -> None:
+def test_every_tick_of_a_real_test_is_recorded(real_run: tuple[dict[str, Any], Run]) -> None:
     summary, recording = real_run
     assert recording.finished
     for topic in ("master", "slave", "latency"):
-        assert recording.sequences[topic].tolist() == list(range(short_plan.ticks))
+        assert recording.sequences[topic].tolist() == list(range(1000))
         assert summary["topics"][topic]["missing"] == 0
     assert summary["recorder"]["cause"] == "completed"
     assert np.all(np.diff(recording.log_ns["master"]) == 2_000_000)
@@ -240,7 +237,7 @@ def test_a_front_door_killed_in_the_first_moments_leaves_nobody(seconds: float, 
 @LINUX
 def test_a_killed_slave_is_noticed_by_the_master_and_named(tmp_path: Path) -> None:
     path, planned = tmp_path / "a.mcap", tmp_path / "plan.toml"
-    planned.write_text(PATIENT + "[link]\nloss_timeout = 1.0\n")
+    planned.write_text(PATIENT + "[link]\nloss_timeout = 1.0\n[recording]\npatience = 1.0\n")
     process = start("run", planned, "--duration", "60", "-o", path)
     numbers = crew(process)
     wait_for_ticks(path)

@@ -132,6 +132,13 @@ def test_the_terminal_says_what_matters() -> None:
     assert "column.stiffness" not in text
 
 
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pages without pictures, which are the slow part."""
+    monkeypatch.setattr(pictures, "svg", lambda _canvas: "<svg></svg>")
+
+
+@pytest.mark.usefixtures("undrawn")
 def test_the_force_path_stands_on_the_terminal_and_the_page() -> None:
     report = fresh("explained")
     assert "force path" not in summary(report)
@@ -204,7 +211,9 @@ def strings_replaced(piece: Any, text: str) -> Any:
 
 
 @pytest.mark.parametrize("name", ["explained", "unknown_effect"])
-def test_no_text_of_a_report_becomes_markup(name: str) -> None:
+def test_no_text_of_a_report_becomes_markup(name: str, request: pytest.FixtureRequest) -> None:
+    if name != "explained":  # which has every picture
+        request.getfixturevalue("undrawn")
     text = "<script>alert(1)</script>\"'><b> $\\frac{$ a & b -- >"
     report = strings_replaced(fresh(name), text)
     report["tolerances"] = {text: {"factor": 1.1, "z": 2.0}}
@@ -236,9 +245,9 @@ def empty(report: Report, path: tuple[Any, ...]) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize("name", ["explained", "unknown_effect"])
-def test_every_piece_may_be_missing(name: str, monkeypatch: Any) -> None:
-    monkeypatch.setattr(pictures, "svg", lambda _canvas: "<svg></svg>")
+def test_every_piece_may_be_missing(name: str) -> None:
     first = pieces(fresh("explained")) if name != "explained" else []
     for path in pieces(fresh(name)):
         if path[-1] in ("site", "effects") or path in first:
@@ -301,8 +310,9 @@ def candidate(*names: str) -> dict[str, Any]:
 
 @pytest.mark.parametrize("others", [(), ("damper.friction",)])
 def test_no_word_of_an_effect_is_said_twice(others: tuple[str, ...]) -> None:
+    explained = fresh("explained")
     for name in CATALOGUE:
-        report = fresh("explained") | {"which": [candidate(name, *others)]}
+        report = explained | {"which": [candidate(name, *others)]}
         lines = summary(report).splitlines()
         first = next(place for place, line in enumerate(lines) if line.startswith("which"))
         last = next(place for place, line in enumerate(lines) if place > first and not line.startswith(" "))
@@ -332,17 +342,15 @@ def test_a_report_without_a_verdict_gets_one(status: str) -> None:
 
 
 def seen(monkeypatch: Any) -> list[Any]:
-    """The canvases of a page, as they are when they are saved."""
-    from matplotlib.figure import Figure
-
+    """The canvases of a page, as they are before they are saved."""
     found: list[Any] = []
-    save = Figure.savefig
 
-    def saved(self: Any, *args: Any, **options: Any) -> None:
-        found.append(self)
-        save(self, *args, **options)
+    def laid_out(canvas: Any) -> str:
+        pictures.fit_labels(canvas)
+        found.append(canvas)
+        return "<svg></svg>"
 
-    monkeypatch.setattr(Figure, "savefig", saved)
+    monkeypatch.setattr(pictures, "svg", laid_out)
     return found
 
 
@@ -386,6 +394,7 @@ def test_no_more_than_the_whole_gap_is_said_to_close() -> None:
     assert "closed" not in next(line for line in summary(clean).split("\n") if line.startswith("how far"))
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_an_effect_that_is_listed_twice_is_said_once() -> None:
     report = fresh("explained")
     first = report["details"]["candidates"][0]

@@ -220,7 +220,7 @@ def test_bins_hold_every_value_once() -> None:
     assert sum(item.count for item in reliability(some())) == 20
 
 
-def test_results_are_json_and_the_page_stands_alone(tmp_path: Path) -> None:
+def test_results_are_json_and_the_page_stands_alone() -> None:
     text = json.dumps(results(some()), allow_nan=False)
     assert len(json.loads(text)["cases"]) == 24
     shown = page(some(), "Made <here>.")
@@ -232,5 +232,9 @@ def test_results_are_json_and_the_page_stands_alone(tmp_path: Path) -> None:
     assert "21 of 24 cases right." in text
     assert check_alone(page([], "")).text.endswith("Cases that are not right None.")
     assert page([], "").count("data:image/png") == 4
-    (tmp_path / "index.html").write_text(shown, encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_the_page_in_a_browser(tmp_path: Path) -> None:
+    (tmp_path / "index.html").write_text(page(some(), "Made here."), encoding="utf-8")
     check_in_browser(tmp_path / "index.html", tmp_path)

@@ -9,13 +9,13 @@ from typing import Any, NamedTuple
 import pytest
 
 from common.terminal.telling import untold
-from validation.benchmark2020 import evidence, figures, page, text
+from validation.benchmark2020 import evidence, figures, late_force, page, text
 from validation.benchmark2020.evidence import Evidence
 from validation.benchmark2020.problem import SETTINGS
 
 
 class Played(NamedTuple):
-    """What the command makes of a few settings and plants."""
+    """What the command makes of a few settings, plants and delays."""
 
     evidence: Evidence
     checks: list[evidence.Check]
@@ -27,7 +27,9 @@ class Played(NamedTuple):
 def played(tmp_path_factory: pytest.TempPathFactory) -> Played:
     folder = tmp_path_factory.mktemp("benchmark2020")
     settings = {name: SETTINGS[name] for name in ("sample", "amb", "none")}
-    found = evidence.gather(settings, 1, 2020, 2, untold)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(late_force, "DELAYS", (0.0, 1e-3, 2e-3, 10e-3))
+        found = evidence.gather(settings, 1, 2020, 2, untold)
     checks = evidence.checks(found)
     pictures = figures.draw_all(found, folder)
     place = folder / "index.html"
