@@ -16,7 +16,8 @@ from pathlib import Path
 PROC, SYS = Path("/proc"), Path("/sys")
 CGROUPS = SYS / "fs/cgroup"
 POLICIES = {0: "other", 1: "fifo", 2: "rr", 3: "batch", 5: "idle", 6: "deadline"}
-STARTED = 19  # place in /proc/PID/stat behind the name
+STARTED = 19  # place in /proc/PID/stat behind the name, whose first is the state
+ENDED = ("Z", "X")  # states of a process that is gone, with or without its parent knowing
 RESET_ON_FORK = 0x40000000
 USER, NICE, SYSTEM, _IDLE, _IOWAIT, IRQ, SOFTIRQ, STEAL = range(8)  # columns of /proc/stat
 BUSY = (USER, NICE, SYSTEM, IRQ, SOFTIRQ)  # guests are counted in `user` already
@@ -148,7 +149,7 @@ def spare_memory() -> int | None:
 
 
 def began(pid: int) -> float | None:
-    """When a process was started, Unix time in s, 0 where the system does not say; None where there is none."""
+    """When a process was started, Unix time in s, 0 where the system does not say; None where none runs."""
     try:
         os.kill(pid, 0)
     except ProcessLookupError:
@@ -156,7 +157,10 @@ def began(pid: int) -> float | None:
     except PermissionError:
         pass  # another user's
     try:
-        ticks = int((PROC / str(pid) / "stat").read_text().rsplit(")", 1)[1].split()[STARTED])
+        state, *facts = (PROC / str(pid) / "stat").read_text().rsplit(")", 1)[1].split()
+        if state in ENDED:
+            return None
+        ticks = int(facts[STARTED - 1])
         since = next(line for line in (PROC / "stat").read_text().splitlines() if line.startswith("btime"))
     except (OSError, StopIteration, IndexError, ValueError):
         return 0.0

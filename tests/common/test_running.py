@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -39,6 +40,14 @@ def announce(folder: Path, process: int, test: str = "default", role: str = runn
     path = folder / f"{test}-{process}.json"
     path.write_text(json.dumps(running.Running(test, "tcp/127.0.0.1:7447", ".", "", role)._asdict()))
     return path
+
+
+def test_a_process_that_ended_unheard_of_runs_no_test(place: Path, other: int) -> None:
+    announce(place, other)
+    assert [one.process for one in running.neighbours()] == [other]
+    os.kill(other, signal.SIGKILL)
+    os.waitid(os.P_PID, other, os.WEXITED | os.WNOWAIT)  # it has ended, and nobody has asked how
+    assert running.neighbours() == []
 
 
 def test_a_test_alone_is_not_refused_and_leaves_no_file(place: Path) -> None:
