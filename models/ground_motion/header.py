@@ -43,7 +43,8 @@ class Header(NamedTuple):
 def columns(cells: list[str], where: str) -> Header:
     """What the header says of one or two columns; `where` stands in errors.
 
-    Raises: InputError: a name or a unit is unknown, or the two columns are of one kind.
+    Raises:
+        InputError: a name or a unit is unknown, or the two columns are of one kind.
     """
     words = [cell.strip().lower().replace("²", "2") for cell in cells]
     times = [place for place, word in enumerate(words) if TIME.fullmatch(word)]
