@@ -15,7 +15,8 @@ from common.rig import GuardedRig
 from common.safety.modes import STILL_LATCHED
 from master.partner import Partner
 
-LEAD_NS = 250_000_000  # from the agreement on the start to the start
+# from the agreement on the start to the start: a message that is lost is sent again twice in that time
+LEAD_NS = 250_000_000
 
 
 class Handshake:

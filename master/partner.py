@@ -13,6 +13,7 @@ from common.safety.watchdog import Finding, Watchdog
 from master.latency import Account
 from master.step import Sent
 
+# before the start: most exchanges wait in no queue, so that some of these show the shortest round trip
 SYNC_EXCHANGES = 200
 OFFSET_BLOCK, OFFSET_BLOCKS = 250, 40  # exchanges: the best of half a second each, twenty seconds of them
 GIVEN_UP_NS = 5 * REPEAT_NS  # silence after which another process may register under the same name

@@ -20,7 +20,8 @@ from common.roles import LATENCY, MASTER, RECORDER, kind_of, title
 from recorder.items import Items
 from recorder.sink import Item, Sink
 
-SILENCE_NS = 5_000_000_000  # a test from which nothing is heard for so long is over
+# a test from which nothing is heard for so long is over: its laboratories repeat their last words for as long
+SILENCE_NS = 5_000_000_000
 ITEMS_PER_TICK, SPARE_TICKS = 4, 100_000  # bounds a stream's items: its topics of every tick, and events
 ASK_NS = 20_000_000  # from asking a laboratory to asking it again, where the answer has come
 ASKED_SILENCE_NS = (

@@ -12,7 +12,7 @@ from common.recording.reader import MACHINES
 from common.recording.writer import Recording
 
 FLUSH_NS = 50_000_000  # with a piece of a laboratory's stream on its way, less than 0.1 s is not in the file
-SYNC_NS = 1_000_000_000
+SYNC_NS = 1_000_000_000  # a power cut costs a second at most; a sync takes tens of ms on a slow disk
 QUEUE_ITEMS = 60_000  # forty seconds of a default test
 CLOSE_S = 25.0  # less than `rths run` allows the recorder to write what it holds
 

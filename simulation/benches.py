@@ -28,7 +28,7 @@ from recorder import files
 from recorder.sink import FileSink, Item, Sink, ThreadedSink
 from slave import assembly as slave
 
-LEAD_NS = 100_000_000
+LEAD_NS = 100_000_000  # before the first tick: what is left to prepare takes a few ms
 UNCOMPENSATED = TableCompensator()
 
 MASTER_FIELDS = ("seq", "t", "column_target", "actuator_command", "column_displacement", "column_force")

@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 
     from common.host.realtime import Granted
 
-BIN_NS = 1000
+BIN_NS = 1000  # 1 µs: the lateness that matters is tens of µs
 BINS = 20_000  # 20 ms: what is later is told apart by the maximum only
 PERCENTILES = (("p50", 500), ("p90", 900), ("p99", 990), ("p99.9", 999))  # per mille
-PATIENCE = 2.0  # s, for the last words
+PATIENCE = 2.0  # s for its last line, which it prints within milliseconds unless the machine is held up
 
 
 class Lateness:

@@ -16,8 +16,10 @@ from common.protocol.exchange import State
 from common.safety.longest import resting
 from common.safety.modes import Mode
 
-IDLE_NS = 5_000_000  # how often the handshake looks after itself
-LEAVE_NS = 5_000_000_000  # how long the last words may take where the recorder is not waited for
+# how often the handshake looks after itself: often beside its requests, which are repeated every 100 ms
+IDLE_NS = 5_000_000
+# how long the last words may take where the recorder is not waited for: five leases of the link
+LEAVE_NS = 5_000_000_000
 PROGRESS_NS = 200_000_000
 RESTING_NS = (
     500_000_000  # between two reports of the way to rest: the user is not kept waiting for the next one

@@ -21,7 +21,8 @@ from common.roles import MASTER, SLAVE, title
 from common.safety.modes import Cause, Mode, Safety, Turn
 
 SLOW_RIG = "slow_rig"  # code of the event of a rig whose calls take too long, and of the message that says so
-REPEAT_NS = 100_000_000  # an unanswered request is sent again after this long
+# an unanswered request is sent again after this long: many round trips even on a slow link, and no wait for a user
+REPEAT_NS = 100_000_000
 
 NO_VALUES: Mapping[str, float] = MappingProxyType({})
 

@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 
 from common.protocol.codec import Reject
 
-NEWS_NS = 1_000_000_000  # between two reports
+# between two reports: as often as a user can read them, however many frames a stranger sends
+NEWS_NS = 1_000_000_000
 UNTOLD = frozenset({Reject.UNREGISTERED.value})  # a process in no test hears those of others
 
 

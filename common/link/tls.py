@@ -9,7 +9,8 @@ from pathlib import Path
 
 from common.link.address import place
 
-PROBE_S = 0.5  # within which a listener says what it thinks of a certificate
+# s within which a listener says what it thinks of a certificate: several round trips even on a slow link
+PROBE_S = 0.5
 
 
 def mismatch(endpoint: str) -> str:

@@ -28,6 +28,7 @@ from common.link.transport import SAMPLES, Packet, Route, heard, said
 from common.protocol.codec import MOST_FRAME
 from common.roles import MASTER, SLAVE
 
+# decides nothing about a rig, since the loops judge silence by messages: it only frees the link of a dead peer
 LEASE_MS = 1000
 ATTEMPT_MS = 500  # opening a session cannot be interrupted, so it is tried again and again for this long
 # A connection on which nobody completes zenoh's handshake is dropped after this time. Our own processes give a dial up

@@ -16,8 +16,10 @@ from common.plan.tables import Limits
 
 UNITS: dict[str, str] = {field.name: field.metadata["rule"].unit for field in dataclasses.fields(Limits)}
 
-PATIENCE = 3  # intervals in a row by which an error must be beyond its limit
-TRAVEL = 10.0  # by so many times its nominal noise a command has moved
+# intervals in a row by which an error must be beyond its limit: a message or two that is late makes one for a moment
+PATIENCE = 3
+# by so many times its nominal noise a command has moved: the reading must then differ beyond any doubt
+TRAVEL = 10.0
 
 
 class Violation(NamedTuple):

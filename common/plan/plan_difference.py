@@ -18,8 +18,8 @@ from common.plan.patience import strict
 from common.plan.plan import Plan
 from common.protocol.codec import MOST_TEXT
 
-MOST_KEYS = 6  # named in a sentence
-MOST_SHOWN = 40  # characters of a name or a value in a sentence
+MOST_KEYS = 6  # named in a sentence, which is to be read at once
+MOST_SHOWN = 40  # characters of a name or a value in a sentence: most keys of a plan are shorter
 VERSION = "rths"  # beside the keys, which all hold a point
 HASHED = "#"  # before the digits of a value that did not fit
 

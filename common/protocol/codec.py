@@ -21,10 +21,12 @@ import msgpack
 
 from common.protocol.messages import Message
 
-CHECK_SIZE = 8
+CHECK_SIZE = 8  # bytes: of damaged frames one in 2^64 passes
 MOST = 2**62  # of a whole number; in ns a century and a half
-MOST_TEXT = 4_000  # characters of a text
-MOST_FRAME = 1 << 20  # bytes of a frame on any channel
+# characters of a text: a rig's own words, or all keys of a plan that differ from their defaults
+MOST_TEXT = 4_000
+# bytes of a frame on any channel: twenty times the largest piece of samples, that of 100 storeys
+MOST_FRAME = 1 << 20
 LEAST = {"shift_ns": -MOST, "command_seq": -1, "heard_seq": -1}  # of these whole numbers; 0 of all others
 
 MESSAGES: tuple[type[Any], ...] = get_args(Message)

@@ -40,11 +40,12 @@ from mcap.writer import MCAP0_MAGIC
 
 from common.recording.bounds import Bounds
 
+# bytes of a record that is looked at: a thousand times the chunk that this software writes
 RECORD_LIMIT = 64 << 20
 DAMAGE = (McapError, ValueError, struct.error, zstandard.ZstdError, MemoryError)  # what libraries raise on it
 HEAD = struct.Struct("<BQ")  # opcode and length of a record
 MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
-WINDOW = 1 << 20
+WINDOW = 1 << 20  # bytes read at a time
 KINDS: dict[int, Any] = {
     Opcode.HEADER: Header,
     Opcode.FOOTER: Footer,

@@ -23,7 +23,7 @@ from common.recording.schema import message_class, message_name, schema_file
 from common.roles import SLAVE
 from common.signals import Signal
 
-CHUNK_SIZE = 64 * 1024
+CHUNK_SIZE = 64 * 1024  # bytes, unpacked: so little is lost with a damaged chunk, and it still packs well
 REPEAT_BYTES = 1 << 20  # schemas and channels, some kilobytes, stand in the file again after so much of it
 SYNC = getattr(os, "fdatasync", os.fsync)  # not every system has the cheaper one
 

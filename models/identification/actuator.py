@@ -16,9 +16,9 @@ from models.transfer_systems import delay, first_order
 LEAST = 20  # samples
 NAMES = ("delay", "time_constant", "gain")
 UNITS = ("s", "s", "")
-LONGEST = 0.5  # s, for either time
-SHORTEST = 1e-6  # s, of a time constant
-HOPELESS = 0.9  # nrmse above which nothing was identified
+LONGEST = 0.5  # s, for either time: an actuator that is slower cannot take part in a test in real time
+SHORTEST = 1e-6  # s, of a time constant: below it the lag is none at any interval
+HOPELESS = 0.9  # nrmse above which nothing was identified: a constant leaves 1
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,8 @@ from models.registry import Array
 
 LEAST = 20  # samples
 RETURN = 0.3  # share of the smallest amplitude by which the motion must come back to count as a reversal
-MATCH = 0.2  # share by which a cycle's amplitude may miss the protocol's
+# share by which a cycle's amplitude may miss the protocol's: the paper's amplitudes differ by 20 % and more
+MATCH = 0.2
 SMOOTH = 250  # samples of a cycle per sample of the average around its peaks
 
 

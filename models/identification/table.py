@@ -20,8 +20,8 @@ NAMES = ("frequency", "damping_ratio", "delay")
 UNITS = ("Hz", "", "s")
 LOW = (0.2, 0.02, 0.0)
 HIGH = (200.0, 5.0, 0.5)
-HOPELESS = 0.8  # nrmse above which nothing was identified
-COHERENT = 0.8  # least coherence of a frequency that is read
+HOPELESS = 0.8  # nrmse above which nothing was identified: a constant leaves 1
+COHERENT = 0.8  # least coherence of a frequency that is read: there a fifth of the power is noise
 
 
 @dataclass(frozen=True)

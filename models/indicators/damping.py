@@ -11,7 +11,7 @@ from common.errors import InputError
 from models.indicators.checks import checked, moving
 from models.registry import Array
 
-LEAST = 20  # samples of a free vibration
+LEAST = 20  # samples of a free vibration: four for each of the five numbers that are fitted
 BOUNDS = ([0.5, -1.0], [2.0, 1.0])  # damped frequency and decay over the frequency of the spectrum's peak
 STARTS = (0.002, 0.02, 0.1)  # damping ratios tried first
 

@@ -22,7 +22,7 @@ from models.loop.substructure import ACTUATOR_COMMAND, COLUMN_TARGET, TABLE_TARG
 from models.registry import Array
 from models.system import Effects, System
 
-FARTHEST = 1e6  # m, command from which on the loop has diverged
+FARTHEST = 1e6  # m, command from which on the loop has diverged: no laboratory is as large
 
 
 class Loop(NamedTuple):

@@ -24,8 +24,8 @@ PERIODS = (
     40  # of the first mode that are watched: a loop of −0.05 % of damping or less then grows by what counts
 )
 PULSE = 0.1  # of the first period
-PUSH = 1e-3  # m/s², of the pulse
-MOST_TICKS = 200_000
+PUSH = 1e-3  # m/s², of the pulse: so small that a specimen keeps its first stiffness
+MOST_TICKS = 200_000  # of the watched motion: 400 s at 2 ms, computed in some hundredths of a second
 MOST_SLAVE_TICKS = 30_000  # of all slaves where there are several, which are stepped one by one: about 2 s
 WATCHED = ("displacement", "column_target", "actuator_command", "table_command", "damper_stroke")
 SILENT = Sensors(*[0.0] * len(Sensors.__dataclass_fields__))

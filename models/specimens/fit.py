@@ -32,7 +32,7 @@ from models.specimens import SPECIMENS
 
 MOST_ROWS = 1200  # of a thinned record
 FOLLOWED = 600  # starting points followed to their minimum, times parameters squared; at least two are
-EVALUATIONS = 50  # most steps to a minimum
+EVALUATIONS = 50  # most steps to a minimum: a start that has not come near it by then is given up
 CONFIDENCE = 0.95
 WEAKEST = 1e-13  # smallest eigenvalue of the normal matrix, relative to its largest
 WIDEST = 50.0  # bound on the logarithm of a factor between estimate and interval

@@ -19,7 +19,7 @@ from models.registry import Array
 
 CYCLES = 12  # of the sine at which amplitude and delay are found
 LEAST_CYCLES = 2.0  # s, as many cycles of it as that where they are more
-AMPLITUDE = 1e-3  # m, of sine and pulse
+AMPLITUDE = 1e-3  # m, of sine and pulse: so small that no limit of the actuator is met
 PULSE = 0.5  # of a period: the pulse's spectrum then has its first zero at four times the frequency
 LEAST_PULSE = 8  # ticks
 WATCHED = (
@@ -27,7 +27,7 @@ WATCHED = (
 )
 LEAST_WATCHED, MOST_WATCHED = 2.0, 40.0  # s
 LOWEST = 0.2  # Hz, below which a transfer system is late by as much as there
-FARTHEST = 1e6  # m, from where on the motion has diverged
+FARTHEST = 1e6  # m, from where on the motion has diverged: no laboratory is as large
 
 
 class Path(NamedTuple):

@@ -18,7 +18,8 @@ from report.budget.limits import PERCENTILES, WAITS, Budget, Late, Machine
 
 OK, OVER, DOUBT, SHORT = "ok", "over", "doubt", "short"
 WAKE, SUM = "wake_lateness", "round_trip"
-LEAST_BEYOND = 5  # values that must lie beyond a percentile, or it is next to a maximum
+# values that must lie beyond a percentile: with fewer it is next to a maximum, which a single pause makes
+LEAST_BEYOND = 5
 EPSILON = 1e-9  # s or values: rounding is no excess
 
 

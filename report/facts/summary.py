@@ -23,7 +23,7 @@ from report.facts.due import due
 
 Result = TypeVar("Result")
 PERCENTILES = (50, 90, 99, 99.9)
-LEAST_TICKS = 500
+LEAST_TICKS = 500  # a second at 2 ms: less holds too few cycles of a building for a delay
 # topic, part, target, measurement, ticks by which the target stands before the measurement that it belongs to
 PATHS = (
     ("master", "actuator", "column_target", "column_displacement", 0),

@@ -16,7 +16,7 @@ from recorder.loop import CONSEQUENCE, ROWS_LOST, SILENCE_NS
 MARGIN_S = 1.0  # on what a process allows itself, for it to leave
 LEAVE_S = LEAVE_NS * 1e-9 + MARGIN_S  # before there are rows that a recorder could ask for again
 SILENCE_S = SILENCE_NS * 1e-9 + MARGIN_S
-KILL_S = 3.0  # from asking to killing
+KILL_S = 3.0  # from asking to killing: a process that works leaves within a second
 WRITE_S = 30.0  # for the recorder to bring to a slow disk what it holds: the file is what the test was for
 
 USED, OWN, CRASHED, LOST, KILLED, WISHED, LED, ASKED, LACKING = range(9)

@@ -19,8 +19,8 @@ from common.roles import MASTER, OPERATOR, title
 from common.terminal import cli
 from common.terminal.printable import shown
 
-REPEAT_S = 0.1
-PATIENCE_S = 3.0
+REPEAT_S = 0.1  # between two sendings of a wish, whose answer takes a tick
+PATIENCE_S = 3.0  # s for all answers: a laboratory looks at its messages every tick, unless it is held up
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from rths.perform.live_child import View
     from rths.perform.processes import Processes, Said
 
-POLL_S = 0.1
+POLL_S = 0.1  # s between two looks at the processes: a user does not notice it
 AGREED = State.SCHEDULED.value  # with which the master reports that all know the start
 UNSAID = (
     "patience",

@@ -19,7 +19,7 @@ from validation.blind.record import Recorded
 
 NAMING = ("explained", "partly_explained", "ambiguous")
 UNKNOWN = ("unknown_effect", "partly_explained")
-VISIBLE = 2.0  # residual to noise from which an effect must be found
+VISIBLE = 2.0  # residual to noise from which an effect must be found: below it noise may hide an effect
 STANDARD_LENGTH = 30.0  # s of test that the time of a diagnosis is scaled to
 
 

@@ -15,7 +15,7 @@ from common.roles import MASTER, RECORDER, SLAVE
 
 SHORTEST, LONGEST = 10.0, 60.0  # s of a drawn test
 MOST_FAULTS = 6
-QUIET = 0.1  # share of schedules in which nothing goes wrong
+QUIET = 0.1  # share of schedules in which nothing goes wrong, so that an alarm without a cause is found too
 SEVERAL = 0.15  # share with two slaves
 ONE_WAY = 0.6  # share of a route's faults in one direction
 PLANS = {1: "default", 2: "two_dampers"}
