@@ -17,9 +17,10 @@ from common.plan.plan import TABLES, Plan
 from common.plan.schema import Rule, required, table_fields
 from docs.markdown import quantity, table
 from models.compensators import COMPENSATORS
-from models.effects import FILES, READINGS
+from models.effects import of_site
 from models.effects.effect import Effect, Parameter
-from models.effects.readings import SIGNALS
+from models.effects.reading import SIGNALS
+from models.effects.sites import SITES
 from models.ground_motion import MOTIONS
 from models.integrators import INTEGRATORS
 from models.specimens import SPECIMENS
@@ -29,7 +30,6 @@ ROOT = Path(__file__).resolve().parent.parent
 NO_ROOMS = frozenset({"tests", "docs"})
 EASED = "; larger with [emulated laboratories](../explanation/safety.md#emulated-laboratories)"
 KEY_HEAD = ("key", "default", "unit", "allowed", "meaning")
-SITES = ("ground", "structure", "actuator", "column", "link", "table", "damper")
 TYPES = {
     "float": "number",
     "int": "whole number",
@@ -139,17 +139,23 @@ def said(action: argparse.Action) -> str:
 
 def effects() -> str:
     """The catalogue by site; effects on readings once, as they exist for every signal."""
-    texts = [
-        f"## {site.capitalize()}\n\n{effect_table(effect for effect in FILES if effect.site == site)}"
-        for site in SITES
-    ]
-    some = next(iter(SIGNALS))
-    of_one = (effect(some, "its unit") for effect in READINGS)
-    generic = (dataclasses.replace(one, name=one.name.replace(some, "<signal>")) for one in of_one)
+    texts = [f"## {site.capitalize()}\n\n{effect_table(of_site(site))}" for site in SITES if "." not in site]
+    some, signal = next(iter(SIGNALS.items()))
+    generic = (of_any_signal(one, some, signal.unit) for one in of_site(f"sensor.{some}"))
     names = ", ".join(f"`{name}`" for name in SIGNALS)
     return "\n".join(
         [*texts, f"## Sensors\n\n`<signal>` is one of {names}.\n\n{effect_table(generic, sized=False)}"]
     )
+
+
+def of_any_signal(effect: Effect, signal: str, unit: str) -> Effect:
+    """An effect on one reading as the reference lists it for all: with `<signal>` and "its unit"."""
+    units = {unit: "its unit", f"{unit}/s": "its unit/s"}
+    parameters = (
+        dataclasses.replace(item, unit=units.get(item.unit, item.unit)) for item in effect.parameters
+    )
+    name = effect.name.replace(signal, "<signal>")
+    return dataclasses.replace(effect, name=name, parameters=tuple(parameters))
 
 
 def effect_table(found: Iterable[Effect], *, sized: bool = True) -> str:

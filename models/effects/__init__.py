@@ -1,130 +1,38 @@
-"""The catalogue of unmodelled effects: one file each, listed here.
+"""The catalogue of unmodelled effects: one file each, in the folder of its site.
 
-An effect is added by its file and its line in `FILES`. Effects on readings exist once per signal.
+A file in a site's folder is all that an effect needs: the catalogue finds it. It defines `EFFECT`, or `EFFECTS` where
+one law exists once per signal.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+import pkgutil
+from collections.abc import Iterator, Mapping, Sequence
+from importlib import import_module
 
 from common.errors import InputError
 from common.plan.schema import Rule, nearest
-from models.effects import (
-    actuator_backlash,
-    actuator_compliance,
-    actuator_deadband,
-    actuator_delay,
-    actuator_gain,
-    actuator_time_constant,
-    actuator_velocity_limit,
-    column_degradation,
-    column_friction,
-    column_inertia,
-    column_pinching,
-    column_slip,
-    column_stiffness,
-    column_viscous,
-    column_yielding,
-    damper_force_limit,
-    damper_friction,
-    damper_gain,
-    damper_mass,
-    damper_motor_lag,
-    damper_offset,
-    damper_stiffness,
-    damper_stroke_stop,
-    damper_viscous,
-    ground_scale,
-    ground_time_shift,
-    link_delay,
-    link_jitter,
-    link_loss,
-    sensor_bias,
-    sensor_delay,
-    sensor_drift,
-    sensor_gain,
-    sensor_lag,
-    sensor_noise,
-    sensor_quantization,
-    structure_damping,
-    structure_mass,
-    structure_p_delta,
-    structure_stiffness,
-    table_backlash,
-    table_bandwidth,
-    table_delay,
-    table_friction,
-    table_gain,
-    table_oil_column,
-    table_payload,
-)
 from models.effects.effect import Effect, Parameter
-from models.effects.readings import SIGNALS
+from models.effects.sites import SITES
 from models.system import System
 
 Entry = tuple[str, Mapping[str, float]]  # name of an effect, its parameters
 
-FILES = (
-    ground_scale.EFFECT,
-    ground_time_shift.EFFECT,
-    structure_mass.EFFECT,
-    structure_stiffness.EFFECT,
-    structure_damping.EFFECT,
-    structure_p_delta.EFFECT,
-    actuator_delay.EFFECT,
-    actuator_time_constant.EFFECT,
-    actuator_gain.EFFECT,
-    actuator_velocity_limit.EFFECT,
-    actuator_backlash.EFFECT,
-    actuator_compliance.EFFECT,
-    actuator_deadband.EFFECT,
-    column_stiffness.EFFECT,
-    column_yielding.EFFECT,
-    column_degradation.EFFECT,
-    column_pinching.EFFECT,
-    column_friction.EFFECT,
-    column_viscous.EFFECT,
-    column_inertia.EFFECT,
-    column_slip.EFFECT,
-    link_delay.EFFECT,
-    link_jitter.EFFECT,
-    link_loss.EFFECT,
-    table_delay.EFFECT,
-    table_gain.EFFECT,
-    table_bandwidth.EFFECT,
-    table_oil_column.EFFECT,
-    table_payload.EFFECT,
-    table_backlash.EFFECT,
-    table_friction.EFFECT,
-    damper_friction.EFFECT,
-    damper_viscous.EFFECT,
-    damper_stiffness.EFFECT,
-    damper_mass.EFFECT,
-    damper_motor_lag.EFFECT,
-    damper_gain.EFFECT,
-    damper_force_limit.EFFECT,
-    damper_stroke_stop.EFFECT,
-    damper_offset.EFFECT,
-)
 
-READINGS = (
-    sensor_gain.effect,
-    sensor_bias.effect,
-    sensor_drift.effect,
-    sensor_lag.effect,
-    sensor_delay.effect,
-    sensor_quantization.effect,
-    sensor_noise.effect,
-)
+def files() -> Iterator[Effect]:
+    """The effects of all files in the folders of sites, by folder and file name."""
+    folders = (item.name for item in pkgutil.iter_modules(__path__, f"{__name__}.") if item.ispkg)
+    for folder in folders:
+        for item in pkgutil.iter_modules(import_module(folder).__path__, f"{folder}."):
+            module = vars(import_module(item.name))
+            yield from module.get("EFFECTS") or (module["EFFECT"],)
+
 
 CATALOGUE: dict[str, Effect] = {
-    item.name: item
-    for item in (
-        *FILES,
-        *(effect(name, signal.unit) for name, signal in SIGNALS.items() for effect in READINGS),
-    )
+    item.name: item for item in sorted(files(), key=lambda item: list(SITES).index(item.site))
 }
+"""Every effect by its name, in the order of sites, within a site by the names of the files."""
 
 
 def lay(system: System, entries: Sequence[Entry]) -> System:

@@ -6,10 +6,8 @@ from common.errors import InputError
 from common.plan.reality import Reality
 from common.roles import SLAVE
 from models.effects import CATALOGUE, lay
+from models.effects.sites import SITES
 from models.system import System
-
-LABORATORY = {"actuator": "master", "column": "master", "table": "slave", "damper": "slave"}
-SIGNALS = {"column_displacement": "master", "column_force": "master"}  # of the others the slave reads
 
 
 def true_system(reality: Reality) -> System:
@@ -23,7 +21,7 @@ def true_system(reality: Reality) -> System:
     only = reality.only or ("",) * len(reality.effects)
     for (name, _), alone in zip(reality.effects, only, strict=True):
         site = CATALOGUE[name].site if name in CATALOGUE else ""
-        lab = laboratory(site)
+        lab = SITES.get(site, "")
         if lab and getattr(reality, lab).class_:
             raise InputError(
                 f"The effect '{name}' cannot be laid over the plug-in in "
@@ -33,11 +31,3 @@ def true_system(reality: Reality) -> System:
         if alone and site != "link" and lab != SLAVE:
             raise InputError(f"The effect '{name}' does not belong to one slave: leave out its slave.")
     return lay(System(reality.plan), reality.effects)
-
-
-def laboratory(site: str) -> str:
-    """The role whose laboratory holds a site of the catalogue: master, slave, or neither."""
-    part, _, signal = site.partition(".")
-    if part == "sensor":
-        return SIGNALS.get(signal, "slave")
-    return LABORATORY.get(part, "")

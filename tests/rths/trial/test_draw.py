@@ -11,7 +11,7 @@ import pytest
 from common.errors import InputError
 from common.plan import plan as plans
 from common.plan import reality as realities
-from models.effects.damper_friction import EFFECT as FRICTION
+from models.effects.damper.friction import EFFECT as FRICTION
 from models.effects.effect import Effect, Parameter
 from models.system import System
 from validation.blind.draw import (

@@ -1,0 +1,1 @@
+"""Effects on the transfer system of the column: servo valve, loop, piston, clevis."""

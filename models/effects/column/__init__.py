@@ -1,0 +1,1 @@
+"""Effects on the specimen of laboratory A and on its fixtures."""

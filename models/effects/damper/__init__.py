@@ -1,0 +1,1 @@
+"""Effects on the active mass damper: mass, spring, rail, motor, end stops."""

@@ -1,0 +1,1 @@
+"""Effects on the ground motion that the building gets."""

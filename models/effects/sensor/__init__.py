@@ -1,0 +1,1 @@
+"""Effects on readings; each exists once per signal."""

@@ -1,0 +1,1 @@
+"""Effects on the shaking table of laboratory B: drive, loop, platform."""
