@@ -66,9 +66,9 @@ class Diagnosis:
             }
             system = laid(system, verdict, kept)
         for reading in self.readings:
-            site = CATALOGUE[reading.effect].site
-            if (sites is None or site in sites) and (noisy or not reading.effect.endswith(".noise")):
-                system = CATALOGUE[reading.effect].apply(system, **{reading.parameter: reading.value})
+            effect = CATALOGUE[reading.effect]
+            if (sites is None or effect.site in sites) and (noisy or not effect.random):
+                system = effect.apply(system, **{reading.parameter: reading.value})
         return system
 
 

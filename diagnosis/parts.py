@@ -105,7 +105,7 @@ def of_sites(sites: tuple[str, ...], plan: Plan) -> tuple[Effect, ...]:
     Noise and rounding are seen directly.
     """
     found = [effect for effect in effects.CATALOGUE.values() if effect.site in sites and effect.fits(plan)]
-    return tuple(effect for effect in found if not effect.name.endswith((".noise", ".quantization")))
+    return tuple(effect for effect in found if not effect.in_samples)
 
 
 ACTUATOR = {

@@ -9,7 +9,6 @@ from typing import Any
 from common.host.clock import unix_ns
 from common.lab.laboratory import Setting
 from common.lab.preflight import Check, Gate, SensorsAtRest
-from common.link.links import link_model
 from common.plan import schema
 from common.plan.plan import Plan
 from common.plan.plugins import construct, find
@@ -21,6 +20,7 @@ from master.rig import ColumnLab
 from master.step import MasterStep
 from models.compiled import plain
 from models.labs import column_lab, noise, readings
+from models.link.links import link_model
 from models.loop import preflight as nominal
 from models.loop import substructure
 from models.loop.closed_loop import build_a

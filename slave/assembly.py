@@ -8,7 +8,6 @@ from typing import Any
 
 from common.lab.laboratory import Setting
 from common.lab.preflight import Check, Gate, SensorsAtRest
-from common.link.links import link_model
 from common.plan import schema
 from common.plan.plan import Plan
 from common.plan.plugins import construct, find
@@ -17,6 +16,7 @@ from common.rig import METHODS, AtRest, GuardedRig, TableMeasurement
 from common.roles import name_of, title
 from models.compiled import plain
 from models.labs import noise, readings, table_lab
+from models.link.links import link_model
 from models.loop.closed_loop import build_b
 from models.loop.realised import true_system
 from slave.loop import NO_COMMAND, SlaveLoop

@@ -12,9 +12,8 @@ import numpy as np
 
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data, Fit, Values
+from models.effects.effect import Effect
 
-EFFECT = "damper.stroke_stop"
-STIFFNESSES = (500.0, 5000.0, 50000.0)  # N/m, soft to hard
 FIRST = 0.02  # of the largest residual, from which on the stop has been met
 INSIDE = 0.97  # of the largest stroke before that
 AFTER = 0.4  # s after first contact that the shortest fit covers
@@ -22,23 +21,27 @@ LONGER = 1.3  # factor from one fit to the next
 EVERY = 5  # of so many averaged samples one judges
 
 
-def stopped(data: Data, fit: Fit) -> Fit | None:
-    """The fit with an end stop as well, None where the damper's stroke was not recorded."""
-    if "damper_stroke" not in data.part.signals or not data.part.present[:, 2].any():
+def stopped(data: Data, fit: Fit, effect: Effect) -> Fit | None:
+    """The fit with an end stop as well, None where the motion that meets it was not recorded or is none."""
+    stop = effect.contact
+    if stop is None or stop.motion not in data.part.signals:
+        return None
+    place = data.part.signals.index(stop.motion)
+    if not data.part.present[:, place].any():
         return None
     bare = fitting.at(data, fit.values, np.zeros(fit.z.size))
     missed = np.max(np.abs(bare.reduced), axis=1)
     first = int(np.argmax(missed > FIRST * missed.max()))
-    reached = float(np.max(np.abs(data.part.measured[: max(1, first * data.group), 2])))
+    reached = float(np.max(np.abs(data.part.measured[: max(1, first * data.group), place])))
     if reached <= 0.0:
         return None
-    fits = [grown(data, fit, first, INSIDE * reached, stiffness) for stiffness in STIFFNESSES]
+    begun = ({stop.place: INSIDE * reached, stop.stiffness: stiffness} for stiffness in stop.starts)
+    fits = [grown(data, fit, first, {**fit.values, effect.name: values}) for values in begun]
     return min(fits, key=lambda item: item.cost)
 
 
-def grown(data: Data, fit: Fit, first: int, stroke: float, stiffness: float) -> Fit:
+def grown(data: Data, fit: Fit, first: int, values: Values) -> Fit:
     """One start, lengthened to the whole test."""
-    values: Values = {**fit.values, EFFECT: {"stroke": stroke, "stiffness": stiffness}}
     z = np.zeros(fit.z.size)
     groups = first + max(10, round(AFTER / (data.system.plan.test.interval * data.group)))
     while groups < data.groups:

@@ -39,9 +39,8 @@ SENSORS = {
     "damper_stroke": "damper",
     "damper_force": "damper",
 }
-SMOOTH = 0.03  # of the largest velocity, where a friction may begin to fall off
+HARD = (0.5, 5.0, 50.0)  # times the largest force over the largest stroke: an end stop from soft to hard
 FARTHEST = 4.0  # times a usual size where a search still begins
-LAGS = (6.0, 26.0)  # factors where the plan believes in no lag: 5 and 25 ms
 LIMITS = (0.25, 0.4, 0.55, 0.7, 0.85, 0.95)  # of what is reached: where a limit is looked for
 
 
@@ -50,11 +49,11 @@ class Scales:
 
     def __init__(self, record: Record, shift: float = 0.0) -> None:
         self._shift = shift
-        self._quick = record.plan.actuator.time_constant == 0.0
+        self._record = record
         self._reached: dict[tuple[str, str], float] = {}
         for key, name in SIGNAL.items():
             if record.has(name):
-                self._reached[key] = float(np.max(np.abs(record.signals[name])))
+                self._reached[key] = self.peak(name)
         if record.has("column_displacement"):
             rate = np.diff(record.signals["column_displacement"][::8]) / (8 * record.plan.test.interval)
             self._reached["a", "m/s"] = float(np.max(np.abs(rate), initial=0.0))
@@ -67,36 +66,42 @@ class Scales:
             if record.has(name):
                 steps = np.diff(record.signals[name][::8]) / (8 * record.plan.test.interval)
                 self._velocities[group] = float(np.max(np.abs(steps), initial=0.0)) or 0.05
-        if record.has("damper_command"):
-            self.motor = float(np.max(np.abs(record.signals["damper_command"])))
-        else:
-            self.motor = 0.0
+
+    def peak(self, signal: str) -> float:
+        """Largest magnitude of a recorded signal, 0 where it was not recorded."""
+        record = self._record
+        return float(np.max(np.abs(record.signals[signal]))) if record.has(signal) else 0.0
 
     def group(self, effect: Effect) -> str:
         """Which of the signals' scales an effect lives on."""
-        part, _, signal = effect.site.partition(".")
-        return SENSORS[signal] if part == "sensor" else GROUP.get(part, "")
+        return SENSORS[effect.signal] if effect.signal else GROUP.get(effect.site, "")
 
     def starts(self, effect: Effect) -> Iterator[tuple[tuple[float, ...], dict[str, float]]]:
         """Parameters from which a search starts, from weak to strong, and the form that each belongs to."""
         strength = [item for item in effect.parameters if not item.shape]
-        shapes = {item.name: item.default for item in effect.parameters if item.default is not None}
         if len(strength) != 1:
             return
         (parameter,) = strength
         for size in self.sizes(effect, parameter):
-            for shape in self.forms(effect, shapes):
-                form = tuple(shape.values()) if effect.name.endswith(".friction") else ()
+            for form, shape in self.forms(effect):
                 yield form, {**shape, parameter.name: size}
 
-    def forms(self, effect: Effect, shapes: dict[str, float]) -> list[dict[str, float]]:
-        """What an effect may look like: an end stop is soft or hard against the force at hand."""
-        if effect.name == "damper.stroke_stop" and (force := self._reached.get(("damper", "N"))):
-            soft = force / self._reached["damper", "m"]
-            return [{"stiffness": min(max(factor * soft, 200.0), 1e6)} for factor in (0.5, 5.0, 50.0)]
-        if effect.name.endswith(".friction"):  # Coulomb's, and one that a velocity makes smooth
-            return [shapes, shapes | {"velocity": SMOOTH * self.velocity(effect)}]
-        return [shapes]
+    def forms(self, effect: Effect) -> list[tuple[tuple[float, ...], dict[str, float]]]:
+        """What an effect may look like, each form by itself: a law at rest is also tried as one that is smooth.
+
+        An end stop is soft or hard against the force at hand; of these the best is one form with the others.
+        """
+        shapes = {item.name: item.default for item in effect.parameters if item.default is not None}
+        if (found := effect.contact) and (force := self.peak(found.force)):
+            (item,) = (item for item in effect.parameters if item.name == found.stiffness)
+            soft = force / self.peak(found.motion)
+            return [((), {item.name: min(max(share * soft, item.least), item.most)}) for share in HARD]
+        smooth = {
+            item.name: item.smoothing * self.velocity(effect) for item in effect.parameters if item.smoothing
+        }
+        if not smooth:
+            return [((), shapes)]
+        return [(tuple(form.values()), form) for form in (shapes, shapes | smooth)]
 
     def velocity(self, effect: Effect) -> float:
         """Velocity that a part reaches, m/s."""
@@ -104,14 +109,14 @@ class Scales:
 
     def sizes(self, effect: Effect, parameter: Parameter) -> list[float]:
         """Sizes of the parameter that counts."""
-        if effect.name == "ground.time_shift" and self._shift != 0.0:
+        if effect.shifts_time and self._shift != 0.0:
             return [self._shift]
-        if effect.name == "actuator.time_constant" and self._quick:
-            return list(LAGS)
+        if starts := effect.starts(self._record.plan):
+            return list(starts)
         key = (self.group(effect), parameter.unit)
         reached = self._reached.get(key)
-        if effect.name == "damper.force_limit":
-            reached = self.motor or None
+        if parameter.follows:
+            reached = self.peak(parameter.follows) or None
         if np.isinf(parameter.null) and reached:
             sizes = [share * reached for share in LIMITS]
         elif reached and key in USUAL:

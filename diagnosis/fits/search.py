@@ -201,16 +201,11 @@ class Searcher:
 
     def with_stop(self, fit: Fit, fits: list[Fit]) -> list[Fit]:
         """The fits, and one with an end stop where all the others miss loudly."""
-        known = {effect.name for effect in self.data.part.candidates}
-        if (
-            not fits
-            or remaining(fits[0]) < LOUD
-            or contact.EFFECT in fit.names
-            or contact.EFFECT not in known
-        ):
+        stops = [effect for effect in self.data.part.candidates if effect.contact]
+        if not fits or not stops or remaining(fits[0]) < LOUD or stops[0].name in fit.names:
             return fits
-        found = contact.stopped(self.data, fit)
-        rest = [item for item in fits if contact.EFFECT not in item.names]
+        found = contact.stopped(self.data, fit, stops[0])
+        rest = [item for item in fits if stops[0].name not in item.names]
         if found is None or found.cost > min(item.cost for item in fits):
             return fits
         return sorted([found, *rest], key=lambda item: item.cost)

@@ -126,7 +126,7 @@ def which(report: Report) -> list[str]:
 def setting(name: str, parameter: str, value: str, *, several: bool) -> str:
     """A parameter's value behind the names of a candidate's effects, with its own effect where they are `several`."""
     own = wording.effect(name) if several else ""
-    return " ".join(filter(None, (own, wording.called(own or wording.effect(name), parameter), value)))
+    return " ".join(filter(None, (own, wording.called(name, parameter), value)))
 
 
 def how_far(report: Report) -> list[str]:

@@ -79,7 +79,7 @@ def setting(name: str, parameter: str, *, several: bool) -> str:
     """What a parameter is called, with its effect where they are `several`; no word twice."""
     if not several:
         return wording.plain(parameter)
-    return ": ".join(filter(None, (wording.effect(name), wording.called(wording.effect(name), parameter))))
+    return ": ".join(filter(None, (wording.effect(name), wording.called(name, parameter))))
 
 
 def parameters(item: Candidate) -> str:

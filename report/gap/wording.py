@@ -18,15 +18,6 @@ STATUS = {
     "unknown_effect": "unknown effect",
     "not_enough_data": "not enough data",
 }
-READINGS = {
-    "gain": "gain",
-    "bias": "bias",
-    "drift": "drift",
-    "lag": "lag",
-    "delay": "delay",
-    "quantization": "quantization",
-    "noise": "added noise",
-}
 DOMINANT = 0.5  # share of the gap from which one site is named as the place
 NOTABLE = 1.0  # standard deviations of its tolerance that make a parameter's move worth a word
 
@@ -51,10 +42,9 @@ def site(name: str) -> str:
 
 def effect(name: str) -> str:
     """An effect in words: `damper friction`, `gain of the column force sensor`."""
-    kind, _, rest = name.partition(".")
-    signal, _, fault = rest.rpartition(".")
-    if kind == "sensor" and signal:
-        return f"{READINGS.get(fault, plain(fault))} of the {plain(signal)} sensor"
+    entry = CATALOGUE.get(name)
+    if entry and entry.signal:
+        return f"{'added ' if entry.random else ''}{plain(entry.fault)} of the {plain(entry.signal)} sensor"
     return plain(name.replace(".", " "))
 
 
@@ -89,7 +79,8 @@ def kind(candidate: Mapping[str, Any]) -> str:
     if candidate.get("kind"):
         return str(candidate["kind"])
     names = candidate.get("effects") or []
-    return "measurement" if names and all(name.startswith("sensor.") for name in names) else "physics"
+    kinds = {CATALOGUE[name].kind if name in CATALOGUE else "physics" for name in names}
+    return "measurement" if kinds == {"measurement"} else "physics"
 
 
 def parameters(candidate: Mapping[str, Any]) -> list[tuple[str, str, str]]:
@@ -101,9 +92,10 @@ def parameters(candidate: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     ]
 
 
-def called(name: str, parameter: str) -> str:
-    """A parameter behind the words `name` of its effect; empty where these end with it: `table delay` has but one."""
-    return "" if f" {name}".endswith(f" {plain(parameter)}") else plain(parameter)
+def called(effect: str, parameter: str) -> str:
+    """A parameter behind its effect's words; empty where these say it already: `table delay` has but one."""
+    entry = CATALOGUE.get(effect)
+    return "" if entry and entry.is_called_by(parameter) else plain(parameter)
 
 
 def equivalent(names: Sequence[str]) -> str:

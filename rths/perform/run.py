@@ -195,7 +195,7 @@ def check(reality: Reality) -> None:
     """Raise InputError where a laboratory could not be built or not show who it is, before any process starts."""
     import master.assembly
     import slave.assembly
-    from common.link.links import link_model
+    from models.link.links import link_model
 
     if reality.plan.link.security.folder:
         from common.link import security

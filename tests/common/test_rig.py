@@ -8,13 +8,13 @@ from typing import Any
 import pytest
 
 from common.errors import InputError, RigError
-from common.link.links import link_model
 from common.plan import tables
 from common.plan.limits import Guard
 from common.plan.plan import Plan
 from common.plan.plugins import construct, find
 from common.plan.reality import as_planned
 from common.rig import METHODS, ColumnCommand, ColumnMeasurement, GuardedRig
+from models.link.links import link_model
 
 
 class Fake:

@@ -15,7 +15,6 @@ from common import roles, signals
 from common.errors import InputError, PlanError
 from common.lab.outlet import next_of, pack_nexts
 from common.link import transport
-from common.link.links import seed_of
 from common.link.transport import Route, heard, said
 from common.plan import plan, reality
 from common.plan.plan import MOST_SLAVES, Plan, from_tables, parse
@@ -23,6 +22,7 @@ from common.recording.reader import read
 from common.recording.writer import Recording
 from common.signals import topics
 from common.terminal import cli
+from models.link.links import seed_of
 
 TWO = "[slave.roof.damper]\nmass = 20.0\n[slave.cellar.control]\ngain = 1.0\n"
 

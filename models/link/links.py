@@ -8,22 +8,18 @@ from common.errors import InputError
 from common.link.mailbox import LinkModel, PerfectLink
 from common.plan.plugins import construct, find
 from common.plan.reality import Reality
+from models.loop.realised import true_system
+from models.system import LinkEffects
 
 METHODS = {"fate": ("direction", "seq", "t")}
 IMPAIRED = "models.link.impaired:ImpairedLink"
-OPTIONS = {  # option of the emulated network behind each parameter of an effect
-    ("link.delay", "delay"): "delay",
-    ("link.jitter", "std"): "jitter",
-    ("link.loss", "probability"): "loss",
-    ("link.loss", "burst"): "burst",
-}
 
 
 def link_model(reality: Reality) -> LinkModel:
     """The impairment of one direction, to or from the slave whose reality it is.
 
     Raises:
-        InputError: the plug-in cannot be constructed.
+        InputError: the plug-in cannot be constructed, or effects of the reality cannot be laid.
     """
     rig, options = reality.link, impairment(reality)
     if rig.class_ and options:
@@ -47,10 +43,6 @@ def seed_of(reality: Reality) -> int:
 
 
 def impairment(reality: Reality) -> dict[str, float]:
-    """Options of the emulated network that the reality's effects ask for."""
-    return {
-        OPTIONS[name, key]: value
-        for name, values in reality.effects
-        for key, value in values.items()
-        if (name, key) in OPTIONS
-    }
+    """Options of the emulated network that the reality's effects ask for; none where they leave it as planned."""
+    effects = true_system(reality).effects.link
+    return {} if effects == LinkEffects() else vars(effects)
