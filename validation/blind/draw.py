@@ -1,8 +1,9 @@
 """Cases of the blind trial, drawn from a seed.
 
-Case k of a set has a random generator of its own, `SeedSequence(seed, spawn_key=(SETS[set], k))`: it is the
-same whatever the number of cases. The spawn keys of the two sets differ, so no draw is in both:
-thresholds of the diagnosis are set on "tune", and "judge" is for judging only.
+Every draw of a case has a name and a random generator of its own, hashed from seed, set, number of the case and
+that name (`lots`): a case is the same whatever the number of cases, and a catalogue that grows leaves all cases
+that hide none of the new effects as they were. The two sets share no draw: thresholds of the diagnosis are set on
+"tune", and "judge" is for judging only.
 
 The seed in a case's plan says nothing about the case: it is a draw of its own.
 """
@@ -23,13 +24,15 @@ from common.plan.plan import Plan
 from common.plan.schema import nearest
 from common.terminal import cli
 from models.effects.effect import Parameter
+from models.effects.sites import SITES
 from models.ground_motion.motions import MOTIONS
 from models.system import Effects, System
 from validation.blind import library as libraries
+from validation.blind import lots
 from validation.blind.library import LABS, PARTS, Library
 
+Lot = tuple[str | int, ...]  # seed, set and number of a case: what all of its draws are named by
 Set = Literal["judge", "tune"]
-SETS: dict[str, int] = {"judge": 0, "tune": 1}
 
 # what may be wrong in a laboratory, and in how many of all cases it is
 SHARES = {"catalogue": 0.50, "formula": 0.15, "unknown": 0.10, "pair": 0.10, "clean": 0.15}
@@ -79,7 +82,7 @@ class Case:
         if silent:
             tables["sensors"] = dict.fromkeys(self.truths["sensors"], 0.0)
         if self.kind in ("formula", "unknown"):
-            lab = libraries.laboratory(self.laid[0].site)
+            lab = SITES[self.laid[0].site]
             tables[lab] = {"rig": {"class": LABS[lab], "options": self._options(lab, tables, laid)}}
         elif laid:
             tables["effect"] = [{"name": item.name, **item.parameters} for item in laid]
@@ -127,7 +130,7 @@ class Beginning:
     index: int
     kind: str
     names: tuple[str, ...]
-    generator: np.random.Generator
+    lot: Lot
 
 
 def _asked_for(
@@ -147,55 +150,50 @@ def _asked_for(
 
 def begin(index: int, seed: int, set_: str, library: Library) -> Beginning:
     """The kind of a case and the names of its effects."""
-    sequence = np.random.SeedSequence(seed, spawn_key=(SETS[set_], index))
-    generator = np.random.default_rng(sequence)
-    kind = KINDS[int(np.searchsorted(np.cumsum(list(SHARES.values())), generator.random(), side="right"))]
+    lot = (seed, set_, index)
+    share = lots.generator(*lot, "kind").random()
+    kind = KINDS[int(np.searchsorted(np.cumsum(list(SHARES.values())), share, side="right"))]
     match kind:
         case "catalogue":
-            names: tuple[str, ...] = (_of_catalogue(generator, library),)
+            names: tuple[str, ...] = (of_catalogue(library, *lot, "effect"),)
         case "formula" if library.formulas:
-            names = (_one(generator, list(library.formulas)),)
+            names = (lots.chosen(library.formulas, *lot, "effect"),)
         case "unknown" if library.strangers:
-            names = (_one(generator, list(library.strangers)),)
+            names = (lots.chosen(library.strangers, *lot, "effect"),)
         case "pair" if len(library.catalogue) > 1:
-            first, second = _of_catalogue(generator, library), _of_catalogue(generator, library)
-            while second == first:
-                second = _of_catalogue(generator, library)
-            names = (first, second)
+            first = of_catalogue(library, *lot, "effect")
+            names = (first, of_catalogue(library, *lot, "second effect", without=first))
         case _:
             names = ()
-    return Beginning(index, kind, names, generator)
+    return Beginning(index, kind, names, lot)
 
 
-def _of_catalogue(generator: np.random.Generator, library: Library) -> str:
-    families: dict[str, list[str]] = {}
-    for name in library.catalogue:
-        families.setdefault(libraries.family(name), []).append(name)
-    return _one(generator, families[_one(generator, list(families))])
-
-
-def _one(generator: np.random.Generator, names: list[str]) -> str:
-    return names[int(generator.integers(len(names)))]
+def of_catalogue(library: Library, *lot: str | int, without: str = "") -> str:
+    """An effect of the catalogue; each family as likely as any other, whatever its number of signals."""
+    effects = [effect for effect in library.catalogue.values() if effect.name != without]
+    family = lots.chosen({effect.family for effect in effects}, *lot)
+    return lots.chosen((effect.name for effect in effects if effect.family == family), *lot)
 
 
 def drawn(begun: Beginning, duration: float, library: Library) -> Case:
     """The rest of a case."""
-    generator = begun.generator
-    plan = draw_plan(generator, duration)
+    lot = begun.lot
+    plan = draw_plan(lot, duration)
     case = Case(
         begun.index,
         begun.kind,
         plan.tables(),
-        draw_truths(generator, plan),
-        int(generator.integers(2**31)),
-        tuple(draw_effect(generator, begun.kind, name, library) for name in begun.names),
+        draw_truths(lots.generator(*lot, "truths"), plan),
+        int(lots.generator(*lot, "noise").integers(2**31)),
+        tuple(draw_effect(lot, begun.kind, name, library) for name in begun.names),
     )
     return replace(case, inside=is_inside(case, plan, library))
 
 
-def draw_plan(generator: np.random.Generator, duration: float) -> Plan:
+def draw_plan(lot: Lot, duration: float) -> Plan:
     """The default test with another motion, scaled to a sensible drift, with the damper or without."""
-    record = _one(generator, sorted(MOTIONS))
+    generator = lots.generator(*lot, "plan")
+    record = lots.chosen(MOTIONS, *lot, "motion")
     damper = bool(generator.random() < WITH_DAMPER)
     peak = log_uniform(generator, *PEAK_DRIFT)
     tables = _default().tables()
@@ -253,22 +251,22 @@ def tolerance(plan: Plan, table: str, name: str) -> float:
     return plan.tolerances.parameters.get(f"{table}.{name}", plan.tolerances.default)
 
 
-def draw_effect(generator: np.random.Generator, kind: str, name: str, library: Library) -> Laid:
-    """An effect with its parameters; one of a pair is of good size."""
+def draw_effect(lot: Lot, kind: str, name: str, library: Library) -> Laid:
+    """An effect with its parameters, each a draw of its own; one of a pair is of good size."""
     if kind == "unknown":
         stranger = library.strangers[name]
-        values = {key: between(generator, *ends) for key, ends in stranger.ranges.items()}
+        values = {
+            key: between(lots.generator(*lot, name, key), *ends) for key, ends in stranger.ranges.items()
+        }
         return Laid(name, stranger.site, values, {})
     effect = library.catalogue[name]
-    formula = _one(generator, list(library.formulas[name])) if kind == "formula" else ""
+    formula = lots.chosen(library.formulas[name], *lot, name, "formula") if kind == "formula" else ""
     values = {
-        item.name: draw_parameter(generator, item, strong=kind == "pair")
+        item.name: draw_parameter(lots.generator(*lot, name, item.name), item, strong=kind == "pair")
         for item in effect.parameters
-        if item.sizes
+        if item.sizes and not (formula and item.smoothing)  # other formulas smooth their laws themselves
     }
     nulls = {item.name: item.null for item in effect.parameters if not item.shape}
-    if formula:
-        values.pop("velocity" if name.endswith(".friction") else "", None)  # these laws bring their own
     return Laid(name, effect.site, values, nulls, formula)
 
 

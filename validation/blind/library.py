@@ -12,7 +12,6 @@ LABS = {
     "master": "validation.blind.labs.column_lab:ColumnLab",
     "slave": "validation.blind.labs.table_lab:TableLab",
 }
-UNDRAWN = ("sensor.delay",)  # one family more would change the case behind every seed
 PARTS = {"master": ("actuator", "column", "sensors"), "slave": ("table", "damper", "sensors")}
 
 
@@ -46,22 +45,4 @@ def shipped() -> Library:
         name: Stranger(site, dict(zip(parameters, ranges, strict=True)))
         for name, (site, parameters, ranges) in UNCATALOGUED.items()
     }
-    catalogue = {name: effect for name, effect in CATALOGUE.items() if family(name) not in UNDRAWN}
-    return Library(catalogue, FORMULAS, strangers)
-
-
-def site_of(name: str) -> str:
-    """The site of an effect of the catalogue, by its name."""
-    return name.rpartition(".")[0] if name.startswith("sensor.") else name.partition(".")[0]
-
-
-def family(name: str) -> str:
-    """Effects that exist once per signal are one family, so that a draw meets each kind alike."""
-    return f"sensor.{name.rpartition('.')[2]}" if name.startswith("sensor.") else name
-
-
-def laboratory(site: str) -> str:
-    """Which laboratory a part stands in: master or slave; raises KeyError for a part that stands in none."""
-    if site.startswith("sensor."):
-        return "master" if site.startswith("sensor.column_") else "slave"
-    return {"actuator": "master", "column": "master", "table": "slave", "damper": "slave"}[site]
+    return Library(CATALOGUE, FORMULAS, strangers)

@@ -12,14 +12,15 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from models.effects import CATALOGUE, of_site
 from validation.blind.draw import Case, Laid
 from validation.blind.judge import NONE, Answer
-from validation.blind.library import site_of
 from validation.blind.record import Recorded
 
 NAMING = ("explained", "partly_explained", "ambiguous")
 UNKNOWN = ("unknown_effect", "partly_explained")
 VISIBLE = 2.0  # residual to noise from which an effect must be found: below it noise may hide an effect
+AS_MUCH = {"butterworth": "delay"}  # a maximally flat low-pass is as much a delay as the catalogue's lag
 STANDARD_LENGTH = 30.0  # s of test that the time of a diagnosis is scaled to
 
 
@@ -132,9 +133,9 @@ def is_named(case: Case, status: str, names: list[str], sets: list[set[str]]) ->
 
 
 def truths(item: Laid) -> set[str]:
-    """Names that are right for an effect: a maximally flat low-pass is as much a delay as the catalogue's lag."""
-    flat = item.formula == "butterworth"
-    return {item.name} | ({item.name.removesuffix(".lag") + ".delay"} if flat else set())
+    """Names that are right for an effect: its own, and the fault of the same reading that its formula is as much."""
+    fault = AS_MUCH.get(item.formula, "")
+    return {item.name} | {effect.name for effect in of_site(item.site) if fault and effect.fault == fault}
 
 
 def same(true: str, name: str, sets: Iterable[set[str]]) -> bool:
@@ -144,7 +145,8 @@ def same(true: str, name: str, sets: Iterable[set[str]]) -> bool:
 
 def sites_of(item: Laid, names: Sequence[str], sets: Iterable[set[str]]) -> set[str]:
     """Sites that are right: the effect's own, and that of an equivalent that is named in its place."""
-    return {item.site} | {site_of(name) for name in names if same(item.name, name, sets)}
+    named = [name for name in names if name in CATALOGUE and same(item.name, name, sets)]
+    return {item.site} | {CATALOGUE[name].site for name in named}
 
 
 def estimates(case: Case, verdict: Mapping[str, Any]) -> list[Estimate]:

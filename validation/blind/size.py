@@ -14,8 +14,9 @@ import numpy as np
 
 from common.recording.reader import Run, Values, read
 from common.rig import ColumnCommand, TableCommand
+from common.roles import MASTER, SLAVE
 from common.signals import MEASURED
-from validation.blind import library
+from models.effects.sites import SITES
 from validation.blind.draw import Case, Laid
 
 FORCE_NOISE = "damper_force"
@@ -42,17 +43,10 @@ def size(case: Case, item: Laid, run: Run) -> float:
     noise = case.truths["sensors"]
     if item.site == "link":
         return max(_ratios(_messages(run), noise), default=0.0)
-    play = {"master": play_a, "slave": play_b}[_place(item)] if _place(item) else play_building
+    play = {MASTER: play_a, SLAVE: play_b}.get(SITES[item.site], play_building)
     with_effect, without = play(case, (item,), run), play(case, (), run)
     difference = {name: values - without[name] for name, values in with_effect.items()}
     return max(_ratios(difference, noise), default=0.0)
-
-
-def _place(item: Laid) -> str:
-    try:
-        return library.laboratory(item.site)
-    except KeyError:
-        return ""
 
 
 def _ratios(difference: dict[str, Values], noise: dict[str, Any]) -> list[float]:

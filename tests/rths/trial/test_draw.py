@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +15,9 @@ from common.plan import plan as plans
 from common.plan import reality as realities
 from models.effects.damper.friction import EFFECT as FRICTION
 from models.effects.effect import Effect, Parameter
+from models.effects.reading import SIGNALS
 from models.system import System
+from validation.blind import lots
 from validation.blind.draw import (
     KINDS,
     NOISE,
@@ -24,9 +28,11 @@ from validation.blind.draw import (
     distances,
     draw,
     draw_parameter,
+    drawn,
+    of_catalogue,
     peak_drift,
 )
-from validation.blind.library import UNDRAWN, Library, Stranger, family, laboratory, shipped, site_of
+from validation.blind.library import Library, Stranger, shipped
 
 
 def softer(system: System, factor: float) -> System:
@@ -63,9 +69,9 @@ def test_what_is_not_asked_for_is_passed_over() -> None:
 
 
 def test_kinds_come_in_their_shares() -> None:
-    drawn = [begin(index, 0, "judge", LIBRARY).kind for index in range(4000)]
+    kinds = [begin(index, 0, "judge", LIBRARY).kind for index in range(4000)]
     for kind in KINDS:
-        assert drawn.count(kind) / 4000 == pytest.approx(SHARES[kind], abs=0.025)
+        assert kinds.count(kind) / 4000 == pytest.approx(SHARES[kind], abs=0.025)
 
 
 def test_truths_are_inside_the_tolerances_and_noise_is_common() -> None:
@@ -155,15 +161,65 @@ def test_the_drift_is_sensible() -> None:
         assert 2.9e-3 < drift < 10.1e-3
 
 
-def test_an_effect_that_came_later_leaves_the_draws_as_they_were() -> None:
-    assert not any(family(name) in UNDRAWN for name in shipped().names)
-    with pytest.raises(InputError, match="Unknown 'sensor.column_force.delay'"):
-        draw(1, 1, "judge", effects=["sensor.column_force.delay"])
+def magnet(system: System, rise: float) -> System:
+    return system.laid("damper", gain=1.0 - rise)
 
 
-def test_names_say_where_an_effect_is() -> None:
-    assert site_of("sensor.column_force.gain") == "sensor.column_force"
-    assert site_of("table.delay") == "table"
-    assert family("sensor.column_force.gain") == family("sensor.damper_force.gain") == "sensor.gain"
-    assert laboratory("sensor.column_force") == laboratory("actuator") == "master"
-    assert laboratory("sensor.damper_force") == laboratory("damper") == "slave"
+RISE = Parameter("rise", "K", null=0.0, least=0.0, most=0.9, sizes=(0.02, 0.05, 0.1, 0.2))
+MADE_UP = Effect("damper.magnet", "damper", "physics", "warm magnets", (RISE,), "none", magnet)
+OF_READING = replace(
+    MADE_UP, name="sensor.damper_force.hum", site="sensor.damper_force", signal="damper_force", fault="hum"
+)
+
+
+@pytest.mark.parametrize("added", [MADE_UP, OF_READING], ids=["physics", "reading"])
+def test_a_further_effect_leaves_every_case_of_the_others_as_it_was(added: Effect) -> None:
+    old = shipped()
+    new = replace(old, catalogue={added.name: added, **old.catalogue})
+    mine = 0
+    for index in range(600):
+        before, after = begin(index, 2026, "judge", old), begin(index, 2026, "judge", new)
+        if added.name in after.names:
+            mine += 1
+            assert after.kind in ("catalogue", "pair")
+        else:
+            assert after == before
+        if index < 30 and added.name not in after.names and after.names:
+            assert drawn(after, 3.0, new) == drawn(before, 3.0, old)
+    families = len({effect.family for effect in new.catalogue.values()})
+    expected = 600 * (SHARES["catalogue"] + 2.0 * SHARES["pair"]) / families
+    assert expected / 2.0 < mine < expected * 2.0
+
+
+def test_a_further_parameter_leaves_the_others_as_they_were() -> None:
+    parameters = (replace(RISE, name="warmth"), *FRICTION.parameters)
+    more = replace(FRICTION, parameters=parameters, apply=lambda system, **_: system)
+    library = replace(LIBRARY, catalogue=LIBRARY.catalogue | {FRICTION.name: more})
+    for old, new in zip(
+        *(draw(5, 7, "judge", effects=[FRICTION.name], library=item) for item in (LIBRARY, library)),
+        strict=True,
+    ):
+        assert new.laid[0].parameters.items() >= old.laid[0].parameters.items()
+        assert (new.plan, new.truths, new.seed) == (old.plan, old.truths, old.seed)
+
+
+def test_every_family_is_drawn_alike_and_every_signal_of_it() -> None:
+    library = shipped()
+    names = [of_catalogue(library, 1, "judge", index, "effect") for index in range(3000)]
+    families = Counter(library.catalogue[name].family for name in names)
+    assert set(families) == {effect.family for effect in library.catalogue.values()}
+    usual = 3000 / len(families)
+    assert all(abs(count - usual) < 5.0 * math.sqrt(usual) for count in families.values())
+    signals = Counter(library.catalogue[name].signal for name in names if library.catalogue[name].signal)
+    assert len(signals) == len(SIGNALS)
+    assert min(signals.values()) > 0.7 * max(signals.values())
+
+
+def test_a_pair_hides_two_different_effects() -> None:
+    pairs = [begin(index, 4, "judge", LIBRARY).names for index in range(300)]
+    assert {frozenset(names) for names in pairs if len(names) == 2} == {frozenset(LIBRARY.catalogue)}
+
+
+def test_the_draw_is_the_same_on_every_machine() -> None:
+    assert lots.number(1, "judge", 0, "kind") == 125882383115718818466265700442863281400
+    assert lots.chosen(("a", "b", "c"), 1) == lots.chosen(("c", "b", "a"), 1)
