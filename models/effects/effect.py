@@ -88,4 +88,4 @@ class Effect:
 
     def is_called_by(self, parameter: str) -> bool:
         """Whether the effect's name says this parameter already, as `table.delay` does of its delay."""
-        return self.name == f"{self.site}.{parameter}"
+        return self.name.replace(".", "_").endswith(f"_{parameter}")

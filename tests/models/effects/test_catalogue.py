@@ -132,8 +132,20 @@ def test_effects_on_readings_of_one_fault_are_one_family() -> None:
     families = {effect.family for effect in CATALOGUE.values() if effect.signal}
     assert families == {f"sensor: {fault}" for fault in FAULTS}
     assert CATALOGUE["table.delay"].family == "table.delay"
-    assert CATALOGUE["table.delay"].is_called_by("delay")
-    assert not CATALOGUE["damper.motor_lag"].is_called_by("time_constant")
+
+
+@pytest.mark.parametrize(
+    ("name", "parameter", "called"),
+    [
+        ("table.delay", "delay", True),
+        ("ground.time_shift", "shift", True),
+        ("sensor.column_force.delay", "delay", True),
+        ("damper.motor_lag", "time_constant", False),
+        ("damper.force_limit", "force", False),
+    ],
+)
+def test_a_parameter_that_the_name_says_is_known(name: str, parameter: str, called: bool) -> None:
+    assert CATALOGUE[name].is_called_by(parameter) is called
 
 
 @EACH
