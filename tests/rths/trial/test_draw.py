@@ -194,7 +194,7 @@ def test_a_further_effect_leaves_every_case_of_the_others_as_it_was(added: Effec
 def test_a_further_parameter_leaves_the_others_as_they_were() -> None:
     parameters = (replace(RISE, name="warmth"), *FRICTION.parameters)
     more = replace(FRICTION, parameters=parameters, apply=lambda system, **_: system)
-    library = replace(LIBRARY, catalogue=LIBRARY.catalogue | {FRICTION.name: more})
+    library = replace(LIBRARY, catalogue={**LIBRARY.catalogue, FRICTION.name: more})
     for old, new in zip(
         *(draw(5, 7, "judge", effects=[FRICTION.name], library=item) for item in (LIBRARY, library)),
         strict=True,
