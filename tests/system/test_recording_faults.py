@@ -46,11 +46,11 @@ def stop(process: subprocess.Popen[str]) -> None:
         if process.poll() is None:
             process.send_signal(signal.SIGINT)
             time.sleep(0.3)
-    finish(process, 20.0)
+    finish(process, 40.0)
 
 
 def test_a_killed_recorder_loses_less_than_a_tenth_of_a_second(tmp_path: Path) -> None:
-    plan = plan_file(tmp_path, 60.0, recording="patience = 30.0")
+    plan = plan_file(tmp_path, 60.0, recording="patience = 5.0")
     losses = []
     for attempt in range(KILLS):
         path = tmp_path / f"{attempt}.mcap"
@@ -109,7 +109,7 @@ def test_a_full_disk_stops_the_test_in_order_and_leaves_what_was_written(
     assert err.splitlines()[-1] == (
         "rths: The recording is lost: the disk does not take it (No space left on device)."
     )
-    assert "recorder: the disk does not take it (No space left on device)." in err
+    assert "recorder: ends the test (recording_lost)" in err
     assert "Traceback" not in out + err
     run = read(path)
     ticks = run.ticks("master")

@@ -261,7 +261,7 @@ class Bench:
         else:
             options += ["--connect", self.place.connect[role]]
         if role == "recorder":
-            options += ["-o", self.recording]
+            options += ["-o", self.recording, "--force"]  # one that is started again begins anew
         else:
             options += [] if "off" in words else processor(role)
         process = Process(module or role, *options, before=self.place.before.get(role, ()))
