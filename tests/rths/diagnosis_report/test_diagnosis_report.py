@@ -14,6 +14,7 @@ from report.gap import pictures, which, wording
 from report.gap.page import page
 from report.gap.schema import schema
 from report.gap.terminal import summary
+from report.pictures import figure
 from report.text.formats import (
     axis_unit,
     nats,
@@ -346,7 +347,7 @@ def seen(monkeypatch: Any) -> list[Any]:
     found: list[Any] = []
 
     def laid_out(canvas: Any) -> str:
-        pictures.fit_labels(canvas)
+        figure.fit_labels(canvas)
         found.append(canvas)
         return "<svg></svg>"
 
