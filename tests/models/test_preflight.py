@@ -171,7 +171,7 @@ def test_the_stepped_loop_of_several_slaves_is_that_of_the_real_loops_to_the_las
 
 def test_several_slaves_have_peaks_too() -> None:
     plan = plans.load(cli.plan_path("two_dampers")).with_test(duration=3.0)
-    assert "of their limits (" in peaks_check(plan).text
+    assert "of their limits at most (" in peaks_check(plan).text
     found = peaks_check(with_table(plan, "limits", damper_stroke=0.01)).risk
     assert found is not None
     assert "damper_stroke" in found.sentence

@@ -72,7 +72,7 @@ def test_the_verdict_says_where_a_test_stopped_and_what_is_missing_until_then() 
         "topics": facts,
         "recorder": {"cause": "a limit"},
     }
-    text = "The test stopped at tick 330 of 7000; until then the recording of slave lacks 204."
+    text = "The test stopped at tick 330 of 7000; until then the slave lacks 204."
     assert completeness(summary) == text
     assert stopped(summary) == "stopped at tick 330 of 7000"
 

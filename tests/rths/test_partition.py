@@ -26,7 +26,7 @@ def test_the_default_partition(default_plan: Plan) -> None:
     assert found.critical_delay == pytest.approx(0.0329, abs=1e-4)
     assert found.delay == pytest.approx(0.0002, abs=1e-4)
     assert found.amplitude == pytest.approx(1.028, abs=2e-3)
-    assert "critical 32.9 ms, expected 2.2 ms (× 15)" in partition_text(default_plan, found)
+    assert "Stable up to 32.9 ms of delay; 2.2 ms expected (margin 15)" in partition_text(default_plan, found)
 
 
 @pytest.mark.parametrize(("lead", "points"), [(0.0088, 1.9), (0.044, 0.0)])
@@ -44,7 +44,7 @@ def test_a_specimen_without_stiffness_bears_any_delay(default_plan: Plan) -> Non
     plan = with_table(default_plan, "column", stiffness=0.0)
     found = assess(plan)
     assert math.isinf(found.critical_delay)
-    assert "stable at any delay" in partition_text(plan, found)
+    assert "Stable at any delay; " in partition_text(plan, found)
 
 
 def test_two_storeys_diverge_beyond_their_critical_delay_only(default_plan: Plan) -> None:
