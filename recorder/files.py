@@ -54,7 +54,7 @@ def reserved(given: Path | None, plan: Plan, label: str = "", *, force: bool = F
 def checked(path: Path) -> Path:
     """The path, where a test can be recorded: a pipe may hold the recorder up; raises InputError."""
     if outputs.is_stream(path) and (str(path) in outputs.STANDARD or not path.is_char_device()):
-        raise InputError(f"Cannot record a test into {path}, which is no file: give a file with -o.")
+        raise InputError(f"Cannot record a test into {path}, which is not a file: give a file with -o.")
     return path
 
 

@@ -20,4 +20,6 @@ class Waited:
         if now_ns - self._said_ns < SAY_NS:
             return ""
         self._said_ns = now_ns
-        return f"still waits for {whom}, for {(now_ns - self._begun_ns) * 1e-9:.0f} of {patience:g} s."
+        return (
+            f"still waits for {whom}: {(now_ns - self._begun_ns) * 1e-9:.0f} of {patience:g} s have passed."
+        )

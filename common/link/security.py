@@ -111,7 +111,7 @@ def check_key(found: Identity, own: x509.Certificate) -> None:
     try:
         key = load_pem_private_key(content(found.key), password=None)
     except (ValueError, TypeError, UnsupportedAlgorithm):
-        raise InputError(f"{found.key} is no private key in PEM without a password.") from None
+        raise InputError(f"{found.key} is not a private key in PEM without a password.") from None
     if key.public_key() != own.public_key():
         raise InputError(
             f"{found.key} is not the key of {found.certificate}: take both from one run of `rths keys`."
@@ -123,7 +123,7 @@ def certificate(path: Path) -> x509.Certificate:
     try:
         return x509.load_pem_x509_certificate(content(path))
     except ValueError:
-        raise InputError(f"{path} is no certificate in PEM.") from None
+        raise InputError(f"{path} is not a certificate in PEM.") from None
 
 
 def content(path: Path) -> bytes:

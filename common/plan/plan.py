@@ -221,7 +221,7 @@ def parse(text: str, base: Path, name: str = "the plan") -> Plan:
     except tomllib.TOMLDecodeError as error:
         raise PlanError(f"{name} is not valid TOML: {error}.") from None
     except RecursionError:
-        raise PlanError(f"{name} is no plan: its values are nested too deeply.") from None
+        raise PlanError(f"{name} is not a plan: its values are nested too deeply.") from None
     try:
         return from_tables(tables, base)
     except PlanError as error:

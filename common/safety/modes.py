@@ -111,7 +111,7 @@ class Safety:
         """Take a turn; raises LocalProtocolError where the table has none, or a reset that was not admitted."""
         row = TURNS[self.mode]
         if turn not in row or (turn is Turn.RESET and self.cause is not None):
-            raise LocalProtocolError(f"'{turn.value}' is no turn of the mode '{self.mode.value}'.")
+            raise LocalProtocolError(f"'{turn.value}' is not a turn of the mode '{self.mode.value}'.")
         before, self.mode = self.mode, row[turn]
         self._told(before, turn, self.mode)
 

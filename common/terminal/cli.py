@@ -54,7 +54,10 @@ def plan_arguments(parser: argparse.ArgumentParser, *, optional: bool = False) -
 def reality_argument(parser: argparse.ArgumentParser) -> None:
     """The option that says what the laboratory really does."""
     parser.add_argument(
-        "--reality", type=Path, metavar="FILE", help="what the laboratories really do (stays secret)"
+        "--reality",
+        type=Path,
+        metavar="FILE",
+        help="what the laboratories really do; nothing of it is recorded",
     )
 
 
@@ -74,7 +77,7 @@ def rt_arguments(parser: argparse.ArgumentParser) -> None:
         "--rt",
         choices=realtime.MODES,
         default="auto",
-        help="real-time priority, locked memory, own processor: what can be had (auto), all or refuse (on), none (off)",
+        help="real-time priority, locked memory, own processor: as available (auto), all or refuse (on), none (off)",
     )
 
 
@@ -92,9 +95,7 @@ def json_argument(parser: argparse.ArgumentParser, text: str) -> None:
 
 def force_argument(parser: argparse.ArgumentParser) -> None:
     """The option without which no file is replaced."""
-    parser.add_argument(
-        "--force", action="store_true", help="replace what exists under the name of an output"
-    )
+    parser.add_argument("--force", action="store_true", help="replace output files that exist")
 
 
 def accept_argument(parser: argparse.ArgumentParser) -> None:

@@ -73,8 +73,8 @@ def partition_risk(plan: Plan, found: Partition) -> Risk | None:
     expected, margin = expected_delay(plan, found), plan.preflight.delay_margin
     return Risk(
         "partition",
-        f"the column's path is unstable beyond {found.critical_delay * 1e3:.1f} ms of delay and "
-        f"{expected * 1e3:.1f} ms are to be expected, where a margin of {margin:g} is wanted, so "
+        f"the column's path is unstable beyond {found.critical_delay * 1e3:.1f} ms of delay, and "
+        f"{expected * 1e3:.1f} ms are expected with a required margin of {margin:g}, so "
         f"{compensation(plan, found.delay)}, give the structure more mass or damping, or let the specimen stand for "
         "less of its stiffness",
     )

@@ -110,7 +110,7 @@ def concerns(facts: Mapping[str, Any]) -> Iterator[str]:
             "you trust."
         )
     if not facts["classes"]:
-        yield "No class of the plan's own would run: all laboratories are emulated."
+        yield "The plan names no class of its own: all laboratories are emulated."
     for slip in facts["slips"]:
         yield f"a slip of units? {slip['where']}: {slip['text']}"
     for risk in facts["refused"]:

@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--rt",
         choices=realtime.MODES,
         default="auto",
-        help="real-time shape: what can be had (default), all or fail, or none",
+        help="real-time settings: take what is available (default), fail without all of them, or take none",
     )
     parser.add_argument(
         "-o",

@@ -49,8 +49,8 @@ def test_who_is_waited_for_is_said_once_in_a_while() -> None:
     waited = Waited(0)
     said = [waited.news("slave and recorder", 30.0, second * 10**9) for second in range(26)]
     assert [text for text in said if text] == [
-        "still waits for slave and recorder, for 10 of 30 s.",
-        "still waits for slave and recorder, for 20 of 30 s.",
+        "still waits for slave and recorder: 10 of 30 s have passed.",
+        "still waits for slave and recorder: 20 of 30 s have passed.",
     ]
     assert waited.news("", 30.0, 100 * SAY_NS) == ""
     assert waited.news("slave", 30.0, 100 * SAY_NS + 1) == ""

@@ -142,10 +142,10 @@ def test_a_missing_file_is_named(copy: Path) -> None:
 
 def test_a_file_that_is_none_is_named(copy: Path) -> None:
     (copy / "keys/slave.key").write_text("nothing")
-    with pytest.raises(InputError, match=r"slave.key is no private key"):
+    with pytest.raises(InputError, match=r"slave.key is not a private key"):
         security.identity(secure_plan(copy), "slave")
     (copy / "keys/slave.pem").write_text("nothing")
-    with pytest.raises(InputError, match=r"slave.pem is no certificate"):
+    with pytest.raises(InputError, match=r"slave.pem is not a certificate"):
         security.identity(secure_plan(copy), "slave")
 
 

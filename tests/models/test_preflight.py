@@ -64,7 +64,7 @@ def test_an_unstable_plan_is_refused_by_partition_and_peaks(default_plan: Plan) 
     plan = dataclasses.replace(uncompensated(default_plan), control=Control(amd=False))
     risks = [one.risk for one in preflight.checks(plan) if one.risk]
     assert [risk.name for risk in risks] == ["partition", "peaks"]
-    assert "unstable beyond 32.9 ms of delay and 44.7 ms are to be expected" in risks[0].sentence
+    assert "unstable beyond 32.9 ms of delay, and 44.7 ms are expected" in risks[0].sentence
     assert "column_error exceeds 90% of its limit of 0.01 m" in risks[1].sentence
 
 

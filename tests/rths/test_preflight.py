@@ -30,7 +30,7 @@ def noted(run: Run, code: str) -> list[tuple[str, str, str]]:
 @pytest.mark.parametrize(
     ("text", "name", "sentence"),
     [
-        (UNSTABLE, "partition", "is unstable beyond 32.9 ms of delay and 44.7 ms are to be expected"),
+        (UNSTABLE, "partition", "is unstable beyond 32.9 ms of delay, and 44.7 ms are expected"),
         (NEAR, "peaks", "the simulated damper_stroke exceeds 90% of its limit of 0.01 m"),
     ],
 )

@@ -199,7 +199,7 @@ def parse_fault(word: str) -> Fault:
     """The fault in a word; raises InputError where it is none."""
     found = FAULT.fullmatch(word)
     if found is None:
-        raise InputError(f"'{word}' is no fault: write kind@at[+duration]:where[(name=value,…)].")
+        raise InputError(f"'{word}' is not a fault: write kind@at[+duration]:where[(name=value,…)].")
     kind = found["kind"]
     if kind not in KINDS:
         raise InputError(f"There is no fault '{kind}': {nearest(kind, KINDS)}")
@@ -233,5 +233,5 @@ def number(text: str, where: str) -> float:
     except ValueError:
         value = float("nan")
     if not abs(value) < 1e12:
-        raise InputError(f"'{text}' in '{where}' is no number that a schedule may have.")
+        raise InputError(f"'{text}' in '{where}' is not a number that a schedule may have.")
     return value

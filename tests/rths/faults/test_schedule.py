@@ -47,16 +47,16 @@ def test_a_line_may_be_written_by_hand() -> None:
     ("line", "part"),
     [
         ("duration=2", "names no seed"),
-        ("seed=1 nonsense", "is no fault"),
+        ("seed=1 nonsense", "is not a fault"),
         ("seed=1 stal@1+1:slave", "did you mean stall"),
         ("seed=1 stall@1+1:roof", "names no place"),
         ("seed=1 stall@1+1:recorder", "names no place"),
         ("seed=1 recorded=1 nan@1+1:recorder(place=1)", "names no place"),
         ("seed=1 outage@1+1:slave", "names no place"),
         ("seed=1 loss@1+1:master>slave", "must give loss"),
-        ("seed=1 loss@1+1:master>slave(loss=nan)", "no number"),
+        ("seed=1 loss@1+1:master>slave(loss=nan)", "is not a number"),
         ("seed=1 slaves=3", "1 or 2 slaves"),
-        ("seed=x", "no number"),
+        ("seed=x", "is not a number"),
     ],
 )
 def test_a_line_that_is_none_is_said_in_one_sentence(line: str, part: str) -> None:
