@@ -1,7 +1,7 @@
 """The master's loop: handshake, one tick after the other, orderly end.
 
-`poll` and `tick` do everything that must be done and never wait; `drive.py` fetches messages and waits
-in real time, and virtual time calls the same two.
+`poll` and `tick` do everything that must be done and never wait; `common/lab/drive.py` fetches messages and waits, in
+real and in virtual time.
 """
 
 from __future__ import annotations

@@ -130,7 +130,8 @@ class RecorderLoop:
             self._take_event(values)
             return
         if topic in self._seen:
-            self._newest = max(self._newest, item, key=lambda one: one[3])
+            if item[3] > self._newest[3]:
+                self._newest = item
             self._note(self._seen[topic], values[0])
         if kind_of(topic) == LATENCY:
             self._missed += bool(values[MISSED_AT])

@@ -1,4 +1,4 @@
-"""A whole test in virtual time: the real loops and rigs in one process over a link in memory."""
+"""A whole test in virtual time: the real drive, loops, rigs and recorder in one process, over a link in memory."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from common.errors import InterlockError, RthsError
-from common.host.clock import VirtualClock
 from common.lab.laboratory import Report, Setting, silent
 from common.lab.preflight import Gate
 from common.link.endpoint import Endpoint
@@ -19,7 +18,6 @@ from common.plan.reality import Reality, as_planned
 from common.plan.tables import Rig, Sensors
 from common.recording.reader import Run, read
 from common.roles import MASTER, RECORDER
-from common.safety.modes import Mode
 from common.terminal.telling import Tell, untold
 from master.assembly import build_loop as build_master
 from master.loop import MasterLoop
@@ -27,18 +25,20 @@ from models.loop import substructure
 from recorder import files
 from recorder.loop import CONSEQUENCE, RecorderLoop
 from recorder.sink import FileSink
+from simulation.processes import driving, recording
+from simulation.world import NO_DRIFT, Drift, World
 from slave.assembly import build_loop as build_slave
 from slave.loop import SlaveLoop
 
 SESSION = 1  # virtual time knows one test only, and the same test gives the same bits
-ROUND_NS = 1_000_000
-MOST_ROUNDS = 20_000
+NO_OPERATOR = "virtual time has no operator who could reset it."
+SAME_CLOCK: Mapping[str, Drift] = {}
 
 
 class Bench(NamedTuple):
-    """A test in memory: clock, master, slaves by role, and the recorder where there is one."""
+    """A test in memory: its time, master, slaves by role, and the recorder where there is one."""
 
-    clock: VirtualClock
+    world: World
     master: MasterLoop
     slaves: dict[str, SlaveLoop]
     recorder: RecorderLoop | None
@@ -63,38 +63,38 @@ def assemble(
     report: Report = silent,
     *,
     gate: Gate | None = None,
+    drifts: Mapping[str, Drift] = SAME_CLOCK,
 ) -> Bench:
     """All laboratories over a link in memory, recording into `output` where one is given.
 
     With a master's `gate` all sensors are judged as the rigs are armed, the slaves' with the same risks accepted, and
-    the recording is told what was passed and overruled; without one nothing is judged.
+    the recording is told what was passed and overruled; without one nothing is judged. `drifts` are the roles' clocks
+    where they differ.
     """
-    clock = VirtualClock()
-    hub = MemoryHub(clock, plan.roles)
+    world, hub = World(), MemoryHub(plan.roles)
     roles = (MASTER, *plan.roles) if output is None else (MASTER, *plan.roles, RECORDER)
-    endpoints: dict[str, Endpoint] = {role: hub.join(role) for role in roles}
+    settings = {}
+    for role in roles:
+        process = world.process(role, drifts.get(role, NO_DRIFT))
+        settings[role] = Setting(plan, hub.join(role, process), process, report)
     gates = {MASTER: gate} | {role: Gate(gate.accepted) for role in plan.roles} if gate else {}
-    master = build_master(
-        Setting(plan, endpoints["master"], clock, report),
-        reality,
-        session=SESSION,
-        epoch_ns=0,
-        gate=gate,
-    )
+    master = build_master(settings[MASTER], reality, session=SESSION, epoch_ns=0, gate=gate)
     slaves = {
-        role: build_slave(
-            Setting(plan, endpoints[role], clock, report), reality.of(role), gate=gates.get(role)
-        )
-        for role in plan.roles
+        role: build_slave(settings[role], reality.of(role), gate=gates.get(role)) for role in plan.roles
     }
-    recorder = None
-    if output is not None:
-        motion = substructure.motion(plan)
-        recording = files.begin(output, plan, motion, substructure.ground_rows(plan, motion))
-        recorder = RecorderLoop(
-            Setting(plan, endpoints["recorder"], clock, report), FileSink(recording, clock)
-        )
-    return Bench(clock, master, slaves, recorder, endpoints, gates)
+    recorder = begin_recording(settings[RECORDER], world, output) if output is not None else None
+    endpoints = {role: setting.endpoint for role, setting in settings.items()}
+    return Bench(world, master, slaves, recorder, endpoints, gates)
+
+
+def begin_recording(setting: Setting, world: World, output: Path) -> RecorderLoop:
+    """The recorder of a new file; its process begins when time does."""
+    motion = substructure.motion(setting.plan)
+    file = files.begin(output, setting.plan, motion, substructure.ground_rows(setting.plan, motion))
+    recorder = RecorderLoop(setting, FileSink(file, setting.clock, synced=False))
+    process = world.process(RECORDER)
+    process.start(recording(recorder, setting.endpoint, process, file))
+    return recorder
 
 
 def run(bench: Bench, stopping: Callable[[], str], tell: Tell = untold) -> RthsError | None:
@@ -103,43 +103,53 @@ def run(bench: Bench, stopping: Callable[[], str], tell: Tell = untold) -> RthsE
     Where several laboratories end with one, that which follows another's is not the one: the cause counts, and of
     several causes the master's.
     """
-    codes = _listening(bench)
-    rounds, most = 0, MOST_ROUNDS + bench.master.lab.plan.preflight.exchanges
-    while not bench.master.lab.running and not _over(bench) and rounds < most:
-        bench.clock.time += ROUND_NS
-        _exchange(bench, poll=True)
-        rounds += 1
-    if bench.master.lab.running:
-        for role, gate in bench.gates.items():
-            gate.note(bench.loops[role].lab)
-    ticks = bench.master.lab.plan.ticks
-    for tick in range(ticks):
-        tell("ticks", tick, ticks)
-        if reason := stopping():
-            bench.master.stop(reason)
-        if not bench.master.lab.running:
-            break
-        _tick(bench, tick)
-    else:
-        bench.master.finish()
-    _come_to_rest(bench)
-    _leave(bench)
+    codes = _listening(bench, tell)
+    play(bench, stopping)
     failed = {role: loop.lab.error for role, loop in bench.loops.items() if loop.lab.error}
     causes = [error for role, error in failed.items() if codes.get(role) != CONSEQUENCE]
-    if not failed and bench.master.ticks < ticks:
+    if not failed and not bench.master.completed:
         return InterlockError(bench.master.lab.exchange.cause or "The test never began.")
     incomplete = [bench.recorder.error] if bench.recorder is not None and bench.recorder.error else []
     return next(iter([*causes, *failed.values(), *incomplete]), None)
 
 
-def _listening(bench: Bench) -> dict[str, str]:
-    """Codes of the errors that end the laboratories' tests from now on, by role, as they are reported."""
+def play(bench: Bench, stopping: Callable[[], str] = str, pause: Callable[[], bool] | None = None) -> None:
+    """Let time pass to the test's end, or until `pause` becomes true: another call then lets it pass on.
+
+    `stopping` gives the reason to end the test early, empty while there is none. What a process raises that is no
+    error of a test is raised again once all others have left.
+    """
+    for role, loop in bench.loops.items():
+        process = bench.world.process(role)
+        wish = stopping if role == MASTER else process.stopping
+        if not process.started:
+            process.start(driving(loop, _unattended(loop, wish), bench.gates.get(role)))
+    bench.world.run(pause)
+    for process in bench.world.processes.values():
+        if process.error is not None:
+            raise process.error
+
+
+def _unattended(loop: MasterLoop | SlaveLoop, stopping: Callable[[], str]) -> Callable[[], str]:
+    """The wish to stop, also of a laboratory that would wait for an operator's reset for ever."""
+    safety = loop.lab.safety
+    return lambda: stopping() or (NO_OPERATOR if safety.latched else "")
+
+
+def _listening(bench: Bench, tell: Tell) -> dict[str, str]:
+    """Codes of the errors that end the laboratories' tests from now on, by role, as they are reported.
+
+    How far the master is, `tell` is told.
+    """
     codes: dict[str, str] = {}
+    ticks = bench.master.lab.plan.ticks
 
     def listen(role: str, onward: Report) -> Report:
         def report(kind: str, data: Mapping[str, Any]) -> None:
             if kind == "event" and data["level"] == "error":
                 codes.setdefault(role, data["code"])
+            if kind == "progress" and role == MASTER:
+                tell("ticks", data["tick"], ticks)
             onward(kind, data)
 
         return report
@@ -154,7 +164,7 @@ def simulated(
 ) -> tuple[Run, RthsError | None]:
     """The nominal models of a plan with several slaves, played as a test: its recording, and what ended it early.
 
-    The loop objects stand in for the compiled rollout, which knows one slave. Without `noise` sensors are free of
+    The loops stand in for the compiled rollout, which knows one slave. Without `noise` sensors are free of
     it; a rig that the plan names has no part in a simulation.
     """
     sensors = plan.sensors if noise else Sensors(**dict.fromkeys(vars(plan.sensors), 0.0))
@@ -164,82 +174,3 @@ def simulated(
         path = output or Path(folder) / "simulation.mcap"
         error = run(assemble(plan, nominal, path), str, tell)
         return read(path), error
-
-
-def _tick(bench: Bench, tick: int) -> None:
-    master, slaves = bench.master, bench.slaves.items()
-    bench.clock.sleep_until(master.lab.tick_ns(tick))
-    _drain(bench, "master", master)
-    if not master.lab.running:
-        return
-    master.tick(tick)
-    for role, slave in slaves:
-        _drain(bench, role, slave)
-        if slave.lab.running:
-            slave.tick(tick)
-    if bench.recorder is not None:
-        master.lab.send_samples()
-        for _, slave in slaves:
-            slave.lab.send_samples()
-        _record(bench)
-
-
-def _come_to_rest(bench: Bench) -> None:
-    """The ramps of all laboratories, an interval at a time."""
-    lab = bench.master.lab
-    tick = lab.tick_at(bench.clock.now() - lab.start_ns) + 1  # after the one that has been
-    while True:
-        bench.clock.sleep_until(bench.master.lab.tick_ns(tick))
-        _exchange(bench, poll=False)
-        loops = [loop for loop in bench.loops.values() if loop.lab.safety.mode is Mode.RAMPING]
-        if not loops:
-            return
-        for loop in loops:
-            loop.ease(tick)
-            loop.tell()
-            loop.lab.send_samples()
-        tick += 1
-
-
-def _exchange(bench: Bench, *, poll: bool) -> None:
-    for role, loop in bench.loops.items():
-        if poll:
-            loop.poll()
-        _drain(bench, role, loop)
-    _record(bench)
-
-
-def _drain(bench: Bench, role: str, loop: MasterLoop | SlaveLoop) -> None:
-    endpoint = bench.endpoints[role]
-    while (received := endpoint.receive()) is not None:
-        loop.take(received)
-
-
-def _record(bench: Bench) -> None:
-    if bench.recorder is None:
-        return
-    endpoint = bench.endpoints["recorder"]
-    while (received := endpoint.receive()) is not None:
-        bench.recorder.take(received.message, received.received_ns)
-    bench.recorder.poll()
-
-
-def _leave(bench: Bench) -> None:
-    bench.clock.sleep_until(bench.master.lab.tick_ns(bench.master.ticks))
-    _exchange(bench, poll=False)
-    loops = bench.loops.values()
-    for loop in loops:
-        loop.disarm()
-    for _ in range(MOST_ROUNDS):
-        if all(loop.left for loop in loops) and (bench.recorder is None or bench.recorder.done):
-            break
-        bench.clock.time += 50 * ROUND_NS
-        for loop in loops:
-            loop.leave()
-        _exchange(bench, poll=False)
-    if bench.recorder is not None:
-        bench.recorder.close()
-
-
-def _over(bench: Bench) -> bool:
-    return any(loop.lab.exchange.ended for loop in bench.loops.values())

@@ -9,6 +9,9 @@ import numpy as np
 
 from common.plan import plan
 from common.plan.plan import Plan
+from common.plan.reality import as_planned
+from simulation import virtual
+from simulation.virtual import Bench
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -130,3 +133,10 @@ def patient(folder: Path) -> Path:
     path = folder / "patient.toml"
     path.write_text(PATIENT)
     return path
+
+
+def running(test: Plan, ticks: int) -> Bench:
+    """A test in virtual time in which all laboratories have made so many ticks; it stands still there."""
+    bench = virtual.assemble(test, as_planned(test), None)
+    virtual.play(bench, pause=lambda: all(loop.ticks >= ticks for loop in bench.loops.values()))
+    return bench

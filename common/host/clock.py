@@ -16,6 +16,16 @@ class Clock(Protocol):
         """Return at or after `deadline`, ns."""
 
 
+class Waiter(Clock, Protocol):
+    """A clock in virtual time on which a process may also wait for a message."""
+
+    def listen(self, timeout: int) -> None:
+        """Return once a message has come, at the latest after `timeout` ns."""
+
+    def wake(self) -> None:
+        """A message has come for the process that waits on this clock."""
+
+
 class MonotonicClock:
     """The machine's monotonic clock."""
 
@@ -31,7 +41,7 @@ class MonotonicClock:
 
 
 class VirtualClock:
-    """A clock that stands still until it is told to move."""
+    """A clock that stands still until it is told to move; of a process that is alone, so that no message comes."""
 
     def __init__(self) -> None:
         self.time = 0
@@ -43,6 +53,13 @@ class VirtualClock:
     def sleep_until(self, deadline: int) -> None:
         """Move to `deadline` unless it has passed."""
         self.time = max(self.time, deadline)
+
+    def listen(self, timeout: int) -> None:
+        """Move on by `timeout` ns."""
+        self.time += timeout
+
+    def wake(self) -> None:
+        """Nobody waits."""
 
 
 def unix_ns() -> int:

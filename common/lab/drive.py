@@ -1,4 +1,4 @@
-"""A laboratory's loop in real time: fetch messages, wait, tick, and leave in order."""
+"""A laboratory's loop in time, real or virtual: fetch messages, wait, tick, and leave in order."""
 
 from __future__ import annotations
 
@@ -164,8 +164,7 @@ def come_to_rest(loop: Loop, tick: int) -> None:
     while lab.safety.mode is Mode.RAMPING:
         tick += max(-((loop.nominal(tick) + late - lab.clock.now()) // lab.interval_ns), 0)
         lab.clock.sleep_until(loop.nominal(tick))
-        while fetch(loop, 0):
-            pass
+        take_all(loop)
         if lab.safety.mode is Mode.RAMPING:  # a message may have stopped the rig at once
             loop.ease(tick)
         loop.tell()
@@ -194,19 +193,23 @@ def wait(loop: Loop, tick: int) -> None:
     lab.clock.sleep_until(loop.earliest(tick))
     if lab.running and tick < lab.plan.ticks and lab.overrun(lab.clock.now() - loop.nominal(tick), tick):
         return
-    while fetch(loop, 0):
-        pass
+    take_all(loop)
     while not loop.heard(tick) and lab.running and lab.clock.now() < loop.latest(tick):
         fetch(loop, loop.latest(tick))
 
 
-def fetch(loop: Loop, deadline: int) -> bool:
-    """Take one message that comes before the deadline; whether there was one."""
+def take_all(loop: Loop) -> None:
+    """Take every message that is there."""
+    receive = loop.lab.endpoint.receive
+    while (received := receive()) is not None:
+        loop.take(received)
+
+
+def fetch(loop: Loop, deadline: int) -> None:
+    """Take one message that comes before the deadline."""
     received = loop.lab.endpoint.receive(max(deadline - loop.lab.clock.now(), 0) * 1e-9)
-    if received is None:
-        return False
-    loop.take(received)
-    return True
+    if received is not None:
+        loop.take(received)
 
 
 def depart(loop: Loop, over: int) -> None:

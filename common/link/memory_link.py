@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Sequence
 from typing import Any
 
-from common.host.clock import Clock
+from common.host.clock import Waiter
 from common.link.endpoint import CHANNELS, Received
 from common.link.transport import CONTROL, Route, heard
 from common.protocol.messages import Message
@@ -19,14 +19,13 @@ class MemoryHub:
     `slaves` are the roles of all slaves of the test.
     """
 
-    def __init__(self, clock: Clock, slaves: Sequence[str] = (SLAVE,)) -> None:
-        self.clock = clock
+    def __init__(self, slaves: Sequence[str] = (SLAVE,)) -> None:
         self._slaves = slaves
         self._members: dict[str, MemoryEndpoint] = {}
 
-    def join(self, role: str) -> MemoryEndpoint:
-        """The access of one role."""
-        return self._members.setdefault(role, MemoryEndpoint(self, role))
+    def join(self, role: str, clock: Waiter) -> MemoryEndpoint:
+        """The access of one role, which waits on a clock of its own."""
+        return self._members.setdefault(role, MemoryEndpoint(self, role, clock))
 
     def hearers(self, role: str, kind: type, to: str) -> list[MemoryEndpoint]:
         """Those who hear a role's messages of a kind, `to` one role alone where it is named."""
@@ -35,10 +34,10 @@ class MemoryHub:
 
 
 class MemoryEndpoint:
-    """One role's access to a MemoryHub; `clock` is the one its messages are stamped by on arrival."""
+    """One role's access to a MemoryHub; by its `clock` its messages are stamped on arrival, and waited for."""
 
-    def __init__(self, hub: MemoryHub, role: str) -> None:
-        self.clock = hub.clock
+    def __init__(self, hub: MemoryHub, role: str, clock: Waiter) -> None:
+        self.clock = clock
         self._hub = hub
         self._role = role
         self._queue: deque[Received] = deque()
@@ -60,9 +59,12 @@ class MemoryEndpoint:
         """Take in what a role has sent."""
         now = self.clock.now()
         self._queue.append(Received(message, role, now, now))
+        self.clock.wake()
 
     def receive(self, timeout: float = 0.0) -> Received | None:
-        """The next message that is there already; time stands still in memory."""
+        """The next message, waiting at most `timeout` s for it; None where there is none."""
+        if not self._queue and timeout > 0.0:
+            self.clock.listen(round(timeout * 1e9))
         return self._queue.popleft() if self._queue else None
 
     def news(self, now_ns: int) -> dict[str, Any] | None:

@@ -18,6 +18,7 @@ from mcap.writer import CompressionType, Writer
 
 from common.errors import InputError
 from common.recording.checksums import CHECKSUMS, checksum, sealed
+from common.recording.chunks import pack_messages
 from common.recording.index import pack_index
 from common.recording.schema import message_class, message_name, schema_file
 from common.roles import SLAVE
@@ -91,6 +92,7 @@ class Recording:
             cast(io.BufferedWriter, self._spool), chunk_size=CHUNK_SIZE, compression=CompressionType.ZSTD
         )
         pack_index(self._writer)
+        pack_messages(self._writer)
         self._writer.start(profile="", library="rths")
         self._names = {topic: [row.name for row in rows] for topic, rows in topics.items()}
         self._classes: dict[str, type[Any]] = {}

@@ -47,7 +47,7 @@ def test_a_refusal_is_one_sentence_that_says_how_to_overrule_it() -> None:
 
 def test_a_gate_tells_the_recording_once_what_was_passed_and_what_was_overruled() -> None:
     clock = VirtualClock()
-    lab = Laboratory("master", Setting(Plan(), MemoryHub(clock).join("master"), clock))
+    lab = Laboratory("master", Setting(Plan(), MemoryHub().join("master", clock), clock))
     gate = Gate(["peaks"])
     gate.judge([Check("link good"), Check("", PEAKS)])
     for _ in range(2):
@@ -168,7 +168,7 @@ class Idle(Counting):
 
 def armed(rig: Counting, gate: Gate, **options: Any) -> None:
     setting = Setting(
-        with_table(Plan(), "preflight", readings=5), MemoryHub(rig.clock).join("master"), rig.clock
+        with_table(Plan(), "preflight", readings=5), MemoryHub().join("master", rig.clock), rig.clock
     )
     GuardedRig(rig, "lab A", ColumnMeasurement, at_rest=SensorsAtRest(gate, setting), **options).arm()
 

@@ -13,7 +13,7 @@ from mcap.reader import make_reader
 
 from common import signals
 from common.errors import InputError
-from common.recording import index
+from common.recording import chunks, index
 from common.recording.reader import read
 from common.recording.writer import Recording
 from common.signals import TOPICS, Kind
@@ -220,3 +220,13 @@ def test_a_signal_is_found_by_name() -> None:
         signals.topic_of("nonsense")
     with pytest.raises(KeyError):
         signals.signal("slave", "column_force")
+
+
+def test_messages_packed_in_one_call_are_the_librarys_to_the_byte(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    packed = write(tmp_path / "packed.mcap", 500)
+    assert isinstance(vars(packed._writer)[chunks.BUILDER], chunks.PackedChunks)
+    monkeypatch.setattr("common.recording.writer.pack_messages", lambda _writer: None)
+    write(tmp_path / "plain.mcap", 500)
+    assert (tmp_path / "packed.mcap").read_bytes() == (tmp_path / "plain.mcap").read_bytes()

@@ -38,7 +38,7 @@ class Slow:
 def laboratory(plan: Plan, read_ms: float, write_ms: float, ticks: int, role: str = "slave") -> Laboratory:
     """A laboratory that runs, after some ticks of a rig."""
     clock = VirtualClock()
-    lab = Laboratory(role, Setting(plan, MemoryHub(clock, plan.roles).join(role), clock))
+    lab = Laboratory(role, Setting(plan, MemoryHub(plan.roles).join(role, clock), clock))
     lab.enter(1)
     for turn in (Turn.CONFIGURE, Turn.ARM, Turn.RUN):
         lab.safety.take(turn)

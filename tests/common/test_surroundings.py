@@ -16,7 +16,7 @@ from common.plan.plan import Plan, parse
 
 def laboratory(plan: Plan | None = None) -> Laboratory:
     clock = VirtualClock()
-    return Laboratory("slave", Setting(plan or Plan(), MemoryHub(clock).join("slave"), clock))
+    return Laboratory("slave", Setting(plan or Plan(), MemoryHub().join("slave", clock), clock))
 
 
 def events(lab: Laboratory) -> list[tuple[str, str, str]]:

@@ -15,11 +15,11 @@ from common.plan.plan import Plan
 from common.plan.reality import Reality, as_planned
 from common.roles import MASTER, SLAVE
 from rths.__main__ import main
+from simulation.world import Process
 from tests.faults.rows import Row, passed
 from tests.faults.simulated import AT, Course, Scene, Stop
 from tests.helpers import largest, with_table
 from validation.faults.rigs import Wrong
-from validation.faults.world import Process
 
 CHANNELS = {
     SLAVE: ("table_displacement", "table_acceleration", "damper_stroke", "damper_force"),

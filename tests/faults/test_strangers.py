@@ -17,13 +17,13 @@ from common.plan.tables import Test
 from common.protocol import codec
 from common.protocol.messages import Command, Feedback, Message
 from common.roles import MASTER, SLAVE
+from simulation.world import Drift
 from tests.common.test_hostile import CONTENTS
 from tests.faults.rows import Row, passed
 from tests.faults.simulated import AT, Course, Scene, same_commands, signed
 from validation.faults import hostile, lab
 from validation.faults.lab import SESSION, Surrounding
 from validation.faults.wire import INSIDER, Letter
-from validation.faults.world import Drift
 
 
 def from_(tick: int, **fields: float) -> Callable[[Any], Message | None]:

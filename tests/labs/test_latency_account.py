@@ -42,7 +42,7 @@ class Trial:
     def __init__(self, plan: Plan, master: Clock, slave: Clock, delays: Delays, extra: float = 0.0) -> None:
         self.master, self.slave, self.delays, self.extra = master, slave, delays, extra
         clock = VirtualClock()
-        self.lab = Laboratory("master", Setting(plan, MemoryHub(clock).join("master"), clock))
+        self.lab = Laboratory("master", Setting(plan, MemoryHub().join("master", clock), clock))
         self.lab.enter(1)
         self.lab.recorder = Recorder(1, "recording", "", "", b"")
         self.offset = ClockOffset(length=OFFSET_BLOCK, blocks=OFFSET_BLOCKS)

@@ -24,7 +24,7 @@ from models.loop import substructure
 from models.loop.closed_loop import signals, simulate
 from simulation import virtual
 from simulation.virtual import Bench
-from tests.helpers import largest, with_table, without_recorder
+from tests.helpers import largest, running, with_table, without_recorder
 
 NO_LIMITS = dict.fromkeys(("error_energy", "numerical_drift", "column_error"), math.inf)
 
@@ -154,16 +154,9 @@ def test_a_limit_on_the_building_holds_for_every_storey(tmp_path: Path) -> None:
 
 
 def test_a_held_tick_does_not_move_what_rates_are_measured_from(short_plan: Plan) -> None:
-    bench = virtual.assemble(
-        without_recorder(short_plan), reality.as_planned(without_recorder(short_plan)), None
-    )
-    while not bench.master.lab.running:
-        bench.clock.time += 1_000_000
-        virtual._exchange(bench, poll=True)
-    for tick in range(100):
-        virtual._tick(bench, tick)
+    bench = running(without_recorder(short_plan), 100)
     before = bench.master._command
-    bench.clock.sleep_until(bench.master.lab.tick_ns(101))  # a whole interval late
+    bench.world.time = bench.master.lab.tick_ns(101)  # a whole interval late
     bench.master.tick(100)
     assert bench.master._command == before
     change = bench.master._limits._actuator

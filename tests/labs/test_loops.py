@@ -10,10 +10,8 @@ import numpy as np
 import pytest
 
 from common.errors import InputError, InterlockError, LostError, RigError, RthsError
-from common.host.clock import VirtualClock
 from common.lab.laboratory import REPEAT_NS
 from common.link.endpoint import Received
-from common.link.memory_link import MemoryEndpoint
 from common.plan import reality
 from common.plan.plan import PROTOCOL_VERSION, Plan, from_tables
 from common.plan.reality import Reality
@@ -28,7 +26,8 @@ from models.loop.closed_loop import rows, signals, simulate
 from rths.examine.replay import replay_master, replay_slave
 from simulation import virtual
 from simulation.virtual import Bench
-from tests.helpers import with_table, without_recorder
+from simulation.world import Drift
+from tests.helpers import running, with_table, without_recorder
 
 
 def run(plan: Plan, path: Path, real: Reality | None = None) -> tuple[Run, Any, Bench]:
@@ -262,9 +261,9 @@ def test_nobody_there_is_said_in_the_time_the_plan_allows(short_plan: Plan) -> N
     plan = with_table(without_recorder(short_plan), "link", connect_timeout=2.0)
     bench = virtual.assemble(plan, reality.as_planned(plan), None)
     while not bench.master.lab.exchange.ended:
-        bench.clock.time += 1_000_000
+        bench.world.time += 1_000_000
         bench.master.poll()
-    assert bench.clock.time == pytest.approx(2.0e9, abs=2e6)
+    assert bench.world.time == pytest.approx(2.0e9, abs=2e6)
     assert isinstance(bench.master.lab.error, LostError)
     assert str(bench.master.lab.error).startswith("No slave joined the test within 2 s")
 
@@ -272,12 +271,10 @@ def test_nobody_there_is_said_in_the_time_the_plan_allows(short_plan: Plan) -> N
 def test_a_slave_that_is_there_and_does_not_arm_is_named(short_plan: Plan) -> None:
     plan = with_table(without_recorder(short_plan), "link", connect_timeout=2.0)
     bench = virtual.assemble(plan, reality.as_planned(plan), None)
-    while bench.master.lab.exchange.state is State.IDLE:
-        bench.clock.time += 1_000_000
-        virtual._exchange(bench, poll=True)
+    virtual.play(bench, pause=lambda: bench.master.lab.exchange.state is not State.IDLE)
     assert bench.master.lab.exchange.state is State.REGISTERED
     while not bench.master.lab.exchange.ended:
-        bench.clock.time += 1_000_000
+        bench.world.time += 1_000_000
         bench.master.poll()
     assert isinstance(bench.master.lab.error, LostError)
     assert str(bench.master.lab.error).startswith("The slave did not arm its rig within 2 s")
@@ -292,17 +289,6 @@ def test_a_missing_recorder_is_said(short_plan: Plan) -> None:
     assert bench.master.ticks == 0
 
 
-def running(plan: Plan, ticks: int) -> Bench:
-    """A test in memory after some ticks."""
-    bench = virtual.assemble(plan, reality.as_planned(plan), None)
-    while not bench.master.lab.running:
-        bench.clock.time += 1_000_000
-        virtual._exchange(bench, poll=True)
-    for tick in range(ticks):
-        virtual._tick(bench, tick)
-    return bench
-
-
 @pytest.fixture
 def bench(short_plan: Plan) -> Bench:
     return running(without_recorder(short_plan), 100)
@@ -310,7 +296,7 @@ def bench(short_plan: Plan) -> Bench:
 
 def test_a_silent_slave_is_lost_and_nothing_more_moves(bench: Bench) -> None:
     for tick in range(100, 100 + 501):
-        bench.clock.sleep_until(bench.master.lab.tick_ns(tick))
+        bench.world.time = bench.master.lab.tick_ns(tick)
         bench.master.tick(tick)
         if bench.master.lab.exchange.ended:
             break
@@ -352,7 +338,7 @@ def test_a_slave_without_commands_keeps_the_last_one_and_goes_on_measuring_until
 ) -> None:
     before = bench.slave._command
     for tick in range(100, 105):
-        bench.clock.sleep_until(bench.slave.tick_ns(tick))
+        bench.world.time = bench.slave.tick_ns(tick)
         bench.slave.tick(tick)
     answers = []
     while (heard := bench.endpoints["master"].receive()) is not None:
@@ -367,7 +353,7 @@ def test_a_tick_that_comes_a_whole_interval_late_moves_nothing_and_sends_nothing
     command = bench.master._command
     while bench.endpoints["slave"].receive() is not None:
         pass
-    bench.clock.sleep_until(bench.master.lab.tick_ns(103) + 1)
+    bench.world.time = bench.master.lab.tick_ns(103) + 1
     for tick in (100, 101, 102):
         bench.master.tick(tick)
         assert bench.master._command == command
@@ -387,14 +373,14 @@ def test_repeated_and_outdated_feedback_is_not_used(bench: Bench) -> None:
         bench.master.take(
             Received(Feedback(session, seq, seq, 0, -1, 0, 0, 0, 0.0, 0.0, 0.0, 999.0), "slave")
         )
-    bench.clock.sleep_until(bench.master.lab.tick_ns(100))
+    bench.world.time = bench.master.lab.tick_ns(100)
     bench.master.tick(100)
     assert bench.master.partners["slave"].used.damper_force != 999.0
 
 
 def test_feedback_of_another_session_is_not_used(bench: Bench) -> None:
     bench.master.take(Received(Feedback(12345, 99, 99, 0, -1, 0, 0, 0, 0.0, 0.0, 0.0, 999.0), "slave"))
-    bench.clock.sleep_until(bench.master.lab.tick_ns(100))
+    bench.world.time = bench.master.lab.tick_ns(100)
     bench.master.tick(100)
     assert bench.master.partners["slave"].used.damper_force != 999.0
 
@@ -422,29 +408,13 @@ def test_a_link_plug_in_delays_and_loses_messages(short_plan: Plan, tmp_path: Pa
     assert np.allclose(ages[30:36], [0.002, 0.004, 0.002, 0.002, 0.004, 0.002])
 
 
-class SkewedClock:
-    """Another machine's clock: a second ahead, and gaining."""
-
-    def __init__(self, true: VirtualClock, gain: float) -> None:
-        self.true, self.gain = true, gain
-
-    def now(self) -> int:
-        return self.true.time + 1_000_000_000 + round(self.true.time * self.gain)
-
-    def sleep_until(self, deadline: int) -> None:
-        raise AssertionError("the loops do not sleep")
-
-
 def test_clocks_that_differ_and_drift_apart_do_not_shift_the_laboratories(
     short_plan: Plan, tmp_path: Path
 ) -> None:
     gain = 500e-6  # a millisecond in two seconds
     path = tmp_path / "skewed.mcap"
-    bench = virtual.assemble(short_plan, reality.as_planned(short_plan), path)
-    endpoint = bench.endpoints["slave"]
-    assert isinstance(endpoint, MemoryEndpoint)
-    bench.slave.lab.clock = endpoint.clock = SkewedClock(bench.clock, gain)
-    bench.slave.lab.heard_ns = endpoint.clock.now()
+    drifts = {"slave": Drift(1_000_000_000, round(gain * 1e9))}  # a second ahead, and gaining
+    bench = virtual.assemble(short_plan, reality.as_planned(short_plan), path, drifts=drifts)
     assert virtual.run(bench, lambda: "") is None
     found = read(path)
     assert found.columns["slave"]["command_seq"].tolist() == list(range(short_plan.ticks))
@@ -472,11 +442,7 @@ def test_a_plug_ins_delay_is_in_the_stamps_and_not_in_the_clocks_offset(
     monkeypatch.setattr("common.link.links.find", lambda *_: OneWay)
     real = dataclasses.replace(reality.as_planned(short_plan), link=Rig("x:OneWay"))
     path = tmp_path / "one_way.mcap"
-    bench = virtual.assemble(short_plan, real, path)
-    endpoint = bench.endpoints["slave"]
-    assert isinstance(endpoint, MemoryEndpoint)
-    bench.slave.lab.clock = endpoint.clock = SkewedClock(bench.clock, 0.0)
-    bench.slave.lab.heard_ns = endpoint.clock.now()
+    bench = virtual.assemble(short_plan, real, path, drifts={"slave": Drift(1_000_000_000)})
     assert virtual.run(bench, lambda: "") is None
     latency = read(path).columns["latency"]
     assert latency["seq"].tolist() == list(range(short_plan.ticks))

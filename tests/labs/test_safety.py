@@ -78,9 +78,18 @@ def test_a_violated_limit_is_never_written_and_both_come_to_rest(
     assert "remote_trip" in codes(run, other)
     for role in ("master", "slave"):
         assert "running → ramping (trip)" in turns(run, role)
+        assert set(np.diff(run.ramps[role]["seq"])) == {1}  # no interval of the way to rest is left out
         assert motion_after(run, role, round(event["t"] / 0.002)) <= motion_bound(plan, role)
         safe = next(one for one in run.events if one["lab"] == role and one["code"] == "safe")
         assert safe["values"]["duration"] > 0.0
+
+
+def test_virtual_time_waits_for_no_operator(short_plan: Plan, tmp_path: Path) -> None:
+    plan = with_table(short_plan, "limits", column_force=12e3)
+    bench, run = played(with_table(plan, "safety", wait_for_reset=True), tmp_path / "a.mcap")
+    assert {loop.lab.safety.mode for loop in bench.loops.values()} == {Mode.SAFE}
+    assert bench.world.time < (plan.test.duration + 1.0) * 1e9
+    assert run.finished
 
 
 def test_the_ramp_begins_where_the_last_command_was_without_a_step(short_plan: Plan, tmp_path: Path) -> None:
@@ -163,7 +172,7 @@ def pressed(bench: Bench, word: str, press: int, lab: str = "master") -> Answer:
 
     loop.lab.endpoint.send = send  # type: ignore[method-assign]
     wish = Operator(0, loop.lab.plan.digest(), word, press, "test")
-    loop.take(Received(wish, "operator", bench.clock.now()))
+    loop.take(Received(wish, "operator", bench.world.time))
     return next(message for message in sent if isinstance(message, Answer))
 
 
@@ -190,7 +199,7 @@ def test_a_press_before_the_trip_resets_nothing(short_plan: Plan) -> None:
 
 def test_an_operator_of_another_plan_is_not_heard(latched: Bench) -> None:
     wish = Operator(0, "another", "reset", 3, "")
-    latched.master.take(Received(wish, "operator", latched.clock.now()))
+    latched.master.take(Received(wish, "operator", latched.world.time))
     assert latched.master.lab.safety.latched
 
 

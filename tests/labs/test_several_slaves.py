@@ -27,7 +27,7 @@ from rths.examine.replay import replay_master, replay_slave
 from simulation import virtual
 from simulation.virtual import Bench
 from slave.assembly import build_loop as build_slave
-from tests.helpers import largest, without_recorder
+from tests.helpers import largest, running, without_recorder
 
 THREE = {"mass": [1.6e5] * 3, "stiffness": [9e7] * 3, "damping": [4e5] * 3}
 
@@ -225,28 +225,14 @@ def test_a_slave_that_trips_ends_the_test_for_all_and_the_sentence_names_it(
     assert {event["lab"] for event in found.events} >= {"master", "slave.middle", "slave.roof"}
 
 
-def running(chosen: Plan, ticks: int) -> Bench:
-    """A test in memory after some ticks."""
-    bench = virtual.assemble(chosen, reality.as_planned(chosen), None)
-    while not bench.master.lab.running:
-        bench.clock.time += 1_000_000
-        virtual._exchange(bench, poll=True)
-    for tick in range(ticks):
-        virtual._tick(bench, tick)
-    return bench
-
-
 def test_a_slave_that_falls_silent_is_named_and_all_others_are_told() -> None:
     bench = running(without_recorder(strict(TWO)), 100)
     bench.slaves["slave.middle"].tick = lambda tick: None  # type: ignore[method-assign]
-    for tick in range(100, 700):
-        virtual._tick(bench, tick)
-        if bench.master.lab.exchange.ended:
-            break
+    virtual.play(bench, pause=lambda: bench.master.lab.exchange.ended)
     assert bench.master.lab.exchange.state is State.LOST
     assert isinstance(bench.master.lab.error, LostError)
     assert str(bench.master.lab.error) == "No valid feedback from the slave 'middle' for 10 ms."
-    virtual._exchange(bench, poll=False)
+    virtual.play(bench, pause=lambda: all(slave.lab.exchange.ended for slave in bench.slaves.values()))
     assert all(slave.lab.exchange.state is State.TRIPPED for slave in bench.slaves.values())
     roof = bench.slaves["slave.roof"].lab.error
     assert str(roof).startswith("The master stopped the test: No valid feedback from the slave 'middle'")
@@ -258,9 +244,7 @@ def test_a_slave_that_never_comes_is_named_with_how_to_start_it() -> None:
     )
     bench = virtual.assemble(chosen, reality.as_planned(chosen), None)
     middle = bench.slaves.pop("slave.middle")
-    while not bench.master.lab.exchange.ended:
-        bench.clock.time += 1_000_000
-        virtual._exchange(bench, poll=True)
+    virtual.play(bench, pause=lambda: bench.master.lab.exchange.ended and bench.slave.lab.exchange.ended)
     assert str(bench.master.lab.error) == (
         "No slave 'middle' joined the test within 2 s: start it with the same plan, --name middle and --connect."
     )
@@ -271,15 +255,11 @@ def test_a_slave_that_never_comes_is_named_with_how_to_start_it() -> None:
 def test_no_slave_is_armed_before_all_have_registered() -> None:
     bench = virtual.assemble(without_recorder(TWO), reality.as_planned(TWO), None)
     late = bench.slaves.pop("slave.middle")
-    for _ in range(500):
-        bench.clock.time += 1_000_000
-        virtual._exchange(bench, poll=True)
+    virtual.play(bench, pause=lambda: bench.world.time > 500_000_000)
     assert bench.master.lab.exchange.state is State.IDLE
     assert bench.slave.lab.exchange.state is State.REGISTERED
     bench.slaves["slave.middle"] = late
-    for _ in range(500):
-        bench.clock.time += 1_000_000
-        virtual._exchange(bench, poll=True)
+    virtual.play(bench, pause=lambda: all(loop.lab.running for loop in bench.loops.values()))
     assert bench.master.lab.running
     assert {slave.lab.start_ns for slave in bench.slaves.values()} == {bench.master.lab.start_ns}
 
@@ -289,10 +269,10 @@ def test_what_another_role_says_counts_for_that_role_alone() -> None:
     session = bench.master.lab.exchange.session
     roof, middle = bench.master.partners.values()
     forged = Feedback(session, 99, 99, 0, -1, 0, 0, 0, 0.0, 0.0, 0.0, 999.0)
-    now = bench.clock.now()
+    now = bench.world.time
     bench.master.take(Received(forged._replace(seq=100), "slave.roof", now))
     bench.master.take(Received(forged._replace(seq=100), "slave.nobody", now))
-    bench.clock.sleep_until(bench.master.lab.tick_ns(101))
+    bench.world.time = bench.master.lab.tick_ns(101)
     bench.master.tick(101)
     assert roof.used.damper_force == 999.0
     assert middle.used.damper_force != 999.0
@@ -307,7 +287,7 @@ def test_the_second_process_of_a_name_is_refused_and_the_test_goes_on(named: boo
     bench = running(chosen, 100)
     role = chosen.roles[0]
     real = reality.as_planned(chosen).of(role)
-    second = build_slave(Setting(chosen, bench.endpoints[role], bench.clock), real)
+    second = build_slave(Setting(chosen, bench.endpoints[role], bench.slave.lab.clock), real)
     second.poll()
     heard = bench.endpoints["master"].receive()
     while heard is not None and not isinstance(heard.message, Waiting):
@@ -325,8 +305,7 @@ def test_the_second_process_of_a_name_is_refused_and_the_test_goes_on(named: boo
     assert "takes part in this test already: stop one of the two" in str(second.lab.error)
     assert second.left
     second.leave()
-    virtual._drain(bench, "master", bench.master)
-    virtual._tick(bench, 100)
+    virtual.play(bench, pause=lambda: bench.master.ticks > 100)
     assert bench.master.lab.running
     assert bench.slave.lab.running
 
@@ -336,15 +315,12 @@ def test_of_two_processes_that_register_the_first_is_armed() -> None:
     bench = virtual.assemble(chosen, reality.as_planned(chosen), None)
     role, first = "slave.roof", bench.slaves["slave.roof"]
     second = build_slave(
-        Setting(chosen, bench.endpoints[role], bench.clock), reality.as_planned(chosen).of(role)
+        Setting(chosen, bench.endpoints[role], bench.slave.lab.clock), reality.as_planned(chosen).of(role)
     )
     request = Register(bench.master.lab.exchange.session, PROTOCOL_VERSION, chosen.digest())
     for slave in (first, second):
         slave.take(Received(request))
-    while bench.master.lab.exchange.state is not State.REGISTERED:
-        bench.clock.time += 1_000_000
-        bench.master.poll()
-        virtual._exchange(bench, poll=True)
+    virtual.play(bench, pause=lambda: bench.master.lab.exchange.state is State.REGISTERED)
     partner = bench.master.partners[role]
     while bench.endpoints["master"].receive() is not None:
         pass
@@ -374,29 +350,24 @@ def stray(**changes: Any) -> Received:
 
 
 def test_a_recorder_of_no_session_or_another_disturbs_no_test(short_plan: Plan, tmp_path: Path) -> None:
-    bench = virtual.assemble(short_plan, reality.as_planned(short_plan), tmp_path / "a.mcap")
-    while not bench.master.lab.running:
-        bench.clock.time += 1_000_000
-        virtual._exchange(bench, poll=True)
-    for tick in range(100):
+    plan = short_plan.with_ticks(100)
+    bench = virtual.assemble(plan, reality.as_planned(plan), tmp_path / "a.mcap")
+
+    def strayed() -> str:
         for loop in bench.loops.values():
-            loop.take(stray())
-            loop.take(stray(session=77))
-        virtual._tick(bench, tick)
-    assert bench.master.lab.exchange.state is State.RUNNING
+            if loop.lab.running:
+                loop.take(stray())
+                loop.take(stray(session=77))
+        return ""
+
+    assert virtual.run(bench, strayed) is None
     assert bench.master.lab.recorded
     assert bench.slave.lab.recorded
-    assert bench.recorder is not None
-    bench.recorder.close()
 
 
 def test_a_recorder_that_comes_late_to_a_test_that_needs_none_is_asked_in(short_plan: Plan) -> None:
     plan = without_recorder(short_plan)
-    bench = virtual.assemble(plan, reality.as_planned(plan), None)
-    while not bench.master.lab.running:
-        bench.clock.time += 1_000_000
-        virtual._exchange(bench, poll=True)
-    virtual._tick(bench, 0)
+    bench = running(plan, 1)
     sent: list[object] = []
     bench.master.lab.endpoint.send = lambda message, to="": sent.append(message) or 0  # type: ignore[func-returns-value,method-assign]
     bench.master.take(Received(Recorder(0, "ready", plan.digest(), "", b""), "recorder"))

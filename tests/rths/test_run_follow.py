@@ -363,7 +363,7 @@ class NoSink:
 
 def test_a_recorder_that_is_asked_keeps_why_the_test_ended(short_plan: Plan) -> None:
     clock = VirtualClock()
-    endpoint = MemoryHub(clock, short_plan.roles).join("recorder")
+    endpoint = MemoryHub(short_plan.roles).join("recorder", clock)
     for known, outcome in ((("lost", "The slave is gone."), "lost"), (("", ""), "stop")):
         loop = RecorderLoop(Setting(short_plan, endpoint, clock), NoSink())
         loop._outcome = known

@@ -14,12 +14,12 @@ from common.plan.patience import strict
 from common.plan.plan import Plan
 from common.plan.reality import as_planned
 from common.terminal import cli
+from simulation.world import Drift
 from validation.faults import hostile
 from validation.faults.lab import SESSION, Simulation, Surrounding
 from validation.faults.rigs import Wrong
 from validation.faults.schedule import KINDS, PROCESS, RIG, Fault, Schedule
 from validation.faults.wire import DROPS, OPEN, QUEUES, Conditions, Direction
-from validation.faults.world import Drift
 
 STATES = {"outage": DROPS, "backlog": QUEUES}
 

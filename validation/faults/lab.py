@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import struct
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
-from common.host.realtime import NOTHING
-from common.host.stopping import Stopper
-from common.lab.drive import Loop, drive, longest_leave
+from common.lab.drive import longest_leave
 from common.lab.laboratory import Report, Setting
-from common.lab.surroundings import Surroundings
 from common.plan.plan import Plan
 from common.plan.reality import Reality
 from common.plan.tables import Rig
@@ -22,14 +19,14 @@ from master import assembly as master_assembly
 from master.loop import MasterLoop
 from models.loop import substructure
 from recorder import files
-from recorder.__main__ import receive
 from recorder.loop import RecorderLoop
 from recorder.sink import FileSink
+from simulation.processes import driving, recording
+from simulation.world import Drift, Process, World
 from slave import assembly as slave_assembly
 from slave.loop import SlaveLoop
 from validation.faults.rigs import Probe, ProbedRig
 from validation.faults.wire import CABLE, Conditions, Port, Wire, WireEndpoint
-from validation.faults.world import Drift, Process, World
 
 SESSION = 1  # simulated time knows one test, and the same test gives the same bits
 PROBED = Rig(class_=f"{ProbedRig.__module__}:{ProbedRig.__name__}")
@@ -46,13 +43,6 @@ class Surrounding(NamedTuple):
 
 
 CALM = Surrounding()
-
-
-class Nowhere(Surroundings):
-    """A machine that reports nothing of its real-time settings."""
-
-    def begin(self) -> None:
-        """Nothing is watched."""
 
 
 class Told(NamedTuple):
@@ -122,25 +112,15 @@ class Simulation:
         probe.partners = list(getattr(loop, "partners", {}).values())
         self.probes[role] = probe
         self.loops[role] = loop
-        process.start(driving(loop, process, self.endpoints[role]), at)
+        rejected = self.endpoints[role].rejected
+        process.start(driving(loop, process.stopping, rejected=rejected), at)
 
     def _add_recorder(self, path: Path) -> None:
         process, setting = self._process(RECORDER)
         motion = substructure.motion(self.plan)
         file = files.begin(path, self.plan, motion, substructure.ground_rows(self.plan, motion))
         loop = self.recorder = RecorderLoop(setting, FileSink(file, process))
-        stopping = cast("Stopper", process.stopping)  # all that is asked of one
-
-        def body() -> None:
-            try:
-                receive(loop, setting.endpoint, stopping)
-            finally:
-                if process.killed:
-                    file.abandon()  # what it had not handed over is gone
-                else:
-                    loop.close()
-
-        process.start(body)
+        process.start(recording(loop, setting.endpoint, process, file))
 
     # -- course -----------------------------------------------------------------------------------
 
@@ -156,13 +136,3 @@ class Simulation:
             for time, command in zip(probe.log.times, probe.log.commands, strict=True):
                 found.update(struct.pack(f"<q{len(command)}d", time, *command))
         return found.hexdigest()
-
-
-def driving(loop: Loop, process: Process, endpoint: WireEndpoint) -> Callable[[], None]:
-    """What a laboratory's process does."""
-
-    def body() -> None:
-        loop.lab.heard_ns = process.now()
-        drive(loop, process.stopping, Nowhere(loop.lab, NOTHING, endpoint.rejected, timed=False))
-
-    return body

@@ -12,7 +12,7 @@ from common.lab.drive import Loop
 from common.lab.laboratory import Laboratory
 from common.protocol.exchange import State
 from common.rig import GuardedRig
-from validation.faults.world import Process
+from simulation.world import Process
 
 COMPUTED = 100_000  # ns that a tick takes between reading and writing
 PRESENT = {

@@ -20,7 +20,7 @@ import numpy as np
 from common.link.endpoint import FrameEndpoint, Received
 from common.link.transport import Packet, Route, heard, said
 from common.protocol.messages import Command, Feedback, Message
-from validation.faults.world import Process, World
+from simulation.world import Process, World
 
 DRAWN = 512  # random numbers drawn at once
 KEPT = 4096  # frames of a route that can be sent again

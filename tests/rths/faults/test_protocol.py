@@ -27,6 +27,7 @@ from common.roles import MASTER, RECORDER, SLAVE
 from common.terminal import cli
 from master import assembly as master_assembly
 from master.loop import MasterLoop
+from simulation.world import World
 from slave import assembly as slave_assembly
 from slave.loop import SlaveLoop
 from tests.helpers import without_recorder
@@ -34,7 +35,6 @@ from validation.faults.hostile import command, feedback
 from validation.faults.invariants import LIMITED
 from validation.faults.lab import PROBED
 from validation.faults.rigs import Probe
-from validation.faults.world import World
 
 SESSION, OTHER = 5, 6
 INSTANCE = 3

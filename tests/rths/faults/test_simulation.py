@@ -12,6 +12,7 @@ from common.plan.reality import as_planned
 from common.protocol.codec import Reject
 from common.recording.reader import read
 from common.roles import MASTER, SLAVE
+from simulation.world import Drift
 from tests.helpers import without_recorder
 from validation.faults import invariants
 from validation.faults.apply import simulation_of
@@ -19,7 +20,6 @@ from validation.faults.invariants import INVARIANTS, SAFETY, Violation, judge
 from validation.faults.lab import Simulation, Surrounding
 from validation.faults.rigs import COMPUTED, named
 from validation.faults.schedule import KINDS, parse
-from validation.faults.world import Drift
 
 HOLDING_NOW = tuple(one for one in INVARIANTS if one not in SAFETY)
 SOME = {  # values of a fault that shows

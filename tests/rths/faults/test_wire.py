@@ -10,8 +10,8 @@ import pytest
 
 from common.link.transport import TICK, Packet
 from common.roles import MASTER, SLAVE
+from simulation.world import World
 from validation.faults.wire import BACKLOG, DROPS, QUEUES, SOCKET, Conditions, Direction, Letter, Wire
-from validation.faults.world import World
 
 MS = 1_000_000
 COUNT = 20_000

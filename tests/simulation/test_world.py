@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from validation.faults.world import Drift, Process, World
+from simulation.world import Drift, Process, World
 
 MS = 1_000_000
 
@@ -145,3 +145,42 @@ def test_the_interpreter_is_as_it_was_afterwards() -> None:
     assert gc.isenabled()
     assert sys.getswitchinterval() == interval
     assert gc.get_freeze_count() <= frozen
+
+
+def test_a_world_that_pauses_goes_on_where_it_was() -> None:
+    one, found = world(), []
+    process = one.process("any")
+
+    def body() -> None:
+        for step in range(1, 5):
+            process.sleep_until(step * MS)
+            found.append(step)
+
+    process.start(body)
+    one.at(3 * MS // 2, lambda: None)  # something to stop at
+    one.run(lambda: len(found) >= 1)
+    assert found == [1]
+    assert process.started
+    assert not process.ended
+    one.run()
+    assert found == [1, 2, 3, 4]
+    assert process.ended
+
+
+def test_who_waits_for_a_message_goes_on_when_it_comes_and_else_when_its_time_is_over() -> None:
+    one, found = world(), []
+    hears, sends = one.process("hears"), one.process("sends")
+
+    def hearing() -> None:
+        for _ in range(2):
+            hears.listen(5 * MS)
+            found.append(one.time // MS)
+
+    def sending() -> None:
+        sends.sleep_until(2 * MS)
+        hears.wake()
+
+    hears.start(hearing)
+    sends.start(sending)
+    one.run()
+    assert found == [2, 7]

@@ -1,8 +1,9 @@
-"""Many processes in one thread and in virtual time: a scheduler of events and the processes that wait for them.
+"""Virtual time: many processes in one thread, and a scheduler of the events that they wait for.
 
 Every process is a greenlet. Where it would block it hands over to the scheduler, which takes the earliest event from
 a heap of (time, order, action): the same calls give the same order, whatever the machine does. World time is in ns
-and is known to no process; each process has a clock of its own, offset and drifting.
+and is known to no process; each process has a clock of its own, offset and drifting. Tests in virtual time and tests
+with drawn faults both run on it (docs/decisions/0034-one-virtual-time.md).
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ NO_DRIFT = Drift()
 class World:
     """Virtual time; `limit` (ns) is where it ends whatever still goes on."""
 
-    def __init__(self, limit: int) -> None:
+    def __init__(self, limit: int = FOREVER) -> None:
         self.time = 0
         self.limit = limit
         self.heap: list[Event] = []
@@ -56,18 +57,29 @@ class World:
         """A process of this world that does not run yet."""
         return self.processes.setdefault(name, Process(self, name, drift))
 
-    def run(self) -> None:
-        """Let time pass until every process has ended, or to the limit; what a process raises is kept in it."""
+    def run(self, pause: Callable[[], bool] | None = None) -> None:
+        """Let time pass until every process has ended, or to the limit; what a process raises is kept in it.
+
+        Where `pause` becomes true time stops before the next event, and may be let pass on by another call.
+        """
         self._hub = greenlet.getcurrent()
         heap = self.heap
         with _garbage_kept():
             try:
                 while heap and heap[0][0] <= self.limit and self.alive:
+                    if pause is not None and pause():
+                        return
                     self.time, _, action, arguments = heappop(heap)
                     action(*arguments)
-            finally:
-                for process in self.processes.values():
-                    process.discard()
+            except BaseException:
+                self._discard()
+                raise
+            self._discard()
+
+    def _discard(self) -> None:
+        """Leave nothing of any process behind."""
+        for process in self.processes.values():
+            process.discard()
 
     def hand_over(self) -> None:
         """Leave a process's greenlet for the scheduler."""
@@ -121,8 +133,10 @@ class Process:
         return time
 
     def sleep_until(self, deadline: int) -> None:
-        """Sleep until its own clock shows `deadline`, ns."""
-        self._wait(self.reached(deadline))
+        """Sleep until its own clock shows `deadline`, ns; one that has passed returns at once."""
+        until = self.reached(deadline)
+        if self.ahead or until > self.world.time:
+            self._wait(until)
 
     # -- what it does -----------------------------------------------------------------------------
 
@@ -140,6 +154,11 @@ class Process:
         self._token += 1
         self.world.alive += 1
         self.world.at(at, self._resume, self._token)
+
+    @property
+    def started(self) -> bool:
+        """Whether it has begun or will begin."""
+        return self._thread is not None
 
     def _end(self) -> None:
         self.world.alive -= not self.ended
@@ -173,10 +192,10 @@ class Process:
         world.hand_over()
 
     def wake(self) -> None:
-        """A message has come for it."""
+        """A message has come for it: it goes on at this time, after what is due before."""
         if self._listening:
             self._listening = False
-            self._resume(self._token)
+            self.world.at(self.world.time, self._resume, self._token)
 
     def _resume(self, token: int) -> None:
         if token != self._token or self.ended:
