@@ -288,14 +288,14 @@ class MasterLoop:
             self.lab.safety.follow(Turn.END)
             self.tell()
 
-    def wind_down(self, reason: str) -> None:
+    def end(self, reason: str) -> None:
         """End the test in order, as the operator wants."""
         self.stop(reason)
 
     def emergency(self, error: EmergencyStopError) -> None:
         """Stop the rig at once."""
         self.lab.emergency(error)
-        self.stop_rig()
+        self.disarm_rig()
 
     def standing(self) -> str:
         """Why the cause of a latched state persists, empty where it is gone."""
@@ -334,14 +334,14 @@ class MasterLoop:
 
     def disarm(self) -> None:
         """Bring the rig to a safe stop and close the accounts; once, before leaving."""
-        self.stop_rig()
+        self.disarm_rig()
         if self.ticks:
             for partner in self._partners:
                 partner.account.finish(self.ticks - 1, self.lab.clock.now())
                 text, values = partner.exchanged()
                 self.lab.note("exchange", text, tick=self.ticks, values=values)
 
-    def stop_rig(self) -> None:
+    def disarm_rig(self) -> None:
         """Disarm the rig, once."""
         if not self._disarmed:
             self._disarmed = True

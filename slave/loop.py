@@ -270,7 +270,7 @@ class SlaveLoop:
         """Stop because somebody at this laboratory wants it so."""
         self.lab.fail(Event.TRIP, InterlockError(reason), code="stop", tick=self.ticks)
 
-    def wind_down(self, reason: str) -> None:
+    def end(self, reason: str) -> None:
         """End the test in order, as the operator wants; the master hears it too."""
         lab = self.lab
         if lab.exchange.allows(Event.STOP):
@@ -281,7 +281,7 @@ class SlaveLoop:
     def emergency(self, error: EmergencyStopError) -> None:
         """Stop the rig at once."""
         self.lab.emergency(error)
-        self.stop_rig()
+        self.disarm_rig()
 
     def standing(self) -> str:
         """Why the cause of a latched state persists, empty where it is gone."""
@@ -292,13 +292,13 @@ class SlaveLoop:
 
     def disarm(self) -> None:
         """Bring the rig to a safe stop; once, before leaving."""
-        self.stop_rig()
+        self.disarm_rig()
         if self.ticks:
             text = f"{self._feedbacks} feedbacks sent, {self._tally.used} commands used."
             values = {"feedbacks_sent": float(self._feedbacks)} | self._tally.values("commands")
             self.lab.note("exchange", text, tick=self.ticks, values=values)
 
-    def stop_rig(self) -> None:
+    def disarm_rig(self) -> None:
         """Disarm the rig, once."""
         if not self._disarmed:
             self._disarmed = True

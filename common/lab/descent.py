@@ -111,7 +111,7 @@ class Descent(Generic[Command]):
         if over or self._settling > self._lab.plan.safety.settle / self._lab.plan.test.interval:
             duration = (tick + 1 - self._begun - max(self._settling - 1, 0)) * self._lab.plan.test.interval
             values = {"duration": duration, "travel": ramp.travel}
-            self._lab.come_to_rest(tick, values | command._asdict())  # type: ignore[attr-defined]
+            self._lab.at_rest(tick, values | command._asdict())  # type: ignore[attr-defined]
         self._lab.sample_ramp(ramp_topic(self._lab.name), tick, *command, *(measured or self._blank))
 
     def _written(self, command: Command, tick: int) -> bool:

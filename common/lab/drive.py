@@ -65,7 +65,7 @@ class Loop(Protocol):
     def stop(self, reason: str) -> None:
         """Somebody wants the test to end."""
 
-    def stop_rig(self) -> None:
+    def disarm_rig(self) -> None:
         """Disarm the rig, once."""
 
     def disarm(self) -> None:
@@ -110,16 +110,16 @@ def drive(loop: Loop, stopping: Callable[[], str], surroundings: Surroundings) -
         over = loop.lab.clock.now()
         if loop.lab.running:
             loop.finish()
-        come_to_rest(loop, following)
+        ramp(loop, following)
         if loop.lab.safety.mode is Mode.EMERGENCY_STOP:
-            loop.stop_rig()
+            loop.disarm_rig()
         stay(loop, stopping)
     except Exception:  # whatever goes wrong in this program, the rig does not stay armed
         loop.disarm()
         raise
     loop.disarm()
     surroundings.end(loop.ticks)
-    depart(loop, over)
+    leave(loop, over)
 
 
 def handshake(loop: Loop, stopping: Callable[[], str]) -> None:
@@ -153,7 +153,7 @@ def run(loop: Loop, stopping: Callable[[], str]) -> int:
     return lab.plan.ticks
 
 
-def come_to_rest(loop: Loop, tick: int) -> None:
+def ramp(loop: Loop, tick: int) -> None:
     """The ramp to rest from a tick on, an interval at a time; those that were missed are left out, never caught up.
 
     A tick that is late by more than a part is left out too: two commands in quick succession would be a step.
@@ -212,7 +212,7 @@ def fetch(loop: Loop, deadline: int) -> None:
         loop.take(received)
 
 
-def depart(loop: Loop, over: int) -> None:
+def leave(loop: Loop, over: int) -> None:
     """Send the last words until they are received, for a bounded time; the recorder may still ask for what it lacks.
 
     A recorder that is held up is waited for as long as during the test, counted from when it was last heard, and then

@@ -140,7 +140,7 @@ class Laboratory:
             t = tick * self.plan.test.interval
             self.outlet.add(topic, at, at, (tick, t, self.safety.mode.value, *values))
 
-    def come_to_rest(self, tick: int, values: Mapping[str, float]) -> None:
+    def at_rest(self, tick: int, values: Mapping[str, float]) -> None:
         """The rig is at rest; `values` say how it came there."""
         self.tick = tick
         self.safety.at_rest()

@@ -17,7 +17,7 @@ class Operated(Protocol):
 
     lab: Laboratory
 
-    def wind_down(self, reason: str) -> None:
+    def end(self, reason: str) -> None:
         """End the test in order."""
 
     def emergency(self, error: EmergencyStopError) -> None:
@@ -49,7 +49,7 @@ def _done(loop: Operated, wish: Operator) -> tuple[bool, str]:
         return True, f"{lab.safety.mode.value}."
     if lab.exchange.ended:
         return False, "The test is over already."
-    loop.wind_down(f"stopped by the operator: {reason}.")
+    loop.end(f"stopped by the operator: {reason}.")
     return True, f"{lab.safety.mode.value}."
 
 

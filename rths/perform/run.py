@@ -169,7 +169,7 @@ def in_real_time(
             view = shown(output, args.live_port) if args.live else None
             follow(processes, ending, progress, stopping, view)
     finally:
-        wind_up(processes, ending)
+        end_all(processes, ending)
         processes.close()
         progress.end()
         if view is not None:
@@ -307,7 +307,7 @@ def answer(processes: Processes, doing: Mapping[str, str]) -> str:
     )
 
 
-def wind_up(processes: Processes, ending: Ending) -> None:
+def end_all(processes: Processes, ending: Ending) -> None:
     """End the processes in order if this program has failed, so that no rig is left in mid-motion."""
     doing: dict[str, str] = {}
     while not processes.all_ended():

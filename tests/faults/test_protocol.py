@@ -171,7 +171,7 @@ def finish(machine: SlaveMachine | MasterMachine, state: State, stop: Message | 
         if stop is not None:
             machine.give(stop, other)
         else:
-            machine.loop.wind_down("enough.")
+            machine.loop.end("enough.")
     if state is State.DONE:
         if stop is None:
             machine.give(messages.Stopped(SESSION, 1), other)
