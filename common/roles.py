@@ -39,12 +39,12 @@ def latency_topic(role: str) -> str:
 
 
 def ramp_topic(role: str) -> str:
-    """The topic of a laboratory's way to rest: `master_ramp`, `slave_ramp.roof`."""
+    """The topic of a laboratory's ramp to rest: `master_ramp`, `slave_ramp.roof`."""
     kind, point, name = role.partition(".")
     return f"{kind}{RAMP}{point}{name}"
 
 
 def ramps_of(topic: str) -> str:
-    """The laboratory whose way to rest a topic holds, empty for any other topic."""
+    """The laboratory whose ramp to rest a topic holds, empty for any other topic."""
     kind, point, name = topic.partition(".")
     return f"{kind.removesuffix(RAMP)}{point}{name}" if kind.endswith(RAMP) else ""

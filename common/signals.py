@@ -136,7 +136,7 @@ MASTER_RAMP = (
     SEQ,
     TIME,
     MODE,
-    Signal("actuator_command", "m", "command written on the way to rest"),
+    Signal("actuator_command", "m", "command written on the ramp to rest"),
     Signal("column_displacement", "m", "specimen deformation measured"),
     Signal("column_force", "N", "restoring force of the specimen measured"),
 )
@@ -145,7 +145,7 @@ SLAVE_RAMP = (
     SEQ,
     TIME,
     MODE,
-    Signal("table_command", "m", "command written to the table on the way to rest"),
+    Signal("table_command", "m", "command written to the table on the ramp to rest"),
     Signal("damper_command", "N", "motor force written on the way to zero"),
     Signal("table_displacement", "m", "table displacement measured"),
     Signal("table_acceleration", "m/s²", "table acceleration measured"),

@@ -1,4 +1,4 @@
-"""Laboratory A on its way to rest: the actuator comes to a hold, then unloads the specimen."""
+"""Laboratory A on its ramp to rest: the actuator comes to a hold, then unloads the specimen."""
 
 from __future__ import annotations
 

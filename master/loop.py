@@ -193,7 +193,7 @@ class MasterLoop:
         self._limits.written(command)
 
     def ease(self, tick: int) -> None:
-        """One interval on the way to rest."""
+        """One interval on the ramp to rest."""
         try:
             self._descent.ease(tick)
         except EmergencyStopError as error:
@@ -393,7 +393,7 @@ class MasterLoop:
 
     @property
     def resting(self) -> Resting:
-        """How far the rig is on its way to rest."""
+        """How far the rig is on its ramp to rest."""
         return self._descent.resting
 
     # -- pacing -----------------------------------------------------------------------------------

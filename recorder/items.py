@@ -28,7 +28,7 @@ class Items:
         topics = signals.topics(plan.roles)
         own = {"event", lab, ramp_topic(lab), *(map(latency_topic, plan.roles) if lab == MASTER else ())}
         self._ticks = range(plan.ticks)
-        self._unbounded = ("event", ramp_topic(lab))  # the way to rest goes on after the last tick
+        self._unbounded = ("event", ramp_topic(lab))  # the ramp to rest goes on after the last tick
         self._rows = {topic: checks(topics[topic], plan) for topic in own}
         self._plain = {topic: Plain(topics[topic]) for topic in own if is_plain(topics[topic], plan)}
 

@@ -27,7 +27,7 @@ ASK_NS = 20_000_000  # from asking a laboratory to asking it again, where the an
 ASKED_SILENCE_NS = (
     2_000_000_000  # the same once it was asked to stop: laboratories that move are heard every interval
 )
-ASKED_NS = 20_000_000_000  # how long it records on at most, once asked: longer than a way to rest at the default limits
+ASKED_NS = 20_000_000_000  # how long it goes on recording once asked: longer than a ramp to rest at the default limits
 STALL_NS = 1_000_000_000  # a recorder that did nothing for so long was held up itself
 ROWS_LOST = "rows_lost"  # code of the event that says what a laboratory did not send again
 MISSED = ("watchdog", "lost")  # a laboratory has missed another
@@ -292,7 +292,7 @@ class RecorderLoop:
     def stop(self, reason: str) -> None:
         """End the recording because somebody wants it so; why the test ended before stays the outcome.
 
-        A test that needs its recording is asked to end, and its way to rest is recorded.
+        A test that needs its recording is asked to end, and its ramp to rest is recorded.
         """
         if self._wish or self.done:
             return

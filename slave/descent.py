@@ -1,4 +1,4 @@
-"""Laboratory B on its way to rest: the table comes to a hold, the damper's motor force to zero."""
+"""Laboratory B on its ramp to rest: the table comes to a hold, the damper's motor force to zero."""
 
 from __future__ import annotations
 

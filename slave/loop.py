@@ -202,7 +202,7 @@ class SlaveLoop:
         return False
 
     def ease(self, tick: int) -> None:
-        """One interval on the way to rest."""
+        """One interval on the ramp to rest."""
         try:
             self._descent.ease(tick)
         except EmergencyStopError as error:
@@ -359,7 +359,7 @@ class SlaveLoop:
 
     @property
     def resting(self) -> Resting:
-        """How far the rig is on its way to rest."""
+        """How far the rig is on its ramp to rest."""
         return self._descent.resting
 
     # -- pacing -----------------------------------------------------------------------------------

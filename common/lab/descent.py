@@ -1,4 +1,4 @@
-"""A rig on its way to rest: read, move on along a ramp, write, until it is at rest and has settled."""
+"""A rig on its ramp to rest: read, step along the ramp, write, until it is at rest and has settled."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Command_co = TypeVar("Command_co", bound=tuple[float, ...], covariant=True)
 
 
 class Resting(NamedTuple):
-    """How far a rig is on its way to rest."""
+    """How far a rig is on its ramp to rest."""
 
     left: float  # s at most, where no interval is left out
     text: str  # what it does, and how long at most
@@ -72,10 +72,10 @@ class Descent(Generic[Command]):
 
     @property
     def resting(self) -> Resting:
-        """How far the rig is on its way to rest."""
+        """How far the rig is on its ramp to rest."""
         safety, interval = self._lab.plan.safety, self._lab.plan.test.interval
         left = max(safety.settle - self._settling * interval, 0.0) + interval
-        doing = "beginning the way to rest"
+        doing = "beginning the ramp to rest"
         if self._ramp is not None:
             doing = (
                 "waiting for the transfer system to settle"

@@ -22,7 +22,7 @@ IDLE_NS = 5_000_000
 LEAVE_NS = 5_000_000_000
 PROGRESS_NS = 200_000_000
 RESTING_NS = (
-    500_000_000  # between two reports of the way to rest: the user is not kept waiting for the next one
+    500_000_000  # between two reports of the ramp to rest: the user is not kept waiting for the next one
 )
 
 
@@ -54,7 +54,7 @@ class Loop(Protocol):
         """One control interval."""
 
     def ease(self, tick: int) -> None:
-        """One interval on the way to rest."""
+        """One interval on the ramp to rest."""
 
     def tell(self) -> None:
         """Tell the other laboratories of the end, again and again; may be called at any time."""
@@ -96,7 +96,7 @@ class Loop(Protocol):
 
     @property
     def resting(self) -> Resting:
-        """How far the rig is on its way to rest."""
+        """How far the rig is on its ramp to rest."""
 
 
 def drive(loop: Loop, stopping: Callable[[], str], surroundings: Surroundings) -> None:
@@ -217,7 +217,7 @@ def leave(loop: Loop, over: int) -> None:
 
     A recorder that is held up is waited for as long as during the test, counted from when it was last heard, and then
     has as long as any other to come back to the link and to ask. A laboratory that routes for others stays while they
-    come to rest, at most for the longest way to rest after the ticks were `over`; the recorder's time counts from
+    come to rest, at most for the longest ramp to rest after the ticks were `over`; the recorder's time counts from
     then.
     """
     lab = loop.lab
@@ -235,7 +235,7 @@ def leave(loop: Loop, over: int) -> None:
 
 
 def coming_to_rest(loop: Loop, rest: int) -> bool:
-    """Whether other laboratories may still be on their way to rest, which ends at `rest` (ns) at the latest.
+    """Whether other laboratories may still be on their ramp to rest, which ends at `rest` (ns) at the latest.
 
     After a trip they repeat their reason; in an orderly end they send nothing before they are at rest.
     """

@@ -134,7 +134,7 @@ class Laboratory:
             self.note(news["code"], news["text"], level=news["level"], tick=tick, values=news["values"])
 
     def sample_ramp(self, topic: str, tick: int, *values: float) -> None:
-        """Record one interval of the way to rest: commands written, then readings."""
+        """Record one interval of the ramp to rest: commands written, then readings."""
         if self.recorded:
             at = self.epoch_ns + self.plan.tick_ns(tick)
             t = tick * self.plan.test.interval

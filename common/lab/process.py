@@ -128,7 +128,7 @@ def answer(loop: Loop) -> str:
     lab = loop.lab
     if lab.safety.mode is not Mode.RAMPING:
         return f"{lab.name}: is {lab.safety.mode.value.replace('_', ' ')}, and leaves as soon as it may."
-    return f"{lab.name}: {loop.resting.text}; a way to rest is never cut short."
+    return f"{lab.name}: {loop.resting.text}; a ramp to rest is never cut short."
 
 
 def announcement(plan: Plan, role: str, endpoint: str) -> AbstractContextManager[None]:

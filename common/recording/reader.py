@@ -44,7 +44,7 @@ MISFIT = (DecodeError, TypeError, ValueError, KeyError, AttributeError)
 class Run:
     """A recording read back: columns by topic and name, metadata, attachments; `roles` are those of its slaves.
 
-    The ways to rest after the last tick are in `ramps`, by role. `part_of` is the role of the slave of several whose
+    The ramps to rest after the last tick are in `ramps`, by role. `part_of` is the role of the slave of several whose
     part of the recording it is, empty for a whole one; `damage` says where the file is damaged, which is read up to
     there only.
     """

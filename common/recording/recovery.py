@@ -53,7 +53,7 @@ class Missing(NamedTuple):
 class Topic:
     """What is left of a topic; `unrecorded` counts messages that were not in the file before the damage either.
 
-    The numbers of the way to rest of a laboratory, `ramp_of`, go on behind those of its ticks; all others begin at 0.
+    The numbers of the ramp to rest of a laboratory, `ramp_of`, go on behind those of its ticks; all others begin at 0.
     """
 
     ramp_of: str = ""

@@ -1,4 +1,4 @@
-"""How long a laboratory's way to rest takes at most, by the plan."""
+"""How long a laboratory's ramp to rest takes at most, by the plan."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ MARGIN_S = 1.0  # on the way itself, for intervals that are left out
 
 
 def resting(plan: Plan) -> float:
-    """The longest way to rest, s: from the limits of speed to a halt, then from the actuator's limit to no load."""
+    """The longest ramp to rest, s: from the limits of speed to a halt, then from the actuator's limit to no load."""
     safety, limits = plan.safety, plan.limits
 
     def change(speed: float) -> SpeedChange:
@@ -28,7 +28,7 @@ def resting(plan: Plan) -> float:
 def fastest(plan: Plan, part: str) -> float:
     """The largest speed of a part's command, m/s; without a limit on it that which holds where none is written out.
 
-    The halt from there is a small part of the longest way to rest, so that a faster command is covered too.
+    The halt from there is a small part of the longest ramp to rest, so that a faster command is covered too.
     """
     for limits in (plan.limits, Limits()):
         speed = min(getattr(limits, f"{part}_velocity"), getattr(limits, f"{part}_step") / plan.test.interval)

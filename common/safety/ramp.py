@@ -1,4 +1,4 @@
-"""The way to rest: bounded velocity, acceleration and jerk to a hold, then the specimen is unloaded; never a step."""
+"""The ramp to rest: bounded velocity, acceleration and jerk to a hold, then the specimen is unloaded; never a step."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ class PlainReport:
     """Lines of one process; `duration` is that of the test, s.
 
     The error that ends a laboratory's test is said when it happens, with the mark of a command's last word, because
-    the way to rest and a reset may take long: whoever passes it on afterwards does not repeat it.
+    the ramp to rest and a reset may take long: whoever passes it on afterwards does not repeat it.
     """
 
     def __init__(self, duration: float) -> None:

@@ -18,7 +18,7 @@ WHOLE = ("completed", "imported")
 def due(run: Run, plan: Plan | None) -> dict[str, int]:
     """Ticks due by topic.
 
-    Of a test that ended early a laboratory's ticks were due until it left them for its way to rest, which its event
+    Of a test that ended early a laboratory's ticks were due until it left them for its ramp to rest, which its event
     says and no row may be later than; where it said nothing, as one that was killed, until the last laboratory did.
     """
     topics = [topic for topic in run.columns if kind_of(topic) in signals.TICK_TOPICS]
@@ -39,7 +39,7 @@ def laboratory(topic: str) -> str:
 
 
 def endings(run: Run, interval: float) -> Mapping[str, int]:
-    """The tick at which each laboratory began its way to rest, of those that said so; `interval` in s."""
+    """The tick at which each laboratory began its ramp to rest, of those that said so; `interval` in s."""
     found: dict[str, int] = {}
     for event in run.events:
         before, after = event["values"].get("from"), event["values"].get("mode")

@@ -153,7 +153,7 @@ class Feed:
             self.standing.event(event)
 
     def _move(self, role: str, columns: Mapping[str, Values]) -> None:
-        """What a laboratory did at some ticks, or on its way to rest."""
+        """What a laboratory did at some ticks, or on its ramp to rest."""
         if not columns or not columns["seq"].size:
             return
         if not self.interval and columns["seq"][-1] > 0:

@@ -35,7 +35,7 @@ class Ending:
     - A process ended during ticks: master and slaves after what they need to notice it and to leave.
     - The recorder after all laboratories: before there are rows after a moment, then when it does not end by itself.
 
-    What was asked and is still there is killed. A laboratory on its way to rest says again and again how long that
+    What was asked and is still there is killed. A laboratory on its ramp to rest says again and again how long that
     takes at most, and is not killed before, whatever the user presses; nor is one whose rig may be arming, for as long
     as the others would wait for it.
     """
@@ -70,7 +70,7 @@ class Ending:
             self._patience = KILL_S if self.agreed else LEAVE_S + KILL_S
 
     def rests(self, name: str, now: float, left: float | None = None) -> None:
-        """Take note that a laboratory is on its way to rest, for at most `left` s: it leaves after that."""
+        """Take note that a laboratory is on its ramp to rest, for at most `left` s: it leaves after that."""
         left = self._rest if left is None else left
         self._due[name] = now + left + MARGIN_S + self._leave + KILL_S
 

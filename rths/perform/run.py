@@ -301,7 +301,7 @@ def answer(processes: Processes, doing: Mapping[str, str]) -> str:
     """The answer to a second wish to stop: what the processes are doing, which is not cut short."""
     there = [name for name in processes.names if name not in processes.ended()]
     if resting := [f"{title(name)}: {text}" for name, text in doing.items() if name in there]:
-        return f"already stopping, no laboratory is killed on its way to rest or as it arms ({'; '.join(resting)})"
+        return f"already stopping, no laboratory is killed on its ramp to rest or as it arms ({'; '.join(resting)})"
     return (
         f"already stopping, and waiting for {' and '.join(map(title, there)) or 'nobody'} to leave in order"
     )

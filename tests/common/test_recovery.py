@@ -320,7 +320,7 @@ RAMP = 100  # ticks, behind those of the test
 
 @pytest.fixture(scope="module")
 def with_ramp(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Ticks and the ways to rest behind them, a chunk for every 25."""
+    """Ticks and the ramps to rest behind them, a chunk for every 25."""
     path = tmp_path_factory.mktemp("ramp") / "a.mcap"
     recording, noise = Recording(path, "trial", 1, TOPICS), random.Random(1)
     for seq in range(TICKS + RAMP):
@@ -358,7 +358,7 @@ def test_a_hole_among_the_ticks_takes_nothing_from_the_ways_to_rest(
 @pytest.mark.parametrize(
     ("chunks", "lost"),
     [
-        ((24, 25), (600, 624)),  # the first quarter of the way to rest
+        ((24, 25), (600, 624)),  # the first quarter of the ramp to rest
         ((25, 26), (625, 649)),
         ((26, 28), (650, 699)),
         ((24, 28), (600, 699)),

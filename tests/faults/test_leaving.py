@@ -1,4 +1,4 @@
-"""A slave whose way to rest lasts longer than the master's: the master, who routes, stays, and no row is lost."""
+"""A slave whose ramp to rest lasts longer than the master's: the master, who routes, stays, and no row is lost."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def routed(scene: Scene) -> None:
 
 
 def ramp(probe: Probe) -> tuple[list[int], list[float]]:
-    """When a rig was told something on its way to rest (ns), and the displacements (m)."""
+    """When a rig was told something on its ramp to rest (ns), and the displacements (m)."""
     log = probe.log
     steps = [place for place, mode in enumerate(log.modes) if mode is Mode.RAMPING]
     return [log.times[place] for place in steps], [log.commands[place][0] for place in steps]

@@ -296,7 +296,7 @@ def test_a_rig_that_prints_holds_nobody_up(tmp_path: Path) -> None:
     code, _, err = finish(start("run", plan, "-o", tmp_path / "a.mcap"), 30.0)
     assert code == 0, err[-1000:]
     assert "master: valve 9999\n" in err
-    assert err.count("reading 4\n") >= 500  # and on the way to rest
+    assert err.count("reading 4\n") >= 500  # and on the ramp to rest
     assert "master: completed\n" in err
 
 

@@ -481,7 +481,7 @@ def worst(found: Mapping[str, Reaction]) -> tuple[float, float]:
 
 
 def evidence(found: Mapping[str, Reaction]) -> str:
-    """The causes and the ways to rest, for a row."""
+    """The causes and the ramps to rest, for a row."""
     return "; ".join(
         f"{lab}: {one.cause}, at rest after {one.duration * 1e3:.0f} ms" for lab, one in found.items()
     )
