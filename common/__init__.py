@@ -1,4 +1,4 @@
-"""Words that every part of a distributed hybrid test shares: units, plan, messages, exchange, recording.
+"""What all parts of a hybrid test share: errors, roles, signals, the interface of a rig; rooms for the rest.
 
 Importing it keeps linear algebra to one thread, unless the environment says otherwise. A laboratory's process at
 real-time priority would wait in a busy loop for threads of ordinary priority, which then get no processor; and the

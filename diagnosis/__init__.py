@@ -1,1 +1,1 @@
-"""Where a recording and its simulation part, which effect does it, and how far naming it closes the gap."""
+"""Where a recording differs from its simulation, which effect causes it, and how far modelling it closes the gap."""

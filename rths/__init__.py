@@ -1,1 +1,1 @@
-"""The front door: one thin file per command."""
+"""The commands: one thin file each."""

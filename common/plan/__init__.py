@@ -1,1 +1,1 @@
-"""What a test is: the plan and the reality as files, their tables and keys, what is checked of them, what differs."""
+"""The plan and the reality of a test as files: their tables and keys, their checks, differences between plans."""

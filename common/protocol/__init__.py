@@ -1,1 +1,1 @@
-"""What the processes of a test say to one another: roles, messages, their bytes, and the states they agree on."""
+"""The protocol between the processes of a test: messages, their bytes, and the states that they agree on."""

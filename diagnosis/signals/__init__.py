@@ -1,1 +1,1 @@
-"""What signals and residuals say by themselves, before any model: noise, quantum, windows, bands, ceilings."""
+"""Signals and residuals by themselves, before any model: noise, quantum, windows, bands, ceilings."""

@@ -1,4 +1,4 @@
-"""What a bench test asks of one part: pieces of motion or force on the grid of ticks, joined into a programme.
+"""The programmes of bench tests: pieces of motion or force on the grid of ticks, joined.
 
 A programme starts and ends at rest; every piece is at rest at both ends and lies between still spans.
 """

@@ -1,1 +1,1 @@
-"""What imposes the computed motion on a specimen: dead time, hydraulic actuator, shaking table."""
+"""Models of what imposes the computed motion: dead time, hydraulic actuator, shaking table."""

@@ -1,1 +1,1 @@
-"""What a recording amounts to: peaks, completeness, late ticks, accounts of messages, storeys, parameters."""
+"""The figures of a recording: peaks, completeness, late ticks, accounts of messages, storeys, parameters."""

@@ -1,1 +1,1 @@
-"""What a plan describes, for its author: figures, likely slips of units, classes that it would run."""
+"""A description of a plan for its author: figures, likely slips of units, classes that it would run."""

@@ -1,1 +1,1 @@
-"""The parts of `rths doctor`: each measures one thing of this machine; `verdict` judges them."""
+"""The checks of `rths doctor`: each measures one property of this machine; `verdict` judges them."""
