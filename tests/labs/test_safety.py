@@ -78,7 +78,7 @@ def test_a_violated_limit_is_never_written_and_both_come_to_rest(
     assert "remote_trip" in codes(run, other)
     for role in ("master", "slave"):
         assert "running → ramping (trip)" in turns(run, role)
-        assert set(np.diff(run.ramps[role]["seq"])) == {1}  # no interval of the way to rest is left out
+        assert set(np.diff(run.ramps[role]["seq"])) == {1}  # no interval of the ramp to rest is left out
         assert motion_after(run, role, round(event["t"] / 0.002)) <= motion_bound(plan, role)
         safe = next(one for one in run.events if one["lab"] == role and one["code"] == "safe")
         assert safe["values"]["duration"] > 0.0
