@@ -151,7 +151,7 @@ def reversed_signs(data: Data) -> list[str]:
 
 
 def parts_of(record: Record, warnings: list[str]) -> list[Part]:
-    """The parts whose inputs and outputs were recorded; what is missing is said."""
+    """The parts whose inputs and outputs were recorded, with warnings for what is missing."""
     parts: list[Part] = []
     if record.ground is not None and record.has("ground_acceleration"):
         parts.append(Ground(record, record.ground))

@@ -1,4 +1,4 @@
-"""The ground motion: what came against what the plan believes."""
+"""The ground motion: the recorded one against that of the plan."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ class Ground:
         return factor * rows[0][:, None]
 
     def first(self, ticks: int) -> Ground:
-        """Computed, and cheap: always the whole of it."""
+        """The whole of it, because it is computed and cheap."""
         return self
 
     def shift(self) -> float:
-        """How much later (s) the motion came, by cross-correlation."""
+        """By how much later (s) the recorded motion came, by cross-correlation."""
         size = 2 * self.measured.size
         came = np.fft.rfft(self.measured[:, 0], size)
         product = np.fft.irfft(came * np.conj(np.fft.rfft(self._believed[0], size)), size)

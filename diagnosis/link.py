@@ -1,4 +1,4 @@
-"""The exchange between the laboratories, read off the messages' numbers and stamps, never off waveforms.
+"""The exchange between the laboratories, judged by the numbers and stamps of the messages, never by waveforms.
 
 Which message a tick used tells ages; stamps tell how long each message took, and which feedback never came:
 

@@ -23,7 +23,7 @@ Signals = dict[str, Array]
 
 @dataclass(frozen=True)
 class Loop:
-    """What re-simulations of one recording share."""
+    """The data that all re-simulations of one recording share."""
 
     record: Record
     ground: Array  # as believed

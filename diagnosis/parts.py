@@ -291,5 +291,5 @@ class Building:
         return rows[:, STOREYS : STOREYS + self.measured.shape[1]]
 
     def first(self, ticks: int) -> Building:
-        """Computed, and cheap: always the whole of it."""
+        """The whole of it, because it is computed and cheap."""
         return self

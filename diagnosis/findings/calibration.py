@@ -1,4 +1,4 @@
-"""Whether stated probabilities come true."""
+"""Whether stated probabilities agree with observed frequencies."""
 
 from __future__ import annotations
 

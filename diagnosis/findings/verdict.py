@@ -19,11 +19,12 @@ LEFT, WELL, HALF = (
     0.15,
     0.5,
 )  # residual over noise, share of a signal's that is left, of energy explained
+# set on draws of `rths blind --set tune` (docs/decisions/0012-diagnosis.md)
 SMALL = 0.05  # of a signal's rms that may be left where a gap is called explained
 TEMPERATURE = 3.0  # by which score differences are divided before they are odds
 DOUBT = {"explained": 0.02, "partly": 0.12, "unknown": 0.9}  # that it is none of the catalogue
 CORRELATED = 2.0  # s, longer than what a model leaves is correlated
-COVER = 1.96  # standard deviations of an interval
+COVER = 1.96  # standard deviations of an interval of 95 %
 
 
 @dataclass(frozen=True)

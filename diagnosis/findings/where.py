@@ -18,6 +18,7 @@ from diagnosis.signals import windows
 from models.effects import CATALOGUE
 from models.registry import Array
 
+# set on draws of `rths blind --set tune` (docs/decisions/0012-diagnosis.md)
 CONSISTENT = 0.35  # share of a residual that another signal's must show to have the same cause
 
 

@@ -1,4 +1,4 @@
-"""The best that any model of a part could explain, against the catalogue; and what the rest depends on."""
+"""How much any model of a part could explain, against the catalogue; and on what the rest depends."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def flexible_share(found: Diagnosis, search: Search) -> float | None:
 
 
 def unknown(found: Diagnosis) -> dict[str, Any]:
-    """What can be said of a residual that no effect of the catalogue explains; empty where there is none."""
+    """A description of a residual that no effect of the catalogue explains; empty where there is none."""
     for verdict in found.verdicts:
         search = verdict.search
         if verdict.outcome not in ("unknown", "partly"):

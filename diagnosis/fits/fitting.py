@@ -26,13 +26,13 @@ from models.effects.effect import Effect, Parameter
 from models.registry import Array
 from models.system import System
 
-AVERAGED = 0.008  # s, over which residuals are averaged
-BLOCK = 1.0  # s, of the blocks that are held out in turn
+AVERAGED = 0.008  # s, over which residuals are averaged: the laboratories move much more slowly
+BLOCK = 1.0  # s, of the blocks that are held out in turn: longer than a model's error is correlated
 HELD_OUT = (2, 4)  # of every five blocks, these
 SHARPER = 0.9  # of the noise first found, from which on a lower one is believed
 COARSE = 3.0  # steps that count as noise where a reading is rounded to more than its noise
 SHORTEST, LONGEST = 6.0, 0.7  # of a beginning: seconds, and share of the test
-FAR = 1e6  # residual, in σ, of a hypothesis that diverges
+FAR = 1e6  # residual, in σ, of a hypothesis that diverges: worse than any that does not
 TOLERANCES = 3.0  # most that a nominal parameter is moved: beyond it the plan is wrong
 STEP, FINE_STEP = 0.4, 2e-3  # tolerances between differences: over the kinks of friction, or exactly
 ROUNDS = 4  # fits with the signals' weights renewed in between
@@ -224,7 +224,7 @@ class Fit:
 
     @property
     def cost(self) -> float:
-        """What a hypothesis is ranked by: on withheld time, with the prior."""
+        """The figure by which hypotheses are ranked: on withheld time, with the prior."""
         return self.chi + self.prior
 
 

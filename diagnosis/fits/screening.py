@@ -85,7 +85,7 @@ def screen(fit: Fit, effects: Iterable[Effect], scales: Scales) -> list[Candidat
 
 
 def look(effect: Effect, plane: Plane, scales: Scales) -> list[Candidate]:
-    """Of every form of an effect the size that promises most; none of one that is there already."""
+    """For every form of an effect the size with the largest expected gain; effects already laid are left out."""
     fit = plane.fit
     if effect.name in fit.names:
         return []

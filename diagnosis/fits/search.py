@@ -1,4 +1,4 @@
-"""Which effects of the catalogue explain a part's gap: forward selection, exchange, pruning.
+"""The search for effects of the catalogue that explain a part's gap: forward selection, exchange, pruning.
 
 Every effect is first laid over the present hypothesis at a few sizes, and what it could gain once the
 nominal parameters give way is read off a linear projection; the most promising are then fitted in full.
@@ -20,27 +20,43 @@ from diagnosis.fits.screening import WORKERS, Candidate, screen
 from models.effects import CATALOGUE
 from models.registry import Array
 
-FITTED = 6  # candidates that are fitted in full at every step
-MOST = 3  # effects of one part
-LEVELS = (1, 4, 16)  # how many averaged samples are taken together to see what is slow
-MATERIAL = 0.12  # systematic residual over noise below which nobody would look for a cause
-PRIOR_GAIN, DATA_GAIN = 6.25, 25.0  # what an effect must save: of tolerances, of residuals
-REST = 0.85  # share of what is left that a further effect must explain,
-SUSPICIOUS = 8.0  # of Σ z²: nominal parameters that are all off together stand in for an effect
-TRACE = 2e-4  # and more than this share of the whole gap,
-LOUD, STEP_OF_REST, STEP_OF_WHOLE = 10.0, 0.4, 0.01  # the same where much more than noise is left
-HALF, SHARE = 0.5, 0.03  # or this share of what is left and this of the whole gap
-NEAR = 1.0  # tolerances from the nominal value where fits begin: what is further away stands in for an effect
-STEPS = 6  # steps between two weightings of a further fit
-LAST = 5  # steps over the whole test after those over its beginning
-MOSTLY = 0.7  # share of what a fit leaves that a beginning must hold
-ROUGH = 4  # steps of a first fit
-LOST = 100.0  # mean square residual in σ² from which on fitted nominal parameters mean nothing
-FINE = 3  # candidates fitted to their end,
+# The figures below were set on draws of `rths blind --set tune` (docs/decisions/0012-diagnosis.md), as a compromise
+# between effects that are overlooked and effects that are named without a cause. Further reasons stand beside them.
+
+# Effort: a fit takes many predictions of the part, a projection few.
+FITTED = 6  # candidates of the projection that are fitted at every step
+FINE = 3  # of these, candidates that are fitted to their end,
 HOPELESS = 30.0  # as long as they leave no more than this times what the best one leaves
-SEEN = 0.3  # trace over noise that an effect must leave to be named
-CANCELLED = 4.0  # times the gap that one of several effects may make without being a makeshift
-TIED = 9.0  # cost by which hypotheses must differ to be told apart
+MOST = 3  # effects of one part: more of them can imitate any residual
+STEPS = 6  # steps between two weightings of a further fit
+ROUGH = 4  # steps of a first fit
+LAST = 5  # steps over the whole test after those over its beginning
+MOSTLY = (
+    0.7  # share of what a fit leaves that a beginning must hold, so that the rest of the test teaches little
+)
+
+# Whether there is a gap: in sums over averaged samples, because noise averages out and systematic errors do not.
+LEVELS = (1, 4, 16)  # averaged samples in a sum, from fast to slow systematic errors
+MATERIAL = 0.12  # systematic residual over noise below which a gap would interest nobody
+PRIOR_GAIN, DATA_GAIN = 6.25, 25.0  # 2.5 tolerances squared; 5 standard deviations squared
+SUSPICIOUS = 8.0  # of Σ z²: nominal parameters that are all off together imitate an effect
+NEAR = 1.0  # tolerances within which fits begin: a parameter that is further away imitates an effect
+LOST = 100.0  # mean square residual in σ² from which on fitted nominal parameters mean nothing
+
+# Whether a further effect is worth its parameters: it explains
+REST = 0.85  # this share of what is left,
+TRACE = 2e-4  # and more than this share of the whole gap, which keeps out effects that fit the noise;
+HALF, SHARE = 0.5, 0.03  # or this share of what is left and this of the whole gap;
+LOUD, STEP_OF_REST, STEP_OF_WHOLE = (
+    10.0,
+    0.4,
+    0.01,
+)  # or these, where more than so many times the noise is left
+
+# What is named.
+SEEN = 0.3  # trace over noise that an effect must leave: a smaller one is not visible in a plot
+CANCELLED = 4.0  # times the gap that one of several effects may make: beyond it effects undo each other
+TIED = 9.0  # cost by which hypotheses differ that can be told apart: 3 standard deviations squared
 
 
 class Gap(NamedTuple):
@@ -65,7 +81,7 @@ def gap(reduced: Array, group: int) -> Gap:
 
 
 def gaps(fit: Fit, group: int) -> list[Gap]:
-    """Of every signal."""
+    """The systematic part of the residual of every signal."""
     return [gap(column, group) for column in fit.reduced.T]
 
 
@@ -122,7 +138,7 @@ class Searcher:
         return physical(Search(self.data, commissioned, chosen, self.alternatives(chosen, first)))
 
     def enough(self, bare: Fit, fit: Fit) -> bool:
-        """Whether nothing is left that a further effect could earn its place by."""
+        """Whether the residual is too small for a further effect to be worth it."""
         return not self.is_gap(fit) or (excess(fit) < TRACE * excess(bare) and fit.prior <= SUSPICIOUS)
 
     def is_gap(self, fit: Fit) -> bool:
@@ -134,7 +150,7 @@ class Searcher:
         )
 
     def worth(self, bare: Fit, before: Fit, after: Fit) -> bool:
-        """Whether one more effect earns its place."""
+        """Whether one more effect is worth its parameters."""
         noise = max(1.0, after.chi / after.reduced.size)
         prior, data = before.prior - after.prior, (before.chi - after.chi) / noise
         if max(prior, 0.0) / PRIOR_GAIN + max(data, 0.0) / DATA_GAIN < 1.0 or prior + data <= 0.0:
@@ -146,7 +162,7 @@ class Searcher:
         return not self.cancelling(bare, after) and refines(bare, before, after)
 
     def idle(self, fit: Fit) -> bool:
-        """Whether an effect of a fit does nothing that could be seen."""
+        """Whether an effect of a fit has no visible influence."""
         return any(float(np.max(size)) < SEEN**2 * self.data.group for size in self.changes(fit))
 
     def changes(self, fit: Fit) -> list[Array]:
@@ -200,7 +216,7 @@ class Searcher:
         return self.with_stop(fit, fits)
 
     def with_stop(self, fit: Fit, fits: list[Fit]) -> list[Fit]:
-        """The fits, and one with an end stop where all the others miss loudly."""
+        """The fits, and one with an end stop where all the others leave a large residual."""
         stops = [effect for effect in self.data.part.candidates if effect.contact]
         if not fits or not stops or remaining(fits[0]) < LOUD or stops[0].name in fit.names:
             return fits
@@ -223,7 +239,7 @@ class Searcher:
         return fit
 
     def pruned(self, bare: Fit, fit: Fit) -> Fit:
-        """The fit without effects that do not pay."""
+        """The fit without effects that explain too little."""
         for name in fit.names:
             if len(fit.names) < 2:
                 break

@@ -1,4 +1,4 @@
-"""How much of a residual any model could explain from what was measured, and what it goes with."""
+"""How much of a residual any model could explain from the measurements, and on which of them it depends."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a signal owes to its sensor: the step it is rounded to."""
+"""The step to which a sensor rounds its readings, found in the signal."""
 
 from __future__ import annotations
 

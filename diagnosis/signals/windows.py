@@ -1,4 +1,4 @@
-"""When, at which frequencies and at which amplitudes a residual exceeds the noise."""
+"""The times, frequencies and amplitudes at which a residual exceeds the noise."""
 
 from __future__ import annotations
 
