@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -24,24 +23,33 @@ from diagnosis.link import Finding
 from diagnosis.parts import Building, ColumnAlone, LaboratoryA, LaboratoryB, Part
 from diagnosis.readings import Reading
 from diagnosis.record import LEAST_TICKS, Record
+from diagnosis.report.records import Report
 from models.effects import CATALOGUE
+from models.loop.closed_loop import MEASURED_A, MEASURED_B
 from models.system import System
 
 SHORTEST = 0.5  # s of a test that anything can be said of
+BUILDING = (
+    "ground_acceleration",
+    "displacement",
+    "column_force",
+    "column_displacement",
+    "damper_force_used",
+)
 AGAINST = -0.7  # correlation from which on a sign is doubted
 
 
-@dataclass
+@dataclass(frozen=True)
 class Diagnosis:
     """Everything that was found in a recording."""
 
     record: Record
-    verdicts: list[Verdict] = field(default_factory=list)
-    readings: list[Reading] = field(default_factory=list)
-    link: list[Finding] = field(default_factory=list)
-    held: dict[str, float] = field(default_factory=dict)  # sensors that repeat samples, and how many
-    white: dict[str, float] = field(default_factory=dict)
-    warnings: list[str] = field(default_factory=list)
+    verdicts: Sequence[Verdict] = ()
+    readings: Sequence[Reading] = ()
+    link: Sequence[Finding] = ()
+    held: Mapping[str, float] = field(default_factory=dict)  # sensors that repeat samples, and how many
+    white: Mapping[str, float] = field(default_factory=dict)  # rms of each reading's noise
+    warnings: Sequence[str] = ()
 
     def named(self, site: str) -> list[str]:
         """The effects found at a site."""
@@ -82,8 +90,8 @@ def laid(system: System, verdict: Verdict, values: Values) -> System:
     return system
 
 
-def diagnose(record: Record, validation: Sequence[Record] = (), tell: Tell = untold) -> dict[str, Any]:
-    """The report on a recording (contract, section 8), as plain values.
+def diagnose(record: Record, validation: Sequence[Record] = (), tell: Tell = untold) -> Report:
+    """The report on a recording (contract, section 8), but for its verdict in words.
 
     Raises:
         InputError: there is nothing in the recording that a model of the plan could be held against.
@@ -97,84 +105,106 @@ def diagnose(record: Record, validation: Sequence[Record] = (), tell: Tell = unt
 
 def examine(record: Record, tell: Tell = untold) -> Diagnosis:
     """Judge every part of a recording."""
-    found = Diagnosis(record)
     if record.ticks < LEAST_TICKS or record.ticks * record.plan.test.interval < SHORTEST:
-        return found
-    if record.other_plan:
-        found.warnings.append(
-            "The plan given asks for another structure, compensation or control than the recording's own: "
-            "the response gap holds that as well."
-        )
-    rounded = readings.steps(record)
-    parts = parts_of(record, found.warnings)
+        return Diagnosis(record)
+    parts = parts_of(record)
     if not parts:
         raise InputError(
             "The recording holds no part's input and output together: "
             "record at least actuator_command with column_displacement, or column_displacement with column_force, "
             "or table_command or damper_command with a reading of that laboratory."
         )
-    datas: list[Data] = []
+    rounded = readings.steps(record)
+    datas, verdicts = [], []
     for number, part in enumerate(parts, 1):
         tell(part.name, number, len(parts))
-        data = fitting.prepare(part, record, rounded)
-        datas.append(data)
-        found.warnings += reversed_signs(data)
+        datas.append(fitting.prepare(part, record, rounded))
         shift = part.shift() if isinstance(part, Ground) else 0.0
-        found.verdicts.append(judge(Searcher(data, Scales(record, shift)).run()))
-    found.white = readings.levels(datas)
-    found.readings = readings.findings(record, found.white, rounded)
-    found.held = readings.held(record, rounded)
-    found.warnings += [
-        f"The sensor {name} repeats {100 * share:.2g} % of its samples to the last bit: it misses samples."
-        for name, share in found.held.items()
+        verdicts.append(judge(Searcher(datas[-1], Scales(record, shift)).run()))
+    white, held = readings.levels(datas), readings.held(record, rounded)
+    return Diagnosis(
+        record,
+        verdicts,
+        readings.findings(record, white, rounded),
+        exchanged(record),
+        held,
+        white,
+        [*of_plan(record), *not_recorded(record), *reversed_signs(datas), *repeating(held)],
+    )
+
+
+def exchanged(record: Record) -> list[Finding]:
+    """What the messages' numbers and stamps say of the exchange, where both ends were recorded."""
+    if not (record.run.has("master") and record.run.has("slave")):
+        return []
+    account = link.account(record.run, record.plan.test.interval)
+    return link.findings(account, record.plan.test.interval)
+
+
+def of_plan(record: Record) -> list[str]:
+    """A sentence where the recording was made under another plan."""
+    if not record.other_plan:
+        return []
+    return [
+        "The plan given asks for another structure, compensation or control than the recording's own: "
+        "the response gap holds that as well."
     ]
-    if record.run.has("master") and record.run.has("slave"):
-        account = link.account(record.run, record.plan.test.interval)
-        found.link = link.findings(account, record.plan.test.interval)
-    return found
 
 
-def reversed_signs(data: Data) -> list[str]:
+def repeating(held: Mapping[str, float]) -> list[str]:
+    """A sentence for each sensor that repeats samples."""
+    return [
+        f"The sensor {name} repeats {100 * share:.2g} % of its samples to the last bit: it misses samples."
+        for name, share in held.items()
+    ]
+
+
+def reversed_signs(datas: Sequence[Data]) -> list[str]:
     """A sentence for each reading that runs against what the plan's model predicts."""
-    predicted = data.part.predict(data.system)
     result = []
-    for name, there, read, said in zip(
-        data.part.signals, data.part.present.T, data.part.measured.T, predicted.T, strict=True
-    ):
-        if there.sum() < LEAST_TICKS or np.ptp(read[there]) == 0.0 or not np.ptp(said[there]) > 0.0:
-            continue
-        if np.corrcoef(read[there], said[there])[0, 1] < AGAINST:
-            result.append(
-                f"{name} runs against what the plan predicts: check its sign and that of the command."
-            )
+    for data in datas:
+        predicted = data.part.predict(data.system)
+        for name, there, read, said in zip(
+            data.part.signals, data.part.present.T, data.part.measured.T, predicted.T, strict=True
+        ):
+            if there.sum() < LEAST_TICKS or np.ptp(read[there]) == 0.0 or not np.ptp(said[there]) > 0.0:
+                continue
+            if np.corrcoef(read[there], said[there])[0, 1] < AGAINST:
+                result.append(
+                    f"{name} runs against what the plan predicts: check its sign and that of the command."
+                )
     return result
 
 
-def parts_of(record: Record, warnings: list[str]) -> list[Part]:
-    """The parts whose inputs and outputs were recorded, with warnings for what is missing."""
+def parts_of(record: Record) -> list[Part]:
+    """The parts whose inputs and outputs were recorded."""
     parts: list[Part] = []
     if record.ground is not None and record.has("ground_acceleration"):
         parts.append(Ground(record, record.ground))
-    needed = (
-        "ground_acceleration",
-        "displacement",
-        "column_force",
-        "column_displacement",
-        "damper_force_used",
-    )
-    if record.has(*needed):
+    if record.has(*BUILDING):
         parts.append(Building(record))
-    if record.has("actuator_command") and (record.has("column_displacement") or record.has("column_force")):
+    if driven(record):
         parts.append(LaboratoryA(record))
-    elif record.has("column_displacement", "column_force"):
+    elif record.has(*MEASURED_A):
         parts.append(ColumnAlone(record, record.signals["column_displacement"]))
-        warnings.append("actuator_command was not recorded: nothing can be said of the actuator.")
-    outputs = ("table_displacement", "table_acceleration", "damper_stroke", "damper_force")
-    if any(record.has(name) for name in outputs) and (
+    if any(record.has(name) for name in MEASURED_B) and (
         record.has("table_command") or record.has("damper_command")
     ):
         parts.append(LaboratoryB(record))
-    missing = [name for name in ("column_displacement", "column_force", *outputs) if not record.has(name)]
-    if missing:
-        warnings.append(f"Not recorded: {', '.join(missing)}; what only they show cannot be decided.")
     return [part for part in parts if np.any(part.measured)]
+
+
+def driven(record: Record) -> bool:
+    """Whether the actuator's command was recorded with a reading of its laboratory."""
+    return record.has("actuator_command") and any(record.has(name) for name in MEASURED_A)
+
+
+def not_recorded(record: Record) -> list[str]:
+    """What cannot be judged for lack of signals, in sentences."""
+    result = []
+    if not driven(record) and record.has(*MEASURED_A):
+        result.append("actuator_command was not recorded: nothing can be said of the actuator.")
+    missing = [name for name in (*MEASURED_A, *MEASURED_B) if not record.has(name)]
+    if missing:
+        result.append(f"Not recorded: {', '.join(missing)}; what only they show cannot be decided.")
+    return result

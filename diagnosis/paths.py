@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from common.errors import InputError
 from diagnosis.record import Record
+from diagnosis.report.evidence import ForcePath, Path, Paths
 from models import indicators
 from models.indicators import FrequencyEvaluation
 from models.labs import force_path as force
@@ -15,32 +14,40 @@ from models.registry import Array
 from models.structures.partition import damping_lost
 
 
-def paths(record: Record, nominal: dict[str, Array] | None) -> dict[str, dict[str, Any]]:
+def paths(record: Record, nominal: dict[str, Array] | None) -> Paths:
     """What the three paths of the loop cost, as recorded and in the nominal simulation.
 
     The command path runs from the building's drift to the specimen's deformation, the force path from the deformation
     to the force that the master used, the exchange from the damper's force in its laboratory to its use.
     Delay and amplitude by Guo's frequency evaluation index, the effect in points added to the first mode's damping.
     """
-    result = {}
-    for name, start, end in (
-        ("command", "column_target", "column_displacement"),
-        ("force", "column_displacement", "column_force"),
-        ("exchange", "damper_force", "damper_force_used"),
-    ):
-        here = measured(record, record.signals, start, end)
-        if here is None:
-            continue
-        entry: dict[str, Any] = {"delay": here.delay, "amplitude": here.amplitude}
-        if name != "exchange":
-            entry["damping_points"] = -100.0 * damping_lost(record.plan, here)
-        there = measured(record, nominal, start, end) if nominal else None
-        if there is not None:
-            entry["nominal_delay"] = there.delay
-            if name != "exchange":
-                entry["nominal_damping_points"] = -100.0 * damping_lost(record.plan, there)
-        result[name] = entry
-    return result
+    return Paths(
+        command=path(record, nominal, "column_target", "column_displacement"),
+        force=path(record, nominal, "column_displacement", "column_force"),
+        exchange=path(record, nominal, "damper_force", "damper_force_used", damped=False),
+    )
+
+
+def path(
+    record: Record, nominal: dict[str, Array] | None, start: str, end: str, *, damped: bool = True
+) -> Path | None:
+    """One path, None where it was not recorded; what it does to the damping only where it is `damped`."""
+    here = measured(record, record.signals, start, end)
+    if here is None:
+        return None
+    there = measured(record, nominal, start, end) if nominal else None
+    return Path(
+        delay=here.delay,
+        amplitude=here.amplitude,
+        damping_points=points(record, here) if damped else None,
+        nominal_delay=there.delay if there else None,
+        nominal_damping_points=points(record, there) if there and damped else None,
+    )
+
+
+def points(record: Record, path: FrequencyEvaluation) -> float:
+    """What a path adds to the first mode's damping, in points of a percent."""
+    return -100.0 * damping_lost(record.plan, path)
 
 
 def measured(record: Record, signals: dict[str, Array], start: str, end: str) -> FrequencyEvaluation | None:
@@ -58,11 +65,11 @@ def measured(record: Record, signals: dict[str, Array], start: str, end: str) ->
         return None
 
 
-def force_path(record: Record) -> dict[str, Any] | None:
+def force_path(record: Record) -> ForcePath | None:
     """Delay (s) with its interval of 95 % and gain of the column force beside the plan's specimen, if known."""
     if not record.has("column_displacement", "column_force"):
         return None
     found = force.force_path(
         record.plan, record.signals["column_displacement"], record.signals["column_force"]
     )
-    return None if found is None else {**found._asdict(), "interval": list(found.interval)}
+    return None if found is None else ForcePath(**found._asdict())

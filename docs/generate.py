@@ -1,4 +1,4 @@
-"""The parts of the documents that come from the code: `python -m docs.generate` writes them between their marks.
+"""What comes from the code: `python -m docs.generate` writes parts of the documents, and the schema of reports.
 
 A part stands between `<!-- name -->` and `<!-- end of name -->`; tests/test_docs.py holds that it is up to date.
 """
@@ -16,6 +16,7 @@ from common.protocol.messages import Command
 from common.rig import ColumnMeasurement, TableCommand, TableMeasurement
 from common.safety.modes import MEANING, TURNS, mermaid
 from common.signals import TOPICS
+from diagnosis.report import schema
 from docs import reference_tables
 from docs.markdown import quantity, table
 from master.step import Outputs
@@ -153,7 +154,8 @@ def renewed(text: str, named: dict[str, str]) -> str:
 
 
 def main() -> None:
-    """Write the parts into the documents."""
+    """Write the parts into the documents, and the schema."""
+    schema.PUBLISHED.write_text(schema.text(), encoding="utf-8")
     for name, named in parts().items():
         path = FOLDER / name
         path.write_text(renewed(path.read_text(encoding="utf-8"), named), encoding="utf-8")

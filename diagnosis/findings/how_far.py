@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from diagnosis import link, loop
 from diagnosis.findings import where
+from diagnosis.findings.series import UNITS, numbers, strongest
 from diagnosis.findings.where import Trace
 from diagnosis.fits import fitting
 from diagnosis.loop import RESPONSE, UNIT, Loop, closed_share, overall
+from diagnosis.report.evidence import History, LoopShare, Step
+from diagnosis.report.records import Gap, HowFar, SignalGap
 from models.effects import CATALOGUE
 from models.registry import Array
 
@@ -27,16 +30,17 @@ DRAWS = 200  # of the bootstrap
 
 
 @dataclass(frozen=True)
-class HowFar:
+class Response:
     """The response gap before and after, and each site's part in it."""
 
-    gap: dict[str, Any]
-    summary: dict[str, Any]
+    gap: Gap
+    how_far: HowFar
     traces: list[Trace]
     shares: dict[str, tuple[float, float, float]]
-    loop_shares: list[dict[str, Any]]
-    waterfall: list[dict[str, Any]]
-    histories: list[dict[str, Any]]
+    loop_shares: tuple[LoopShare, ...]
+    waterfall: tuple[Step, ...]
+    histories: tuple[History, ...]
+    warnings: tuple[str, ...]
 
 
 class Judge:
@@ -103,7 +107,7 @@ class Judge:
         return result
 
 
-def judge(found: Diagnosis, validation: Sequence[Record]) -> HowFar:
+def judge(found: Diagnosis, validation: Sequence[Record]) -> Response:
     """Gap before and after, shares of the sites."""
     record = found.record
     held = held_out(record)
@@ -114,34 +118,34 @@ def judge(found: Diagnosis, validation: Sequence[Record]) -> HowFar:
     gap_before, gap_after = own.gap(before), own.gap(after)
     floor = overall({name: floors.get(name, 0.0) for name in gap_after})
     traces = all_traces(found)
-    summary = {
-        "nominal": overall(own.gap(nominal)),
-        "before": overall(gap_before),
-        "after": overall(gap_after),
-        "closed": closed_share(overall(gap_before), overall(gap_after), floor),
-        "closed_interval": closed_interval(own, before, after, floor),
-        "noise_floor": floor,
-        "judged_on": "held-out time windows",
-    }
-    if validation:
-        summary |= validated(found, validation)
+    summary = HowFar(
+        nominal=overall(own.gap(nominal)),
+        before=overall(gap_before),
+        after=overall(gap_after),
+        closed=closed_share(overall(gap_before), overall(gap_after), floor),
+        closed_interval=closed_interval(own, before, after, floor),
+        noise_floor=floor,
+        judged_on="held-out time windows",
+    )
+    others = validated(found, validation, summary) if validation else summary
     share, rows = shares(own, traces)
-    return HowFar(
+    return Response(
         gap_entry(record, own, nominal, floors),
-        summary,
+        others or summary,
         traces,
         share,
         rows,
-        waterfall(own, traces, summary),
+        waterfall(own, traces, others or summary),
         histories(own, before, after),
+        () if others else ("The recordings given for validation hold no closed loop to judge by.",),
     )
 
 
-def waterfall(own: Judge, traces: Sequence[Trace], summary: Mapping[str, Any]) -> list[dict[str, Any]]:
+def waterfall(own: Judge, traces: Sequence[Trace], summary: HowFar) -> tuple[Step, ...]:
     """The overall gap on withheld time after each step: nominal, tolerances, site by site, noise."""
     steps = [
-        {"label": "nominal models", "value": summary["nominal"]},
-        {"label": "parameters within tolerances", "value": summary["before"]},
+        Step(label="nominal models", value=summary.nominal),
+        Step(label="parameters within tolerances", value=summary.before),
     ]
     taken: set[str] = set()
     for trace in sorted(traces, key=lambda item: -item.ratio):
@@ -149,33 +153,31 @@ def waterfall(own: Judge, traces: Sequence[Trace], summary: Mapping[str, Any]) -
         if names:
             taken.add(trace.site)
             value = overall(own.gap(own.signals(frozenset(taken))))
-            steps.append({"label": "+ " + ", ".join(names), "value": value})
-    return [*steps, {"label": "noise floor", "value": summary["noise_floor"]}]
+            steps.append(Step(label="+ " + ", ".join(names), value=value))
+    return (*steps, Step(label="noise floor", value=summary.noise_floor))
 
 
 def histories(
     own: Judge, before: Mapping[str, Array] | None, after: Mapping[str, Array] | None
-) -> list[dict[str, Any]]:
+) -> tuple[History, ...]:
     """Response signals recorded and simulated, in the seconds in which they differ most."""
-    from diagnosis.findings.details import UNITS, numbers, strongest
-
     if before is None or after is None:
-        return []
+        return ()
     result = []
     for name in own.gap(after):
         recorded = own.record.signals[name]
         shown = strongest(recorded - before[name], own.record.plan.test.interval)
         result.append(
-            {
-                "signal": name,
-                "unit": UNITS.get(name, ""),
-                "t": numbers(own.record.time[shown]),
-                "recorded": numbers(recorded[shown]),
-                "before": numbers(before[name][shown]),
-                "after": numbers(after[name][shown]),
-            }
+            History(
+                signal=name,
+                unit=UNITS.get(name, ""),
+                t=numbers(own.record.time[shown]),
+                recorded=numbers(recorded[shown]),
+                before=numbers(before[name][shown]),
+                after=numbers(after[name][shown]),
+            )
         )
-    return result
+    return tuple(result)
 
 
 def held_out(record: Record) -> Mask:
@@ -203,7 +205,7 @@ def bare(found: Diagnosis, own: Judge) -> Mapping[str, Array] | None:
 
 def gap_entry(
     record: Record, own: Judge, nominal: Mapping[str, Array] | None, floors: Mapping[str, float]
-) -> dict[str, Any]:
+) -> Gap:
     """The gap between recording and nominal simulation, per signal and overall."""
     everywhere = np.ones(record.ticks, dtype=bool)
     gaps = own.gap(nominal, everywhere)
@@ -212,19 +214,19 @@ def gap_entry(
         peak = None
         if nominal is not None:
             peak = float(np.max(np.abs(record.signals[name] - nominal[name])[record.present[name]]))
-        signals[name] = {
-            "nrmse": value,
-            "noise_floor": floors.get(name, 0.0),
-            "peak_error": peak,
-            "unit": UNIT.get(name, "m"),
-        }
+        signals[name] = SignalGap(
+            nrmse=value,
+            noise_floor=floors.get(name, 0.0),
+            peak_error=peak,
+            unit=UNIT.get(name, "m"),
+        )
     floor = overall({name: floors.get(name, 0.0) for name in gaps})
-    return {"signals": signals, "overall": overall(gaps), "overall_noise_floor": floor}
+    return Gap(signals=signals, overall=overall(gaps), overall_noise_floor=floor)
 
 
 def closed_interval(
     own: Judge, before: Mapping[str, Array] | None, after: Mapping[str, Array] | None, floor: float
-) -> list[float]:
+) -> tuple[float, float]:
     """90 % interval of the share closed, by drawing blocks of the withheld time anew."""
     interval = own.record.plan.test.interval
     length = max(1, round(2.0 / interval))
@@ -253,11 +255,11 @@ def closed_interval(
         scale = np.maximum(sums[2 * count :], 1e-300)
         b, a = (float(np.sqrt(np.mean(sums[i * count : (i + 1) * count] / scale))) for i in (0, 1))
         values.append(closed_share(b, a, floor))
-    return [float(np.percentile(values, 5)), float(np.percentile(values, 95))]
+    return float(np.percentile(values, 5)), float(np.percentile(values, 95))
 
 
-def validated(found: Diagnosis, validation: Sequence[Record]) -> dict[str, Any]:
-    """The same on other recordings of the laboratories."""
+def validated(found: Diagnosis, validation: Sequence[Record], own: HowFar) -> HowFar | None:
+    """The same on other recordings of the laboratories, None where none of them holds a closed loop."""
     before, after, floor = [], [], []
     for record in validation:
         judge_ = Judge(found, record, np.ones(record.ticks, dtype=bool))
@@ -267,18 +269,18 @@ def validated(found: Diagnosis, validation: Sequence[Record]) -> dict[str, Any]:
         after.append(overall(judge_.gap(judge_.signals(None))))
         floor.append(overall(judge_.floor()))
     if not before:
-        found.warnings.append("The recordings given for validation hold no closed loop to judge by.")
-        return {}
+        return None
     b, a, f = (float(np.mean(values)) for values in (before, after, floor))
     spread = [closed_share(*item) for item in zip(before, after, floor, strict=True)]
-    return {
-        "before": b,
-        "after": a,
-        "closed": closed_share(b, a, f),
-        "closed_interval": [min(spread), max(spread)],
-        "noise_floor": f,
-        "judged_on": "recordings given",
-    }
+    return replace(
+        own,
+        before=b,
+        after=a,
+        closed=closed_share(b, a, f),
+        closed_interval=(min(spread), max(spread)),
+        noise_floor=f,
+        judged_on="recordings given",
+    )
 
 
 def all_traces(found: Diagnosis) -> list[Trace]:
@@ -308,14 +310,14 @@ def all_traces(found: Diagnosis) -> list[Trace]:
 
 def shares(
     own: Judge, traces: Sequence[Trace]
-) -> tuple[dict[str, tuple[float, float, float]], list[dict[str, Any]]]:
+) -> tuple[dict[str, tuple[float, float, float]], tuple[LoopShare, ...]]:
     """Share of the response gap each site is responsible for, with an interval from thirds of the time.
 
     Beside it the exact Shapley values, what each site takes away first, and what it takes away last.
     """
     sites = [trace.site for trace in sorted(traces, key=lambda item: -item.ratio)]
     if len(sites) < 2:
-        return dict.fromkeys(sites, (1.0, 1.0, 1.0)), []
+        return dict.fromkeys(sites, (1.0, 1.0, 1.0)), ()
     players = sites[:PLAYERS]
     simulated: dict[frozenset[str], Mapping[str, Array] | None] = {}
 
@@ -332,16 +334,16 @@ def shares(
     for site in sites:
         drawn = [item.get(site, 0.0) for item in weights]
         result[site] = (drawn[0], min(drawn), max(drawn))
-    rows = [
-        {
-            "site": site,
-            "shapley": values[0],
-            "interval": [min(item[site][0] for item in found), max(item[site][0] for item in found)],
-            "first_in": values[1],
-            "last_out": values[2],
-        }
+    rows = tuple(
+        LoopShare(
+            site=site,
+            shapley=values[0],
+            interval=(min(item[site][0] for item in found), max(item[site][0] for item in found)),
+            first_in=values[1],
+            last_out=values[2],
+        )
         for site, values in found[0].items()
-    ]
+    )
     return result, rows
 
 

@@ -1,56 +1,48 @@
-"""The report of a diagnosis as plain values (contract, section 8)."""
+"""The report of a diagnosis, put together from its findings (contract, section 8)."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from common.terminal.telling import Tell, untold
-from diagnosis.findings import details, how_far, next_test, where
+from diagnosis.findings import details, exercise, how_far, next_test, where
 from diagnosis.findings.which import which
-from diagnosis.fits import exercise
+from diagnosis.report.records import Place, Report, Status, Tolerance
 
 if TYPE_CHECKING:
     from diagnosis.diagnose import Diagnosis
     from diagnosis.record import Record
 
-VERSION = 1
 STILL = 5.0  # rms of a signal over its noise below which it hardly moved
 
 
-def build(found: Diagnosis, validation: Sequence[Record], tell: Tell = untold) -> dict[str, Any]:
-    """The whole report."""
+def build(found: Diagnosis, validation: Sequence[Record], tell: Tell = untold) -> Report:
+    """The whole report, but for its verdict in words."""
     tell("how far the gap closes", 0, 0)
     far = how_far.judge(found, validation)
-    status = status_of(found)
-    sites = sites_of(found, far)
-    entries = which(found)
+    named = which(found)
     tell("the next test", 0, 0)
     tests = next_test.choices(found)
-    evidence = details.details(found, far, entries)
-    evidence["next"] = [
-        {"test": item.test, "separation": item.separation, "pair": list(item.pair), "why": ""}
-        for item in tests[:5]
-    ]
-    return {
-        "version": VERSION,
-        "status": status,
-        "tolerances": tolerances(found),
-        "gap": far.gap,
-        "where": sites,
-        "which": entries,
-        "equivalent": [list(names) for verdict in found.verdicts for names in verdict.equivalent],
-        "how_far": far.summary,
-        "not_exercised": exercise.not_exercised(found),
-        "next_test": next_test.sentence(tests),
-        "warnings": found.warnings,
-        "details": evidence,
-    }
+    return Report(
+        version=1,
+        status=status_of(found),
+        tolerances=tolerances(found),
+        gap=far.gap,
+        where=sites_of(found, far),
+        which=named.candidates,
+        equivalent=tuple(names for verdict in found.verdicts for names in verdict.equivalent),
+        how_far=far.how_far,
+        not_exercised=exercise.not_exercised(found),
+        next_test=next_test.sentence(tests),
+        warnings=(*found.warnings, *far.warnings, *named.warnings),
+        details=details.details(found, far, named.candidates, tests),
+    )
 
 
-def status_of(found: Diagnosis) -> str:
+def status_of(found: Diagnosis) -> Status:
     """The status in one word."""
     if not found.verdicts or not moved(found):
         return "not_enough_data"
@@ -77,29 +69,29 @@ def moved(found: Diagnosis) -> bool:
     return False
 
 
-def tolerances(found: Diagnosis) -> dict[str, dict[str, float]]:
+def tolerances(found: Diagnosis) -> dict[str, Tolerance]:
     """How far each nominal parameter was moved."""
     result = {}
     for verdict in found.verdicts:
         fit = verdict.search.chosen
         for nuisance, z in zip(verdict.search.data.part.nuisances, fit.z, strict=True):
-            result[nuisance.name] = {"factor": 1.0 + float(z) * nuisance.tolerance, "z": float(z)}
+            result[nuisance.name] = Tolerance(factor=1.0 + float(z) * nuisance.tolerance, z=float(z))
     return result
 
 
-def sites_of(found: Diagnosis, far: how_far.HowFar) -> list[dict[str, Any]]:
+def sites_of(found: Diagnosis, far: how_far.Response) -> tuple[Place, ...]:
     """Where the gap lies, the largest share first."""
-    entries: list[dict[str, Any]] = []
+    places = []
     for trace in far.traces:
-        entries.append(
-            {
-                "site": trace.site,
-                "residual_to_noise": trace.ratio,
-                "when": where.when(trace, found.record) if trace.series.size else [],
-                "frequency_band": where.frequencies(trace, found.record) if trace.series.size else [0.0, 0.0],
-            }
+        share, low, high = far.shares[trace.site]
+        places.append(
+            Place(
+                site=trace.site,
+                residual_to_noise=trace.ratio,
+                when=where.when(trace, found.record) if trace.series.size else (),
+                frequency_band=where.frequencies(trace, found.record) if trace.series.size else (0.0, 0.0),
+                share=share,
+                share_interval=(low, high),
+            )
         )
-    for entry in entries:
-        share, low, high = far.shares[entry["site"]]
-        entry |= {"share": share, "share_interval": [low, high]}
-    return sorted(entries, key=lambda entry: -entry["share"])
+    return tuple(sorted(places, key=lambda place: -(place.share or 0.0)))

@@ -160,14 +160,14 @@ def shapley(
     return result
 
 
-def when(trace: Trace, record: Record, threshold: float = 1.0) -> list[list[float]]:
+def when(trace: Trace, record: Record, threshold: float = 1.0) -> tuple[tuple[float, float], ...]:
     """Windows of time in which a site's trace stands out of the noise."""
     parts = windows.windows(trace.series, 1.0, record.plan.test.interval)
     level = max(threshold, 0.25 * float(np.max(parts.ratio, initial=0.0)))
-    return windows.intervals(parts, min(level, 0.9 * float(np.max(parts.ratio, initial=0.0))))
+    spans = windows.intervals(parts, min(level, 0.9 * float(np.max(parts.ratio, initial=0.0))))
+    return tuple((begin, end) for begin, end in spans)
 
 
-def frequencies(trace: Trace, record: Record) -> list[float]:
+def frequencies(trace: Trace, record: Record) -> tuple[float, float]:
     """Band that holds most of a site's trace, Hz."""
-    low, high = windows.band(trace.series, 0.0, record.plan.test.interval)
-    return [float(low), float(high)]
+    return windows.band(trace.series, 0.0, record.plan.test.interval)

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from diagnosis.findings.verdict import Verdict, intervals
+from diagnosis.findings.verdict import Interval, Verdict, intervals
 from diagnosis.fits.fitting import Values
 from diagnosis.fits.search import MATERIAL, PRIOR_GAIN, gaps
+from diagnosis.report.records import Candidate
+from diagnosis.report.values import Parameters, Value
 from models.effects import CATALOGUE
 
 if TYPE_CHECKING:
@@ -17,45 +20,51 @@ if TYPE_CHECKING:
 
 MOST_OTHERS = 5  # alternatives listed
 
-Parameters = dict[str, dict[str, dict[str, Any]]]
+
+class Named(NamedTuple):
+    """The candidates, the verdict first, then the alternatives by probability."""
+
+    candidates: tuple[Candidate, ...]
+    warnings: tuple[str, ...]
 
 
-def which(found: Diagnosis) -> list[dict[str, Any]]:
-    """The verdict first, then the alternatives by probability."""
+def which(found: Diagnosis) -> Named:
+    """The candidates, and what is to be said of the verdict's parameters."""
     named = [verdict for verdict in found.verdicts if verdict.effects]
     effects = [name for verdict in named for name in verdict.effects]
     effects += [reading.effect for reading in found.readings] + [item.effect for item in found.link]
     probability = float(np.prod([verdict.probability for verdict in found.verdicts]))
     if not effects:
         probability = min(probability, nothing(found))
-    parameters = fitted(found, named) | seen(found)
+    fits = {name: values for verdict in named for name, values in intervals(verdict.search.chosen).items()}
+    parameters = {name: fitted(values) for name, values in fits.items()} | seen(found)
     others = [
         item for verdict in found.verdicts for item in alternatives(verdict, effects, parameters, probability)
     ]
-    others.sort(key=lambda item: -item["probability"])
-    return [entry(effects, probability, parameters, 0.0), *others[:MOST_OTHERS]]
+    others.sort(key=lambda item: -(item.probability or 0.0))
+    first = entry(effects, probability, parameters, 0.0)
+    ends = tuple(warning for name, values in fits.items() for warning in at_the_end(name, values))
+    return Named((first, *others[:MOST_OTHERS]), ends)
 
 
-def fitted(found: Diagnosis, named: list[Verdict]) -> Parameters:
-    """Parameters of effects found by fits, with intervals; one at the end of its range is said so."""
-    result: Parameters = {}
-    for verdict in named:
-        for name, values in intervals(verdict.search.chosen).items():
-            shapes = {item.name for item in CATALOGUE[name].parameters if item.shape}
-            result[name] = {
-                key: value(item.value, item.low, item.high, item.unit) for key, item in values.items()
-            }
-            found.warnings += [
-                f"{key} of {name} lies at the end of its range."
-                for key, item in values.items()
-                if item.on_bound and key not in shapes
-            ]
-    return result
+def fitted(values: Mapping[str, Interval]) -> dict[str, Value]:
+    """Parameters of an effect found by a fit, with intervals."""
+    return {key: value(item.value, item.low, item.high, item.unit) for key, item in values.items()}
 
 
-def seen(found: Diagnosis) -> Parameters:
+def at_the_end(name: str, values: Mapping[str, Interval]) -> list[str]:
+    """A sentence for each parameter of an effect, shapes aside, that a fit left at the end of its range."""
+    shapes = {item.name for item in CATALOGUE[name].parameters if item.shape}
+    return [
+        f"{key} of {name} lies at the end of its range."
+        for key, item in values.items()
+        if item.on_bound and key not in shapes
+    ]
+
+
+def seen(found: Diagnosis) -> dict[str, dict[str, Value]]:
     """Parameters of effects that were read off samples and message numbers."""
-    result: Parameters = {}
+    result = {}
     for reading in found.readings:
         unit = unit_of(reading.effect, reading.parameter)
         result[reading.effect] = {reading.parameter: value(reading.value, *reading.interval, unit)}
@@ -69,7 +78,7 @@ def seen(found: Diagnosis) -> Parameters:
 
 def alternatives(
     verdict: Verdict, effects: list[str], parameters: Parameters, probability: float
-) -> list[dict[str, Any]]:
+) -> list[Candidate]:
     """Entries in which one part's effects are others."""
     rest = [name for name in effects if name not in verdict.effects]
     result = []
@@ -83,7 +92,7 @@ def alternatives(
     return result
 
 
-def bare(values: Values) -> Parameters:
+def bare(values: Values) -> dict[str, dict[str, Value]]:
     """Parameters without intervals."""
     return {
         name: {key: value(size, None, None, unit_of(name, key)) for key, size in given.items()}
@@ -91,10 +100,10 @@ def bare(values: Values) -> Parameters:
     }
 
 
-def value(size: float, low: float | None, high: float | None, unit: str) -> dict[str, Any]:
-    """A parameter as the report holds it; what is not finite is null."""
-    ends = [None if end is None or not math.isfinite(end) else end for end in (low, high)]
-    return {"value": size, "interval": ends, "unit": unit}
+def value(size: float, low: float | None, high: float | None, unit: str) -> Value:
+    """A parameter as the report holds it; an end that is not finite is not known."""
+    lower, upper = (None if end is None or not math.isfinite(end) else end for end in (low, high))
+    return Value(value=size, interval=(lower, upper), unit=unit)
 
 
 def unit_of(effect: str, parameter: str) -> str:
@@ -113,11 +122,8 @@ def nothing(found: Diagnosis) -> float:
     return float(1.0 - 0.3 * min(worst, 1.0) ** 4)
 
 
-def entry(effects: list[str], probability: float, parameters: Parameters, score: float) -> dict[str, Any]:
-    """One line of `which`."""
-    return {
-        "effects": effects,
-        "probability": probability,
-        "parameters": parameters,
-        "held_out_score": score,
-    }
+def entry(effects: list[str], probability: float, parameters: Parameters, score: float) -> Candidate:
+    """One candidate."""
+    return Candidate(
+        effects=tuple(effects), probability=probability, parameters=parameters, held_out_score=score
+    )

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from typing import TypeVar
 
 import numpy as np
 
@@ -12,6 +14,8 @@ from diagnosis.signals.features import features
 from diagnosis.signals.systematic import systematic_rms
 from models.indicators.checks import checked
 from models.registry import Array
+
+Name = TypeVar("Name", bound=str)  # of a coordinate
 
 PERIOD = 0.01  # s, between the samples that the model sees: content up to 30 Hz and more
 FOLDS = 4  # of the choice of the penalty
@@ -87,7 +91,9 @@ def along(gram: Array, product: Array, count: int) -> Array:
     return np.asarray(vectors @ scaled)
 
 
-def depends_on(coordinates: dict[str, Array], residual: Array, noise_rms: float) -> list[tuple[str, float]]:
+def depends_on(
+    coordinates: Mapping[Name, Array], residual: Array, noise_rms: float
+) -> list[tuple[Name, float]]:
     """Share (0…1) of a residual's systematic energy that a function of each coordinate alone explains.
 
     Every coordinate (n,), such as a displacement, a rate or the time, on its own: a broken line over
@@ -98,7 +104,7 @@ def depends_on(coordinates: dict[str, Array], residual: Array, noise_rms: float)
     Raises:
         InputError: lengths differ or values are not finite.
     """
-    checked(residual=residual, **coordinates)
+    checked(residual=residual, **{str(name): values for name, values in coordinates.items()})
     varying = residual - residual.mean()
     found = systematic_rms(varying, noise_rms)
     energy = found.rms**2 if found.z > SURE else 0.0

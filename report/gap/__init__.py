@@ -1,1 +1,1 @@
-"""A diagnosis report for people: its schema, a look on the terminal, one page."""
+"""A diagnosis report for people: a look on the terminal, one page."""

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from common.errors import InputError
 from common.terminal import cli, outputs
 from common.terminal.printable import all_shown
 from common.terminal.telling import Tell, untold
 from report.text.progress import Progress
+
+if TYPE_CHECKING:
+    from diagnosis.report.records import Report
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -53,16 +57,16 @@ def run(args: argparse.Namespace) -> int:
             from report.gap import page
 
             progress.tell("page")
-            outputs.write_text(args.html, page.page(report), args.force)
+            outputs.write_text(args.html, page.page(report.plain()), args.force)
     if args.json:
-        text = json.dumps(report, allow_nan=False) + "\n"
+        text = json.dumps(report.plain(), allow_nan=False) + "\n"
         if str(args.json) == "-":
             sys.stdout.write(text)
             return 0
         outputs.write_text(args.json, text, args.force)
     from report.gap import terminal
 
-    outputs.aside(args.html, args.json).write(terminal.summary(all_shown(report)) + "\n")
+    outputs.aside(args.html, args.json).write(terminal.summary(all_shown(report.plain())) + "\n")
     return 0
 
 
@@ -83,8 +87,8 @@ def diagnose_file(
     validate: Sequence[Path] = (),
     against_ideal: bool = False,
     tell: Tell = untold,
-) -> dict[str, Any]:
-    """The report on a recording, as plain values that JSON can hold.
+) -> Report:
+    """The report on a recording.
 
     Raises:
         InputError: a file cannot be read, or holds nothing to diagnose.
@@ -100,6 +104,4 @@ def diagnose_file(
     report = diagnose(own, others, tell)
     from report.gap import wording
 
-    report["details"]["test"]["file"] = path.name
-    report["verdict"] = wording.verdict(report)
-    return report
+    return dataclasses.replace(report, verdict=wording.verdict(report.plain()))

@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--diagnosis",
         default=DIAGNOSIS,
         metavar="MODULE:FUNCTION",
-        help="judge another diagnosis: a function from a recording's path to a report",
+        help="judge another diagnosis: a function from a recording's path to a diagnosis.report.records.Report",
     )
     parser.add_argument(
         "-o",

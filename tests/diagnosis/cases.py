@@ -94,7 +94,7 @@ class Cases:
         """The diagnosis of a case."""
         key = (repr(effects or {}), *sorted(options.items()))
         if key not in self._reports:
-            self._reports[key] = diagnose_file(self.file(effects, **options))
+            self._reports[key] = diagnose_file(self.file(effects, **options)).plain()
         return self._reports[key]
 
 

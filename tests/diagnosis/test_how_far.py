@@ -73,7 +73,7 @@ def test_shares_of_two_sites_sum_to_one(cases: Cases) -> None:
 def test_another_recording_of_the_laboratories_judges(cases: Cases) -> None:
     effects = FOUND["column"]
     other = cases.file(effects, scale=0.15, duration=8.0)
-    far = diagnose_file(cases.file(effects), validate=[other])["how_far"]
+    far = diagnose_file(cases.file(effects), validate=[other]).how_far.plain()
     assert far["judged_on"] == "recordings given"
     assert far["closed"] > 0.9
     assert far["before"] > far["after"]
@@ -82,8 +82,9 @@ def test_another_recording_of_the_laboratories_judges(cases: Cases) -> None:
 
 def test_a_recording_of_other_laboratories_is_not_closed(cases: Cases) -> None:
     wrong = cases.file({"table.gain": {"factor": 0.93}}, scale=0.15, duration=8.0)
-    far = diagnose_file(cases.file(FOUND["column"]), validate=[wrong])["how_far"]
-    assert far["closed"] < 0.0  # adding friction to laboratories without makes it worse
+    far = diagnose_file(cases.file(FOUND["column"]), validate=[wrong]).how_far
+    assert far.closed is not None
+    assert far.closed < 0.0  # adding friction to laboratories without makes it worse
 
 
 def without_table_target(cases: Cases) -> record.Record:
@@ -98,11 +99,13 @@ def without_table_target(cases: Cases) -> record.Record:
 def test_without_a_loop_the_parts_are_judged_by_themselves(cases: Cases) -> None:
     found = examine(without_table_target(cases))
     far = how_far.judge(found, ())
-    assert far.summary["closed"] > 0.9
-    assert far.summary["after"] == pytest.approx(far.summary["noise_floor"], rel=0.15)
+    closed = far.how_far.plain()
+    assert closed["closed"] > 0.9
+    assert closed["after"] == pytest.approx(closed["noise_floor"], rel=0.15)
+    assert not far.warnings
     warned = how_far.judge(found, [without_table_target(cases)])
-    assert warned.summary["judged_on"] == "held-out time windows"
-    assert any("no closed loop" in text for text in found.warnings)
+    assert warned.how_far.judged_on == "held-out time windows"
+    assert any("no closed loop" in text for text in warned.warnings)
 
 
 @pytest.mark.parametrize(
@@ -137,6 +140,6 @@ def test_a_diverging_simulation_is_a_gap_not_a_crash(cases: Cases) -> None:
     assert judge.loop is not None
     wild = judge.loop.simulate(found.system().moved("actuator", delay=0.2))
     assert set(judge.gap(wild).values()) == set(judge.gap(None).values()) == {10.0}
-    assert how_far.histories(judge, None, judge.signals(None)) == []
+    assert how_far.histories(judge, None, judge.signals(None)) == ()
     quiet = dataclasses.replace(judge.loop, names=("column_force",))
     assert set(quiet.gap(judge.signals(None))) == {"column_force"}

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from common.errors import InputError
 from common.recording.reader import GROUND, Run, read
 from diagnosis import record
-from diagnosis.diagnose import parts_of
+from diagnosis.diagnose import not_recorded, parts_of
 from tests.diagnosis.cases import Cases, short
 
 
@@ -94,10 +94,11 @@ def test_a_signal_that_is_mostly_missing_is_not_there(cases: Cases) -> None:
 
 
 def test_what_is_not_recorded_is_said_and_the_rest_is_judged(cases: Cases) -> None:
-    warnings: list[str] = []
     run = without(run_of(cases), "slave", "table_displacement", "table_acceleration")
     run = without(run, "master", "actuator_command")
-    names = [part.name for part in parts_of(record.build(run), warnings)]
+    found = record.build(run)
+    warnings = not_recorded(found)
+    names = [part.name for part in parts_of(found)]
     assert names == ["ground", "structure", "column", "laboratory B"]
     assert any("table_displacement, table_acceleration" in text for text in warnings)
     assert any("actuator_command" in text for text in warnings)
@@ -107,7 +108,7 @@ def test_one_laboratory_alone(cases: Cases) -> None:
     run = run_of(cases)
     del run.columns["master"], run.sequences["master"]
     found = record.build(run)
-    assert [part.name for part in parts_of(found, [])] == ["laboratory B"]
+    assert [part.name for part in parts_of(found)] == ["laboratory B"]
     assert not found.has("column_force")
 
 

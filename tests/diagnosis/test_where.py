@@ -130,6 +130,6 @@ def test_when_and_at_which_frequency(cases: Cases) -> None:
     t = whole.time
     burst: Array = np.where((t >= 2.0) & (t < 5.0), 10.0, 0.0) * np.sin(2.0 * np.pi * 4.0 * t)
     trace = Trace("damper", burst, 6.0, "damper_force", 1.0)
-    assert where.when(trace, whole) == [[2.0, 5.0]]
+    assert where.when(trace, whole) == ((2.0, 5.0),)
     low, high = where.frequencies(trace, whole)
     assert 3.0 < low < 4.0 < high < 5.0

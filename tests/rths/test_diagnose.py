@@ -12,7 +12,7 @@ import pytest
 
 from common.errors import InterlockError
 from common.recording.reader import read
-from report.gap.schema import schema
+from diagnosis.report.schema import schema
 from tests.diagnosis.cases import Cases, play, short
 from tests.helpers import with_table
 

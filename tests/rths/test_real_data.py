@@ -41,7 +41,7 @@ def lag_by_correlation(command: Any, response: Any, interval: float, finer: int 
 def rig(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
     """The force rig's recording and the report on it."""
     path = imported(EXAMPLES / "force_rig.csv", "force_rig", tmp_path_factory.mktemp("rig"))
-    return path, diagnose_file(path)
+    return path, diagnose_file(path).plain()
 
 
 @pytest.mark.slow
@@ -77,7 +77,7 @@ def test_what_is_left_of_the_force_rigs_gap_is_said(rig: tuple[Path, dict[str, A
     ],
 )
 def test_a_fibre_column_yields_and_softens_with_the_drift_it_has_seen(name: str, tmp_path: Path) -> None:
-    report = diagnose_file(imported(COLUMNS / f"column_{name}.csv", f"column_{name}", tmp_path))
+    report = diagnose_file(imported(COLUMNS / f"column_{name}.csv", f"column_{name}", tmp_path)).plain()
     assert set(report["which"][0]["effects"]) == {"column.yielding", "column.degradation"}
     assert report["status"] == "partly_explained"
     assert report["how_far"]["after"] < 0.15 * report["how_far"]["before"]

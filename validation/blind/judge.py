@@ -11,9 +11,11 @@ import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from common.errors import InputError
+from diagnosis.report import read
+from diagnosis.report.records import Report
 from validation.blind.worker import DIAGNOSIS
 
 HOME = Path(__file__).resolve().parents[2]
@@ -24,12 +26,13 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 class Answer(NamedTuple):
     """What a diagnosis said of one recording, and how long it took."""
 
-    report: dict[str, Any]
+    report: Report | None  # None where it failed
     seconds: float
+    error: str = ""
 
 
 GRACE = 3.0  # s, in which an interrupted process may end those that it started
-NONE = Answer({"status": "error", "error": "the diagnosis gave no answer"}, float("nan"))
+NONE = Answer(None, float("nan"), "the diagnosis gave no answer")
 
 
 def diagnose_all(
@@ -97,4 +100,6 @@ def environment(jobs: int) -> dict[str, str]:
 
 def _answer(path: Path) -> Answer:
     data = json.loads(path.read_text(encoding="utf-8"))
-    return Answer(data["report"], float(data["seconds"]))
+    said = data.get("report")
+    report = None if said is None else read.report(said, f"What the diagnosis said of {path.stem}")
+    return Answer(report, float(data["seconds"]), data.get("error", ""))

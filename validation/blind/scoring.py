@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
 
+from diagnosis.report.records import Candidate
+from diagnosis.report.values import Value
 from models.effects import CATALOGUE, of_site
 from validation.blind.draw import Case, Laid
 from validation.blind.judge import NONE, Answer
@@ -84,12 +85,12 @@ def judge_all(
 def judge(case: Case, recorded: Recorded, answer: Answer) -> Outcome:
     """One case judged."""
     report = answer.report
-    status = str(report.get("status", "error"))
-    verdict = _first(report, "which") if status in NAMING else {}
-    names = [str(name) for name in verdict.get("effects", [])]
-    sets = [set(group) for group in report.get("equivalent", [])]
+    status = report.status if report else "error"
+    verdict = report.which[0] if report and report.which and status in NAMING else None
+    names = list(verdict.effects) if verdict else []
+    sets = [set(group) for group in report.equivalent] if report else []
     truth = [item.name for item in case.laid]
-    site = str(_first(report, "where").get("site", ""))
+    site = report.where[0].site if report and report.where else ""
     located = any(site in sites_of(item, names, sets) for item in case.laid)
     named = is_named(case, status, names, sets)
     right = named and (located or not case.laid or case.inside)
@@ -108,17 +109,17 @@ def judge(case: Case, recorded: Recorded, answer: Answer) -> Outcome:
         status=status,
         verdict=names,
         verdict_site=site,
-        probability=float(verdict.get("probability", math.nan)),
+        probability=number(verdict.probability) if verdict else math.nan,
         named=named,
         located=located,
         surplus=any(not any(same(item, name, sets) for item in truth) for name in names),
         right=right,
         why="",
-        estimates=estimates(case, verdict) if named else [],
-        shrinkage=_closed(report) / best_closed(case),
+        estimates=estimates(case, verdict) if named and verdict else [],
+        shrinkage=number(report.how_far.closed if report else None) / best_closed(case),
         seconds=answer.seconds * STANDARD_LENGTH / duration,
     )
-    return outcome if right else _with(outcome, why=why(outcome, report))
+    return outcome if right else replace(outcome, why=why(outcome, answer.error))
 
 
 def is_named(case: Case, status: str, names: list[str], sets: list[set[str]]) -> bool:
@@ -149,11 +150,11 @@ def sites_of(item: Laid, names: Sequence[str], sets: Iterable[set[str]]) -> set[
     return {item.site} | {CATALOGUE[name].site for name in named}
 
 
-def estimates(case: Case, verdict: Mapping[str, Any]) -> list[Estimate]:
+def estimates(case: Case, verdict: Candidate) -> list[Estimate]:
     """The strength parameters of the true effects that the verdict itself names."""
-    found = verdict.get("parameters", {})
+    found = verdict.parameters
     return [
-        estimate(item, name, found[item.name].get(name, {}))
+        estimate(item, name, found[item.name].get(name))
         for item in case.laid
         if item.name in found
         for name in item.nulls
@@ -161,14 +162,14 @@ def estimates(case: Case, verdict: Mapping[str, Any]) -> list[Estimate]:
     ]
 
 
-def estimate(item: Laid, name: str, said: Mapping[str, Any]) -> Estimate:
+def estimate(item: Laid, name: str, said: Value | None) -> Estimate:
     """One parameter; relative to its distance from the null value where that is finite."""
     true, null = item.parameters[name], item.nulls[name]
-    value = float(said.get("value", math.nan))
+    value = number(said.value if said else None)
     miss = abs(value - true) if math.isfinite(value) else math.inf
     strength = abs(true - null) if math.isfinite(null) else abs(true)
-    interval = said.get("interval")
-    inside = bool(interval[0] <= true <= interval[1]) if interval else None
+    low, high = (said.interval if said else None) or (None, None)
+    inside = None if low is None or high is None else low <= true <= high
     return Estimate(
         f"{item.name}.{name}", true, value, miss / strength, miss / abs(true) if true else miss, inside
     )
@@ -179,25 +180,16 @@ def best_closed(_case: Case) -> float:
     return 1.0
 
 
-def _closed(report: Mapping[str, Any]) -> float:
-    closed = (report.get("how_far") or {}).get("closed")
-    return math.nan if closed is None else float(closed)
+def number(value: float | None) -> float:
+    """A number of a report, NaN where it was not determined."""
+    return math.nan if value is None else value
 
 
-def _first(report: Mapping[str, Any], key: str) -> dict[str, Any]:
-    entries = report.get(key) or [{}]
-    return dict(entries[0])
-
-
-def _with(outcome: Outcome, **values: Any) -> Outcome:
-    return Outcome(**(vars(outcome) | values))
-
-
-def why(outcome: Outcome, report: Mapping[str, Any]) -> str:
-    """Why a case is wrong, in a sentence."""
+def why(outcome: Outcome, error: str) -> str:
+    """Why a case is wrong, in a sentence; `error` is that of a diagnosis that failed."""
     reasons = []
     if outcome.status == "error":
-        reasons.append(str(report.get("error", "no report")))
+        reasons.append(error)
     elif not outcome.named:
         said = " and ".join(outcome.verdict) or outcome.status
         wanted = {"clean": "no_gap", "unknown": " or ".join(UNKNOWN)}

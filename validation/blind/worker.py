@@ -1,6 +1,6 @@
 """The process that diagnoses: `python -m validation.blind.worker FOLDER OUT`. It knows recordings, nothing else.
 
-For every recording it leaves `OUT/<name>.json`: the report, and the seconds it took. One line per
+For every recording it leaves `OUT/<name>.json`: the report or the error, and the seconds it took. One line per
 recording on standard output says that it is done.
 """
 
@@ -18,13 +18,14 @@ from typing import Any
 
 from common.errors import InputError, RthsError
 from common.terminal import cli
+from diagnosis.report.records import Report
 from validation.spread import spread
 
 DIAGNOSIS = "rths.examine.diagnose:diagnose_file"
 
 
 def find(reference: str) -> Any:
-    """The diagnosing function 'module:function': the path of a recording in, the report as plain values out."""
+    """The diagnosing function 'module:function': the path of a recording in, the `Report` out."""
     module, _, name = reference.partition(":")
     try:
         return getattr(importlib.import_module(module), name)
@@ -33,17 +34,18 @@ def find(reference: str) -> Any:
 
 
 def diagnose(path: Path, reference: str, out: Path) -> str:
-    """Diagnose one recording into `out`; its name. A diagnosis that fails is a report that says so."""
+    """Diagnose one recording into `out`; its name. A diagnosis that fails leaves its error in the report's place."""
     function = find(reference)
     started = time.perf_counter()
     try:
-        report: dict[str, Any] = function(path)
+        found: Report = function(path)
+        answer: dict[str, Any] = {"report": found.plain()}
     except RthsError as error:
-        report = {"status": "error", "error": str(error)}
+        answer = {"error": str(error)}
     except Exception as error:  # one failure must not take the other cases with it
         traceback.print_exc()
-        report = {"status": "error", "error": f"{type(error).__name__}: {error}"}
-    answer = {"report": report, "seconds": time.perf_counter() - started}
+        answer = {"error": f"{type(error).__name__}: {error}"}
+    answer["seconds"] = time.perf_counter() - started
     (out / f"{path.stem}.json").write_text(json.dumps(answer), encoding="utf-8")
     return path.stem
 

@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
+from diagnosis.report.schema import schema
 from models.effects import CATALOGUE
 from report.gap import pictures, which, wording
 from report.gap.page import page
-from report.gap.schema import schema
 from report.gap.terminal import summary
 from report.pictures import figure
 from report.text.formats import (

@@ -19,8 +19,11 @@ import pytest
 from common.errors import InputError
 from common.recording.reader import read
 from common.terminal import cli
+from diagnosis.report.read import report as read_report
+from diagnosis.report.records import Report
 from models.effects import CATALOGUE
 from rths.prove import blind
+from tests.rths.diagnosis_report.reports import bare
 from validation.blind import library as libraries
 from validation.blind.draw import Case, draw
 from validation.blind.judge import diagnose_all
@@ -34,23 +37,23 @@ LIBRARY = Library(
 )
 
 
-def no_gap(_path: Path) -> dict[str, Any]:
+def no_gap(_path: Path) -> Report:
     """A diagnosis that never sees a gap."""
-    return {"status": "no_gap", "where": [], "which": []}
+    return read_report(bare("no_gap"))
 
 
-def spy(path: Path) -> dict[str, Any]:
+def spy(path: Path) -> Report:
     """A diagnosis that tells what it could see."""
-    return {
-        "status": "no_gap",
+    seen = {
         "environment": dict(os.environ),
         "words": sys.argv,
         "beside": sorted(item.name for item in path.parent.iterdir()),
         "there": [str(item) for item in Path.cwd().rglob("*") if item.is_file()],
     }
+    return read_report(bare("no_gap") | {"warnings": [json.dumps(seen)]})
 
 
-def broken(_path: Path) -> dict[str, Any]:
+def broken(_path: Path) -> Report:
     """A diagnosis that fails."""
     raise ValueError("nothing works")
 
@@ -103,16 +106,18 @@ def test_the_diagnosing_process_sees_recordings_only(tmp_path: Path, monkeypatch
     assert set(answers) == found == {f"{name}.mcap" for name in done}
     for answer in answers.values():
         assert answer.seconds > 0.0
-        assert answer.report["beside"] == sorted(found)
-        assert "RTHS_TRUTH" not in answer.report["environment"]
-        assert str(tmp_path) in answer.report["words"]
-        assert all("reports" in name or "complaints" in name for name in answer.report["there"])
+        assert answer.report is not None
+        seen = json.loads(answer.report.warnings[0])
+        assert seen["beside"] == sorted(found)
+        assert "RTHS_TRUTH" not in seen["environment"]
+        assert str(tmp_path) in seen["words"]
+        assert all("reports" in name or "complaints" in name for name in seen["there"])
 
 
 def test_a_failing_diagnosis_does_not_take_the_others_with_it(tmp_path: Path) -> None:
     list(record_all(cases(2), tmp_path))
     answers = diagnose_all(tmp_path, diagnosis=f"{HERE}:broken")
-    assert [item.report["error"] for item in answers.values()] == ["ValueError: nothing works"] * 2
+    assert [item.error for item in answers.values()] == ["ValueError: nothing works"] * 2
     with pytest.raises(InputError, match=r"diagnoses failed: There is no diagnosis 'rths\.nowhere:x'"):
         diagnose_all(tmp_path, diagnosis="rths.nowhere:x")
 

@@ -10,6 +10,8 @@ from typing import Any
 import pytest
 
 from diagnosis.findings.calibration import clopper_pearson
+from diagnosis.report import read
+from tests.rths.diagnosis_report.reports import bare
 from tests.rths.report.pages import check_alone, check_in_browser
 from validation.blind.draw import Case, Laid
 from validation.blind.judge import Answer
@@ -40,16 +42,36 @@ def case(kind: str, *laid: Laid, inside: bool = False, index: int = 0) -> Case:
     return Case(index, kind, {"test": {"duration": 15.0}}, {}, 1, laid, inside)
 
 
+PLACE = {
+    "share": 1.0,
+    "share_interval": [1.0, 1.0],
+    "residual_to_noise": 9.0,
+    "when": [],
+    "frequency_band": None,
+}
+
+
 def said(status: str, *effects: str, site: str = "", probability: float = 0.9, **more: Any) -> dict[str, Any]:
-    report: dict[str, Any] = {"status": status, "where": [{"site": site}] if site else [], "which": []}
+    report = bare(status)
+    report["where"] = [PLACE | {"site": site}] if site else []
     if effects:
-        report["which"] = [{"effects": list(effects), "probability": probability}]
+        first = {
+            "effects": list(effects),
+            "probability": probability,
+            "parameters": {},
+            "held_out_score": 0.0,
+        }
+        report["which"] = [first]
     return report | more
+
+
+def value(number: float, *interval: float) -> dict[str, Any]:
+    return {"value": number, "interval": list(interval), "unit": ""}
 
 
 def judged(what: Case, report: dict[str, Any], *sizes: float, seconds: float = 2.0) -> Outcome:
     sizes = sizes or tuple(10.0 for _ in what.laid)
-    return judge(what, Recorded(what.index, "a.mcap", sizes, ""), Answer(report, seconds))
+    return judge(what, Recorded(what.index, "a.mcap", sizes, ""), Answer(read.report(report), seconds))
 
 
 def test_the_true_effect_at_its_site_is_right() -> None:
@@ -119,7 +141,8 @@ def test_an_unknown_effect_is_said_to_be_unknown_at_its_site() -> None:
 
 
 def test_a_diagnosis_that_fails_is_wrong() -> None:
-    outcome = judged(case("catalogue", RUB), {"status": "error", "error": "ValueError: no"})
+    failed = Answer(None, 2.0, "ValueError: no")
+    outcome = judge(case("catalogue", RUB), Recorded(0, "a.mcap", (10.0,), ""), failed)
     assert outcome.why == "ValueError: no"
     missing = judge_all([case("clean", index=7)], {7: Recorded(7, "x.mcap", (), "")}, {})
     assert [item.status for item in missing] == ["error"]
@@ -127,9 +150,7 @@ def test_a_diagnosis_that_fails_is_wrong() -> None:
 
 def test_a_parameter_is_judged_by_its_distance_from_nothing() -> None:
     report = said("explained", "column.stiffness", site="column")
-    report["which"][0]["parameters"] = {
-        "column.stiffness": {"factor": {"value": 0.91, "interval": [0.9, 0.92]}}
-    }
+    report["which"][0]["parameters"] = {"column.stiffness": {"factor": value(0.91, 0.9, 0.92)}}
     (one,) = judged(case("catalogue", SOFT), report).estimates
     assert one.error == pytest.approx(0.1)
     assert one.plain_error == pytest.approx(0.01 / 0.9)
@@ -139,11 +160,12 @@ def test_a_parameter_is_judged_by_its_distance_from_nothing() -> None:
 
 
 def some() -> list[Outcome]:
-    good = said("explained", "damper.friction", site="damper", probability=1.0, how_far={"closed": 0.97})
-    good["which"][0]["parameters"] = {"damper.friction": {"force": {"value": 3.03, "interval": [2.9, 3.1]}}}
+    far = bare("explained")["how_far"] | {"closed": 0.97}
+    good = said("explained", "damper.friction", site="damper", probability=1.0, how_far=far)
+    good["which"][0]["parameters"] = {"damper.friction": {"force": value(3.03, 2.9, 3.1)}}
     return [
         *(judged(case("catalogue", RUB, index=i), good) for i in range(19)),
-        judged(case("formula", SLIP, index=19), said("unknown_effect", site="column", how_far=None)),
+        judged(case("formula", SLIP, index=19), said("unknown_effect", site="column")),
         judged(case("catalogue", SOFT, index=20), said("no_gap"), 0.3),
         judged(case("pair", RUB, SLIP, index=21), said("explained", "column.slip", site="column")),
         judged(case("clean", index=22), said("no_gap")),

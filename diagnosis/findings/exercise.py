@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 FAINT = 0.3  # rms of an effect's trace over noise below which it could hide
 
 
-def not_exercised(found: Diagnosis) -> list[str]:
+def not_exercised(found: Diagnosis) -> tuple[str, ...]:
     """Catalogue effects that even at their strongest usual size would have hidden in the noise."""
     result = []
     for verdict in found.verdicts:
@@ -35,4 +35,4 @@ def not_exercised(found: Diagnosis) -> list[str]:
             change = np.where(data.part.present, (more - whole) / data.sigma, 0.0)
             if float(np.max(np.sqrt(np.mean(change**2, axis=0)))) < FAINT:
                 result.append(effect.name)
-    return result
+    return tuple(result)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from diagnosis.findings import where
 from diagnosis.fits import fitting
 from diagnosis.fits.search import Search, gaps
 from diagnosis.parts import LaboratoryA, LaboratoryB
+from diagnosis.report.evidence import Ceiling, Coordinate, Dependence, Unknown
 from diagnosis.signals import windows
 from diagnosis.signals.ceiling import ceiling, depends_on
 from models.registry import Array
@@ -19,7 +20,7 @@ from models.registry import Array
 if TYPE_CHECKING:
     from diagnosis.diagnose import Diagnosis
 
-COORDINATE = {
+COORDINATE: dict[str, Coordinate] = {
     "column_displacement": "displacement",
     "column_force": "force",
     "table_displacement": "displacement",
@@ -31,6 +32,7 @@ COORDINATE = {
     "damper_command": "command",
 }
 SMOOTH = 0.008  # s, over which rates are taken
+FAINT = 0.02  # share below which a residual does not depend on a coordinate
 
 
 def worst(search: Search, fit: fitting.Fit) -> int:
@@ -51,7 +53,7 @@ def inputs_of(found: Diagnosis, search: Search) -> dict[str, Array]:
     return result
 
 
-def ceilings(found: Diagnosis) -> list[dict[str, Any]]:
+def ceilings(found: Diagnosis) -> tuple[Ceiling, ...]:
     """Per part with a gap: what a flexible model explains of its residual on withheld time, and the catalogue."""
     result = []
     for verdict in found.verdicts:
@@ -63,8 +65,8 @@ def ceilings(found: Diagnosis) -> list[dict[str, Any]]:
             site = where.unexplained(search.data, search.chosen).site
             if verdict.effects:
                 site = where.traces(search.data, search.chosen)[0].site
-            result.append({"site": site, "flexible": flexible, "catalogue": max(0.0, search.explained)})
-    return result
+            result.append(Ceiling(site=site, flexible=flexible, catalogue=max(0.0, search.explained)))
+    return tuple(result)
 
 
 def flexible_share(found: Diagnosis, search: Search) -> float | None:
@@ -89,8 +91,8 @@ def flexible_share(found: Diagnosis, search: Search) -> float | None:
         return None
 
 
-def unknown(found: Diagnosis) -> dict[str, Any]:
-    """A description of a residual that no effect of the catalogue explains; empty where there is none."""
+def unknown(found: Diagnosis) -> Unknown | None:
+    """A description of a residual that no effect of the catalogue explains; None where there is none."""
     for verdict in found.verdicts:
         search = verdict.search
         if verdict.outcome not in ("unknown", "partly"):
@@ -102,28 +104,29 @@ def unknown(found: Diagnosis) -> dict[str, Any]:
         shares = dependence(found, search, residual, float(data.sigma[place]))
         spectrum = windows.bands(residual, float(data.white[place]), interval)
         peak = int(np.argmax(spectrum.residual[1:])) + 1 if spectrum.residual.size > 1 else 0
-        return {
-            "site": where.unexplained(data, search.chosen).site,
-            "depends_on": [{"on": name, "share": share} for name, share in shares if share > 0.02],
-            "frequency": float(spectrum.frequency[peak]),
-            "amplitude": float(np.sqrt(2.0 * np.mean(residual**2))),
-            "unit": UNITS.get(data.part.signals[place], ""),
-        }
-    return {}
+        return Unknown(
+            site=where.unexplained(data, search.chosen).site,
+            depends_on=tuple(item for item in shares if (item.share or 0.0) > FAINT),
+            frequency=float(spectrum.frequency[peak]),
+            amplitude=float(np.sqrt(2.0 * np.mean(residual**2))),
+            unit=UNITS.get(data.part.signals[place], ""),
+        )
+    return None
 
 
-def dependence(found: Diagnosis, search: Search, residual: Array, noise: float) -> list[tuple[str, float]]:
+def dependence(found: Diagnosis, search: Search, residual: Array, noise: float) -> list[Dependence]:
     """How much of a residual a function of one coordinate alone explains."""
     interval = found.record.plan.test.interval
     step = max(1, round(SMOOTH / interval))
-    coordinates: dict[str, Array] = {"time": found.record.time}
+    coordinates: dict[Coordinate, Array] = {"time": found.record.time}
     for name, values in inputs_of(found, search).items():
-        short = COORDINATE.get(name.removeprefix("predicted "), "")
+        short = COORDINATE.get(name.removeprefix("predicted "))
         if short and short not in coordinates:
             coordinates[short] = values
         if short == "displacement" and "velocity" not in coordinates:
             coordinates["velocity"] = np.gradient(values, interval * step)
     try:
-        return depends_on(coordinates, residual, noise)
+        shares = depends_on(coordinates, residual, noise)
     except InputError:
         return []
+    return [Dependence(on=name, share=share) for name, share in shares]
