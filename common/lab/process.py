@@ -172,7 +172,7 @@ def join(
     )
     if role != OPERATOR:  # whose command waits for a few seconds only
         report("waiting", {"lab": role, "text": f"{text}, {plan.link.connect_timeout:g} s at most."})
-    return ZenohLink(
+    link = ZenohLink(
         role,
         plan.test.name,
         slaves=plan.roles,
@@ -181,8 +181,9 @@ def join(
         patience=plan.link.connect_timeout,
         stopping=Search(role, plan, report, stopping),
         identity=identity,
-        noticed=lambda text: warn("stranger", text),
     )
+    link.watch(lambda text: warn("stranger", text))
+    return link
 
 
 def enter(

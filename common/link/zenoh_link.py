@@ -136,7 +136,7 @@ class ZenohLink:
     """One role's access to the link of a test; `listen` and `connect` are zenoh endpoints (tcp/host:port).
 
     `slaves` are the roles of all slaves of the test. With an identity the link is TLS and the endpoints are those of
-    TLS too; `noticed` is told of those who join without a part in the test, from a thread of zenoh's.
+    TLS too.
     """
 
     def __init__(
@@ -150,7 +150,6 @@ class ZenohLink:
         patience: float = 0.0,
         stopping: Callable[[], str] = str,
         identity: Identity | None = None,
-        noticed: Callable[[str], None] = lambda _: None,
     ) -> None:
         if identity is not None:
             listen, connect = secured(listen), dialled(connect)
@@ -161,11 +160,10 @@ class ZenohLink:
             secure(config, identity, test, slaves)
         if listen:
             self._session = self._listening(config, listen)
-            if identity is not None:
-                self._watch(guests(slaves), noticed)
         else:
             refusal = identity.refusal if identity is not None else unrefused
             self._session = reach(config, connect, patience, stopping, refusal)
+        self._expected = guests(slaves) if listen and identity is not None else None
         self._publishers = {
             (route.channel, route.to): self._session.declare_publisher(
                 key(test, route),
@@ -189,8 +187,14 @@ class ZenohLink:
                 "choose another with --listen."
             ) from None
 
-    def _watch(self, expected: Sequence[str], noticed: Callable[[str], None]) -> None:
-        """Tell of everybody whose certificate is the authority's but of no role of the test."""
+    def watch(self, noticed: Callable[[str], None]) -> None:
+        """Tell of everybody whose certificate is the authority's but of no role of the test, from a thread of zenoh's.
+
+        Those who have joined already are told of too; where this end does not listen with an identity, nobody is.
+        """
+        if self._expected is None:
+            return
+        expected = self._expected
 
         def joined(event: zenoh.LinkEvent) -> None:
             name = event.link.auth_identifier

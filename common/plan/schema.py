@@ -7,7 +7,7 @@ import difflib
 import math
 import re
 from collections.abc import Iterable, Mapping
-from typing import Any, TypeVar
+from typing import Any, TypedDict, TypeVar, Unpack
 
 from common.errors import PlanError
 
@@ -64,25 +64,31 @@ class Rule:
         )
 
 
+class Allowed(TypedDict, total=False):
+    """What a key allows, as `Rule` holds it."""
+
+    unit: str
+    above: float
+    least: float
+    most: float
+    choices: tuple[str, ...]
+    pattern: str
+    infinite: bool
+
+
 def key(
     text: str,
     *,
     default: Any = dataclasses.MISSING,
-    unit: str = "",
-    above: float | None = None,
-    least: float | None = None,
-    most: float | None = None,
-    choices: Iterable[str] = (),
-    pattern: str = "",
     more: bool = False,
-    infinite: bool = False,
+    **allowed: Unpack[Allowed],
 ) -> Any:
-    """Field of a plan's table: a default, a text for the reference, and the allowed range.
+    """Field of a plan's table: a default, a text for the reference, and what is allowed.
 
     Without a default the key must be given. With `more`, the field is a dict that takes every further number of the
     table: the parameters of a model that a registry checks by the model's name.
     """
-    rule = Rule(text, unit, above, least, most, tuple(choices), pattern, infinite)
+    rule = Rule(text, **allowed)
     metadata = {"rule": rule, "more": more}
     if isinstance(default, dict):
         return dataclasses.field(default_factory=default.copy, metadata=metadata)

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -44,27 +45,27 @@ class DamperFit:
         return self.parameters[name]
 
 
+class Record(NamedTuple):
+    """Tick by tick what moves a damper, and what it answers; (n,) each."""
+
+    command: Array  # N, of the motor
+    ground: Array  # m/s², acceleration of the table
+    stroke: Array  # m
+    force: Array  # N
+
+
 @jit
-def respond(
-    p: Array,
-    interval: float,
-    substeps: int,
-    command: Array,
-    ground: Array,
-    start: float,
-    start_rate: float,
-    stroke: Array,
-    force: Array,
-) -> None:
-    """Stroke (m) and force (N) at each tick; `p` in the order of NAMES, `ground` the table's acceleration.
+def respond(p: Array, interval: float, substeps: int, record: Record, begin: tuple[float, float]) -> None:
+    """Fill stroke (m) and force (N) of a record; `p` in the order of NAMES, `begin` the stroke and its rate (m/s).
 
     Runge-Kutta of fourth order; the motor's lag is exact for its held command, the table's acceleration a
     straight line from tick to tick.
     """
+    command, ground, stroke, force = record.command, record.ground, record.stroke, record.force
     mass, damping, stiffness, lag, gain, friction = p[0], p[1], p[2], p[3], p[4], p[5]
     h = interval / substeps
     fade = np.exp(-0.5 * h / lag) if lag > 0.0 else 0.0
-    x, v, u = start, start_rate, 0.0
+    x, v, u = begin[0], begin[1], 0.0
     for k in range(command.size):
         stroke[k] = x
         force[k] = stiffness * x + damping * v + friction * np.tanh(v / CREEP) - u
@@ -98,7 +99,7 @@ def response(
     """Stroke (m) and force (N), each (n,), for parameters (6,) in the order of NAMES."""
     stroke, force = np.empty(command.size), np.empty(command.size)
     substeps = max(int(np.ceil(interval / SUBSTEP - 1e-9)), 1)
-    respond(values, interval, substeps, command, ground, start, rate, stroke, force)
+    respond(values, interval, substeps, Record(command, ground, stroke, force), (start, rate))
     return stroke, force
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from common.errors import InputError
@@ -11,6 +13,17 @@ from models.compiled import jit
 from models.integrators.state import NEXT_DISPLACEMENT
 from models.registry import Array
 from models.structures.partition import matrices
+
+
+class Whole(NamedTuple):
+    """The whole building with its memories, which `march` moves on."""
+
+    code: int  # of the integrator
+    coefficients: Array  # of the integrator
+    K: Array  # (n, n) N/m
+    mass: Array  # (n,) kg
+    state: Array  # (rows, n) of the integrator
+    balance: Array  # (n,) external minus restoring force, N
 
 
 def response(plan: Plan, ground: Array) -> Array:
@@ -34,33 +47,15 @@ def response(plan: Plan, ground: Array) -> Array:
     mass = np.diag(M).copy()
     result = np.zeros((plan.ticks, n))
     state = method.start(np.zeros(n), np.zeros(n), -mass * ground[0, 0])
-    march(
-        method.code,
-        method.coefficients,
-        np.ascontiguousarray(K),
-        mass,
-        ground,
-        plan.test.interval,
-        state,
-        np.zeros(n),
-        result,
-    )
+    numerical = Whole(method.code, method.coefficients, np.ascontiguousarray(K), mass, state, np.zeros(n))
+    march(numerical, ground, plan.test.interval, result)
     return result
 
 
 @jit
-def march(
-    code: int,
-    coefficients: Array,
-    K: Array,
-    mass: Array,
-    ground: Array,
-    interval: float,
-    state: Array,
-    balance: Array,
-    result: Array,
-) -> None:
-    """Fill `result` (ticks, n) from the ground's acceleration."""
+def march(whole: Whole, ground: Array, interval: float, result: Array) -> None:
+    """Fill `result` (ticks, n) m from the ground's acceleration."""
+    K, mass, state, balance = whole.K, whole.mass, whole.state, whole.balance
     n = mass.size
     for tick in range(result.shape[0]):
         for i in range(n):
@@ -69,4 +64,4 @@ def march(
                 force -= K[i, j] * state[NEXT_DISPLACEMENT, j]
             balance[i] = force
             result[tick, i] = state[NEXT_DISPLACEMENT, i]
-        integrators.step(code, coefficients, state, balance, interval)
+        integrators.step(whole.code, whole.coefficients, state, balance, interval)

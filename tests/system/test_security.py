@@ -72,13 +72,13 @@ class Ear:
 
 
 @contextmanager
-def ears(folder: Path, *roles: str, **words: Any) -> Iterator[dict[str, Ear]]:
+def ears(folder: Path, *roles: str) -> Iterator[dict[str, Ear]]:
     """A master and others on a link with certificates, who know of each other's subscriptions."""
     endpoint = listenable()
     with ExitStack() as stack:
         found: dict[str, Ear] = {}
         for role in ("master", *roles):
-            place = {"listen": endpoint, **words} if role == "master" else {"connect": endpoint}
+            place = {"listen": endpoint} if role == "master" else {"connect": endpoint}
             found[role] = Ear(role, identity(folder, role), **place)
             stack.callback(found[role].link.close)
         found["master"].endpoint = endpoint  # type: ignore[attr-defined]
@@ -183,7 +183,8 @@ def master(folder: Path) -> Iterator[tuple[Ear, str, list[str]]]:
     """A master that listens, where, and what it has noticed."""
     noticed: list[str] = []
     endpoint = listenable()
-    ear = Ear("master", identity(folder, "master"), listen=endpoint, noticed=noticed.append)
+    ear = Ear("master", identity(folder, "master"), listen=endpoint)
+    ear.link.watch(noticed.append)
     yield ear, endpoint, noticed
     ear.link.close()
 
@@ -328,7 +329,8 @@ def test_a_visitor_with_a_certificate_of_no_role_is_noticed_and_gets_nothing_thr
         told.append(text)
         noticed.set()
 
-    with ears(folder, "slave", noticed=notice) as found:
+    with ears(folder, "slave") as found:
+        found["master"].link.watch(notice)
         endpoint = found["master"].endpoint  # type: ignore[attr-defined]
         with bare(endpoint, identity(folder, "visitor")) as session:
             for role in ("master", "operator", "visitor"):

@@ -40,6 +40,16 @@ class Servo(NamedTuple):
     ripple_frequency: float = 10.0  # Hz
 
 
+class Memory(NamedTuple):
+    """What the laboratory remembers, which `advance` moves on."""
+
+    state: Array
+    past: Array  # commands within the dead time
+    approximation: Array  # of a dead time that is approximated
+    specimen: Array
+    filtered: Array  # of the readings
+
+
 @jit
 def velocity(p: Servo, stiffness: float, state: Array, wanted: float, piston: float, time: float) -> float:
     """Velocity (m/s) of the piston at `piston` m under the command `wanted` m.
@@ -100,14 +110,11 @@ def advance(
     p: Servo,
     column: Specimen,
     lags: Array,
-    state: Array,
-    past: Array,
-    approximation: Array,
-    memory: Array,
-    filtered: Array,
+    memory: Memory,
     command: float,
 ) -> tuple[float, float]:
     """Displacement (m) and force (N) behind their filters one interval later, the command ramped."""
+    state, past, approximation, filtered = memory.state, memory.past, memory.approximation, memory.filtered
     start = state[COMMAND]
     back = p.delay / p.step
     displacement, force = 0.0, 0.0
@@ -124,7 +131,7 @@ def advance(
             middle = 0.5 * (early + late)
         piston = drive(p, column.stiffness, state, early, middle, late)
         deformation = clevis(p, column.stiffness, state, piston) if p.backlash > 0.0 else piston
-        state[FORCE], state[READING] = specimen.force(column, memory, deformation, p.step)
+        state[FORCE], state[READING] = specimen.force(column, memory.specimen, deformation, p.step)
         state[PISTON], state[DEFORMATION] = piston, deformation
         displacement = filters.step_filter(lags[0], filtered[0], deformation, p.step)
         force = filters.step_filter(lags[1], filtered[1], state[READING], p.step)

@@ -15,7 +15,7 @@ from common.plan.tables import Sensors as Levels
 from common.rig import ColumnCommand, ColumnMeasurement
 from validation.blind.labs import column_kernel, laying, sensors
 from validation.blind.labs.column_effects import KNOWN
-from validation.blind.labs.column_kernel import Servo
+from validation.blind.labs.column_kernel import Memory, Servo
 from validation.blind.labs.parts import delay, filters, specimen
 from validation.blind.labs.parts.specimen import Specimen
 
@@ -47,11 +47,13 @@ class ColumnLab:
         values |= {"step": interval / steps, "steps": float(steps)}
         self._servo = Servo(**{key: values[key] for key in Servo._fields if key in values})
         self._column = Specimen(**{key: values[key] for key in Specimen._fields if key in values})
-        self._state = np.zeros(column_kernel.STATE)
-        self._past = delay.ring(self._servo.delay, self._servo.step)
-        self._approximation = np.zeros(3)
-        self._memory = np.zeros(specimen.SIZE)
-        self._filtered = np.zeros((len(SIGNALS), 3))
+        self._memory = Memory(
+            np.zeros(column_kernel.STATE),
+            delay.ring(self._servo.delay, self._servo.step),
+            np.zeros(3),
+            np.zeros(specimen.SIZE),
+            np.zeros((len(SIGNALS), 3)),
+        )
         self._true: tuple[float, ...] = (0.0, 0.0)
 
     def arm(self) -> None:
@@ -67,11 +69,7 @@ class ColumnLab:
             self._servo,
             self._column,
             self._lags,
-            self._state,
-            self._past,
-            self._approximation,
             self._memory,
-            self._filtered,
             float(command[0]),
         )
 

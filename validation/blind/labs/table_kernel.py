@@ -26,6 +26,16 @@ STATE = 13
 DISPLACEMENT, ACCELERATION, STROKE_OUT, FORCE = range(4)  # places of the readings
 
 
+class Memory(NamedTuple):
+    """What the laboratory remembers, which `advance` moves on."""
+
+    state: Array
+    past: Array  # commands within the dead time
+    approximation: Array  # of a dead time that is approximated
+    work: Array  # (6, MOVING): rates, and room for the readings
+    filtered: Array  # of the readings
+
+
 class Bench(NamedTuple):
     """True parameters of table and damper; zero is none of an effect."""
 
@@ -169,11 +179,7 @@ def told(p: Bench, value: float) -> float:
 def advance(
     p: Bench,
     lags: Array,
-    state: Array,
-    past: Array,
-    approximation: Array,
-    work: Array,
-    filtered: Array,
+    memory: Memory,
     command: float,
     motor_command: float,
 ) -> tuple[float, float, float, float]:
@@ -181,6 +187,8 @@ def advance(
 
     The table's command is ramped, the motor's is held.
     """
+    state, past, approximation = memory.state, memory.past, memory.approximation
+    work, filtered = memory.work, memory.filtered
     begun, back, steps = state[COMMAND], p.delay / p.step, int(p.steps)
     push = asked(p, motor_command)
     out = work[5]

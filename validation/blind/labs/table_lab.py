@@ -17,7 +17,7 @@ from validation.blind.labs import laying, table_kernel
 from validation.blind.labs.column_lab import STEP, readings
 from validation.blind.labs.parts import delay
 from validation.blind.labs.table_effects import KNOWN
-from validation.blind.labs.table_kernel import Bench
+from validation.blind.labs.table_kernel import Bench, Memory
 
 SIGNALS = TableMeasurement._fields
 
@@ -45,11 +45,13 @@ class TableLab:
         steps = math.ceil(interval / STEP - 1e-9)
         values |= {"step": interval / steps, "steps": float(steps)}
         self._bench = Bench(**{key: values[key] for key in Bench._fields if key in values})
-        self._state = np.zeros(table_kernel.STATE)
-        self._past = delay.ring(self._bench.delay, self._bench.step)
-        self._approximation = np.zeros(3)
-        self._work = np.zeros((6, table_kernel.MOVING))
-        self._filtered = np.zeros((len(SIGNALS), 3))
+        self._memory = Memory(
+            np.zeros(table_kernel.STATE),
+            delay.ring(self._bench.delay, self._bench.step),
+            np.zeros(3),
+            np.zeros((6, table_kernel.MOVING)),
+            np.zeros((len(SIGNALS), 3)),
+        )
         self._true: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
 
     def arm(self) -> None:
@@ -64,11 +66,7 @@ class TableLab:
         self._true = table_kernel.advance(
             self._bench,
             self._lags,
-            self._state,
-            self._past,
-            self._approximation,
-            self._work,
-            self._filtered,
+            self._memory,
             float(command[0]),
             float(command[1]),
         )
