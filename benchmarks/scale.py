@@ -215,8 +215,7 @@ def free_vibration(plan: Plan) -> float:
     quiet = replace(ideal(plan), structure=still, control=control).with_ticks(FREE)
     ground = np.zeros((2, FREE + 1))
     ground[0, 1] = 1.0
-    start = substructure.STOREYS
-    x = simulate(quiet, ground).outputs[10:, start : start + n]
+    x = simulate(quiet, ground).master["displacement"].reshape(FREE, n)[10:]
     shape = np.sin((np.arange(n) + 1) * math.pi / (2 * n + 1))
     q = x @ shape
     cosine = q[1:-1] @ (q[2:] + q[:-2]) / (2.0 * q[1:-1] @ q[1:-1])

@@ -189,6 +189,15 @@ MEASURED = {
     "slave": ("table_displacement", "table_acceleration", "damper_stroke", "damper_force"),
 }
 
+# What the master computes at a tick, by name in the order of the table: of the building, for each slave, of each storey
+OF_BUILDING = tuple(
+    row.name
+    for row in MASTER
+    if row.kind is Kind.NUMBER and not row.per_slave and row.name not in (TIME.name, *MEASURED["master"])
+)
+SENT = tuple(row.name for row in MASTER if row.per_slave and row.name in {other.name for other in SLAVE})
+OF_STOREYS = tuple(row.name for row in MASTER if row.kind is Kind.STOREYS)
+
 RESPONSES = ("column_displacement", "column_force", "table_acceleration", "damper_force")
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from common.roles import SLAVE
 from diagnosis.record import Mask, Record
 from models.loop import closed_loop, substructure
 from models.loop.closed_loop import Exchange
@@ -38,7 +39,7 @@ class Loop:
             self.ground * factor, system.effects.time_shift / system.plan.test.interval
         )
         plan = system.plan.with_ticks(self.record.ticks)
-        exchange = self.exchange if linked else None
+        exchange = {SLAVE: self.exchange} if linked and self.exchange else None
         rollout = closed_loop.simulate(plan, rows, effects=system.effects, exchange=exchange, seed=seed)
         if not rollout.finite:
             return None

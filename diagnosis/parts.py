@@ -17,9 +17,8 @@ from common.plan.plan import Plan
 from diagnosis.record import Mask, Record
 from models import effects
 from models.effects.effect import Effect
+from models.labs.kinds import COLUMN, TABLE
 from models.loop import replay
-from models.loop.closed_loop import MEASURED_A, MEASURED_B
-from models.loop.substructure import STOREYS
 from models.registry import Array
 from models.system import System
 
@@ -120,7 +119,7 @@ ACTUATOR = {
         "servo.delay",
     ),
 }
-COLUMN = (("column", "stiffness"), ("column", "mass"), ("column", "damping"))
+OF_COLUMN = (("column", "stiffness"), ("column", "mass"), ("column", "damping"))
 
 
 class LaboratoryA:
@@ -128,7 +127,7 @@ class LaboratoryA:
 
     name = "laboratory A"
     exact = False
-    signals: tuple[str, ...] = MEASURED_A
+    signals: tuple[str, ...] = COLUMN.measured
 
     devices: ClassVar[dict[str, str]] = {"actuator_command": "actuator"}
     units: ClassVar[dict[str, str]] = {"actuator_command": "m"}
@@ -137,12 +136,12 @@ class LaboratoryA:
         self.inputs = {"actuator_command": record.signals["actuator_command"]}
         first, most = self.inputs["actuator_command"][0], np.max(np.abs(self.inputs["actuator_command"]))
         self._start = float(first) if abs(first) > UNREST * most else 0.0
-        self.measured, self.present = outputs(record, MEASURED_A)
+        self.measured, self.present = outputs(record, COLUMN.measured)
         self.nuisances = nuisances(
             record,
-            tuple(("actuator", name) for name in ACTUATOR[record.plan.actuator.model]) + COLUMN,
+            tuple(("actuator", name) for name in ACTUATOR[record.plan.actuator.model]) + OF_COLUMN,
         )
-        sites = ["actuator", *(f"sensor.{name}" for name in MEASURED_A if record.has(name))]
+        sites = ["actuator", *(f"sensor.{name}" for name in COLUMN.measured if record.has(name))]
         with_column = (*sites, "column") if record.has("column_force") else tuple(sites)
         self.candidates = of_sites(with_column, record.plan)
 
@@ -170,7 +169,7 @@ class ColumnAlone:
     def __init__(self, record: Record, deformation: Array) -> None:
         self.inputs = deformation
         self.measured, self.present = outputs(record, self.signals)
-        self.nuisances = nuisances(record, COLUMN)
+        self.nuisances = nuisances(record, OF_COLUMN)
         self.candidates = of_sites(("column", "sensor.column_force"), record.plan)
 
     def predict(self, system: System) -> Array:
@@ -188,18 +187,18 @@ class LaboratoryB:
 
     name = "laboratory B"
     exact = False
-    signals: tuple[str, ...] = MEASURED_B
+    signals: tuple[str, ...] = TABLE.measured
     devices: ClassVar[dict[str, str]] = {"table_command": "table", "damper_command": "damper's motor"}
     units: ClassVar[dict[str, str]] = {"table_command": "m", "damper_command": "N"}
 
     def __init__(self, record: Record) -> None:
         none = np.zeros(record.ticks)
         self.inputs = {name: record.signals.get(name, none) for name in self.devices}
-        self.measured, self.present = outputs(record, MEASURED_B)
+        self.measured, self.present = outputs(record, TABLE.measured)
         driven = record.has("table_command") and float(np.ptp(self.inputs["table_command"])) > 0.0
-        self.nuisances = nuisances(record, (*TABLE, *DAMPER) if driven else DAMPER)
+        self.nuisances = nuisances(record, (*OF_TABLE, *OF_DAMPER) if driven else OF_DAMPER)
         moving = [
-            name for name, values in zip(MEASURED_B, self.measured.T, strict=True) if np.ptp(values) > 0.0
+            name for name, values in zip(TABLE.measured, self.measured.T, strict=True) if np.ptp(values) > 0.0
         ]
         sites = [f"sensor.{name}" for name in moving if record.has(name)] + (["table"] if driven else [])
         self.anew = self.beginnings(record)
@@ -244,12 +243,12 @@ class LaboratoryB:
         return with_fields(self, fields)
 
 
-TABLE = (
+OF_TABLE = (
     ("table", "frequency"),
     ("table", "damping_ratio"),
     ("table", "delay"),
 )
-DAMPER = (
+OF_DAMPER = (
     ("damper", "mass"),
     ("damper", "stiffness"),
     ("damper", "damping"),
@@ -288,7 +287,7 @@ class Building:
     def predict(self, system: System) -> Array:
         """Displacement, velocity and acceleration of every storey."""
         rows = replay.building(system, self._ground, *self._inputs)
-        return rows[:, STOREYS : STOREYS + self.measured.shape[1]]
+        return np.column_stack([rows[name] for name in type(self).signals])
 
     def first(self, ticks: int) -> Building:
         """The whole of it, because it is computed and cheap."""

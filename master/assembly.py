@@ -20,10 +20,10 @@ from master.rig import ColumnLab
 from master.step import MasterStep
 from models.compiled import plain
 from models.labs import column_lab, noise, readings
+from models.labs.kinds import COLUMN
 from models.link.links import link_model
 from models.loop import preflight as nominal
 from models.loop import substructure
-from models.loop.closed_loop import build_a
 from models.loop.realised import true_system
 from models.registry import Array
 from models.system import System
@@ -61,7 +61,7 @@ def build_rig(reality: Reality, at_rest: AtRest | None = None) -> GuardedRig:
 def check(reality: Reality) -> None:
     """Raise InputError where the laboratory could not be built; nothing of it is constructed or moved."""
     master_step(reality)
-    build_a(true_system(reality))
+    COLUMN.build(true_system(reality))
     if reality.master.class_:
         find(reality.master.class_, reality.base, "[master.rig]")
 
@@ -105,5 +105,5 @@ def warm_up(reality: Reality) -> None:
     """Compile the kernels on arrays that are thrown away."""
     outputs = master_step(reality)(0, 0.0, 0.0, [0.0] * len(reality.plan.roles))
     MasterLimits(reality.plan).violation(ColumnMeasurement(0.0, 0.0), outputs)
-    column_lab.enter(plain(build_a(true_system(reality))), 0.0)
+    column_lab.enter(plain(COLUMN.build(true_system(reality))), 0.0)
     readings.step(readings.build(reality.plan.test.interval, ("any",), {}), 0, 0.0, 0.0, 0.0)

@@ -11,7 +11,7 @@ from common.plan.tables import Actuator, Column, Sensors
 from common.rig import ColumnCommand, ColumnMeasurement
 from models.compiled import plain
 from models.labs import column_lab, noise, readings
-from models.loop.closed_loop import MEASURED_A
+from models.labs.kinds import COLUMN
 from models.system import Effects
 
 
@@ -28,7 +28,7 @@ class ColumnLab:
         effects: Effects | None = None,
     ) -> None:
         more = effects or Effects()
-        levels = noise.levels_a(schema.fill(Sensors, sensors or {}, "sensors"))
+        levels = noise.levels(schema.fill(Sensors, sensors or {}, "sensors"), COLUMN.measured)
         lab = column_lab.build(
             interval,
             schema.fill(Actuator, actuator or {}, "actuator"),
@@ -37,8 +37,8 @@ class ColumnLab:
             more.column,
         )
         self._lab = plain(lab)
-        self._readings = readings.build(interval, MEASURED_A, more.sensors)
-        self._noise = noise.Noise(seed, readings.levels(MEASURED_A, levels, more.sensors))
+        self._readings = readings.build(interval, COLUMN.measured, more.sensors)
+        self._noise = noise.Noise(seed, readings.levels(COLUMN.measured, levels, more.sensors))
         self._plain = not more.sensors  # a reading is value plus noise
         self._interval, self._tick = interval, 0
         self._true = (0.0, 0.0)

@@ -36,7 +36,13 @@ class Outputs(NamedTuple):
 
     def sent(self) -> list[Sent]:
         """The command for each slave in its message's order: the target, the motor's force, the target's rates."""
-        values: Any = self[3:8]
+        values: Any = (
+            self.table_target,
+            self.damper_command,
+            self.table_target_velocity,
+            self.table_target_acceleration,
+            self.table_target_jerk,
+        )
         return [values] if type(self.table_target) is float else list(zip(*values, strict=True))
 
 
@@ -48,7 +54,7 @@ class MasterStep:
         self._building, self._output = plain(building), building.output
         self._forces = building.dampers[substructure.FORCE_USED]
         self._plain = plan.storeys == len(plan.roles) == 1
-        self._slaves, self._storeys = len(plan.roles), plan.storeys
+        self._places = list(substructure.layout(len(plan.roles), plan.storeys).values())
         self._advance = substructure.enter
 
     def __call__(
@@ -63,13 +69,5 @@ class MasterStep:
 
     def _grouped(self, row: list[float]) -> Outputs:
         """The values of a row by name, those of several slaves or storeys together."""
-        slaves, n = self._slaves, self._storeys
-        first, sent = substructure.TABLE_TARGET, substructure.SENT
-        storeys = first + sent * slaves
-        each = [row[first + place : storeys : sent] for place in range(sent)]
-        own = [row[start : start + n] for start in range(storeys, len(row), n)]
-        return Outputs(
-            *row[:first],
-            *(values if slaves > 1 else values[0] for values in each),
-            *(values if n > 1 else values[0] for values in own),
-        )
+        groups = (row[place] for place in self._places)
+        return Outputs(*(values if len(values) > 1 else values[0] for values in groups))  # type: ignore[arg-type]

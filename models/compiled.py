@@ -23,6 +23,11 @@ Function = TypeVar("Function", bound=Callable[..., object])
 
 UNCOUNTED: dict[str, Any] = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
 
+MERGED: Any = {
+    "error_model": "numpy",
+    "forceinline": True,
+} | UNCOUNTED  # into the kernel that calls
+
 numba.config.CACHE_DIR = str(folder())  # type: ignore[attr-defined]
 
 
@@ -32,7 +37,7 @@ def jit(function: Function) -> Function:
     Divisions by zero give inf or nan as in NumPy, the interpreter's lock is released, and a kernel is
     merged into the one that calls it: views of arrays passed between them would cost more than the work.
     """
-    compiled = numba.njit(cache=True, error_model="numpy", nogil=True, forceinline=True, **UNCOUNTED)
+    compiled = numba.njit(cache=True, nogil=True, **MERGED)
     return cast(Function, compiled(function))
 
 

@@ -11,7 +11,7 @@ from common.plan.plan import Plan
 from models import cache, compensators, energy_balance
 from models.compiled import plain
 from models.labs import column_lab, readings, table_lab
-from models.loop import column_loop, replay, substructure
+from models.loop import replay, substructure
 from models.loop.closed_loop import simulate
 from models.structures.response import response
 from models.system import System
@@ -23,7 +23,7 @@ def compile_all() -> None:
     ground = np.zeros((2, plan.ticks + 1))
     simulate(plan, ground)
     alone = replace(plan, control=replace(plan.control, amd=False))
-    column_loop.simulate(alone, ground)
+    simulate(alone, ground, slaves={})
     response(alone, ground)
     still = np.zeros(plan.ticks)
     replay.laboratory_a(System(plan), still)

@@ -36,21 +36,17 @@ def columns(name: str, tell: Tell = untold) -> Source:
         InputError: it can be neither read nor simulated.
     """
     if name in cli.SHIPPED or name.endswith(".toml"):
-        return simulated(cli.plan_path(name), tell)
+        return simulated(cli.plan_path(name))
     tell(f"reading {name}", 0, 0)
     return recorded(read(Path(name)))
 
 
-def simulated(path: Path, tell: Tell = untold) -> Source:
+def simulated(path: Path) -> Source:
     """The simulation of a plan."""
     from models.loop import substructure
     from models.loop.closed_loop import signals, simulate
 
     test = plan.load(path)
-    if test.slaves:
-        from simulation.virtual import simulated as played
-
-        return recorded(played(test, tell=tell)[0])
     record = substructure.motion(test)
     values = signals(test, simulate(test, substructure.ground_rows(test, record)))
     ticks = (values["t"] / test.test.interval).round().astype(int)

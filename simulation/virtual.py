@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,9 +12,7 @@ from common.lab.preflight import Gate
 from common.link.endpoint import Endpoint
 from common.link.memory_link import MemoryHub
 from common.plan.plan import Plan
-from common.plan.reality import Reality, as_planned
-from common.plan.tables import Rig, Sensors
-from common.recording.reader import Run, read
+from common.plan.reality import Reality
 from common.roles import MASTER, RECORDER
 from common.terminal.telling import Tell, untold
 from master.assembly import build_loop as build_master
@@ -157,20 +153,3 @@ def _listening(bench: Bench, tell: Tell) -> dict[str, str]:
     for role, loop in bench.loops.items():
         loop.lab.report = listen(role, loop.lab.report)
     return codes
-
-
-def simulated(
-    plan: Plan, output: Path | None = None, *, noise: bool = False, tell: Tell = untold
-) -> tuple[Run, RthsError | None]:
-    """The nominal models of a plan with several slaves, played as a test: its recording, and what ended it early.
-
-    The loops stand in for the compiled rollout, which knows one slave. Without `noise` sensors are free of
-    it; a rig that the plan names has no part in a simulation.
-    """
-    sensors = plan.sensors if noise else Sensors(**dict.fromkeys(vars(plan.sensors), 0.0))
-    nominal = replace(as_planned(plan), plan=replace(plan, sensors=sensors), master=Rig())
-    nominal = replace(nominal, slaves=dict.fromkeys(nominal.slaves, Rig()))
-    with tempfile.TemporaryDirectory() as folder:
-        path = output or Path(folder) / "simulation.mcap"
-        error = run(assemble(plan, nominal, path), str, tell)
-        return read(path), error

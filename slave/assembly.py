@@ -16,8 +16,8 @@ from common.rig import METHODS, AtRest, GuardedRig, TableMeasurement
 from common.roles import name_of, title
 from models.compiled import plain
 from models.labs import noise, readings, table_lab
+from models.labs.kinds import TABLE
 from models.link.links import link_model
-from models.loop.closed_loop import build_b
 from models.loop.realised import true_system
 from slave.loop import NO_COMMAND, SlaveLoop
 from slave.rig import TableLab
@@ -57,7 +57,7 @@ def build_rig(reality: Reality, at_rest: AtRest | None = None) -> GuardedRig:
 
 def check(reality: Reality) -> None:
     """Raise InputError where a slave's laboratory could not be built; nothing of it is constructed or moved."""
-    build_b(true_system(reality))
+    TABLE.build(true_system(reality))
     SlaveStep(reality.plan)
     if reality.slave.class_:
         find(reality.slave.class_, reality.base, f"[{reality.role}.rig]")
@@ -83,6 +83,6 @@ def build_loop(
 
 def warm_up(reality: Reality) -> None:
     """Compile the kernels on arrays that are thrown away."""
-    table_lab.enter(plain(build_b(true_system(reality))), 0.0, 0.0)
+    table_lab.enter(plain(TABLE.build(true_system(reality))), 0.0, 0.0)
     readings.step(readings.build(reality.plan.test.interval, ("any",), {}), 0, 0.0, 0.0, 0.0)
     SlaveStep(reality.plan)(NO_COMMAND, TableMeasurement(0.0, 0.0, 0.0, 0.0))

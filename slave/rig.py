@@ -11,7 +11,7 @@ from common.plan.tables import Damper, Sensors, Table
 from common.rig import TableCommand, TableMeasurement
 from models.compiled import plain
 from models.labs import noise, readings, table_lab
-from models.loop.closed_loop import MEASURED_B
+from models.labs.kinds import TABLE
 from models.system import Effects
 
 
@@ -28,7 +28,7 @@ class TableLab:
         effects: Effects | None = None,
     ) -> None:
         more = effects or Effects()
-        levels = noise.levels_b(schema.fill(Sensors, sensors or {}, "sensors"))
+        levels = noise.levels(schema.fill(Sensors, sensors or {}, "sensors"), TABLE.measured)
         lab = table_lab.build(
             interval,
             schema.fill(Table, table or {}, "table"),
@@ -37,8 +37,8 @@ class TableLab:
             more.damper,
         )
         self._lab = plain(lab)
-        self._readings = readings.build(interval, MEASURED_B, more.sensors)
-        self._noise = noise.Noise(seed, readings.levels(MEASURED_B, levels, more.sensors))
+        self._readings = readings.build(interval, TABLE.measured, more.sensors)
+        self._noise = noise.Noise(seed, readings.levels(TABLE.measured, levels, more.sensors))
         self._plain = not more.sensors  # a reading is value plus noise
         self._interval, self._tick = interval, 0
         self._true = (0.0, 0.0, 0.0, 0.0)

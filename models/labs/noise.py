@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from common.plan.tables import Sensors
@@ -16,16 +18,9 @@ def lab_seed(seed: int, lab: int) -> int:
     return int(np.random.SeedSequence([seed, lab]).generate_state(1)[0])
 
 
-def levels_a(sensors: Sensors) -> Array:
-    """Rms noise of laboratory A's readings: displacement m, force N."""
-    return np.array([sensors.column_displacement, sensors.column_force])
-
-
-def levels_b(sensors: Sensors) -> Array:
-    """Rms noise of laboratory B's readings: displacement m, acceleration m/s², stroke m, force N."""
-    return np.array(
-        [sensors.table_displacement, sensors.table_acceleration, sensors.damper_stroke, sensors.damper_force]
-    )
+def levels(sensors: Sensors, names: Sequence[str]) -> Array:
+    """Rms noise that the plan gives the named readings, each in its signal's unit."""
+    return np.array([getattr(sensors, name) for name in names])
 
 
 class Noise:

@@ -1,30 +1,34 @@
-"""The whole test as one compiled rollout: building, both laboratories, the exchange between them.
+"""The whole test as one compiled rollout: the building, the master's laboratory, and any number of slaves'.
 
 It is the simulation that a recording is compared with, and the reference for the real loops.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba.core import types
+from numba.extending import overload
 from numpy.typing import NDArray
 
 from common import signals as table
+from common.errors import InputError
 from common.plan.plan import Plan
+from common.roles import MASTER, name_of
 from models import compensators
 from models.compensators import Built as Compensator
 from models.compensators import Wanted
-from models.compiled import jit
-from models.labs import column_lab, noise, readings, table_lab
-from models.labs.readings import Readings
-from models.loop import substructure
+from models.compiled import MERGED, jit
+from models.labs import kinds, noise
+from models.labs.kinds import COLUMN, TABLE, Kind
+from models.loop import site, substructure
+from models.loop.site import Site
 from models.loop.substructure import (
     ACTUATOR_COMMAND,
-    COLUMN_TARGET,
     DAMPER_COMMAND,
-    STOREYS,
+    OF_SLAVES,
     TABLE_ACCELERATION,
     TABLE_JERK,
     TABLE_TARGET,
@@ -36,30 +40,8 @@ from models.system import Effects, System
 
 Index = NDArray[np.int64]
 
-MEASURED_A = ("column_displacement", "column_force")
-MEASURED_B = ("table_displacement", "table_acceleration", "damper_stroke", "damper_force")
-
-
-class Rows(NamedTuple):
-    """What a rollout fills: one row per tick."""
-
-    outputs: Array  # (ticks, 8 + 5·storeys): the master's, in the order of `substructure`
-    measured_a: Array  # (ticks, 2)
-    measured_b: Array  # (ticks, 4)
-    damper_force_used: Array  # (ticks,)
-    table_command: Array  # (ticks,)
-
-
-class Rollout(NamedTuple):
-    """What a rollout gives: one row per tick."""
-
-    outputs: Array  # (ticks, 8 + 5·storeys): the master's, in the order of `substructure`
-    measured_a: Array  # (ticks, 2)
-    measured_b: Array  # (ticks, 4)
-    damper_force_used: Array  # (ticks,)
-    table_command: Array  # (ticks,)
-    finite: bool  # False where the loop diverged; the rows from there on are zero
-    ticks: int  # rows filled
+LARGEST = float(np.finfo(np.float64).max)  # m: every command that is a finite number is below
+DISPLACEMENT, FORCE = map(COLUMN.measured.index, (COLUMN.follows, COLUMN.force))  # of the master's laboratory
 
 
 class Exchange(NamedTuple):
@@ -69,16 +51,47 @@ class Exchange(NamedTuple):
     feedback: Index  # (ticks,): feedback used at the master's tick, −1 for none yet
 
 
+class Rollout(NamedTuple):
+    """What a rollout gives: signals by name, one row per tick, up to where the loop diverged."""
+
+    master: dict[
+        str, Array
+    ]  # (ticks,), of several storeys (ticks, storeys), of several slaves (ticks, slaves)
+    slaves: dict[str, dict[str, Array]]  # by role, (ticks,) each: the table's command and what is measured
+    exchange: dict[str, Exchange]  # by role of the slave
+    finite: bool  # False where the loop diverged
+    ticks: int  # rows of every signal
+
+
+class Slave(NamedTuple):
+    """A slave's laboratory, which follows the target that it is sent."""
+
+    site: Site
+    compensator: Compensator
+    follows: int  # channel that its compensator compares with the target
+    force: int  # channel of the force that goes back to the building
+    written: Array  # (ticks,) commands of its transfer system, m
+    present: Array  # (1,) target of the present tick, m
+
+
+class Traffic(NamedTuple):
+    """What passes between the building and its slaves."""
+
+    outputs: Array  # (ticks, width): the building's rows, from which the slaves' commands are read
+    nothing: Array  # (width,) zeros: what a slave follows before its first command
+    forces: Array  # (ticks, slaves) as measured, N
+    used: Array  # (ticks, slaves) as the building used them, N
+    command: Index  # (slaves, ticks), as in `Exchange`
+    feedback: Index  # (slaves, ticks)
+
+
 class Loop(NamedTuple):
-    """Everything that moves in a closed loop, at rest, and the messages that its ticks use."""
+    """Everything that moves in a closed loop, at rest."""
 
     building: Substructure
-    lab_a: column_lab.ColumnLab
-    lab_b: table_lab.TableLab
-    compensator_b: Compensator
-    sensors_a: Readings
-    sensors_b: Readings
-    exchange: Exchange
+    own: Site  # the master's laboratory
+    slaves: tuple[Slave, ...]  # of any kinds
+    traffic: Traffic
 
 
 def on_time(ticks: int) -> Exchange:
@@ -91,163 +104,242 @@ def simulate(
     ground: Array,
     *,
     effects: Effects | None = None,
+    slaves: Mapping[str, System] | None = None,
     seed: int | None = None,
-    exchange: Exchange | None = None,
+    noise: Mapping[str, Array] | None = None,
+    exchange: Mapping[str, Exchange] | None = None,
+    farthest: float = LARGEST,
 ) -> Rollout:
-    """Closed loop of a plan with one slave: its models over the whole test, with effects laid over them where given.
+    """Closed loop of a plan: its models over the whole test, with effects laid over them where given.
 
-    `ground` as `substructure.ground_rows` gives it. Without a `seed` the sensors are free of noise; with
-    one they read what the emulated laboratories read under that seed of the plan. Of the link's effects
-    only the `exchange` counts: which message was used at which tick.
+    `ground` as `substructure.ground_rows` gives it. Every slave is what `plan` and `effects` say, or its entry in
+    `slaves`, systems by role; with no entry at all, `{}`, building and master's laboratory move alone, which takes a
+    building without dampers. With a `seed` the sensors read what the emulated laboratories read under that seed of the
+    plan; `noise` are rows (ticks, channels) that err in the readings of single roles; else they are free of noise. Of
+    the link's effects only the `exchange` of each role counts, in time where it is not given. A command of the
+    actuator that is not finite or beyond `farthest` (m) ends the loop.
+
+    Raises:
+        InputError: a building with dampers is to move alone, noise is given twice or has another shape, or a model,
+            method or parameter is unknown to the registries.
     """
-    ticks, system = plan.ticks, System(plan, effects or Effects())
-    loop = at_rest(system, ground, exchange or on_time(ticks))
-    width = loop.building.output.size
-    rows = Rows(
-        np.zeros((ticks, width)),
-        np.zeros((ticks, len(MEASURED_A))),
-        np.zeros((ticks, len(MEASURED_B))),
-        np.zeros(ticks),
-        np.zeros(ticks),
-    )
-    filled = roll(loop, *noises(system, seed), np.zeros(width), rows)
-    return Rollout(*rows, filled == ticks, filled)
-
-
-def at_rest(system: System, ground: Array, exchange: Exchange) -> Loop:
-    """The closed loop of a system with one slave before its first tick."""
-    plan, effects = system.plan, system.effects
-    interval, follow = plan.test.interval, plan.table.compensator
-    return Loop(
-        substructure.build(plan, ground, effects.p_delta),
-        build_a(system),
-        build_b(system),
-        compensators.build(follow.kind, follow.parameters, interval, plan.follows_in),
-        readings.build(interval, MEASURED_A, effects.sensors),
-        readings.build(interval, MEASURED_B, effects.sensors),
-        exchange,
+    of_master = System(plan, effects or Effects())
+    systems = {role: System(plan.of(role), of_master.effects) for role in plan.roles}
+    systems = systems if slaves is None else dict(slaves)
+    if not systems and (plan.control.amd or plan.slaves):
+        raise InputError("The loop of laboratory A alone knows no damper: set amd in [control] to false.")
+    ticks, given = plan.ticks, exchange or {}
+    used = {role: given.get(role) or on_time(ticks) for role in systems}
+    drawn = errors({MASTER: of_master} | systems, seed, noise or {})
+    loop = at_rest(of_master, systems, ground, used, drawn)
+    filled = roll(loop, farthest)
+    return Rollout(
+        master_signals(plan, loop, filled),
+        {role: slave_signals(slave, filled) for role, slave in zip(systems, loop.slaves, strict=True)},
+        used,
+        filled == ticks,
+        filled,
     )
 
 
-def build_a(system: System) -> column_lab.ColumnLab:
-    """Laboratory A of a system, at rest."""
-    plan, effects = system.plan, system.effects
-    return column_lab.build(plan.test.interval, plan.actuator, plan.column, effects.actuator, effects.column)
+def at_rest(
+    master: System,
+    slaves: Mapping[str, System],
+    ground: Array,
+    exchange: Mapping[str, Exchange],
+    errors: Mapping[str, Array],
+) -> Loop:
+    """The closed loop before its first tick; `slaves`, `exchange` and `errors` of the readings by role."""
+    plan, count = master.plan, len(slaves)
+    ticks = plan.ticks
+    building = substructure.build(plan, ground, master.effects.p_delta, slaves=count > 0)
+    traffic = Traffic(
+        np.zeros((ticks, building.output.size)),
+        np.zeros(building.output.size),
+        np.zeros((ticks, count)),
+        np.zeros((ticks, count)),
+        np.array([exchange[role].command for role in slaves], dtype=np.int64).reshape(count, ticks),
+        np.array([exchange[role].feedback for role in slaves], dtype=np.int64).reshape(count, ticks),
+    )
+    followers = tuple(follower(TABLE, system, errors[role]) for role, system in slaves.items())
+    return Loop(building, site.build(COLUMN, master, errors[MASTER]), followers, traffic)
 
 
-def build_b(system: System) -> table_lab.TableLab:
-    """Laboratory B of a system, at rest."""
-    plan, effects = system.plan, system.effects
-    return table_lab.build(plan.test.interval, plan.table, plan.damper, effects.table, effects.damper)
+def follower(kind: Kind, system: System, errors: Array) -> Slave:
+    """A slave's laboratory at rest."""
+    plan, ticks = system.plan, errors.shape[0]
+    chosen = plan.table.compensator
+    return Slave(
+        site.build(kind, system, errors),
+        compensators.build(chosen.kind, chosen.parameters, plan.test.interval, plan.follows_in),
+        kind.measured.index(kind.follows),
+        kind.measured.index(kind.force),
+        np.zeros(ticks),
+        np.zeros(1),
+    )
 
 
-def noises(system: System, seed: int | None) -> tuple[Array, Array]:
-    """Noise of both laboratories' readings, (ticks, 2) and (ticks, 4); zero without a seed."""
-    ticks, sensors, more = system.plan.ticks, system.plan.sensors, system.effects.sensors
-    if seed is None:
-        return noise_a(system, seed), np.zeros((ticks, len(MEASURED_B)))
-    b = readings.levels(MEASURED_B, noise.levels_b(sensors), more)
-    return noise_a(system, seed), noise.Noise(noise.lab_seed(seed, noise.LAB_B), b).rows(ticks)
+def errors(systems: Mapping[str, System], seed: int | None, given: Mapping[str, Array]) -> dict[str, Array]:
+    """What errs in the readings of master and slaves, (ticks, channels) by role, the slaves in their order.
 
-
-def noise_a(system: System, seed: int | None) -> Array:
-    """Noise of laboratory A's readings, (ticks, 2); zero without a seed."""
-    ticks, sensors, more = system.plan.ticks, system.plan.sensors, system.effects.sensors
-    if seed is None:
-        return np.zeros((ticks, len(MEASURED_A)))
-    levels = readings.levels(MEASURED_A, noise.levels_a(sensors), more)
-    return noise.Noise(noise.lab_seed(seed, noise.LAB_A), levels).rows(ticks)
+    Raises:
+        InputError: the noise is given twice, or has another shape.
+    """
+    result = {}
+    for place, (role, system) in enumerate(systems.items(), noise.LAB_A):
+        kind, ticks = COLUMN if role == MASTER else TABLE, system.plan.ticks
+        result[role] = site.errors(kind, system, ticks, None if seed is None else noise.lab_seed(seed, place))
+        if role not in given:
+            continue
+        if seed is not None:
+            raise InputError("The noise is given twice, as rows and by a seed: leave one of them out.")
+        if given[role].shape != result[role].shape:
+            raise InputError(
+                f"The noise has the shape {given[role].shape}: give one row per tick, {ticks}, "
+                f"with {', '.join(kind.measured)}."
+            )
+        result[role] = np.ascontiguousarray(given[role], dtype=np.float64)
+    return result
 
 
 @jit
-def roll(loop: Loop, noise_a: Array, noise_b: Array, nothing: Array, rows: Rows) -> int:
-    """Fill the rows tick by tick; return how many ticks stayed finite.
-
-    `noise_a` (ticks, 2) and `noise_b` (ticks, 4) are what errs in the readings; `nothing` is a row of zeros: what the
-    slave follows before its first command.
-    """
-    building = loop.building
-    displacement, force = 0.0, 0.0
-    y, y_acceleration, stroke, damper_force, present = 0.0, 0.0, 0.0, 0.0, 0.0
+def roll(loop: Loop, farthest: float) -> int:
+    """Fill the rows tick by tick; return how many ticks had a command of the actuator within `farthest` (m)."""
+    building, own, traffic = loop.building, loop.own, loop.traffic
     interval = building.scalars[substructure.INTERVAL]
-    measured_a, measured_b = rows.measured_a, rows.measured_b
-    for tick in range(rows.outputs.shape[0]):
-        t = tick * interval
-        measured_a[tick, 0] = readings.step(loop.sensors_a, 0, displacement, noise_a[tick, 0], t)
-        measured_a[tick, 1] = readings.step(loop.sensors_a, 1, force, noise_a[tick, 1], t)
-        answered = loop.exchange.feedback[tick]
-        rows.damper_force_used[tick] = measured_b[answered, 3] if answered >= 0 else 0.0
-        building.dampers[substructure.FORCE_USED, 0] = rows.damper_force_used[tick]
-        substructure.advance(building, tick, measured_a[tick, 0], measured_a[tick, 1])
-        if not np.isfinite(building.output[ACTUATOR_COMMAND]):
+    for tick in range(traffic.outputs.shape[0]):
+        site.read(own, tick, tick * interval)
+        for place in range(traffic.used.shape[1]):
+            answered = traffic.feedback[place, tick]
+            traffic.used[tick, place] = traffic.forces[answered, place] if answered >= 0 else 0.0
+            building.dampers[substructure.FORCE_USED, place] = traffic.used[tick, place]
+        substructure.advance(building, tick, own.measured[tick, DISPLACEMENT], own.measured[tick, FORCE])
+        command = building.output[ACTUATOR_COMMAND]
+        if not abs(command) <= farthest:
             return tick
         for place in range(building.output.size):
-            rows.outputs[tick, place] = building.output[place]
-        displacement, force = column_lab.advance(loop.lab_a, building.output[ACTUATOR_COMMAND])
-        measured_b[tick, 0] = readings.step(loop.sensors_b, 0, y, noise_b[tick, 0], t)
-        measured_b[tick, 1] = readings.step(loop.sensors_b, 1, y_acceleration, noise_b[tick, 1], t)
-        measured_b[tick, 2] = readings.step(loop.sensors_b, 2, stroke, noise_b[tick, 2], t)
-        measured_b[tick, 3] = readings.step(loop.sensors_b, 3, damper_force, noise_b[tick, 3], t)
-        sent = loop.exchange.command[tick]
-        row = rows.outputs[sent] if sent >= 0 else nothing
-        wanted = Wanted(
-            row[TABLE_TARGET],
-            row[TABLE_VELOCITY],
-            row[TABLE_ACCELERATION],
-            row[TABLE_JERK],
-            present,
-            measured_b[tick, 0],
-        )
-        rows.table_command[tick] = compensators.step(loop.compensator_b, wanted, interval)
-        present = row[TABLE_TARGET]
-        y, y_acceleration, stroke, damper_force = table_lab.advance(
-            loop.lab_b, rows.table_command[tick], row[DAMPER_COMMAND]
-        )
-    return rows.outputs.shape[0]
+            traffic.outputs[tick, place] = building.output[place]
+        kinds.advance(own.lab, own.truth, command, 0.0)
+        follow_all(loop.slaves, 0, traffic, tick, interval)
+    return traffic.outputs.shape[0]
+
+
+@jit
+def follow(slave: Slave, place: int, traffic: Traffic, tick: int, interval: float) -> None:
+    """One tick of a slave: its readings, its table's command, and its laboratory one interval on."""
+    read, count = slave.site.measured, traffic.used.shape[1]
+    site.read(slave.site, tick, tick * interval)
+    traffic.forces[tick, place] = read[tick, slave.force]
+    sent = traffic.command[place, tick]
+    row = traffic.outputs[sent] if sent >= 0 else traffic.nothing
+    first = OF_SLAVES + place
+    target = row[first + TABLE_TARGET * count]
+    wanted = Wanted(
+        target,
+        row[first + TABLE_VELOCITY * count],
+        row[first + TABLE_ACCELERATION * count],
+        row[first + TABLE_JERK * count],
+        slave.present[0],
+        read[tick, slave.follows],
+    )
+    slave.written[tick] = compensators.step(slave.compensator, wanted, interval)
+    slave.present[0] = target
+    kinds.advance(slave.site.lab, slave.site.truth, slave.written[tick], row[first + DAMPER_COMMAND * count])
+
+
+def follow_all(slaves: tuple[Slave, ...], place: int, traffic: Traffic, tick: int, interval: float) -> None:
+    """`follow` of every slave, the first at `place`; compiled code only."""
+    raise NotImplementedError("Only compiled kernels move slaves of any kinds on.")
+
+
+@overload(follow_all, jit_options=MERGED, strict=False)  # strict compares annotations too
+def _follow_all(slaves: types.BaseTuple, place: Any, traffic: Any, tick: Any, interval: Any) -> Any:
+    """Code for these slaves: a loop where all are of one kind, else the first and then the rest."""
+    count = len(slaves)
+    if count == 0:
+        return lambda slaves, place, traffic, tick, interval: None
+    if count > 1 and isinstance(slaves, types.UniTuple):
+
+        def alike(slaves: Any, place: Any, traffic: Any, tick: Any, interval: Any) -> None:
+            for i in range(count):
+                follow(slaves[i], place + i, traffic, tick, interval)
+
+        return alike
+
+    def different(slaves: Any, place: Any, traffic: Any, tick: Any, interval: Any) -> None:
+        follow(slaves[0], place, traffic, tick, interval)
+        follow_all(slaves[1:], place + 1, traffic, tick, interval)
+
+    return different
+
+
+def master_signals(plan: Plan, loop: Loop, ticks: int) -> dict[str, Array]:
+    """What the master computed, measured and used."""
+    slaves = len(loop.slaves)
+    computed = substructure.named(loop.traffic.outputs[:ticks], slaves, plan.storeys)
+    measured = dict(zip(COLUMN.measured, loop.own.measured[:ticks].T, strict=True))
+    used = loop.traffic.used[:ticks]
+    return computed | measured | {"damper_force_used": used[:, 0] if slaves == 1 else used}
+
+
+def slave_signals(slave: Slave, ticks: int) -> dict[str, Array]:
+    """What a slave wrote and measured."""
+    measured = dict(zip(TABLE.measured, slave.site.measured[:ticks].T, strict=True))
+    return {TABLE.drives[0]: slave.written[:ticks]} | measured
 
 
 def signals(plan: Plan, rollout: Rollout) -> dict[str, Array]:
-    """The rollout's signals by name, as a recording names them; (ticks,) or (ticks, storeys) each."""
-    n, rows = plan.storeys, slice(0, rollout.ticks)
-    result: dict[str, Array] = {
-        "t": np.arange(rollout.ticks, dtype=np.float64) * plan.test.interval,
-        "ground_acceleration": rollout.outputs[rows, substructure.GROUND_ACCELERATION],
-        "column_target": rollout.outputs[rows, COLUMN_TARGET],
-        "actuator_command": rollout.outputs[rows, ACTUATOR_COMMAND],
-        "table_target": rollout.outputs[rows, TABLE_TARGET],
-        "table_target_velocity": rollout.outputs[rows, TABLE_VELOCITY],
-        "table_target_acceleration": rollout.outputs[rows, TABLE_ACCELERATION],
-        "table_target_jerk": rollout.outputs[rows, TABLE_JERK],
-        "damper_command": rollout.outputs[rows, DAMPER_COMMAND],
-        "table_command": rollout.table_command[rows],
-        "damper_force_used": rollout.damper_force_used[rows],
-    }
-    for place, name in enumerate(substructure.STOREY_ROWS):
-        start = STOREYS + place * n
-        values = rollout.outputs[rows, start : start + n]
-        result[name] = values[:, 0] if n == 1 else values
-    for place, name in enumerate(MEASURED_A):
-        result[name] = rollout.measured_a[rows, place]
-    for place, name in enumerate(MEASURED_B):
-        result[name] = rollout.measured_b[rows, place]
+    """The rollout's signals by name, as a recording names them; (ticks,), (ticks, storeys) or (ticks, slaves) each.
+
+    Those of a named slave are called `NAME.signal`.
+    """
+    result: dict[str, Array] = {}
+    order = table.topics(list(rollout.slaves))
+    for topic, columns in topics(plan, rollout).items():
+        name = name_of(topic)
+        for key in (row.name for row in order[topic] if row.kind in (table.Kind.NUMBER, table.Kind.STOREYS)):
+            if not name:
+                result.setdefault(key, columns[key])
+            elif key != table.TIME.name:
+                result[f"{name}.{key}"] = columns[key]
+    del result["damper_force_age"]
+    return result
+
+
+def stacked(rollout: Rollout) -> dict[str, Array]:
+    """The rollout's signals by name, those of several slaves together: (ticks, slaves)."""
+    slaves = list(rollout.slaves.values())
+    if len(slaves) < 2:
+        return rollout.master | (slaves[0] if slaves else {})
+    return rollout.master | {name: np.stack([one[name] for one in slaves], axis=1) for name in slaves[0]}
+
+
+def topics(plan: Plan, rollout: Rollout) -> dict[str, dict[str, Any]]:
+    """Everything that a recording of the rollout holds, by topic and signal."""
+    seq = np.arange(rollout.ticks)
+    own: dict[str, Any] = {"seq": seq, "t": seq.astype(np.float64) * plan.test.interval}
+    used = [item.feedback[: rollout.ticks] for item in rollout.exchange.values()]
+    feedback = np.array(used, dtype=np.int64).reshape(len(used), rollout.ticks).T
+    age = np.where(feedback < 0, 0.0, (seq[:, None] - feedback) * plan.test.interval)
+    one = len(rollout.slaves) == 1
+    about = {"damper_force_seq": feedback, "damper_force_age": age}
+    about = {name: values[:, 0] if one else values for name, values in about.items()}
+    result = {MASTER: own | rollout.master | about}
+    for place, (role, columns) in enumerate(rollout.slaves.items()):
+        command = rollout.exchange[role].command[: rollout.ticks]
+        sent = {name: rollout.master[name] if one else rollout.master[name][:, place] for name in table.SENT}
+        received = {name: np.where(command < 0, 0.0, values[command]) for name, values in sent.items()}
+        result[role] = own | {"command_seq": command} | received | columns
     return result
 
 
 def rows(plan: Plan, rollout: Rollout) -> Iterator[tuple[str, tuple[Any, ...]]]:
     """The rollout's messages as a recording holds them: topic and values in the order of the signal table."""
-    columns: dict[str, Any] = signals(plan, rollout)
-    ticks = rollout.ticks
-    feedback = np.arange(ticks) - 1
-    columns |= {
-        "seq": np.arange(ticks),
-        "command_seq": np.arange(ticks),
-        "damper_force_seq": feedback,
-        "damper_force_age": np.where(feedback < 0, 0.0, plan.test.interval),
-    }
+    order = table.topics(list(rollout.slaves))
     tables = {
-        topic: list(zip(*(columns[row.name].tolist() for row in table.TOPICS[topic]), strict=True))
-        for topic in ("master", "slave")
+        topic: list(zip(*(columns[row.name].tolist() for row in order[topic]), strict=True))
+        for topic, columns in topics(plan, rollout).items()
     }
-    for tick in range(ticks):
+    for tick in range(rollout.ticks):
         for topic, values in tables.items():
             yield topic, values[tick]

@@ -14,8 +14,7 @@ import numpy as np
 from common.plan.plan import Plan
 from common.plan.tables import Sensors
 from models.indicators.growth import grows
-from models.loop import several_slaves
-from models.loop.closed_loop import signals, simulate
+from models.loop.closed_loop import simulate, stacked
 from models.registry import Array
 from models.structures import shear_building
 from models.structures.partition import matrices
@@ -26,7 +25,6 @@ PERIODS = (
 PULSE = 0.1  # of the first period
 PUSH = 1e-3  # m/s², of the pulse: so small that a specimen keeps its first stiffness
 MOST_TICKS = 200_000  # of the watched motion: 400 s at 2 ms, computed in some hundredths of a second
-MOST_SLAVE_TICKS = 30_000  # of all slaves where there are several, which are stepped one by one: about 2 s
 WATCHED = ("displacement", "column_target", "actuator_command", "table_command", "damper_stroke")
 SILENT = Sensors(*[0.0] * len(Sensors.__dataclass_fields__))
 
@@ -34,8 +32,7 @@ SILENT = Sensors(*[0.0] * len(Sensors.__dataclass_fields__))
 def unstable(plan: Plan) -> bool:
     """Whether the free motion of the nominal loop grows; raises InputError where a model or parameter cannot be."""
     period, interval = float(shear_building.modes(*matrices(plan)).periods[0]), plan.test.interval
-    most = MOST_SLAVE_TICKS // len(plan.slaves) if plan.slaves else MOST_TICKS
-    ticks = min(math.ceil(PERIODS * period / interval), most)
+    ticks = min(math.ceil(PERIODS * period / interval), MOST_TICKS)
     free = replace(plan.with_ticks(ticks), sensors=SILENT)
     pushed = max(round(PULSE * period / interval), 2)
     ground = np.zeros((2, ticks + 1))
@@ -45,11 +42,6 @@ def unstable(plan: Plan) -> bool:
 
 def moved(plan: Plan, ground: Array) -> list[Array]:
     """What moves in the loop, by tick; a single row that is not finite where the loop diverges."""
-    columns = (
-        several_slaves.simulate(plan, ground, plan.test.seed)
-        if plan.slaves
-        else signals(plan, simulate(plan, ground))
-    )
-    motions = [columns[name] for name in WATCHED]
-    whole = motions[0].shape[0] == plan.ticks
-    return motions if whole else [np.full((plan.ticks, 1), math.nan)]
+    rollout = simulate(plan, ground)
+    columns = stacked(rollout)
+    return [columns[name] for name in WATCHED] if rollout.finite else [np.full((plan.ticks, 1), math.nan)]

@@ -13,13 +13,12 @@ from common.plan import patience
 from common.plan.plan import Plan
 from common.plan.tables import Limits
 from models.compensators import COMPENSATORS
-from models.loop import free_motion, limited, several_slaves, substructure
-from models.loop.closed_loop import signals, simulate
+from models.loop import free_motion, limited, substructure
+from models.loop.closed_loop import simulate, stacked
 from models.registry import Array
 from models.structures.partition import Partition, assess
 
 MOST_TICKS = 1_000_000  # of the simulation, which is kept in memory
-MOST_SLAVE_TICKS = 60_000  # of all slaves where there are several, which are stepped one by one: about 4 s
 AMPLITUDE_ERROR = (
     0.2  # of the compensated actuator's amplitude: a stiffness wrong by a fifth is another specimen
 )
@@ -172,8 +171,7 @@ def simulated_peaks(plan: Plan, *, known_unstable: bool = False) -> tuple[Peaks 
 
     Of a loop that is `known_unstable`, which another check refuses, only peaks beyond their share are refused.
     """
-    most = MOST_SLAVE_TICKS // len(plan.slaves) if plan.slaves else MOST_TICKS
-    short = plan.with_ticks(min(plan.ticks, most))
+    short = plan.with_ticks(min(plan.ticks, MOST_TICKS // len(plan.roles)))
     columns, finite = simulated(short)
     if not columns["actuator_command"].size:
         risk = Risk("peaks", "the simulated test has no finite command at all, so look at [structure]")
@@ -194,11 +192,8 @@ def simulated_peaks(plan: Plan, *, known_unstable: bool = False) -> tuple[Peaks 
 def simulated(plan: Plan) -> tuple[dict[str, Array], bool]:
     """Signals of the nominal test with its sensors' noise, and whether they are finite to its end."""
     ground = substructure.ground_rows(plan, substructure.motion(plan))
-    if plan.slaves:
-        columns = several_slaves.simulate(plan, ground, plan.test.seed)
-        return columns, columns["actuator_command"].size == plan.ticks
     rollout = simulate(plan, ground, seed=plan.test.seed)
-    return signals(plan, rollout), rollout.finite
+    return stacked(rollout), rollout.finite
 
 
 def peaks(plan: Plan, columns: dict[str, Array]) -> Peaks:

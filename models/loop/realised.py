@@ -31,3 +31,8 @@ def true_system(reality: Reality) -> System:
         if alone and site != "link" and lab != SLAVE:
             raise InputError(f"The effect '{name}' does not belong to one slave: leave out its slave.")
     return lay(System(reality.plan), reality.effects)
+
+
+def true_slaves(reality: Reality) -> dict[str, System]:
+    """The laboratories of all slaves as they really are, by role; raises InputError as `true_system` does."""
+    return {role: true_system(reality.of(role)) for role in reality.plan.roles}

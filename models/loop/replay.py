@@ -11,15 +11,16 @@ import numpy as np
 
 from models.compiled import jit
 from models.labs import column_lab, readings, specimen, table_lab
-from models.labs.column_lab import ColumnLab
+from models.labs.kinds import COLUMN, TABLE, Kind
 from models.labs.readings import Readings
 from models.labs.specimen import Specimen
-from models.labs.table_lab import TableLab
-from models.loop import substructure
-from models.loop.closed_loop import MEASURED_A, MEASURED_B, build_a, build_b
+from models.loop import site, substructure
+from models.loop.site import Site
 from models.loop.substructure import Substructure
 from models.registry import Array
 from models.system import System
+
+STROKE = TABLE.measured.index("damper_stroke")  # channel
 
 
 def laboratory_a(system: System, command: Array, start: float = 0.0) -> Array:
@@ -27,14 +28,12 @@ def laboratory_a(system: System, command: Array, start: float = 0.0) -> Array:
 
     From rest at a command of `start` m that has been there for long.
     """
-    result = np.empty((command.size, len(MEASURED_A)))
-    interval = system.plan.test.interval
-    sensors = readings.build(interval, MEASURED_A, system.effects.sensors)
-    lab = build_a(system)
+    interval, played = system.plan.test.interval, silent(COLUMN, system, command.size)
     if start != 0.0:
-        column_lab.begin(lab, start, interval)
-    play_a(lab, sensors, command, interval, result)
-    return result
+        column_lab.begin(played.lab, start, interval)
+        played.truth[:] = played.lab.state[[column_lab.DISPLACEMENT, column_lab.FORCE]]
+    site.play(played, np.stack([command, np.zeros_like(command)], axis=1), interval, 0, command.size)
+    return played.measured
 
 
 def laboratory_b(system: System, command: Array, motor: Array, anew: Array | None = None) -> Array:
@@ -42,12 +41,22 @@ def laboratory_b(system: System, command: Array, motor: Array, anew: Array | Non
 
     `anew` (m, 3) are ticks, ascending, at which the damper begins anew with a stroke (m) and its rate (m/s).
     """
-    result = np.empty((command.size, len(MEASURED_B)))
-    interval = system.plan.test.interval
-    sensors = readings.build(interval, MEASURED_B, system.effects.sensors)
+    interval, played = system.plan.test.interval, silent(TABLE, system, command.size)
+    drive, state = np.stack([command, motor], axis=1), played.lab.state
     begun = np.zeros((0, 3)) if anew is None else anew
-    play_b(build_b(system), sensors, command, motor, begun, interval, result)
-    return result
+    begun = begun[begun[:, 0] < command.size]
+    borders = [0, *begun[:, 0].astype(int).tolist(), command.size]
+    site.play(played, drive, interval, 0, borders[1])
+    for place, (_, stroke, rate) in enumerate(begun.tolist(), 1):
+        state[table_lab.STROKE], state[table_lab.STROKE_RATE] = stroke, rate
+        played.truth[STROKE] = stroke
+        site.play(played, drive, interval, borders[place], borders[place + 1])
+    return played.measured
+
+
+def silent(kind: Kind, system: System, ticks: int) -> Site:
+    """A laboratory at rest whose sensors are free of noise."""
+    return site.build(kind, system, site.errors(kind, system, ticks))
 
 
 def column(system: System, deformation: Array) -> Array:
@@ -65,50 +74,18 @@ def column(system: System, deformation: Array) -> Array:
     return result
 
 
-def building(system: System, ground: Array, displacement: Array, force: Array, damper: Array) -> Array:
-    """Rows of `substructure` (ticks, 8 + 5·storeys) of a plan with one slave, for the measurements (ticks,) used."""
+def building(
+    system: System, ground: Array, displacement: Array, force: Array, dampers: Array
+) -> dict[str, Array]:
+    """What the building computes, by signal, for the measurements (ticks,) used.
+
+    `dampers` are the dampers' forces (N) used, (ticks,), or (ticks, slaves) where there are several.
+    """
     arrays = substructure.build(system.plan, ground, system.effects.p_delta)
     result = np.zeros((force.size, arrays.output.size))
-    play_building(arrays, displacement, force, damper, result)
-    return result
-
-
-@jit
-def play_a(lab: ColumnLab, sensors: Readings, command: Array, interval: float, result: Array) -> None:
-    """Fill `result` (ticks, 2) from the commands."""
-    displacement, force = lab.state[column_lab.DISPLACEMENT], lab.state[column_lab.FORCE]
-    for tick in range(command.size):
-        t = tick * interval
-        result[tick, 0] = readings.step(sensors, 0, displacement, 0.0, t)
-        result[tick, 1] = readings.step(sensors, 1, force, 0.0, t)
-        displacement, force = column_lab.advance(lab, command[tick])
-
-
-@jit
-def play_b(
-    lab: TableLab,
-    sensors: Readings,
-    command: Array,
-    motor: Array,
-    anew: Array,
-    interval: float,
-    result: Array,
-) -> None:
-    """Fill `result` (ticks, 4) from the commands."""
-    y, acceleration, stroke, force = 0.0, 0.0, 0.0, 0.0
-    next_one = 0
-    for tick in range(command.size):
-        t = tick * interval
-        if next_one < anew.shape[0] and tick == int(anew[next_one, 0]):
-            stroke = anew[next_one, 1]
-            lab.state[table_lab.STROKE] = stroke
-            lab.state[table_lab.STROKE_RATE] = anew[next_one, 2]
-            next_one += 1
-        result[tick, 0] = readings.step(sensors, 0, y, 0.0, t)
-        result[tick, 1] = readings.step(sensors, 1, acceleration, 0.0, t)
-        result[tick, 2] = readings.step(sensors, 2, stroke, 0.0, t)
-        result[tick, 3] = readings.step(sensors, 3, force, 0.0, t)
-        y, acceleration, stroke, force = table_lab.advance(lab, command[tick], motor[tick])
+    slaves = arrays.dampers.shape[1]
+    play_building(arrays, displacement, force, dampers.reshape(force.size, slaves), result)
+    return substructure.named(result, slaves, system.plan.storeys)
 
 
 @jit
@@ -134,11 +111,12 @@ def play_reading(sensors: Readings, values: Array, interval: float, result: Arra
 
 @jit
 def play_building(
-    building: Substructure, displacement: Array, force: Array, damper: Array, result: Array
+    building: Substructure, displacement: Array, force: Array, dampers: Array, result: Array
 ) -> None:
-    """Fill `result` (ticks, 8 + 5·storeys) from the measurements."""
+    """Fill the output rows `result` (ticks, width) from the measurements."""
     for tick in range(force.size):
-        building.dampers[substructure.FORCE_USED, 0] = damper[tick]
+        for slave in range(dampers.shape[1]):
+            building.dampers[substructure.FORCE_USED, slave] = dampers[tick, slave]
         substructure.advance(building, tick, displacement[tick], force[tick])
         for place in range(building.output.size):
             result[tick, place] = building.output[place]

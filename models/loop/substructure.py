@@ -17,12 +17,14 @@ from numpy.typing import NDArray
 
 from common.plan.building import is_matrix
 from common.plan.plan import Plan, resolve
+from common.signals import OF_BUILDING, OF_STOREYS, SENT
 from models import compensators, force_correction, integrators, specimens, trend
 from models.compensators import Built as Compensator
 from models.compensators import Wanted
 from models.compiled import jit
 from models.ground_motion import GroundMotion, ground, load
 from models.integrators.state import ACCELERATION, DISPLACEMENT, NEXT_DISPLACEMENT, NEXT_VELOCITY, VELOCITY
+from models.labs import kinds
 from models.registry import Array
 from models.structures import partition, shear_building
 
@@ -35,25 +37,56 @@ FORCE_SCALE, MOTOR_GAIN, FORCE_USED = range(3)
 MATRIX = -1  # in place of a specimen's code: the numerical part is linear and coupled by a stiffness matrix
 DELAYED = force_correction.CORRECTED + 1  # place in `filtered`
 
-# places in the output row: a slave's SENT values, those of further slaves after them, then one per storey each
-GROUND_ACCELERATION, COLUMN_TARGET, ACTUATOR_COMMAND = range(3)
-TABLE_TARGET, DAMPER_COMMAND, TABLE_VELOCITY, TABLE_ACCELERATION, TABLE_JERK = range(3, 8)
-SENT = 5
-STOREYS = TABLE_TARGET + SENT  # where there is one slave
-STOREY_ROWS = ("displacement", "velocity", "acceleration", "absolute_acceleration", "numerical_force")
-STOREY_VALUES = len(STOREY_ROWS)
+# places in the output row: what is the building's; what is sent to each slave; what each storey has. A signal of slaves
+# or storeys takes as many places as there are of them, and its number here is its place among the signals of its group
+GROUND_ACCELERATION, COLUMN_TARGET, ACTUATOR_COMMAND = (
+    OF_BUILDING.index(name) for name in ("ground_acceleration", "column_target", "actuator_command")
+)
+OF_SLAVES = len(OF_BUILDING)  # first place of what is sent
+TABLE_TARGET, DAMPER_COMMAND, TABLE_VELOCITY, TABLE_ACCELERATION, TABLE_JERK = (
+    SENT.index(name)
+    for name in (
+        "table_target",
+        "damper_command",
+        "table_target_velocity",
+        "table_target_acceleration",
+        "table_target_jerk",
+    )
+)
+SENT_VALUES = len(SENT)
+STOREY_DISPLACEMENT, STOREY_VELOCITY, STOREY_ACCELERATION, STOREY_ABSOLUTE, STOREY_FORCE = (
+    OF_STOREYS.index(name)
+    for name in ("displacement", "velocity", "acceleration", "absolute_acceleration", "numerical_force")
+)
+STOREY_VALUES = len(OF_STOREYS)
+
+
+def layout(slaves: int, storeys: int) -> dict[str, slice]:
+    """Places of every signal in the output row by name, in their order; `slaves` of them, and `storeys`."""
+    widths = dict.fromkeys(OF_BUILDING, 1) | dict.fromkeys(SENT, slaves) | dict.fromkeys(OF_STOREYS, storeys)
+    result, end = {}, 0
+    for name, width in widths.items():
+        result[name] = slice(end, end + width)
+        end += width
+    return result
+
+
+def named(rows: Array, slaves: int, storeys: int) -> dict[str, Array]:
+    """Output rows (ticks, width) by signal: (ticks,) each, or with an axis for several slaves or several storeys."""
+    found = {name: rows[:, place] for name, place in layout(slaves, storeys).items()}
+    return {name: values[:, 0] if values.shape[1] == 1 else values for name, values in found.items()}
 
 
 class Substructure(NamedTuple):
     """The numerical side with its memories, which `advance` moves on."""
 
+    compensator: Compensator
     codes: Codes
     scalars: Array
     dampers: Array  # (3, slaves): λ, motor force over floor velocity N·s/m, and the force that a tick uses, N
     mass: Array  # (n,) kg
     coefficients: Array  # of the integrator
     column_params: Array  # (n, parameters) of the numerical columns, or (n, n) their stiffness matrix N/m
-    compensator: Compensator
     ground: Array  # (2, ticks + 1): acceleration m/s², displacement m
     state: Array  # (rows, n) of the integrator
     column_memory: Array  # (n, memory)
@@ -82,7 +115,7 @@ def build(plan: Plan, rows: Array, p_delta: float = 0.0, *, slaves: bool = True)
     scalars = [
         plan.test.interval,
         column.deformation_ratio,
-        float(column.represents),
+        kinds.COLUMN.scale(plan),
         *force_correction.coefficients(chosen.force, plan.test.interval),
         p_delta,
         float(chosen.force.unit_delay),
@@ -90,13 +123,13 @@ def build(plan: Plan, rows: Array, p_delta: float = 0.0, *, slaves: bool = True)
     n = plan.storeys
     floors = [lab.damper.floor - 1 for lab in labs]
     return Substructure(
+        compensator,
         np.array([method.code, columns.code, column.storey - 1, *floors]),
         np.array(scalars),
         np.array([damper(lab) for lab in labs]).reshape(-1, FORCE_USED + 1).T.copy(),
         mass,
         method.coefficients,
         columns.params,
-        compensator,
         rows,
         method.start(np.zeros(n), np.zeros(n), -mass * rows[0, 0]),
         columns.memory,
@@ -104,7 +137,7 @@ def build(plan: Plan, rows: Array, p_delta: float = 0.0, *, slaves: bool = True)
         np.zeros(DELAYED + 1),
         np.zeros(1),
         np.zeros(n),
-        np.zeros(TABLE_TARGET + SENT * len(labs) + STOREY_VALUES * n),
+        np.zeros(OF_SLAVES + SENT_VALUES * len(labs) + STOREY_VALUES * n),
     )
 
 
@@ -139,7 +172,7 @@ def integration(plan: Plan) -> integrators.Method:
 
 def damper(plan: Plan) -> tuple[float, float, float]:
     """A slave's column of `dampers`; zero where the building does without the damper."""
-    force_scale = plan.damper.force_scale if plan.control.amd else 0.0
+    force_scale = kinds.TABLE.scale(plan)
     return force_scale, plan.control.gain / plan.damper.force_scale if force_scale else 0.0, 0.0
 
 
@@ -186,42 +219,25 @@ def control(building: Substructure, tick: int) -> None:
     state, recent, output = building.state, building.recent, building.output
     interval = building.scalars[INTERVAL]
     here, ahead = ground[1, tick], ground[1, tick + 1]
-    for slave in range(dampers.shape[1]):
-        floor, more, past = codes[FLOORS + slave], SENT * slave, recent[1 + slave]
+    slaves = dampers.shape[1]
+    for slave in range(slaves):
+        floor, past, first = codes[FLOORS + slave], recent[1 + slave], OF_SLAVES + slave
         trend.remember(past, state[ACCELERATION, floor])
-        output[TABLE_TARGET + more] = state[NEXT_DISPLACEMENT, floor] + ahead
-        output[TABLE_VELOCITY + more] = (
+        output[first + TABLE_TARGET * slaves] = state[NEXT_DISPLACEMENT, floor] + ahead
+        output[first + TABLE_VELOCITY * slaves] = (
             state[NEXT_VELOCITY, floor] + (ahead - here) / interval + 0.5 * interval * ground[0, tick + 1]
         )
-        output[TABLE_ACCELERATION + more] = trend.ahead(past) + ground[0, tick + 1]
-        output[TABLE_JERK + more] = (
+        output[first + TABLE_ACCELERATION * slaves] = trend.ahead(past) + ground[0, tick + 1]
+        output[first + TABLE_JERK * slaves] = (
             trend.slope(past, interval) + (ground[0, tick + 1] - ground[0, tick]) / interval
         )
-        output[DAMPER_COMMAND + more] = dampers[MOTOR_GAIN, slave] * state[NEXT_VELOCITY, floor]
+        output[first + DAMPER_COMMAND * slaves] = dampers[MOTOR_GAIN, slave] * state[NEXT_VELOCITY, floor]
 
 
 @jit
 def enter(building: tuple[Any, ...], tick: int, column_displacement: float, column_force: float) -> None:
     """`advance` for a caller outside compiled code, which holds the building as `compiled.plain` gives it."""
-    codes, scalars, dampers, mass, coefficients, columns, compensator, ground = building[:8]
-    state, column_memory, recent, filtered, target, balance, output = building[8:]
-    whole = Substructure(
-        codes,
-        scalars,
-        dampers,
-        mass,
-        coefficients,
-        columns,
-        Compensator(*compensator),
-        ground,
-        state,
-        column_memory,
-        recent,
-        filtered,
-        target,
-        balance,
-        output,
-    )
+    whole = Substructure(Compensator(*building[0]), *building[1:])
     advance(whole, tick, column_displacement, column_force)
 
 
@@ -247,10 +263,11 @@ def advance(building: Substructure, tick: int, column_displacement: float, colum
     n = building.mass.size
     storeys = output.size - STOREY_VALUES * n
     for i in range(n):
-        output[storeys + i] = state[DISPLACEMENT, i]
-        output[storeys + n + i] = state[VELOCITY, i]
-        output[storeys + 2 * n + i] = state[ACCELERATION, i]
-        output[storeys + 3 * n + i] = state[ACCELERATION, i] + ground[0, tick]
+        first = storeys + i
+        output[first + STOREY_DISPLACEMENT * n] = state[DISPLACEMENT, i]
+        output[first + STOREY_VELOCITY * n] = state[VELOCITY, i]
+        output[first + STOREY_ACCELERATION * n] = state[ACCELERATION, i]
+        output[first + STOREY_ABSOLUTE * n] = state[ACCELERATION, i] + ground[0, tick]
 
 
 @jit
@@ -266,7 +283,7 @@ def equilibrate(building: Substructure, tick: int, specimen_force: float) -> Non
         balance[i] = -mass[i] * building.ground[0, tick]
     for slave in range(dampers.shape[1]):
         balance[codes[FLOORS + slave]] += dampers[FORCE_SCALE, slave] * dampers[FORCE_USED, slave]
-    forces = output.size - n
+    forces = output.size - (STOREY_VALUES - STOREY_FORCE) * n
     if codes[SPECIMEN] == MATRIX:
         couple(building.column_params, state, forces, output)
     for i in range(n):

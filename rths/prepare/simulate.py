@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 import json
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
-from common.errors import InterlockError
 from common.plan.plan import Plan, ideal
 from common.plan.tables import Compensator, Control
 from common.terminal import cli, outputs
-from common.terminal.telling import Tell
 from report.text.progress import Progress
 
 if TYPE_CHECKING:
@@ -45,9 +42,8 @@ def run(args: argparse.Namespace) -> int:
         from models.loop import substructure
 
         motion = substructure.motion(plan)
-        columns, beyond_limit = (
-            played(plan, args, progress.tell) if plan.slaves else rolled_out(plan, motion, args)
-        )
+        progress.tell(plan.test.name)
+        columns, beyond_limit = rolled_out(plan, motion, args)
     summary = summarize(plan, columns, beyond_limit) | {"ground_motion": motion.describe()}
     if args.output:
         summary["file"] = str(args.output)
@@ -62,28 +58,14 @@ def run(args: argparse.Namespace) -> int:
 def rolled_out(plan: Plan, motion: Any, args: argparse.Namespace) -> tuple[dict[str, Any], str]:
     """Signals of the compiled rollout, written where a file is wanted; the first value beyond the plan's limits."""
     from models.loop import substructure
-    from models.loop.closed_loop import signals, simulate
+    from models.loop.closed_loop import signals, simulate, stacked
 
     ground = substructure.ground_rows(plan, motion)
     rollout = simulate(plan, ground, seed=plan.test.seed if args.noise else None)
     if args.output:
         with outputs.writing(args.output, args.force) as path:
             write(path, plan, rollout, motion, ground)
-    columns = signals(plan, rollout)
-    return columns, beyond(plan, columns, rollout.ticks)
-
-
-def played(plan: Plan, args: argparse.Namespace, tell: Tell) -> tuple[dict[str, Any], str]:
-    """The same of several slaves: the loops themselves in virtual time, which a limit stops."""
-    from simulation.source import recorded
-    from simulation.virtual import simulated
-
-    place = outputs.writing(args.output, args.force) if args.output else contextlib.nullcontext()
-    with place as path:
-        found, error = simulated(plan, path, noise=args.noise, tell=tell)
-    if error is not None and not isinstance(error, InterlockError):
-        raise error
-    return recorded(found).signals, str(error or "")
+    return signals(plan, rollout), beyond(plan, stacked(rollout), rollout.ticks)
 
 
 def adapted(plan: Plan, args: argparse.Namespace) -> Plan:
@@ -158,7 +140,7 @@ def show(plan: Plan, summary: dict[str, Any], stream: TextIO) -> None:
 
 
 def write(path: Path, plan: Plan, rollout: Rollout, motion: Any, ground: Any) -> None:
-    """The simulation as a recording: the master's and the slave's topics."""
+    """The simulation as a recording: the topics of master and slaves."""
     from models.loop.closed_loop import rows
     from recorder import files
 

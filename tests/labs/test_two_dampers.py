@@ -11,7 +11,7 @@ from scipy.signal import StateSpace, lsim
 
 from common.plan.plan import Plan, from_tables, ideal
 from models.loop import substructure
-from simulation import virtual
+from models.loop.closed_loop import simulate, stacked
 
 Array = NDArray[np.float64]
 
@@ -76,12 +76,10 @@ def exact(ground: Array, interval: float) -> tuple[Array, Array]:
 def errors(interval: float) -> tuple[float, float]:
     """NRMSE of the floors' displacements and of the strokes."""
     plan = tall(interval)
-    found, error = virtual.simulated(plan)
-    assert error is None
-    ground = substructure.ground_rows(plan, substructure.motion(plan))[:, :-1]
-    floors, strokes = exact(ground, interval)
-    got = np.stack([found.columns[role]["damper_stroke"] for role in plan.roles], axis=1)
-    pairs = ((found.columns["master"]["displacement"], floors), (got, strokes))
+    ground = substructure.ground_rows(plan, substructure.motion(plan))
+    found = stacked(simulate(plan, ground))
+    floors, strokes = exact(ground[:, :-1], interval)
+    pairs = ((found["displacement"], floors), (found["damper_stroke"], strokes))
     return tuple(  # type: ignore[return-value]
         float(np.sqrt(np.mean((x - y) ** 2)) / np.sqrt(np.mean(y**2))) for x, y in pairs
     )

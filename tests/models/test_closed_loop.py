@@ -10,7 +10,9 @@ import pytest
 
 from common.plan.plan import Plan, from_tables, ideal
 from common.plan.tables import Actuator, Compensator, Control
+from common.roles import SLAVE
 from common.signals import TOPICS
+from models.labs.kinds import COLUMN
 from models.loop import substructure
 from models.loop.closed_loop import Exchange, on_time, rows, signals, simulate
 from models.structures import shear_building
@@ -115,17 +117,19 @@ def test_the_damper_adds_three_points_of_damping(default_plan: Plan) -> None:
 def test_noise_comes_from_the_seed_alone(short_plan: Plan) -> None:
     rows_ = ground(short_plan)
     first, again, other = (simulate(short_plan, rows_, seed=seed) for seed in (1, 1, 2))
-    assert np.array_equal(first.measured_a, again.measured_a)
-    assert not np.array_equal(first.measured_a, other.measured_a)
+    for name in COLUMN.measured:
+        assert np.array_equal(first.master[name], again.master[name])
+        assert not np.array_equal(first.master[name], other.master[name])
 
 
 def test_a_lost_message_is_bridged_by_the_one_before(short_plan: Plan) -> None:
     nominal = on_time(short_plan.ticks)
     command, feedback = nominal.command.copy(), nominal.feedback.copy()
     command[500], feedback[700] = 499, 698
-    found = simulate(short_plan, ground(short_plan), exchange=Exchange(command, feedback))
-    assert found.damper_force_used[700] == found.measured_b[698, 3]
-    assert found.damper_force_used[701] == found.measured_b[700, 3]
+    exchange = {SLAVE: Exchange(command, feedback)}
+    found = signals(short_plan, simulate(short_plan, ground(short_plan), exchange=exchange))
+    assert found["damper_force_used"][700] == found["damper_force"][698]
+    assert found["damper_force_used"][701] == found["damper_force"][700]
 
 
 @pytest.mark.parametrize("integrator", ["newmark_explicit", "central_difference", "cr", "kr_alpha"])

@@ -13,12 +13,11 @@ from common.plan import plan as plans
 from common.plan.plan import Plan
 from common.plan.tables import Compensator, Control
 from common.terminal import cli
-from models.loop import limited, preflight, several_slaves, substructure
+from models.loop import limited, preflight, substructure
 from models.loop.closed_loop import signals, simulate
 from models.loop.preflight import expected_delay, partition_check, peaks, peaks_check
 from models.registry import Array
 from models.structures.partition import assess, critical_delay_of
-from simulation import virtual
 from tests.helpers import with_table
 
 
@@ -149,24 +148,6 @@ def test_limited_quantities_that_are_no_signals(short_plan: Plan) -> None:
     assert np.flatnonzero(found["column_error"]).tolist() == [22]
     assert found["column_error"][22] == 1.0
     assert peaks(short_plan, columns).name == "column_error"
-
-
-def test_the_stepped_loop_of_several_slaves_is_that_of_the_real_loops_to_the_last_bit() -> None:
-    plan = plans.load(cli.plan_path("two_dampers")).with_test(duration=1.0)
-    ground = substructure.ground_rows(plan, substructure.motion(plan))
-    found = several_slaves.simulate(plan, ground, plan.test.seed)
-    run, error = virtual.simulated(plan, noise=True)
-    assert error is None
-    compared = 0
-    for name, values in found.items():
-        if name in run.columns["master"]:
-            assert np.array_equal(values, run.columns["master"][name]), name
-            compared += 1
-        for place, slave in enumerate(plan.slaves):
-            if name in run.columns[f"slave.{slave}"]:
-                assert np.array_equal(values[:, place], run.columns[f"slave.{slave}"][name]), name
-                compared += 1
-    assert compared == len(found) - 5 + 2 * 10
 
 
 def test_several_slaves_have_peaks_too() -> None:

@@ -14,12 +14,15 @@ from common.plan import reality
 from common.plan.plan import Plan, from_tables
 from common.plan.reality import Reality
 from common.recording.reader import Run, read
+from common.roles import kind_of
 from common.signals import TOPICS
 from models.effects import CATALOGUE, lay
 from models.effects.sites import SITES
+from models.link.exchange import exchange
+from models.link.links import link_model
 from models.loop import substructure
-from models.loop.closed_loop import rows, simulate
-from models.loop.realised import true_system
+from models.loop.closed_loop import Exchange, rows, simulate
+from models.loop.realised import true_slaves, true_system
 from models.system import System
 from simulation import virtual
 from tests.models.effects.distinct import DISTINCT
@@ -34,6 +37,12 @@ def real(plan: Plan, *effects: dict[str, Any], **tables: Any) -> Reality:
     return reality.from_reality({"effect": list(effects), **tables}, plan, Path())
 
 
+def used(truth: Reality) -> dict[str, Exchange]:
+    """Which messages the test of a reality uses, slave by slave."""
+    ticks, interval = truth.plan.ticks, truth.plan.test.interval
+    return {role: exchange(ticks, interval, link_model(truth.of(role))) for role in truth.plan.roles}
+
+
 def assert_equals_the_rollout(plan: Plan, truth: Reality, path: Path) -> Run:
     """Every value of the recording is the closed loop's, to the last bit."""
     error = virtual.run(virtual.assemble(plan, truth, path), lambda: "")
@@ -41,13 +50,16 @@ def assert_equals_the_rollout(plan: Plan, truth: Reality, path: Path) -> Run:
     recording, system = read(path), true_system(truth)
     motion = substructure.motion(system.plan)
     ground = substructure.ground_rows(system.plan, motion, system.effects.time_shift)
-    found = simulate(system.plan, ground, effects=system.effects, seed=truth.seed)
+    slaves = true_slaves(truth)
+    found = simulate(
+        system.plan, ground, effects=system.effects, slaves=slaves, seed=truth.seed, exchange=used(truth)
+    )
     assert found.finite
-    expected: dict[str, list[Any]] = {"master": [], "slave": []}
+    expected: dict[str, list[Any]] = {topic: [] for topic in ("master", *slaves)}
     for topic, values in rows(system.plan, found):
         expected[topic].append(values)
     for topic, table in expected.items():
-        for place, signal in enumerate(TOPICS[topic]):
+        for place, signal in enumerate(TOPICS[kind_of(topic)]):
             column = np.array([values[place] for values in table])
             assert np.array_equal(recording.columns[topic][signal.name], column), f"{topic}/{signal.name}"
     return recording
@@ -154,6 +166,34 @@ def test_effects_and_parameters_of_a_reality_come_together(plan: Plan, tmp_path:
 def test_without_effects_the_system_is_the_plan(plan: Plan) -> None:
     assert true_system(reality.as_planned(plan)) == System(plan)
     assert true_system(real(plan)) == System(plan)
+
+
+def test_effects_of_single_slaves_are_those_of_the_real_loops(tmp_path: Path) -> None:
+    slaves = {
+        "roof": {"damper": {"mass": 12.0, "floor": 2}, "control": {"gain": 5e4}},
+        "cellar": {"damper": {"mass": 20.0, "force_scale": 10.0}, "control": {"gain": 1.2e4}},
+    }
+    building = {"mass": [1.6e5] * 2, "stiffness": [6e7] * 2, "damping": [4e5] * 2}
+    tables = {
+        "test": {"duration": 1.0},
+        "structure": building,
+        "column": {"stiffness": 30e6},
+        "slave": slaves,
+    }
+    plan = from_tables(tables, Path())
+    truth = real(
+        plan,
+        effect("damper.friction", force=3.0) | {"slave": "roof"},
+        effect("table.gain", factor=0.95) | {"slave": "cellar"},
+        effect("sensor.damper_force.drift", rate=0.5) | {"slave": "cellar"},
+        effect("damper.mass", factor=1.1),
+        effect("column.stiffness", factor=0.9),
+        effect("link.delay", delay=0.005) | {"slave": "cellar"},
+    )
+    run = assert_equals_the_rollout(plan, truth, tmp_path / "two.mcap")
+    command = run.columns["slave.cellar"]["command_seq"]
+    assert not np.array_equal(command, run.columns["slave.roof"]["command_seq"])
+    assert run.columns["slave.roof"]["damper_force"].any()
 
 
 def test_effects_are_laid_in_the_order_given(plan: Plan) -> None:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 from common.terminal.telling import Tell, untold
 from models.indicators import ForcePath
 from models.labs.force_path import force_path
+from models.labs.kinds import COLUMN
 from models.system import Effects, SensorEffects
 from validation.benchmark2020.problem import EL_CENTRO, SETTINGS, with_compensator
 from validation.benchmark2020.runs import Result, Stage, play
@@ -39,5 +40,5 @@ def late_force(on: Stage, delay: float) -> Late:
     plan = with_compensator(on.plants[0], SETTINGS[SETTING])
     effects = Effects(sensors={"column_force": SensorEffects(delay=delay)})
     result, rollout = play(on, SETTING, plan, effects=effects)
-    path = force_path(plan, rollout.displacement, rollout.force) if result.stable else None
+    path = force_path(plan, *(rollout.master[name] for name in COLUMN.measured)) if result.stable else None
     return Late(delay, result, path)

@@ -7,14 +7,18 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
+import numpy as np
 from threadpoolctl import threadpool_limits
 
 from common.plan.plan import Plan
 from common.plan.tables import Compensator
+from common.roles import MASTER
 from common.terminal.telling import Tell, untold
 from models import indicators
 from models.labs import noise, specimen
-from models.loop import column_loop, substructure
+from models.labs.kinds import COLUMN
+from models.loop import substructure
+from models.loop.closed_loop import Rollout, simulate
 from models.registry import Array
 from models.structures import response
 from models.system import Effects
@@ -66,7 +70,7 @@ def stage(case: Case, motion: Motion, plants: int, seed: int) -> Stage:
     """A case under a motion, its reference computed, its plants and its noise drawn."""
     plan = planned(case, motion)
     ground = substructure.ground_rows(plan, substructure.motion(plan))
-    levels = noise.levels_a(plan.sensors)
+    levels = noise.levels(plan.sensors, COLUMN.measured)
     rows = noise.Noise(noise.lab_seed(plan.test.seed, noise.LAB_A), levels).rows(plan.ticks)
     others = [with_plant(plan, plant) for plant in draw(plan, plants, seed)]
     reference = response.response(plan, ground)
@@ -84,13 +88,14 @@ def specimen_force(plan: Plan, displacement: Array) -> Array:
 
 def play(
     on: Stage, setting: str, chosen: Plan, plant: int = NOMINAL, effects: Effects | None = None
-) -> tuple[Result, column_loop.ColumnRollout]:
+) -> tuple[Result, Rollout]:
     """One test on a stage, with the plan that has its plant and compensator."""
     first = on.reference[:, chosen.column.storey - 1]
-    rollout = column_loop.simulate(
-        chosen, on.ground, effects=effects, noise=on.noise, farthest=ASTRAY * peak(first)
+    rollout = simulate(
+        chosen, on.ground, effects=effects, slaves={}, noise={MASTER: on.noise}, farthest=ASTRAY * peak(first)
     )
-    target, measured = rollout.target, rollout.displacement
+    signals = {name: np.ascontiguousarray(values) for name, values in rollout.master.items()}
+    target, measured = signals["column_target"], signals["column_displacement"]
     if not rollout.finite or peak(target) > RUNAWAY * peak(first):
         return unstable(on, setting, plant), rollout
     nominal, interval = plant == NOMINAL, chosen.test.interval
@@ -101,10 +106,10 @@ def play(
         plant,
         True,
         near(measured, first),
-        criteria(target, measured, rollout.floors, on.reference, interval) if nominal else None,
+        criteria(target, measured, signals["displacement"], on.reference, interval) if nominal else None,
         indicators.correlation_delay(target, measured, interval, LEAD_MOST) if nominal else math.nan,
         chosen.sensors.column_displacement / rms(target) if nominal else math.nan,
-        peak(rollout.force),
+        peak(signals["column_force"]),
         peak(measured),
     )
     return result, rollout

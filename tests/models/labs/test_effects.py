@@ -24,8 +24,9 @@ from master.rig import ColumnLab
 from models.effects import CATALOGUE, lay, null_parameters
 from models.effects.effect import Effect, Parameter
 from models.labs import column_lab, specimen, table_lab
+from models.labs.kinds import COLUMN, TABLE
 from models.loop import substructure
-from models.loop.closed_loop import MEASURED_A, MEASURED_B, Rollout, signals, simulate
+from models.loop.closed_loop import Rollout, signals, simulate, stacked
 from models.system import ActuatorEffects, ColumnEffects, DamperEffects, System, TableEffects
 from slave.rig import TableLab
 from tests.models.effects.distinct import DISTINCT
@@ -55,7 +56,7 @@ def rollout(system: System, seed: int | None = 3) -> Rollout:
 
 
 def everything(found: Rollout) -> Array:
-    return np.hstack([found.outputs, found.measured_a, found.measured_b, found.table_command[:, None]])
+    return np.column_stack(list(stacked(found).values()))
 
 
 @pytest.fixture(scope="module")
@@ -118,7 +119,7 @@ def test_an_effect_in_the_rigs_shows_only_at_its_laboratory(plan: Plan) -> None:
         differs = np.any(np.array(rigs(changed)) != before, axis=0)
         part, _, signal = effect.site.partition(".")
         if part == "sensor":
-            place = (*MEASURED_A, *MEASURED_B).index(signal)
+            place = (*COLUMN.measured, *TABLE.measured).index(signal)
             assert np.flatnonzero(differs).tolist() == [place], effect.name
         else:
             in_a, in_b = part in ("actuator", "column"), part in ("table", "damper")
@@ -931,7 +932,7 @@ def test_a_motion_that_comes_whole_ticks_later_moves_everything_alike(plan: Plan
     if ticks > 0:
         assert np.allclose(motion[:, ticks:], straight[:, :-ticks], atol=1e-12)
         assert not motion[:, :ticks].any()
-        assert not shifted.outputs[: ticks - 1, substructure.TABLE_TARGET].any()
+        assert not shifted.master["table_target"][: ticks - 1].any()
         for name in ("displacement", "column_force", "table_displacement", "damper_force"):
             before, after = signals(plan, plain)[name], signals(plan, shifted)[name]
             assert np.allclose(after[ticks:], before[:-ticks], atol=1e-9 * np.max(np.abs(before))), name

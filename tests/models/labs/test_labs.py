@@ -15,6 +15,7 @@ from scipy.integrate import solve_ivp
 
 from common.plan.tables import Actuator, Column, Damper, Sensors, Table
 from models.labs import column_lab, noise, table_lab
+from models.labs.kinds import TABLE
 from models.transfer_systems import delay
 
 DT = 0.002
@@ -189,7 +190,7 @@ def test_the_dampers_force_balances_its_motion() -> None:
 
 
 def test_noise_is_the_same_one_by_one_and_at_once() -> None:
-    levels = noise.levels_b(Sensors())
+    levels = noise.levels(Sensors(), TABLE.measured)
     single, whole = noise.Noise(3, levels), noise.Noise(3, levels)
     rows = whole.rows(2500)
     assert np.array_equal(rows, [single.row() for _ in range(2500)])

@@ -18,8 +18,9 @@ from common.rig import ColumnCommand, TableCommand
 from master.rig import ColumnLab
 from models.effects import CATALOGUE, lay
 from models.labs import noise, readings
+from models.labs.kinds import COLUMN, TABLE
 from models.loop import substructure
-from models.loop.closed_loop import MEASURED_A, MEASURED_B, Rollout, simulate
+from models.loop.closed_loop import Rollout, simulate
 from models.system import Effects, SensorEffects, System
 from slave.rig import TableLab
 
@@ -149,10 +150,10 @@ def test_quantisation_errors_are_those_of_widrow() -> None:
     assert abs(error.mean()) < 4.0 * error.std() / math.sqrt(values.size)
 
 
-@pytest.mark.parametrize("name", [*MEASURED_A, *MEASURED_B])
+@pytest.mark.parametrize("name", [*COLUMN.measured, *TABLE.measured])
 def test_levels_add_as_independent_noises_do(name: str) -> None:
-    names = MEASURED_A if name in MEASURED_A else MEASURED_B
-    nominal = (noise.levels_a if name in MEASURED_A else noise.levels_b)(Sensors())
+    names = COLUMN.measured if name in COLUMN.measured else TABLE.measured
+    nominal = noise.levels(Sensors(), names)
     found = readings.levels(names, nominal, {name: SensorEffects(noise=3.0)})
     for place, other in enumerate(names):
         squared = nominal[place] ** 2 + (9.0 if other == name else 0.0)
@@ -177,13 +178,13 @@ SIZES = {"gain": 1.1, "bias": 0.02, "drift": 0.01, "lag": 0.005, "delay": 0.0071
 
 
 @pytest.mark.parametrize("kind", SIZES)
-@pytest.mark.parametrize("name", [*MEASURED_A, *MEASURED_B])
+@pytest.mark.parametrize("name", [*COLUMN.measured, *TABLE.measured])
 def test_the_rigs_falsify_the_reading_named_and_the_truth_stays(name: str, kind: str) -> None:
     """From one laboratory's readings without the effect, those with it by the formula."""
     effect = CATALOGUE[f"sensor.{name}.{kind}"]
     size = SIZES[kind] * (1.0 if kind in ("gain", "lag", "delay") else min(effect.parameters[0].most, 1.0))
     system = lay(System(Plan()), [(effect.name, {effect.parameters[0].name: size})])
-    quiet = dict.fromkeys((*MEASURED_A, *MEASURED_B), 0.0)
+    quiet = dict.fromkeys((*COLUMN.measured, *TABLE.measured), 0.0)
     rows: list[list[tuple[float, ...]]] = []
     for effects in (Effects(), system.effects):
         lab_a = ColumnLab(DT, 1, sensors=quiet, effects=effects)
@@ -194,7 +195,7 @@ def test_the_rigs_falsify_the_reading_named_and_the_truth_stays(name: str, kind:
             lab_a.write(ColumnCommand(2e-3 * math.sin(0.03 * tick)))
             lab_b.write(TableCommand(1e-2 * math.sin(0.02 * tick), 30.0 * math.sin(0.04 * tick)))
     plain, falsified = np.array(rows[0]), np.array(rows[1])
-    place = (*MEASURED_A, *MEASURED_B).index(name)
+    place = (*COLUMN.measured, *TABLE.measured).index(name)
     t, value = DT * np.arange(300), plain[:, place]
     expected = {
         "gain": size * value,
@@ -218,10 +219,11 @@ def test_the_loop_acts_on_the_falsified_force(default_plan: Plan) -> None:
     plan = default_plan.with_test(duration=3.0)
     cell = loop(lay(System(plan), [("sensor.column_force.gain", {"factor": 1.07})]))
     column = loop(lay(System(plan), [("column.stiffness", {"factor": 1.07})]))
-    for left, right in ((cell.outputs, column.outputs), (cell.measured_a, column.measured_a)):
-        assert np.allclose(left, right, rtol=1e-9, atol=1e-9 * np.max(np.abs(right)))
+    for name, right in column.master.items():
+        assert np.allclose(cell.master[name], right, rtol=1e-9, atol=1e-9 * np.max(np.abs(right)))
     nominal = loop(System(plan))
-    assert np.max(np.abs(cell.outputs - nominal.outputs)) > 1e-4
+    displacement = cell.master["displacement"] - nominal.master["displacement"]
+    assert np.max(np.abs(displacement)) > 1e-4
 
 
 def test_a_bias_of_the_force_moves_the_building_by_its_statics(default_plan: Plan) -> None:
@@ -231,6 +233,6 @@ def test_a_bias_of_the_force_moves_the_building_by_its_statics(default_plan: Pla
     found = simulate(system.plan, still, effects=system.effects)
     # 3/4 of the storey and the specimen hold against the force that is not there
     stiffness = 0.75 * 25e6 + 12.5e6 * 0.5
-    x = found.outputs[:, substructure.STOREYS]
+    x = found.master["displacement"]
     assert x[-1] == pytest.approx(-1000.0 / stiffness, rel=2e-3)
-    assert found.measured_a[-1, 1] == pytest.approx(1000.0 + 12.5e6 * 0.5 * x[-1], rel=2e-3)
+    assert found.master["column_force"][-1] == pytest.approx(1000.0 + 12.5e6 * 0.5 * x[-1], rel=2e-3)

@@ -12,6 +12,7 @@ from common.plan.plan import Plan
 from models import indicators
 from models.effects import CATALOGUE, lay
 from models.effects.effect import Effect
+from models.labs.kinds import COLUMN, TABLE
 from models.loop import replay, substructure
 from models.loop.closed_loop import Rollout, signals, simulate
 from models.system import ColumnEffects, Effects, System
@@ -20,8 +21,6 @@ from tests.models.effects.distinct import DISTINCT
 Array = NDArray[np.float64]
 
 EACH = pytest.mark.parametrize("effect", DISTINCT.values(), ids=list(DISTINCT))
-MOTOR = substructure.DAMPER_COMMAND
-COMMAND = substructure.ACTUATOR_COMMAND
 IN_SHORT_STEPS = ("viscous", "friction", "inertia")  # of the column: rates count
 
 
@@ -39,6 +38,28 @@ def rollout(system: System) -> Rollout:
     return simulate(system.plan, ground(system), effects=system.effects)
 
 
+def measured(found: Rollout) -> tuple[Array, Array]:
+    """Displacement and force of the column as read."""
+    displacement, force = (found.master[name] for name in COLUMN.measured)
+    return displacement, force
+
+
+def alone(system: System, found: Rollout) -> tuple[Array, Array]:
+    """Both laboratories alone, behind the commands that they had in the loop."""
+    slave = found.slaves["slave"]
+    return (
+        replay.laboratory_a(system, found.master["actuator_command"]),
+        replay.laboratory_b(system, slave["table_command"], found.master["damper_command"]),
+    )
+
+
+def assert_computed(system: System, found: Rollout) -> None:
+    """The building alone computes to the last bit what it computed in the loop."""
+    got = replay.building(system, ground(system), *measured(found), found.master["damper_force_used"])
+    for name, values in got.items():
+        assert np.array_equal(values, found.master[name]), name
+
+
 def strong(effect: Effect) -> dict[str, float]:
     """The strongest size, the shape at its default."""
     item = next(item for item in effect.parameters if not item.shape)
@@ -52,19 +73,16 @@ def test_each_laboratory_alone_reads_to_the_bit_what_it_read_in_the_loop(effect:
     system = lay(System(plan), [(effect.name, strong(effect))])
     found = rollout(system)
     assert found.finite
-    a = replay.laboratory_a(system, found.outputs[:, COMMAND].copy())
-    b = replay.laboratory_b(system, found.table_command, found.outputs[:, MOTOR].copy())
-    assert a.tobytes() == found.measured_a.tobytes()
-    assert b.tobytes() == found.measured_b.tobytes()
+    a, b = alone(system, found)
+    assert a.tobytes() == np.column_stack(measured(found)).tobytes()
+    assert b.tobytes() == np.column_stack([found.slaves["slave"][name] for name in TABLE.measured]).tobytes()
 
 
 @EACH
 def test_the_building_alone_computes_what_it_computed_in_the_loop(effect: Effect, plan: Plan) -> None:
     system = lay(System(plan), [(effect.name, strong(effect))])
     found = rollout(system)
-    displacement, force = found.measured_a.T.copy()
-    got = replay.building(system, ground(system), displacement, force, found.damper_force_used)
-    assert got.tobytes() == found.outputs.tobytes()
+    assert_computed(system, found)
 
 
 def test_a_building_of_three_storeys_too(plan: Plan) -> None:
@@ -72,9 +90,7 @@ def test_a_building_of_three_storeys_too(plan: Plan) -> None:
     system = System(plan).moved("structure", **tables).moved("column", storey=2).moved("damper", floor=3)
     system = lay(system, [("structure.p_delta", {"stiffness": -1e6}), ("ground.time_shift", {"shift": 0.01})])
     found = rollout(system)
-    displacement, force = found.measured_a.T.copy()
-    got = replay.building(system, ground(system), displacement, force, found.damper_force_used)
-    assert got.tobytes() == found.outputs.tobytes()
+    assert_computed(system, found)
 
 
 def rest(system: System, force: Array, displacement: Array) -> float:
@@ -90,7 +106,7 @@ def test_the_specimen_alone_feels_what_it_felt_in_the_loop(name: str, plan: Plan
     """Where only the deformation counts, to rounding."""
     system = lay(System(plan), [(name, strong(CATALOGUE[name]))])
     found = rollout(system)
-    displacement, force = found.measured_a.T.copy()
+    displacement, force = measured(found)
     got = replay.column(system, displacement)
     assert np.allclose(got, force, rtol=1e-9, atol=1e-6 * np.max(np.abs(force)))
 
@@ -117,7 +133,7 @@ def test_the_specimen_alone_with_rates_from_the_ticks(
     """Rates come from straight lines between the ticks: near what the servo loop's finer motion gave."""
     system = System(plan, Effects(column=effects))
     found = rollout(system)
-    displacement, force = found.measured_a.T.copy()
+    displacement, force = measured(found)
     got = replay.column(system, displacement)
     assert np.std(got - force) < share * rest(system, force, displacement)
 
@@ -139,7 +155,7 @@ def test_a_column_with_a_dashpot_alone_feels_what_it_felt_in_the_loop(plan: Plan
     """The loop's own short steps beside differences over the ticks."""
     system = System(plan).moved("column", damping=5e4)
     found = rollout(system)
-    displacement, force = found.measured_a.T.copy()
+    displacement, force = measured(found)
     got = replay.column(system, displacement)
     assert np.std(got - force) < 2e-4 * np.std(force)
     path = indicators.force_path(got, force, plan.test.interval)
@@ -158,10 +174,10 @@ def test_the_specimen_alone_reads_through_its_load_cell(plan: Plan) -> None:
         ],
     )
     found = rollout(system)
-    got = replay.column(system, found.measured_a[:, 0].copy())
+    got = replay.column(system, found.master["column_displacement"])
     # the loop's deformation is that of the ticks too, so rounding to a step can differ by rounding only
-    assert np.mean(got == found.measured_a[:, 1]) > 0.999
-    assert np.max(np.abs(got - found.measured_a[:, 1])) <= 100.0 + 1e-6
+    assert np.mean(got == found.master["column_force"]) > 0.999
+    assert np.max(np.abs(got - found.master["column_force"])) <= 100.0 + 1e-6
 
 
 def test_a_laboratory_that_begins_at_a_command_stays_there(plan: Plan) -> None:
@@ -184,8 +200,7 @@ def test_a_damper_that_begins_anew_swings_freely_from_there(tick: int, plan: Pla
 def test_the_noise_alone_lies_between_a_noisy_loop_and_its_replay(plan: Plan) -> None:
     found = simulate(plan, ground(System(plan)), seed=8)
     system = System(plan)
-    a = replay.laboratory_a(system, found.outputs[:, COMMAND].copy())
-    b = replay.laboratory_b(system, found.table_command, found.outputs[:, MOTOR].copy())
+    a, b = alone(system, found)
     nominal = signals(plan, found)
     for name, truth in (
         ("column_displacement", a[:, 0]),

@@ -16,7 +16,7 @@ from common.errors import InputError
 from common.plan.plan import Plan, parse
 from common.plan.tables import Actuator, Column, ServoHydraulics
 from models.effects import lay
-from models.labs import column_lab
+from models.labs import column_lab, kinds
 from models.loop import closed_loop, replay, substructure
 from models.system import ActuatorEffects, ColumnEffects, System
 from models.transfer_systems import servo_hydraulic
@@ -259,5 +259,6 @@ def test_the_plan_of_the_laboratory_alone_reads_what_the_loop_read(plan: Plan) -
     for base in (short, with_table(short, "actuator", command="ramp")):
         ground = substructure.ground_rows(base, substructure.motion(base))
         found = closed_loop.simulate(base, ground)
-        again = replay.laboratory_a(System(base), found.outputs[:, substructure.ACTUATOR_COMMAND].copy())
-        assert again.tobytes() == found.measured_a.tobytes()
+        again = replay.laboratory_a(System(base), found.master["actuator_command"])
+        for values, name in zip(again.T, kinds.COLUMN.measured, strict=True):
+            assert np.array_equal(values, found.master[name])

@@ -1,4 +1,4 @@
-"""The loop of laboratory A alone: the numbers of the whole closed loop, and those of equations written out anew."""
+"""The loop without slaves: the numbers of the whole closed loop, and those of equations written out anew."""
 
 from __future__ import annotations
 
@@ -15,9 +15,13 @@ from common.errors import InputError
 from common.plan import plan as plans
 from common.plan.plan import Plan, ideal, parse
 from common.plan.tables import Compensator
+from common.roles import MASTER
+from common.signals import OF_BUILDING, OF_STOREYS
 from models import effects
-from models.loop import closed_loop, column_loop, substructure
-from models.loop.column_loop import ColumnRollout
+from models.labs import noise
+from models.labs.kinds import COLUMN
+from models.loop import closed_loop, site, substructure
+from models.loop.closed_loop import Rollout
 from models.registry import Array
 from models.structures import partition, shear_building
 from models.structures.response import response
@@ -34,26 +38,23 @@ def ground_of(plan: Plan) -> Array:
     return substructure.ground_rows(plan, substructure.motion(plan))
 
 
-def assert_same(found: ColumnRollout, whole: closed_loop.Rollout, plan: Plan) -> None:
-    signals = closed_loop.signals(plan, whole)
-    ticks = found.ticks
-    assert (found.finite, ticks) == (whole.finite, whole.ticks)
-    for name, values in (
-        ("column_target", found.target),
-        ("actuator_command", found.command),
-        ("column_displacement", found.displacement),
-        ("column_force", found.force),
-        ("displacement", found.floors),
-    ):
-        assert np.array_equal(np.squeeze(values[:ticks]), signals[name]), name
+def alone(plan: Plan, ground: Array, **options: Any) -> Rollout:
+    return closed_loop.simulate(plan, ground, slaves={}, **options)
+
+
+def assert_same(found: Rollout, whole: Rollout) -> None:
+    assert (found.finite, found.ticks) == (whole.finite, whole.ticks)
+    assert not found.slaves
+    for name in (*OF_BUILDING, *COLUMN.measured, *OF_STOREYS):
+        assert np.array_equal(found.master[name], whole.master[name]), name
 
 
 @pytest.mark.parametrize("seed", [None, 5])
 def test_it_is_the_closed_loop_to_the_last_bit(plan: Plan, seed: int | None) -> None:
     ground = ground_of(plan)
-    found = column_loop.simulate(plan, ground, seed=seed)
+    found = alone(plan, ground, seed=seed)
     assert found.finite
-    assert_same(found, closed_loop.simulate(plan, ground, seed=seed), plan)
+    assert_same(found, closed_loop.simulate(plan, ground, seed=seed))
 
 
 @pytest.mark.parametrize(
@@ -68,46 +69,46 @@ def test_it_is_so_with_effects_and_any_compensator(default_plan: Plan, laid: lis
     base = with_table(default_plan.with_test(duration=3.0), "control", amd=False)
     system = effects.lay(System(base), laid)
     ground = ground_of(base)
-    found = column_loop.simulate(system.plan, ground, effects=system.effects, seed=1)
-    assert_same(found, closed_loop.simulate(system.plan, ground, effects=system.effects, seed=1), system.plan)
+    found = alone(system.plan, ground, effects=system.effects, seed=1)
+    assert_same(found, closed_loop.simulate(system.plan, ground, effects=system.effects, seed=1))
 
 
 def test_noise_that_is_given_is_that_of_the_seed(plan: Plan) -> None:
     ground = ground_of(plan)
-    noise = closed_loop.noise_a(System(plan), 9)
+    rows = site.errors(COLUMN, System(plan), plan.ticks, noise.lab_seed(9, noise.LAB_A))
     one, other = (
-        column_loop.simulate(plan, ground, noise=noise),
-        column_loop.simulate(plan, ground, seed=9),
+        alone(plan, ground, noise={MASTER: rows}),
+        alone(plan, ground, seed=9),
     )
-    assert np.array_equal(one.force, other.force)
+    assert np.array_equal(one.master["column_force"], other.master["column_force"])
     with pytest.raises(InputError, match="given twice"):
-        column_loop.simulate(plan, ground, noise=noise, seed=9)
+        alone(plan, ground, noise={MASTER: rows}, seed=9)
     with pytest.raises(InputError, match="one row per tick"):
-        column_loop.simulate(plan, ground, noise=noise[1:])
+        alone(plan, ground, noise={MASTER: rows[1:]})
 
 
 def test_a_plan_with_a_damper_is_refused(default_plan: Plan) -> None:
     with pytest.raises(InputError, match="set amd"):
-        column_loop.simulate(default_plan, ground_of(default_plan))
+        alone(default_plan, ground_of(default_plan))
 
 
 def test_a_loop_that_diverges_ends_where_its_command_leaves_all_bounds(plan: Plan) -> None:
     parameters = {"proportional": 40.0, "integral": 0.0, "derivative": 0.0}
     wild = replace(plan, compensator=Compensator("pid", parameters))
-    found = column_loop.simulate(wild, ground_of(wild))
+    found = alone(wild, ground_of(wild), farthest=1e6)
     assert not found.finite
     assert 0 < found.ticks < wild.ticks
-    assert np.all(np.abs(found.command[: found.ticks]) <= 1e6)
-    assert not found.command[found.ticks :].any()
-    assert not found.floors[found.ticks :].any()
+    assert found.master["displacement"].shape == (found.ticks, plan.storeys)
+    assert np.all(np.abs(found.master["actuator_command"]) <= 1e6)
+    assert np.all(np.isfinite(found.master["displacement"]))
 
 
 def test_threads_get_what_one_gets(plan: Plan) -> None:
     ground = ground_of(plan)
     with ThreadPoolExecutor(2) as pool:
-        found = list(pool.map(lambda seed: column_loop.simulate(plan, ground, seed=seed).force, range(4)))
+        found = list(pool.map(lambda seed: alone(plan, ground, seed=seed).master["column_force"], range(4)))
     for seed, force in enumerate(found):
-        assert np.array_equal(force, column_loop.simulate(plan, ground, seed=seed).force)
+        assert np.array_equal(force, alone(plan, ground, seed=seed).master["column_force"])
 
 
 def written_out(plan: Plan, ground: Array, *, late: bool) -> Array:
@@ -143,19 +144,21 @@ def test_with_an_ideal_actuator_it_solves_the_equations_written_out(plan: Plan, 
     force = replace(base.compensator.force, unit_delay=late)
     base = replace(base, compensator=replace(base.compensator, force=force))
     ground = ground_of(base)
-    found = column_loop.simulate(base, ground)
+    found = alone(base, ground)
     expected = written_out(base, ground, late=late)
-    np.testing.assert_allclose(found.floors, expected, atol=1e-9 * np.abs(expected).max(), rtol=0)
+    np.testing.assert_allclose(
+        found.master["displacement"], expected, atol=1e-9 * np.abs(expected).max(), rtol=0
+    )
 
 
 def test_with_an_ideal_actuator_the_test_is_the_whole_building(plan: Plan) -> None:
     base = ideal(plan)
     ground = ground_of(base)
     expected = response(base, ground)
-    found = column_loop.simulate(base, ground).floors
+    found = alone(base, ground).master["displacement"]
     assert np.abs(found - expected).max() < 0.01 * np.abs(expected).max()
     numb = replace(base, column=replace(base.column, mass=0.0, damping=0.0, stiffness=0.0))
-    assert np.abs(column_loop.simulate(numb, ground).floors - expected).max() > 0.1 * np.abs(expected).max()
+    assert np.abs(alone(numb, ground).master["displacement"] - expected).max() > 0.1 * np.abs(expected).max()
 
 
 def tower(rows: bool, **column: Any) -> Plan:
