@@ -10,12 +10,13 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
-from common.errors import EmergencyStopError, InterlockError, RigError
+from common.errors import InterlockError, RigError
 from common.host import lateness
-from common.lab.descent import Descent, Resting
-from common.lab.laboratory import REPEAT_NS, Laboratory, Setting
+from common.lab.descent import Descent
+from common.lab.laboratory import Laboratory, Setting
 from common.lab.operation import obey
 from common.lab.preflight import Gate
+from common.lab.rig_loop import RigLoop
 from common.link.endpoint import Received
 from common.link.mailbox import LinkModel
 from common.plan import patience
@@ -44,7 +45,7 @@ from master.partner import Partner
 from master.step import MasterStep, Outputs
 
 
-class MasterLoop:
+class MasterLoop(RigLoop):
     """Laboratory A in a test; `links` are the impairments of what comes from each slave, by role."""
 
     def __init__(
@@ -58,27 +59,22 @@ class MasterLoop:
         epoch_ns: int,
         gate: Gate | None = None,
     ) -> None:
-        self.lab = Laboratory(MASTER, setting)
-        plan = setting.plan
+        plan, lab = setting.plan, Laboratory(MASTER, setting)
+        self._limits = MasterLimits(plan)
+        zero, readings = ColumnCommand(0.0), len(ColumnMeasurement._fields)
+        descent = Descent(lab, rig, partial(ColumnRamp, plan), zero, readings)
+        super().__init__(lab, rig, descent, self._limits.standing)
         self.partners = {role: Partner(role, self.lab, links[role]) for role in plan.roles}
         self._partners = tuple(self.partners.values())
         self._handshake = Handshake(self.lab, self._partners, rig, epoch_ns - setting.clock.now(), gate)
         self._alone = len(self._partners) == 1
-        self._rig = rig
-        self.lab.watch(rig)
         self._step = step
-        self._limits = MasterLimits(plan)
-        begin = partial(ColumnRamp, plan)
-        self._descent = Descent(self.lab, rig, begin, ColumnCommand(0.0), len(ColumnMeasurement._fields))
-        self._disarmed = False
         self._command = 0.0
         self._drift = 0.0
         self._column_force = 0.0
-        self._said_ns = -REPEAT_NS
         self._sent_ns = 0  # when the newest command went out
         self._digest = plan.digest()
         self._late = lateness.LateTicks()
-        self.ticks = 0
         self.lab.enter(session)
 
     # -- messages ---------------------------------------------------------------------------------
@@ -144,7 +140,7 @@ class MasterLoop:
         held = late and not lab.plan.makes_good
         forces = [partner.begin(tick, wake) for partner in self._partners]
         self._tell_late(tick - 1)
-        if self._alarmed(tick, wake, late=late):
+        if self._alarmed(tick, wake - lab.tick_ns(tick), late=late):
             self.ease(tick)
             return
         try:
@@ -167,19 +163,12 @@ class MasterLoop:
         self._column_force = measured.column_force
         self._watch(tick, wake)
 
-    def _alarmed(self, tick: int, wake_ns: int, *, late: bool) -> bool:
-        """Trip where this loop came far too late, or a slave has been silent for too long; hold before that."""
-        lab = self.lab
-        if lab.overrun(wake_ns - lab.tick_ns(tick), tick):
-            return True
-        if late:  # the silence may be this loop's own
-            return False
+    def _finding(self, tick: int) -> tuple[Finding, str]:
+        """What the slaves' watchdogs say, and of which slave: the first of which it is the worst."""
         findings = [partner.look(tick) for partner in self._partners]
-        if Finding.RAMP in findings:
-            lab.silent(self._partners[findings.index(Finding.RAMP)].title, tick)
-            return True
-        lab.safety.follow(Turn.HOLD if Finding.HOLD in findings else Turn.RESUME)
-        return False
+        held = Finding.HOLD if Finding.HOLD in findings else findings[0]
+        worst = Finding.RAMP if Finding.RAMP in findings else held
+        return worst, self._partners[findings.index(worst)].title
 
     def _write(self, outputs: Outputs, *, held: bool) -> None:
         """Move to the tick's command, or stay where it came too late."""
@@ -191,19 +180,6 @@ class MasterLoop:
         self._descent.wrote(command)
         self._rig.write(command)
         self._limits.written(command)
-
-    def ease(self, tick: int) -> None:
-        """One interval on the ramp to rest."""
-        try:
-            self._descent.ease(tick)
-        except EmergencyStopError as error:
-            self.emergency(error)
-
-    def _rig_failed(self, error: RigError, tick: int) -> None:
-        if isinstance(error, EmergencyStopError):
-            self.emergency(error)
-        else:
-            self._trip(error, "rig", tick)
 
     def _tell_late(self, tick: int) -> None:
         """Warn where too many ticks up to this one, which has just been judged, came late in any exchange.
@@ -277,32 +253,9 @@ class MasterLoop:
 
     # -- end --------------------------------------------------------------------------------------
 
-    def _trip(self, error: RigError | InterlockError, code: str, tick: int = 0) -> None:
-        self.lab.fail(Event.TRIP, error, code=code, tick=tick)
-
     def stop(self, reason: str) -> None:
         """Bring the test to an end; after its last tick, or earlier because somebody wants it so."""
-        if self.lab.exchange.allows(Event.STOP):
-            self.lab.exchange.happen(Event.STOP, cause=reason)
-            self.lab.note("stop", reason, tick=self.ticks)
-            self.lab.safety.follow(Turn.END)
-            self.tell()
-
-    def end(self, reason: str) -> None:
-        """End the test in order, as the operator wants."""
-        self.stop(reason)
-
-    def emergency(self, error: EmergencyStopError) -> None:
-        """Stop the rig at once."""
-        self.lab.emergency(error)
-        self.disarm_rig()
-
-    def standing(self) -> str:
-        """Why the cause of a latched state persists, empty where it is gone."""
-        try:
-            return self._limits.standing(self._rig.read())
-        except RigError as error:
-            return str(error)
+        self.end(reason)
 
     def leave(self, *, last: bool = False) -> None:
         """Tell the slaves and give the recorder the rest; may be called again until `left`, and a `last` time."""
@@ -310,20 +263,14 @@ class MasterLoop:
         waited = [partner for partner in self._partners if partner.registered and not partner.stopped]
         if lab.exchange.state is State.STOPPING and not waited:
             lab.exchange.happen(Event.FINISH)
-        now = lab.clock.now()
-        if not last and now - self._said_ns < REPEAT_NS // 2:
-            return
-        self._said_ns = now
-        self._say_end()
-        lab.send_samples(everything=True)
-        lab.endpoint.send(lab.outlet.finished())
-
-    def tell(self) -> None:
-        """Tell the slaves that the test ends, again after a while."""
-        now = self.lab.clock.now()
-        if now - self._said_ns >= REPEAT_NS // 2:
-            self._said_ns = now
+        if self._due(last=last):
             self._say_end()
+            self._hand_over()
+
+    @property
+    def _ends(self) -> bool:
+        """Whether the test ends, in order or not."""
+        return self.lab.exchange.state is State.STOPPING or self.lab.error is not None
 
     def _say_end(self) -> None:
         lab = self.lab
@@ -340,14 +287,6 @@ class MasterLoop:
                 partner.account.finish(self.ticks - 1, self.lab.clock.now())
                 text, values = partner.exchanged()
                 self.lab.note("exchange", text, tick=self.ticks, values=values)
-
-    def disarm_rig(self) -> None:
-        """Disarm the rig, once."""
-        if not self._disarmed:
-            self._disarmed = True
-            if failure := self._rig.disarm():
-                self.lab.note("disarm", str(failure), level="warning", tick=self.ticks)
-                self.lab.explain(failure, tick=self.ticks)
 
     @property
     def left(self) -> bool:
@@ -390,11 +329,6 @@ class MasterLoop:
             "round_trip": max(account.round_trip for account in accounts),
             "missed": float(max(account.missed for account in accounts)),
         }
-
-    @property
-    def resting(self) -> Resting:
-        """How far the rig is on its ramp to rest."""
-        return self._descent.resting
 
     # -- pacing -----------------------------------------------------------------------------------
 

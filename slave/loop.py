@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from functools import partial
 
-from common.errors import EmergencyStopError, InterlockError, RigError
-from common.lab.descent import Descent, Resting
-from common.lab.laboratory import REPEAT_NS, Laboratory, Setting
+from common.errors import InterlockError, RigError
+from common.lab.descent import Descent
+from common.lab.laboratory import Laboratory, Setting
 from common.lab.operation import obey
+from common.lab.rig_loop import RigLoop
 from common.link.endpoint import Received
 from common.link.mailbox import LinkModel, Mailbox
 from common.protocol.exchange import Event, State
@@ -42,18 +43,19 @@ NO_COMMAND = Command(0, -1, 0, 0, -1, 0.0, 0.0, 0.0, 0.0, 0.0)
 NOTHING_HEARD = (-1, 0)
 
 
-class SlaveLoop:
+class SlaveLoop(RigLoop):
     """Laboratory B in a test, or one of several; `instance` tells this process from others of its role."""
 
     def __init__(
         self, setting: Setting, rig: GuardedRig, link: LinkModel, *, role: str = SLAVE, instance: int = 1
     ) -> None:
-        self.lab = Laboratory(role, setting)
+        lab = Laboratory(role, setting)
+        self._limits = SlaveLimits(setting.plan)
+        zero, readings = TableCommand(0.0, 0.0), len(TableMeasurement._fields)
+        descent = Descent(lab, rig, partial(TableRamp, setting.plan), zero, readings)
+        super().__init__(lab, rig, descent, self._limits.standing)
         self._instance = instance
         self._handshake = Handshake(self.lab, rig, instance)
-        self._rig = rig
-        self.lab.watch(rig)
-        self._limits = SlaveLimits(setting.plan)
         self._commands: Mailbox[Command] = Mailbox(link, "command", setting.plan.test.interval, nominal=0)
         self._received_ns: dict[int, int] = {}
         self._heard = NOTHING_HEARD  # number and arrival of the newest command
@@ -63,15 +65,10 @@ class SlaveLoop:
         self._leap_ns = (
             setting.plan.window * self.lab.interval_ns
         )  # clocks drift slowly: beyond it is no drift
-        self._said_ns = -REPEAT_NS
-        begin = partial(TableRamp, setting.plan)
-        self._descent = Descent(self.lab, rig, begin, TableCommand(0.0, 0.0), len(TableMeasurement._fields))
         self._watchdog = Watchdog(setting.plan.safety, setting.plan.test.interval)
         self._tally = Tally(setting.plan.ticks, setting.plan.window)
         self._feedbacks = 0  # sent
-        self._disarmed = False
         self._master_ticks = 0  # those it says it has done
-        self.ticks = 0
 
     # -- messages ---------------------------------------------------------------------------------
 
@@ -155,7 +152,7 @@ class SlaveLoop:
         if not held and (command := self._commands.take(tick)) is not None:
             self._command = command
             self._tally.use(command.seq)
-        if self._alarmed(tick, now, late=late):
+        if self._alarmed(tick, now - self.tick_ns(tick), late=late):
             self.ease(tick)
             return
         command = self._command
@@ -186,33 +183,10 @@ class SlaveLoop:
         self.lab.rig_time.begin()
         self.lab.heard_ns = now
 
-    def _alarmed(self, tick: int, now: int, *, late: bool) -> bool:
-        """Trip where this loop came far too late, or the master has been silent for too long; hold before that."""
-        lab = self.lab
-        if lab.overrun(now - self.tick_ns(tick), tick):
-            return True
-        if late:  # the silence may be this loop's own
-            return False
+    def _finding(self, tick: int) -> tuple[Finding, str]:
+        """What the watchdog says of the master."""
         judged = self._commands.judged(self._command)
-        finding = self._watchdog.look(tick, judged.seq, judged.heard_seq)
-        if finding is Finding.RAMP:
-            lab.silent("master", tick)
-            return True
-        lab.safety.follow(Turn.HOLD if finding is Finding.HOLD else Turn.RESUME)
-        return False
-
-    def ease(self, tick: int) -> None:
-        """One interval on the ramp to rest."""
-        try:
-            self._descent.ease(tick)
-        except EmergencyStopError as error:
-            self.emergency(error)
-
-    def _rig_failed(self, error: RigError, tick: int) -> None:
-        if isinstance(error, EmergencyStopError):
-            self.emergency(error)
-        else:
-            self.lab.fail(Event.TRIP, error, code="rig", tick=tick)
+        return self._watchdog.look(tick, judged.seq, judged.heard_seq), MASTER
 
     def _answer(self, tick: int, started_ns: int, measured: TableMeasurement, wanted: TableCommand) -> None:
         lab, command = self.lab, self._command
@@ -270,26 +244,6 @@ class SlaveLoop:
         """Stop because somebody at this laboratory wants it so."""
         self.lab.fail(Event.TRIP, InterlockError(reason), code="stop", tick=self.ticks)
 
-    def end(self, reason: str) -> None:
-        """End the test in order, as the operator wants; the master hears it too."""
-        lab = self.lab
-        if lab.exchange.allows(Event.STOP):
-            lab.exchange.happen(Event.STOP, cause=reason)
-            lab.note("stop", reason, tick=self.ticks)
-            lab.safety.follow(Turn.END)
-
-    def emergency(self, error: EmergencyStopError) -> None:
-        """Stop the rig at once."""
-        self.lab.emergency(error)
-        self.disarm_rig()
-
-    def standing(self) -> str:
-        """Why the cause of a latched state persists, empty where it is gone."""
-        try:
-            return self._limits.standing(self._rig.read())
-        except RigError as error:
-            return str(error)
-
     def disarm(self) -> None:
         """Bring the rig to a safe stop; once, before leaving."""
         self.disarm_rig()
@@ -298,37 +252,27 @@ class SlaveLoop:
             values = {"feedbacks_sent": float(self._feedbacks)} | self._tally.values("commands")
             self.lab.note("exchange", text, tick=self.ticks, values=values)
 
-    def disarm_rig(self) -> None:
-        """Disarm the rig, once."""
-        if not self._disarmed:
-            self._disarmed = True
-            if failure := self._rig.disarm():
-                self.lab.note("disarm", str(failure), level="warning", tick=self.ticks)
-                self.lab.explain(failure, tick=self.ticks)
+    @property
+    def _ends(self) -> bool:
+        """Whether the test has ended here: of its orderly end the master knows, who ends it."""
+        return self.lab.error is not None
 
-    def tell(self) -> None:
-        """Tell the master why this laboratory has stopped, again after a while."""
-        now = self.lab.clock.now()
-        if self.lab.error is not None and now - self._said_ns >= REPEAT_NS // 2:
-            self._said_ns = now
+    def _say_end(self) -> None:
+        if self.lab.error is not None:
             self.lab.say_why()
 
     def leave(self, *, last: bool = False) -> None:
         """Tell the master and give the recorder the rest; may be called again until `left`, and a `last` time."""
         lab = self.lab
-        now = lab.clock.now()
-        if not last and now - self._said_ns < REPEAT_NS // 2:
+        if not self._due(last=last):
             return
-        self._said_ns = now
         session = lab.exchange.session
         if lab.exchange.state is State.STOPPING:
             lab.exchange.happen(Event.FINISH)
-        if lab.error is not None:
-            lab.say_why()
+        self._say_end()
         if session and (last or lab.exchange.state is State.DONE):
             lab.endpoint.send(Stopped(session, self.ticks))
-        lab.send_samples(everything=True)
-        lab.endpoint.send(lab.outlet.finished())
+        self._hand_over()
 
     @property
     def left(self) -> bool:
@@ -356,11 +300,6 @@ class SlaveLoop:
     def progress(self) -> dict[str, float]:
         """What a user watches while it runs."""
         return {}
-
-    @property
-    def resting(self) -> Resting:
-        """How far the rig is on its ramp to rest."""
-        return self._descent.resting
 
     # -- pacing -----------------------------------------------------------------------------------
 
