@@ -40,7 +40,7 @@ KNOWN_A = {**column_effects.KNOWN, **sensors.known(SIGNALS_A)}
 KNOWN_B = {**table_effects.KNOWN, **sensors.known(SIGNALS_B)}
 
 # a command of several frequencies that begins at rest, with about the amplitudes of the default test
-TIMES = np.arange(4000) * DT
+TIMES = np.arange(2500) * DT
 RISE = np.minimum(TIMES / 2.0, 1.0) ** 2
 COLUMN = RISE * (2.2e-3 * np.sin(12.5 * TIMES) + 0.1e-3 * np.sin(40.0 * TIMES))
 TABLE = RISE * (4.5e-3 * np.sin(12.5 * TIMES) + 0.2e-3 * np.sin(40.0 * TIMES))
@@ -322,10 +322,14 @@ def test_the_valve_limits_the_speed_and_the_load_the_way() -> None:
 
 
 def test_friction_stops_and_drags_the_damper() -> None:
-    still = np.zeros(4000)
-    held = play_b(effect("damper.friction", "lugre", force=5.0), command=still, motor=np.full(4000, 3.0))
+    still = np.zeros(TIMES.size)
+    held = play_b(
+        effect("damper.friction", "lugre", force=5.0), command=still, motor=np.full(TIMES.size, 3.0)
+    )
     assert np.max(np.abs(held["damper_stroke"])) < 1e-4
-    tugged = play_b(effect("damper.friction", "lugre", force=5.0), command=still, motor=np.full(4000, 7.0))
+    tugged = play_b(
+        effect("damper.friction", "lugre", force=5.0), command=still, motor=np.full(TIMES.size, 7.0)
+    )
     assert np.max(tugged["damper_stroke"]) > 0.01
     for formula in ("tanh", "dahl", "lugre"):
         found = play_b(effect("damper.friction", formula, force=5.0))
@@ -417,7 +421,7 @@ def test_readings_leak_and_get_lost() -> None:
 
 
 def test_noise_is_white_and_of_its_level_and_follows_the_seed() -> None:
-    still = np.zeros(4000)
+    still = np.zeros(TIMES.size)
     found = play_b(command=still, motor=still, sensors={})
     for name, level in zip(SIGNALS_B, (10e-6, 0.01, 2e-6, 0.2), strict=True):
         assert np.std(found[name]) == pytest.approx(level, rel=0.05)
