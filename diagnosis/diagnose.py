@@ -3,30 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from common.errors import InputError
-from common.plan.plan import Plan
 from common.terminal.telling import Tell, untold
-from diagnosis import link, readings
-from diagnosis.findings import report
-from diagnosis.findings.verdict import Verdict, judge
+from diagnosis.findings import readings, report
+from diagnosis.findings.found import Diagnosis
+from diagnosis.findings.verdict import judge
 from diagnosis.fits import fitting
-from diagnosis.fits.fitting import Data, Values
+from diagnosis.fits.fitting import Data
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import Searcher
-from diagnosis.ground import Ground
-from diagnosis.link import Finding
-from diagnosis.parts import Building, ColumnAlone, LaboratoryA, LaboratoryB, Part
-from diagnosis.readings import Reading
-from diagnosis.record import LEAST_TICKS, Record
+from diagnosis.recorded import link
+from diagnosis.recorded.ground import Ground
+from diagnosis.recorded.link import Finding
+from diagnosis.recorded.parts import Building, ColumnAlone, LaboratoryA, LaboratoryB, Part
+from diagnosis.recorded.record import LEAST_TICKS, Record
 from diagnosis.report.records import Report
-from models.effects import CATALOGUE
 from models.loop.closed_loop import MEASURED_A, MEASURED_B
-from models.system import System
 
 SHORTEST = 0.5  # s of a test that anything can be said of
 BUILDING = (
@@ -37,57 +33,6 @@ BUILDING = (
     "damper_force_used",
 )
 AGAINST = -0.7  # correlation from which on a sign is doubted
-
-
-@dataclass(frozen=True)
-class Diagnosis:
-    """Everything that was found in a recording."""
-
-    record: Record
-    verdicts: Sequence[Verdict] = ()
-    readings: Sequence[Reading] = ()
-    link: Sequence[Finding] = ()
-    held: Mapping[str, float] = field(default_factory=dict)  # sensors that repeat samples, and how many
-    white: Mapping[str, float] = field(default_factory=dict)  # rms of each reading's noise
-    warnings: Sequence[str] = ()
-
-    def named(self, site: str) -> list[str]:
-        """The effects found at a site."""
-        names = [name for verdict in self.verdicts for name in verdict.effects]
-        names += [item.effect for item in self.readings] + [item.effect for item in self.link]
-        return [name for name in names if CATALOGUE[name].site == site]
-
-    def system(
-        self, sites: frozenset[str] | None = None, plan: Plan | None = None, *, noisy: bool = True
-    ) -> System:
-        """A plan with parameters moved inside their tolerances and the effects found, of some sites or of all.
-
-        The recording's own plan where none is given; without added noise of sensors where not `noisy`.
-        """
-        system = System(plan or self.record.plan)
-        for verdict in self.verdicts:
-            fit = verdict.search.chosen
-            kept = {
-                name: values
-                for name, values in fit.values.items()
-                if sites is None or CATALOGUE[name].site in sites
-            }
-            system = laid(system, verdict, kept)
-        for reading in self.readings:
-            effect = CATALOGUE[reading.effect]
-            if (sites is None or effect.site in sites) and (noisy or not effect.random):
-                system = effect.apply(system, **{reading.parameter: reading.value})
-        return system
-
-
-def laid(system: System, verdict: Verdict, values: Values) -> System:
-    """A system with a part's parameters moved and some of its effects laid over it."""
-    part, z = verdict.search.data.part, verdict.search.chosen.z
-    for nuisance, place in zip(part.nuisances, z, strict=True):
-        system = nuisance.moved(system, float(place))
-    for name, given in values.items():
-        system = CATALOGUE[name].apply(system, **given)
-    return system
 
 
 def diagnose(record: Record, validation: Sequence[Record] = (), tell: Tell = untold) -> Report:

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from common.errors import InputError
 from common.plan.limits import UNITS
 from diagnosis.findings import where
+from diagnosis.findings.found import Diagnosis
 from diagnosis.fits import fitting
 from diagnosis.fits.search import Search, gaps
-from diagnosis.parts import LaboratoryA, LaboratoryB
+from diagnosis.recorded.parts import LaboratoryA, LaboratoryB
 from diagnosis.report.evidence import Ceiling, Coordinate, Dependence, Unknown
 from diagnosis.signals import windows
 from diagnosis.signals.ceiling import ceiling, depends_on
 from models.registry import Array
-
-if TYPE_CHECKING:
-    from diagnosis.diagnose import Diagnosis
 
 COORDINATE: dict[str, Coordinate] = {
     "column_displacement": "displacement",

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from common.recording.outcome import outcome
 from diagnosis.findings import where
 from diagnosis.findings.ceilings import ceilings, unknown
+from diagnosis.findings.found import Diagnosis
+from diagnosis.findings.how_far import Response
+from diagnosis.findings.next_test import Choice
 from diagnosis.findings.series import UNITS, numbers, strongest
+from diagnosis.findings.verdict import Verdict
+from diagnosis.findings.where import Trace
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data, Fit
 from diagnosis.fits.search import remaining
-from diagnosis.paths import force_path, paths
+from diagnosis.recorded.paths import force_path, paths
+from diagnosis.recorded.record import Record
 from diagnosis.report.evidence import (
     Abscissa,
     Curve,
@@ -36,14 +41,6 @@ from diagnosis.signals import windows
 from models.effects import CATALOGUE
 from models.loop import closed_loop
 from models.registry import Array
-
-if TYPE_CHECKING:
-    from diagnosis.diagnose import Diagnosis
-    from diagnosis.findings.how_far import Response
-    from diagnosis.findings.next_test import Choice
-    from diagnosis.findings.verdict import Verdict
-    from diagnosis.findings.where import Trace
-    from diagnosis.record import Record
 
 COORDINATES = {  # natural coordinates of a site: abscissa and ordinate
     "actuator": ("actuator_command", "column_displacement"),

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from common.errors import InputError
+from diagnosis.findings.found import Diagnosis
 from diagnosis.fits import fitting
-
-if TYPE_CHECKING:
-    from diagnosis.diagnose import Diagnosis
 
 FAINT = 0.3  # rms of an effect's trace over noise below which it could hide
 

@@ -5,24 +5,22 @@ from __future__ import annotations
 import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from diagnosis import link, loop
 from diagnosis.findings import where
+from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.series import UNITS, numbers, strongest
 from diagnosis.findings.where import Trace
 from diagnosis.fits import fitting
-from diagnosis.loop import RESPONSE, UNIT, Loop, closed_share, overall
+from diagnosis.recorded import link, loop
+from diagnosis.recorded.loop import RESPONSE, UNIT, Loop, closed_share, overall
+from diagnosis.recorded.record import Record
 from diagnosis.report.evidence import History, LoopShare, Step
 from diagnosis.report.records import Gap, HowFar, SignalGap
+from diagnosis.signals.mask import Mask
 from models.effects import CATALOGUE
 from models.registry import Array
-
-if TYPE_CHECKING:
-    from diagnosis.diagnose import Diagnosis
-    from diagnosis.record import Mask, Record
 
 QUIET = 0.2  # noise over a signal's rms from which on a part alone is not judged by it
 PLAYERS = 6  # sites among which shares are computed exactly

@@ -10,19 +10,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from common.errors import InputError
+from diagnosis.findings.found import Diagnosis
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data, Fit, Problem
 from diagnosis.fits.search import Search, exchanged_pair
-from diagnosis.parts import LaboratoryA, LaboratoryB
+from diagnosis.recorded.parts import LaboratoryA, LaboratoryB
 from models.registry import Array
-
-if TYPE_CHECKING:
-    from diagnosis.diagnose import Diagnosis
 
 SECONDS = 10.0  # length of a test
 ENOUGH = 3.0  # standard deviations at which two hypotheses are told apart

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from common.terminal.telling import Tell, untold
 from diagnosis.findings import details, exercise, how_far, next_test, where
+from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.which import which
+from diagnosis.recorded.record import Record
 from diagnosis.report.records import Place, Report, Status, Tolerance
-
-if TYPE_CHECKING:
-    from diagnosis.diagnose import Diagnosis
-    from diagnosis.record import Record
 
 STILL = 5.0  # rms of a signal over its noise below which it hardly moved
 

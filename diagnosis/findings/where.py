@@ -12,8 +12,8 @@ import numpy as np
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data, Fit
 from diagnosis.fits.search import gap
-from diagnosis.parts import LaboratoryB
-from diagnosis.record import Record
+from diagnosis.recorded.parts import LaboratoryB
+from diagnosis.recorded.record import Record
 from diagnosis.signals import windows
 from models.effects import CATALOGUE
 from models.registry import Array

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.verdict import Interval, Verdict, intervals
 from diagnosis.fits.fitting import Values
 from diagnosis.fits.search import MATERIAL, PRIOR_GAIN, gaps
 from diagnosis.report.records import Candidate
 from diagnosis.report.values import Parameters, Value
 from models.effects import CATALOGUE
-
-if TYPE_CHECKING:
-    from diagnosis.diagnose import Diagnosis
 
 MOST_OTHERS = 5  # alternatives listed
 

@@ -19,8 +19,9 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from common.errors import InputError
-from diagnosis.parts import EXACT, MODEL_ERROR, Part
-from diagnosis.record import Mask, Record
+from diagnosis.recorded.parts import EXACT, MODEL_ERROR, Part
+from diagnosis.recorded.record import Record
+from diagnosis.signals.mask import Mask
 from models.effects import CATALOGUE
 from models.effects.effect import Effect, Parameter
 from models.registry import Array

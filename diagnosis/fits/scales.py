@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from diagnosis.record import Record
+from diagnosis.recorded.record import Record
 from models.effects.effect import Effect, Parameter
 
 USUAL = {  # what the default test reaches

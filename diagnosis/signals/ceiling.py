@@ -9,8 +9,8 @@ from typing import TypeVar
 import numpy as np
 
 from common.errors import InputError
-from diagnosis.record import Mask
 from diagnosis.signals.features import features
+from diagnosis.signals.mask import Mask
 from diagnosis.signals.systematic import systematic_rms
 from models.indicators.checks import checked
 from models.registry import Array

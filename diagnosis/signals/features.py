@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 from scipy import ndimage
 
-from diagnosis.record import Mask
+from diagnosis.signals.mask import Mask
 from models.registry import Array
 
 LAGS = (-0.02, -0.01, 0.0, 0.01, 0.02, 0.03, 0.04, 0.06, 0.08, 0.11, 0.15, 0.2)  # s

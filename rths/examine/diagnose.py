@@ -95,8 +95,8 @@ def diagnose_file(
     """
     from common.plan import plan as plans
     from common.recording.reader import read
-    from diagnosis import record
     from diagnosis.diagnose import diagnose
+    from diagnosis.recorded import record
 
     chosen = plans.load(cli.plan_path(plan)) if plan else None
     own = record.build(read(path), chosen, against_ideal=against_ideal)

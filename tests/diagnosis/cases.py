@@ -13,8 +13,8 @@ from common.plan import plan, reality
 from common.plan.plan import Plan
 from common.recording.reader import read
 from common.terminal import cli
-from diagnosis import record
-from diagnosis.record import Record
+from diagnosis.recorded import record
+from diagnosis.recorded.record import Record
 from models.effects import CATALOGUE
 from models.registry import Array
 from rths.examine.diagnose import diagnose_file

@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 
 from common.plan.plan import Plan
 from common.recording.reader import read
-from diagnosis import record
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data, Fit
-from diagnosis.parts import MODEL_ERROR, Building, LaboratoryA, LaboratoryB, Part
+from diagnosis.recorded import record
+from diagnosis.recorded.parts import MODEL_ERROR, Building, LaboratoryA, LaboratoryB, Part
 from models.effects import CATALOGUE
 from models.registry import Array
 from models.system import System

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from common.recording.reader import read
-from diagnosis import record
 from diagnosis.diagnose import examine
 from diagnosis.findings import how_far
-from diagnosis.loop import closed_share, overall
+from diagnosis.recorded import record
+from diagnosis.recorded.loop import closed_share, overall
 from rths.examine.diagnose import diagnose_file
 from tests.diagnosis.cases import Cases, Effects
 

@@ -15,7 +15,7 @@ from common.plan import reality
 from common.plan.plan import Plan
 from common.plan.tables import Rig
 from common.recording.reader import Run, read
-from diagnosis.link import Finding, account, exchange_of, findings
+from diagnosis.recorded.link import Finding, account, exchange_of, findings
 from models.link.exchange import exchange
 from models.link.impaired import ImpairedLink
 from models.loop.closed_loop import on_time

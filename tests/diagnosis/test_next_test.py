@@ -11,7 +11,7 @@ from diagnosis.findings import next_test
 from diagnosis.findings.next_test import Choice
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data, Values
-from diagnosis.parts import LaboratoryA
+from diagnosis.recorded.parts import LaboratoryA
 from models.effects import CATALOGUE, checked
 from tests.diagnosis.cases import Cases
 

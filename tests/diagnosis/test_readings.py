@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from common.recording.reader import read
-from diagnosis import readings, record
+from diagnosis.findings import readings
+from diagnosis.findings.readings import Reading
 from diagnosis.fits import fitting
-from diagnosis.parts import LaboratoryA, LaboratoryB
-from diagnosis.readings import Reading
-from diagnosis.record import Record
+from diagnosis.recorded import record
+from diagnosis.recorded.parts import LaboratoryA, LaboratoryB
+from diagnosis.recorded.record import Record
 from tests.diagnosis.cases import Cases, named
 
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from common.errors import InputError
 from common.recording.reader import GROUND, Run, read
-from diagnosis import record
 from diagnosis.diagnose import not_recorded, parts_of
+from diagnosis.recorded import record
 from tests.diagnosis.cases import Cases, short
 
 

@@ -8,7 +8,7 @@ import pytest
 from diagnosis.fits import fitting, search
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import Searcher
-from diagnosis.parts import LaboratoryA
+from diagnosis.recorded.parts import LaboratoryA
 from tests.diagnosis.cases import Cases, Effects, counts_as, estimate, named, white
 
 ALONE: list[tuple[str, dict[str, float], dict[str, float]]] = [  # effect, truth, relative error allowed

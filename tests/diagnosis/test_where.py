@@ -14,8 +14,8 @@ from diagnosis.findings import where
 from diagnosis.findings.where import Trace
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data
-from diagnosis.parts import Building, LaboratoryA, LaboratoryB, Part
-from diagnosis.record import Record
+from diagnosis.recorded.parts import Building, LaboratoryA, LaboratoryB, Part
+from diagnosis.recorded.record import Record
 from models.effects import CATALOGUE, checked, lay
 from models.registry import Array
 from tests.diagnosis.cases import Cases, white

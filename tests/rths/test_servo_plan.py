@@ -13,8 +13,8 @@ import pytest
 from common.plan import reality
 from common.plan.plan import parse
 from common.recording.reader import Run, read
-from diagnosis import record
-from diagnosis.parts import Building, LaboratoryA
+from diagnosis.recorded import record
+from diagnosis.recorded.parts import Building, LaboratoryA
 from models.loop import closed_loop, substructure
 from models.system import System
 from simulation import virtual

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.parts import Nuisance, of_sites
-from diagnosis.record import Record
+from diagnosis.recorded.parts import Nuisance, of_sites
+from diagnosis.recorded.record import Record
 from models.loop import substructure
 from models.registry import Array
 from models.system import System

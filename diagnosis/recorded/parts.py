@@ -14,7 +14,8 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 
 from common.plan.plan import Plan
-from diagnosis.record import Mask, Record
+from diagnosis.recorded.record import Record
+from diagnosis.signals.mask import Mask
 from models import effects
 from models.effects.effect import Effect
 from models.labs.kinds import COLUMN, TABLE

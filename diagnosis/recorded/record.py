@@ -11,10 +11,9 @@ from common.errors import InputError
 from common.plan.plan import Plan, ideal, parse
 from common.recording.reader import GROUND, Run
 from common.roles import SLAVE
+from diagnosis.signals.mask import Mask
 from models.loop import substructure
 from models.registry import Array
-
-Mask = NDArray[np.bool_]
 
 MASTER_FIRST = ("master", "slave")
 SLAVE_FIRST = ("slave", "master")

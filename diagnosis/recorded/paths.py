@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from common.errors import InputError
-from diagnosis.record import Record
+from diagnosis.recorded.record import Record
 from diagnosis.report.evidence import ForcePath, Path, Paths
 from models import indicators
 from models.indicators import FrequencyEvaluation

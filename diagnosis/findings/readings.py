@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from diagnosis.fits.fitting import Data
-from diagnosis.record import Record
+from diagnosis.recorded.record import Record
 from diagnosis.signals.noise import quantum
 from models.labs.kinds import COLUMN, TABLE
 from models.registry import Array

@@ -21,7 +21,8 @@ from scipy.optimize import minimize
 from scipy.stats import beta
 
 from common.recording.reader import Run
-from diagnosis.record import Mask, laid_out
+from diagnosis.recorded.record import laid_out
+from diagnosis.signals.mask import Mask
 from models.loop.closed_loop import Exchange
 from models.registry import Array
 

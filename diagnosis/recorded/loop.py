@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from common.roles import SLAVE
-from diagnosis.record import Mask, Record
+from diagnosis.recorded.record import Record
+from diagnosis.signals.mask import Mask
 from models.loop import closed_loop, substructure
 from models.loop.closed_loop import Exchange
 from models.registry import Array
