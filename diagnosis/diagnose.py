@@ -8,6 +8,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from common.errors import InputError
+from common.signals import MEASURED
 from common.terminal.telling import Tell, untold
 from diagnosis.findings import readings, report
 from diagnosis.findings.found import Diagnosis
@@ -22,7 +23,6 @@ from diagnosis.recorded.link import Finding
 from diagnosis.recorded.parts import Building, ColumnAlone, LaboratoryA, LaboratoryB, Part
 from diagnosis.recorded.record import LEAST_TICKS, Record
 from diagnosis.report.records import Report
-from models.loop.closed_loop import MEASURED_A, MEASURED_B
 
 SHORTEST = 0.5  # s of a test that anything can be said of
 BUILDING = (
@@ -130,9 +130,9 @@ def parts_of(record: Record) -> list[Part]:
         parts.append(Building(record))
     if driven(record):
         parts.append(LaboratoryA(record))
-    elif record.has(*MEASURED_A):
+    elif record.has(*MEASURED["master"]):
         parts.append(ColumnAlone(record, record.signals["column_displacement"]))
-    if any(record.has(name) for name in MEASURED_B) and (
+    if any(record.has(name) for name in MEASURED["slave"]) and (
         record.has("table_command") or record.has("damper_command")
     ):
         parts.append(LaboratoryB(record))
@@ -141,15 +141,15 @@ def parts_of(record: Record) -> list[Part]:
 
 def driven(record: Record) -> bool:
     """Whether the actuator's command was recorded with a reading of its laboratory."""
-    return record.has("actuator_command") and any(record.has(name) for name in MEASURED_A)
+    return record.has("actuator_command") and any(record.has(name) for name in MEASURED["master"])
 
 
 def not_recorded(record: Record) -> list[str]:
     """What cannot be judged for lack of signals, in sentences."""
     result = []
-    if not driven(record) and record.has(*MEASURED_A):
+    if not driven(record) and record.has(*MEASURED["master"]):
         result.append("actuator_command was not recorded: nothing can be said of the actuator.")
-    missing = [name for name in (*MEASURED_A, *MEASURED_B) if not record.has(name)]
+    missing = [name for name in (*MEASURED["master"], *MEASURED["slave"]) if not record.has(name)]
     if missing:
         result.append(f"Not recorded: {', '.join(missing)}; what only they show cannot be decided.")
     return result
