@@ -45,7 +45,7 @@ def numbers(report: Report) -> str:
     closed = wording.closed(report)
     rows += [["closed, of what noise leaves to close", bar(far.get("closed"), closed)]] if closed else []
     kept = rows if known(wording.nominal_gap(report)) else rows[1:]
-    judged = f"Judged on {far['judged_on']}." if far.get("judged_on") else ""
+    judged = f"{wording.judged_on(report)}." if far.get("judged_on") else ""
     return table(("", "overall gap"), kept) + paragraph(judged, "note")
 
 
@@ -85,10 +85,7 @@ def paths(report: Report) -> str:
         paragraph(text) + table(head, rows) if rows else absent("The paths' delays are not in this report.")
     )
     force = wording.force_path(report)
-    beside = (
-        "The measured column force against that of the plan's specimen at the measured displacement, which no index of "
-        f"tracking shows: {force}."
-    )
+    beside = f"{force} No index of tracking shows this, because tracking compares displacements."
     return section("paths", "Paths of the loop", content, paragraph(beside) if force else "")
 
 

@@ -13,6 +13,7 @@ WIDTH = 100
 LABEL = 12
 BAR = 16
 MOST = 25  # lines of the whole
+UNBROKEN = "\u00a0%"
 
 
 def summary(report: Report) -> str:
@@ -21,7 +22,7 @@ def summary(report: Report) -> str:
         *verdict(report),
         *gap(report),
         *where(report),
-        *row("force path", wording.force_path(report)),
+        *row("force path", wording.force_path(report), 2),
         *which(report),
         *how_far(report),
         *tolerances(report),
@@ -38,9 +39,17 @@ def row(label: str, text: str, most: int = 1) -> list[str]:
     if not text:
         return []
     lines = textwrap.wrap(
-        text, WIDTH - LABEL, max_lines=most, placeholder=" …", break_long_words=True, break_on_hyphens=False
+        text.replace(" %", UNBROKEN),  # a number and its sign stay on one line
+        WIDTH - LABEL,
+        max_lines=most,
+        placeholder=" …",
+        break_long_words=True,
+        break_on_hyphens=False,
     )
-    return [(label if place == 0 else "").ljust(LABEL) + line for place, line in enumerate(lines)]
+    return [
+        (label if place == 0 else "").ljust(LABEL) + line.replace(UNBROKEN, " %")
+        for place, line in enumerate(lines)
+    ]
 
 
 def rows(label: str, texts: Sequence[str]) -> list[str]:
@@ -134,14 +143,16 @@ def how_far(report: Report) -> list[str]:
     found = report.get("how_far") or {}
     if not known(found.get("before")) or not known(found.get("after")):
         return row("how far", "not determined")
-    text = f"{percent(found['before'])} → {percent(found['after'])}"
+    before, after = percent(found["before"]), percent(found["after"])
+    verb = "falls" if as_float(found["after"]) < as_float(found["before"]) else "goes"
+    text = f"{wording.judged_on(report)}, the gap {verb} from {before} to {after} "
+    text += f"(noise {percent(found.get('noise_floor'))})"
     closed = wording.closed(report)
-    text += f", closed {closed}" if closed else ""
-    text += f", noise floor {percent(found.get('noise_floor'))}"
+    text += f"; closed {closed}" if closed else ""
     nominal = wording.nominal_gap(report)
-    text += f"; {percent(nominal)} before tolerances" if known(nominal) else ""
-    text += f"; judged on {found['judged_on']}" if found.get("judged_on") else ""
-    return row("how far", text, 2)
+    if known(nominal) and percent(nominal) != before:
+        text += f"; {percent(nominal)} before parameters were moved"
+    return row("how far", f"{text}.", 3)
 
 
 def tolerances(report: Report) -> list[str]:

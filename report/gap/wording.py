@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from models.effects import CATALOGUE
+from report.text.force_path import sentence as force_sentence
 from report.text.formats import as_float, known, percent, percent_interval, quantity
 
 Report = Mapping[str, Any]
@@ -17,6 +18,10 @@ STATUS = {
     "ambiguous": "ambiguous",
     "unknown_effect": "unknown effect",
     "not_enough_data": "not enough data",
+}
+JUDGED = {
+    "held-out time windows": "On data not used for fitting",
+    "recordings given": "On the recordings given for validation",
 }
 DOMINANT = 0.5  # share of the gap from which one site is named as the place
 NOTABLE = 1.0  # standard deviations of its tolerance that make a parameter's move worth a word
@@ -176,13 +181,18 @@ def closed(report: Report) -> str:
     return percent(min(as_float(far["closed"]), 1.0)) + (f" ({interval})" if interval else "")
 
 
+def judged_on(report: Report) -> str:
+    """The data on which the gap before and after is compared, as the beginning of a sentence."""
+    said = (report.get("how_far") or {}).get("judged_on")
+    return JUDGED.get(str(said), "In this recording")
+
+
 def force_path(report: Report) -> str:
-    """How late the column force is and its gain, in words; empty where the report does not say."""
+    """How late the column force is and its gain, as a sentence; empty where the report does not say."""
     found = (report.get("details") or {}).get("force_path")
     if not found:
         return ""
-    delay = quantity(found.get("delay"), "s", found.get("interval"))
-    return f"delay {delay}, gain {as_float(found.get('gain')):.4f}"
+    return force_sentence(found["delay"], found["interval"], found["gain"])
 
 
 def above_floor(item: Mapping[str, Any]) -> float:

@@ -11,6 +11,7 @@ from common.plan.limits import UNITS
 from common.recording.reader import Run
 from common.roles import LATENCY, MASTER, SLAVE, kind_of, name_of, title
 from report.facts.summary import plan_of
+from report.text.force_path import sentence as force_sentence
 from report.text.formats import apart, milliseconds, quantity
 
 Summary = Mapping[str, Any]
@@ -157,29 +158,7 @@ def force_path(summary: Summary) -> str:
     found = summary["force_path"]
     if found is None:
         return ""
-    low, high = found["interval"]
-    return (
-        f"The measured force {beside(found['delay'])} (95 %: {between(low, high)}); "
-        f"amplitude {100.0 * (found['gain'] - 1.0):+.1f} %."
-    )
-
-
-def beside(delay: float) -> str:
-    """A force's delay (s) beside that of the planned specimen, in words; it leads where the delay is negative."""
-    return f"{'leads' if delay < 0.0 else 'lags behind'} the planned specimen's by {short(abs(delay))} ms"
-
-
-def between(low: float, high: float) -> str:
-    """An interval of delays (s) in ms: magnitudes where both have one sign, else both ends with their signs."""
-    if low < 0.0 < high:
-        return f"from {short(-low)} ms ahead to {short(high)} ms behind"
-    ends = sorted((abs(low), abs(high)))
-    return f"{short(ends[0])}–{short(ends[1])}"
-
-
-def short(delay: float) -> str:
-    """A positive delay (s) in ms with two digits where it is below 1 ms, else with one after the point."""
-    return f"{delay * 1e3:.2f}" if delay < 1e-3 else f"{delay * 1e3:.1f}"
+    return force_sentence(found["delay"], found["interval"], found["gain"])
 
 
 def energy(summary: Summary) -> str:
