@@ -6,6 +6,7 @@ import argparse
 import importlib
 import sys
 from collections.abc import Sequence
+from importlib.metadata import version
 from pathlib import Path
 
 import common
@@ -20,6 +21,7 @@ VERBS = {
     "live": "show a test while it runs, or its recording, in a browser",
     "stop": "stop a running test, in order or at once",
     "reset": "let laboratories leave their latched safe state",
+    "init": "write a plan to begin with, and the skeleton of a rig",
     "check": "describe a plan: periods, delays, peaks, likely slips of units, classes that it would run",
     "simulate": "compute the closed loop of nominal models",
     "bench": "test one part alone, recorded",
@@ -46,7 +48,7 @@ VERBS = {
 
 FOLDERS = {
     "rths.perform": ("run", "live", "stop", "reset"),
-    "rths.prepare": ("check", "simulate", "bench", "identify", "keys", "doctor"),
+    "rths.prepare": ("init", "check", "simulate", "bench", "identify", "keys", "doctor"),
     "rths.examine": (
         "inspect",
         "report",
@@ -106,6 +108,7 @@ EXAMPLES = {
     "live": "rths live runs/default-20260101-120000.mcap",
     "stop": "rths stop --emergency",
     "reset": "rths reset --reason inspected",
+    "init": "rths init my_test",
     "check": "rths check test.toml",
     "simulate": "rths simulate default --ideal --no-amd",
     "bench": "rths bench actuator paper -o actuator.mcap",
@@ -137,7 +140,8 @@ def overview() -> str:
     rows = "\n".join(f"  {verb:<{width}}  {text}" for verb, text in VERBS.items())
     codes = "\n".join(f"  {code}  {meaning}" for code, meaning in EXIT_CODES.items())
     return (
-        "usage: rths VERB [options]\n\nDistributed real-time hybrid testing: two laboratories, one structure, 2 ms.\n\n"
+        "usage: rths VERB [options]\n       rths --version\n\n"
+        "Distributed real-time hybrid testing: two laboratories, one structure, 2 ms.\n\n"
         f"{rows}\n\nexit codes:\n{codes}\n\n'rths VERB --help' explains each with an example.\n"
     )
 
@@ -153,6 +157,9 @@ def command(words: Sequence[str]) -> int:
     Raises:
         RthsError: it cannot be run, or failed.
     """
+    if words and words[0] == "--version":
+        sys.stdout.write(f"rths {version('rths')}\n")
+        return 0
     if not words or words[0] in ("-h", "--help"):
         sys.stdout.write(overview())
         return 0 if words else 2

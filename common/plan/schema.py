@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any, TypedDict, TypeVar, Unpack
 
 from common.errors import PlanError
+from common.plan.units import in_si
 
 Table = TypeVar("Table")
 
@@ -117,7 +118,7 @@ def fill(cls: type[Table], values: object, where: str) -> Table:
         if name in fields and fields[name] is not open_to_more:
             given[fields[name].name] = convert(fields[name], value, where)
         elif open_to_more:
-            given[open_to_more.name][name] = as_type("float", value, f"{name} in [{where}]")
+            given[open_to_more.name][name] = as_type("float", value, f"{name} in [{where}]", None)
         else:
             raise PlanError(f"Unknown key '{name}' in [{where}]: {nearest(str(name), fields)}")
     for name, field in fields.items():
@@ -147,26 +148,28 @@ def convert(field: dataclasses.Field[Any], value: object, where: str) -> object:
         and isinstance(value, list)
         and any(isinstance(row, list) for row in value)
     ):
-        return tuple(matrix_row(row, name) for row in value)
+        return tuple(matrix_row(row, rule.unit, name) for row in value)
     if field.type in ("Storeys", "StoreysOrMatrix"):
         items = value if isinstance(value, list) else [value]
-        return tuple(in_range(as_type("float", item, name), rule, name) for item in items)
-    return in_range(as_type(str(field.type), value, name), rule, name)
+        return tuple(in_range(as_type("float", item, name, rule.unit), rule, name) for item in items)
+    return in_range(as_type(str(field.type), value, name, rule.unit), rule, name)
 
 
-def matrix_row(row: object, name: str) -> Storeys:
+def matrix_row(row: object, unit: str, name: str) -> Storeys:
     """One row of a matrix; its range is that of the whole matrix, which the plan checks."""
     if not isinstance(row, list):
         raise PlanError(
             f"{name} mixes rows and numbers: give one value per storey, or a matrix as a list of rows."
         )
-    return tuple(in_range(as_type("float", item, name), Rule(""), name) for item in row)
+    return tuple(in_range(as_type("float", item, name, unit), Rule(""), name) for item in row)
 
 
-def as_type(kind: str, value: object, name: str) -> Any:
-    """`value` as a float, int, bool, str or table; an int is accepted for a float, nothing else is bent."""
+def as_type(kind: str, value: object, name: str, unit: str | None = "") -> Any:
+    """`value` as a float, int, bool, str or table; for a float an int or a text with a unit may stand, in SI `unit`."""
     if kind == "float" and isinstance(value, int | float) and not isinstance(value, bool):
         return float(value)
+    if kind == "float" and isinstance(value, str):
+        return in_si(value, unit, name)
     types: dict[str, type] = {"int": int, "str": str, "bool": bool}
     if kind in types and isinstance(value, types[kind]) and (kind == "bool" or not isinstance(value, bool)):
         return value

@@ -46,7 +46,10 @@ WRONG = {
         "[actuator]\ndelai = 0.1\n",
         "Unknown key 'delai' in .actuator.: did you mean delay",
     ),
-    "text for a number": ("[test]\nduration = '3'\n", r"duration in \[test\] must be a number, not '3'"),
+    "text for a number": (
+        "[test]\nduration = '3'\n",
+        r"duration in \[test\] must be a number in s, or one with its unit, not '3'",
+    ),
     "number for a truth": ("[control]\namd = 1\n", r"amd in \[control\] must be true or false, not 1"),
     "number for a text": ("[test]\nname = 3\n", r"name in \[test\] must be a text in quotes, not 3"),
     "broken number for a count": (

@@ -69,7 +69,7 @@ WRONG = {
     ),
     "wrong type": (
         "[slave.roof.damper]\nmass = 'a'\n",
-        r"mass in \[slave.roof.damper\] must be a number, not 'a'",
+        r"mass in \[slave.roof.damper\] must be a number in kg, or one with its unit, not 'a'",
     ),
     "out of range": (
         "[slave.roof.table]\ndelay = -1.0\n",

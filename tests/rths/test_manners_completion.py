@@ -21,7 +21,7 @@ from tests.processes import finished
 
 SLOW = ("numba", "scipy", "matplotlib", "zenoh")
 ASKED = {
-    "in": ["inspect"],
+    "in": ["init", "inspect"],
     "simulate d": ["default"],
     "simulate ": ["benchmark2020", "default", "other", "paper", "plan.toml", "rc_column", "two_dampers"],
     "simulate --dur": ["--duration"],

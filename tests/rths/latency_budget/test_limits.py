@@ -39,7 +39,10 @@ def test_a_budget_limits_only_what_it_names(tmp_path: Path) -> None:
         ("[round_trip]\np98 = 1.0", "Unknown key 'p98' in [round_trip]: did you mean p99?"),
         ("[round_trip]\nmax = 1.0", "Unknown key 'max' in [round_trip]: known here: p50, p90, p99, p99.9"),
         ("[round_trip]\np99.9 = 1.0", 'p99.9 in [round_trip] must be written in quotes: "p99.9" = 1e-3.'),
-        ("[round_trip]\np99 = '1 ms'", "p99 in [round_trip] must be a number, not '1 ms'."),
+        (
+            "[round_trip]\np99 = '1'",
+            "p99 in [round_trip] must be a number, or one with its unit, not '1'.",
+        ),
         ("[round_trip]\np99 = true", "p99 in [round_trip] must be a number, not True."),
         ("[round_trip]\np99 = -1e-3", "p99 in [round_trip] is -0.001, but must be at least 0 s and finite."),
         ("[round_trip]\np99 = nan", "p99 in [round_trip] is nan, but must be at least 0 s and finite."),
@@ -47,7 +50,10 @@ def test_a_budget_limits_only_what_it_names(tmp_path: Path) -> None:
         ("[late]\nshares = 0.1", "Unknown key 'shares' in [late]: did you mean share?"),
         ("[late]\nshare = 2", "share in [late] is 2.0, but must be at least 0 and at most 1."),
         ("[late]\nlongest_gap = -1", "longest_gap in [late] is -1.0, but must be at least 0 ticks."),
-        ("[machine]\nstolen_share = 'x'", "stolen_share in [machine] must be a number, not 'x'."),
+        (
+            "[machine]\nstolen_share = 'x'",
+            "stolen_share in [machine] must be a number, or one with its unit, not 'x'.",
+        ),
         (
             "[machine]\nstolen_share = 0.1",
             "it sets no limit: give one such as p99 = 0.6e-3 in [feedback_one_way].",

@@ -1,0 +1,73 @@
+"""Numbers with units in a plan: `"160 t"`, `"12.5 kN/mm"`, `"4.87 mm"`, as the SI value that the key is in."""
+
+from __future__ import annotations
+
+import re
+from decimal import Decimal
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+from common.errors import PlanError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?(?P<unit>\D.*)?$", re.DOTALL)
+ONE = r"[^\W\d]+(?:[²³]|(?:\^|\*\*)-?\d)?"  # a unit and its power
+UNIT = re.compile(
+    rf"%|\(?{ONE}\)?(?:\s*[·*/ ]\s*\(?{ONE}\)?)*\)?"
+)  # pint computes whatever it reads, 9**9**9 too
+LONGEST = 60  # characters; the longest unit that a key has takes 11
+ACCELERATION = "m/s²"
+ANY = (Exception,)  # pint passes on what its parser, Python's tokens and decimal raise
+OF_ACCELERATION = {"g": "g_n", "gal": "cm/s²", "Gal": "cm/s²"}  # elsewhere g is a gram and gal a gallon
+SAME = {"kp": "kgf", "Kip": "kip", "Kips": "kip", "kips": "kip", "tonf": "t * g_n", "ms2": "m/s²"}
+
+
+@cache
+def registry() -> Any:
+    """The units that pint knows, with decimal numbers, so that 4.87 mm are 0.00487 m to the last bit."""
+    import pint
+
+    return pint.UnitRegistry(non_int_type=Decimal)
+
+
+def in_si(text: str, unit: str | None, name: str) -> float:
+    """The number that a text such as "12.5 kN/mm" stands for, in the SI unit of its key.
+
+    Args:
+        text: a number with a unit behind it; "%" is a hundredth.
+        unit: that of the key, as in "N/m"; empty for a plain number, None where only the model knows it and any fits.
+        name: what a sentence calls the key.
+
+    Raises:
+        PlanError: the text is no number with a unit, or its unit is one of another quantity.
+    """
+    found = NUMBER.match(text) if len(text) <= LONGEST else None
+    given = (found["unit"] or "").strip() if found else ""
+    if found is None or not given:
+        raise PlanError(
+            f"{name} must be a number{f' in {unit}' if unit else ''}, or one with its unit, not {text!r}."
+        )
+    return converted(Decimal(text[: found.start("unit")]), given, unit, name)
+
+
+def converted(number: Decimal, given: str, unit: str | None, name: str) -> float:
+    """A number in a unit that was given, in the unit of the key; raises PlanError where they do not fit."""
+    import pint
+
+    unknown = PlanError(
+        f"{name} has the unit {given!r}, which is not known: give it in {unit or 'SI units'}."
+    )
+    if given and not UNIT.fullmatch(given):
+        raise unknown
+    known: Mapping[str, str] = SAME | OF_ACCELERATION if unit == ACCELERATION else SAME
+    quantity = registry().Quantity
+    try:
+        value = quantity(number, known.get(given, given) or "dimensionless")
+        return float((value.to_base_units() if unit is None else value.to(unit or "dimensionless")).magnitude)
+    except pint.DimensionalityError:
+        wanted = f"in {unit}, or in another unit of the same quantity" if unit else "without a unit"
+        raise PlanError(f"{name} is in {given}, which does not fit: give it {wanted}.") from None
+    except ANY as error:
+        raise unknown from error
