@@ -13,10 +13,11 @@ from pathlib import Path
 from common.errors import InputError
 from common.host.clock import unix_ns
 from common.host.machine import facts
-from common.lab.preflight import ACCEPTED, Risk
+from common.lab.preflight import ACCEPTED
 from common.plan.plan import Plan
 from common.recording.reader import CLOCK, GROUND
 from common.recording.writer import Recording
+from common.safety.risks import Risk
 from common.signals import topics
 from common.terminal import outputs
 from models.ground_motion import GroundMotion

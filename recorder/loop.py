@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from common import signals
 from common.errors import IncompleteError, InputError, InterlockError, LostError
 from common.host.clock import Clock
-from common.lab.laboratory import REPEAT_NS, SLOW_RIG, Report, Setting
+from common.lab.laboratory import REPEAT_NS, SLOW_RIG, Setting
 from common.lab.outlet import BURST, PIECE, Inlet, pack_nexts
 from common.lab.surroundings import CODES, described
 from common.link.endpoint import Endpoint
@@ -16,6 +16,7 @@ from common.plan import patience
 from common.plan.plan import PROTOCOL_VERSION, Plan
 from common.plan.plan_difference import differences, digest_of, said
 from common.protocol.messages import Finished, Message, Recorder, Register, Resend, Samples
+from common.reporting import Report
 from common.roles import LATENCY, MASTER, RECORDER, kind_of, title
 from recorder.items import Items
 from recorder.sink import Item, Sink
@@ -125,16 +126,16 @@ class RecorderLoop:
             self._sink.put(items)
 
     def _count(self, item: Item) -> None:
-        topic, values = item[0], item[3:]
+        topic = item[0]
         if topic == "event":
-            self._take_event(values)
+            self._take_event(item[3:])
             return
         if topic in self._seen:
             if item[3] > self._newest[3]:
                 self._newest = item
-            self._note(self._seen[topic], values[0])
+            self._note(self._seen[topic], item[3])
         if kind_of(topic) == LATENCY:
-            self._missed += bool(values[MISSED_AT])
+            self._missed += bool(item[3 + MISSED_AT])
 
     @staticmethod
     def _note(seen: bytearray, tick: int) -> None:

@@ -6,9 +6,10 @@ import shutil
 from pathlib import Path
 
 from common import signals
-from common.lab.preflight import Check, Risk
+from common.lab.preflight import Check
 from common.plan.plan import Plan
 from common.roles import kind_of
+from common.safety.risks import Risk
 from common.signals import Kind, Signal
 
 # bytes of a protobuf field: its value, with a stamp's at seven bytes of seven bits, and of flags and texts none

@@ -7,12 +7,13 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from common.errors import InterlockError, RthsError
-from common.lab.laboratory import Report, Setting, silent
+from common.lab.laboratory import Setting
 from common.lab.preflight import Gate
 from common.link.endpoint import Endpoint
 from common.link.memory_link import MemoryHub
 from common.plan.plan import Plan
 from common.plan.reality import Reality
+from common.reporting import Report, silent
 from common.roles import MASTER, RECORDER
 from common.terminal.telling import Tell, untold
 from master.assembly import build_loop as build_master

@@ -194,8 +194,10 @@ def wait(loop: Loop, tick: int) -> None:
     if lab.running and tick < lab.plan.ticks and lab.overrun(lab.clock.now() - loop.nominal(tick), tick):
         return
     take_all(loop)
-    while not loop.heard(tick) and lab.running and lab.clock.now() < loop.latest(tick):
-        fetch(loop, loop.latest(tick))
+    while not loop.heard(tick) and lab.running and (left := loop.latest(tick) - lab.clock.now()) > 0:
+        received = lab.endpoint.receive(left * 1e-9)
+        if received is not None:
+            loop.take(received)
 
 
 def take_all(loop: Loop) -> None:

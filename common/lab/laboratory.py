@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from common.errors import EmergencyStopError, InterlockError, LostError, RigError, RthsError
 from common.host.clock import Clock
@@ -15,6 +15,7 @@ from common.plan.limits import Standstill, Violation
 from common.plan.plan import Plan
 from common.protocol.exchange import Event, Exchange, State
 from common.protocol.messages import Message, Recorder, Resend, Trip
+from common.reporting import Report, silent
 from common.rig import GuardedRig
 from common.rig_time import RigTime
 from common.roles import MASTER, SLAVE, title
@@ -28,12 +29,6 @@ NO_VALUES: Mapping[str, float] = MappingProxyType({})
 
 HANDSHAKE = {Event.REGISTER: Turn.CONFIGURE, Event.ARM: Turn.ARM}  # what they are to the rig
 MODES = {mode: number for number, mode in enumerate(Mode)}  # as an event's values have them
-
-Report = Callable[[str, Mapping[str, Any]], None]
-
-
-def silent(_kind: str, _data: Mapping[str, Any]) -> None:
-    """A report that nobody reads."""
 
 
 class Setting(NamedTuple):

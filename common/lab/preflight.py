@@ -9,13 +9,11 @@ import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
-from common.errors import InputError, RigError
+from common.errors import RigError
 from common.lab.laboratory import Laboratory, Setting
 from common.plan.patience import strict
 from common.plan.plan import Plan
-from common.plan.schema import nearest
-
-NAMES = ("partition", "peaks", "sensors", "link", "disk")
+from common.safety.risks import Risk, known
 
 # codes of the recording's events
 PASSED, SENSORS, LINK, ACCEPTED = "preflight", "sensors", "link", "accepted_risk"
@@ -26,13 +24,6 @@ OFFSET_SHARE = 0.1  # share of the limit that a rig at rest may read: a zeroed s
 NO_NOISE: Mapping[str, float] = {}
 
 SENSORS_PASSED = "Sensor check at rest: passed"
-
-
-class Risk(NamedTuple):
-    """One reason not to move; the sentence says what, with which figures, and what to do."""
-
-    name: str
-    sentence: str
 
 
 class Check(NamedTuple):
@@ -63,18 +54,6 @@ def refusal(risks: Sequence[Risk]) -> RefusedError:
         f"Pre-flight refuses the test: {'; '.join(risk.sentence for risk in risks)}; "
         f"to run it all the same, give {options}."
     )
-
-
-def known(names: Iterable[str]) -> tuple[str, ...]:
-    """The names of risks that somebody accepts, each once.
-
-    Raises:
-        InputError: there is no such risk.
-    """
-    for name in names:
-        if name not in NAMES:
-            raise InputError(f"There is no risk '{name}' to accept: {nearest(name, NAMES)}")
-    return tuple(dict.fromkeys(names))
 
 
 class Gate:

@@ -15,13 +15,14 @@ from common.host.stopping import Stopper
 from common.host.waited import Waited
 from common.lab import lacking
 from common.lab.drive import Loop, drive
-from common.lab.laboratory import Report, Setting
+from common.lab.laboratory import Setting
 from common.lab.preflight import Check, Gate
 from common.lab.surroundings import Surroundings
 from common.link.address import checked, loopback
 from common.link.endpoint import FrameEndpoint
 from common.plan.plan import Plan
 from common.plan.reality import Reality
+from common.reporting import Report
 from common.roles import MASTER, OPERATOR, RECORDER, SLAVE, title
 from common.safety.modes import Mode
 from common.terminal import cli

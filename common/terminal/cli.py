@@ -15,12 +15,12 @@ from typing import Any, NoReturn
 
 from common.errors import InputError, RthsError
 from common.host import realtime
-from common.lab import preflight
-from common.lab.laboratory import Report
 from common.plan import plan as plans
 from common.plan import reality as realities
 from common.plan.plan import Plan
 from common.plan.reality import Reality
+from common.reporting import Report
+from common.safety import risks
 from common.terminal.plain_report import PlainReport, plain, say
 from common.terminal.printable import escaping, shown
 
@@ -105,13 +105,13 @@ def accept_argument(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NAME",
-        help=f"run although pre-flight names this risk ({', '.join(preflight.NAMES)}); may be repeated, is recorded",
+        help=f"run although pre-flight names this risk ({', '.join(risks.NAMES)}); may be repeated, is recorded",
     )
 
 
 def accepted_risks(args: argparse.Namespace) -> tuple[str, ...]:
     """Names of the risks that the command line accepts; raises InputError for an unknown name."""
-    return preflight.known(args.accept_risk)
+    return risks.known(args.accept_risk)
 
 
 def load_plan(args: argparse.Namespace) -> Plan:

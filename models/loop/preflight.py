@@ -8,10 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from common.lab.preflight import Check, Risk
+from common.lab.preflight import Check
 from common.plan import patience
 from common.plan.plan import Plan
 from common.plan.tables import Limits
+from common.safety.risks import Risk
 from models.compensators import COMPENSATORS
 from models.loop import free_motion, limited, substructure
 from models.loop.closed_loop import simulate, stacked

@@ -13,10 +13,11 @@ from common.errors import InputError, RigError
 from common.host.clock import VirtualClock
 from common.lab import preflight
 from common.lab.laboratory import Laboratory, Setting
-from common.lab.preflight import Check, Gate, RefusedError, Risk, SensorsAtRest, link_risk, sensor_risk
+from common.lab.preflight import Check, Gate, RefusedError, SensorsAtRest, link_risk, sensor_risk
 from common.link.memory_link import MemoryHub
 from common.plan.plan import Plan
 from common.rig import ColumnMeasurement, GuardedRig
+from common.safety.risks import Risk
 from common.terminal import cli
 from tests.helpers import with_table
 

@@ -10,10 +10,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from common.lab.drive import longest_leave
-from common.lab.laboratory import Report, Setting
+from common.lab.laboratory import Setting
 from common.plan.plan import Plan
 from common.plan.reality import Reality
 from common.plan.tables import Rig
+from common.reporting import Report
 from common.roles import MASTER, RECORDER
 from master import assembly as master_assembly
 from master.loop import MasterLoop
