@@ -9,4 +9,4 @@ Report = Callable[[str, Mapping[str, Any]], None]
 
 
 def silent(_kind: str, _data: Mapping[str, Any]) -> None:
-    """A report that nobody reads."""
+    """A report that is discarded."""

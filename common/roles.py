@@ -1,4 +1,4 @@
-"""Who takes part in a test: a master, one slave or several with names, a recorder; an operator and an observer.
+"""The roles in a test: a master, one slave or several with names, a recorder; an operator and an observer.
 
 A role is what a process is called in messages, keys and topics: `master`, `recorder`, `slave` where there is one,
 `slave.NAME` where the plan names its slaves. An operator may say something on the control channel and nothing else, an

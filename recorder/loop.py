@@ -161,7 +161,7 @@ class RecorderLoop:
     # -- housekeeping -----------------------------------------------------------------------------
 
     def poll(self) -> None:
-        """Say how far it is, ask for what is missing, notice when all is there or nobody is left."""
+        """Report its progress, ask for missing rows, and notice when it has all rows or every laboratory has left."""
         now = self._clock.now()
         self._notice_stall(now)
         if self._session and now - self._filled_ns >= ASK_NS:

@@ -113,7 +113,7 @@ class Handshake:
         self._lab.endpoint.send(Scheduled(self._lab.exchange.session))
 
     def poll(self) -> None:
-        """Before the first tick: give up when nobody comes, or when the master has fallen silent."""
+        """Before the first tick: give up when no master comes, or when it has fallen silent."""
         lab = self._lab
         seconds = lab.plan.link.connect_timeout
         if lab.exchange.ended or lab.exchange.state is State.SCHEDULED:

@@ -1,6 +1,7 @@
 """Tests that run on this machine in real time: a small file each, so that commands find them, and none joins another.
 
-A user's files lie in a folder of his own. Their names, which say the test and the process, can be read by everybody:
+The files of a user lie in a folder of that user.
+Their names, which say the test and the process, can be read by everybody:
 other users' tests disturb one as much as one's own. What is in them is for their owner alone.
 """
 
@@ -46,7 +47,7 @@ class Neighbour(NamedTuple):
 
 
 def home() -> Path:
-    """The folder in which each user has his own."""
+    """The folder that holds a folder for each user."""
     return Path(os.environ.get(FOLDER) or tempfile.gettempdir())
 
 

@@ -14,7 +14,7 @@ class Waited:
         self._begun_ns = self._said_ns = begun_ns
 
     def news(self, whom: str, patience: float, now_ns: int) -> str:
-        """A sentence where it is time for one, else empty; nothing while nobody is waited for."""
+        """A sentence if it is time for one, else empty; empty as well while no process is awaited."""
         if not whom:
             self._begun_ns = self._said_ns = now_ns
         if now_ns - self._said_ns < SAY_NS:

@@ -88,7 +88,7 @@ class Loop(Protocol):
 
     @property
     def awaited(self) -> str:
-        """Who has not joined the test yet, empty where all have."""
+        """The processes that have not joined the test yet, empty where all have."""
 
     @property
     def progress(self) -> Mapping[str, float]:

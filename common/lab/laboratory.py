@@ -199,7 +199,7 @@ class Laboratory:
         self.fail(Event.TRIP, error, code="limit", tick=tick, values=violation.values)
 
     def overrun(self, late_ns: int, tick: int) -> bool:
-        """End the test where a tick comes too many intervals late: nobody knows what the rig did meanwhile."""
+        """End the test where a tick comes too many intervals late, because the rig's motion meanwhile is unknown."""
         most = self.plan.safety.overrun
         if late_ns <= most * self.interval_ns:
             return False

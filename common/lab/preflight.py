@@ -34,7 +34,7 @@ class Check(NamedTuple):
 
 
 class RefusedError(RigError):
-    """A test that must not begin, for a risk that nobody has accepted by name (exit 3)."""
+    """A test that must not begin because of a risk that was not accepted by name (exit 3)."""
 
 
 def check(risks: Iterable[Risk], accepted: Collection[str]) -> tuple[list[Risk], list[Risk]]:
@@ -47,7 +47,7 @@ def check(risks: Iterable[Risk], accepted: Collection[str]) -> tuple[list[Risk],
 
 
 def refusal(risks: Sequence[Risk]) -> RefusedError:
-    """The refusal for risks that nobody has accepted, as one sentence; `risks` is not empty."""
+    """The refusal for risks that were not accepted, as one sentence; `risks` is not empty."""
     names = dict.fromkeys(risk.name for risk in risks)
     options = " ".join(f"--accept-risk {name}" for name in names)
     return RefusedError(

@@ -165,7 +165,7 @@ def join(
     elif not loopback(listen):
         warn(
             "open_link",
-            f"The link on {listen} is open: whoever reaches it can move the rigs; see docs/how-to/security.md.",
+            f"The link on {listen} is open: anybody who reaches it can move the rigs; see docs/how-to/security.md.",
         )
     others = [title(one) for one in (*plan.roles, RECORDER)]
     text = (

@@ -14,7 +14,7 @@ PROBE_S = 0.5
 
 
 def mismatch(endpoint: str) -> str:
-    """Why one end with certificates and one without do not meet; empty where that is not so, or nobody listens."""
+    """Why an end with certificates and one without cannot connect; empty where that is not so, or nothing listens."""
     speaks = speaks_tls(endpoint)
     if speaks and not endpoint.startswith("tls/"):
         return (
@@ -30,7 +30,7 @@ def mismatch(endpoint: str) -> str:
 
 
 def speaks_tls(endpoint: str) -> bool | None:
-    """Whether TLS is spoken at an endpoint; None where nobody listens."""
+    """Whether TLS is spoken at an endpoint; None where nothing listens."""
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
     context.check_hostname, context.verify_mode = False, ssl.CERT_NONE  # only whether, not to whom
     try:

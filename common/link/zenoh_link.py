@@ -96,7 +96,7 @@ def reach(
 
     Raises:
         InputError: the certificate is refused, which waiting does not cure.
-        LostError: nobody listens there.
+        LostError: nothing listens there.
         InterlockError: somebody wants to stop.
     """
     deadline = time.monotonic() + seconds
@@ -250,7 +250,7 @@ def stay_attached() -> None:
 
 
 def listenable() -> str:
-    """An endpoint on loopback at a port that nobody uses now."""
+    """An endpoint on loopback at a port that is free at present."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return f"tcp/127.0.0.1:{probe.getsockname()[1]}"

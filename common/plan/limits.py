@@ -211,7 +211,7 @@ class Frozen:
 
     def _look(self, readings: Sequence[float], last: Sequence[float], command: float) -> Standstill | None:
         for channel, reading, before in zip(self._channels, readings, last or readings, strict=True):
-            if self._plain:  # nobody has followed it since
+            if self._plain:  # no command has moved it since
                 channel.begin(before, command)
             channel.take(reading, command)
         self._plain = all(one.same == 1 and (one.judged or one.noise <= 0.0) for one in self._channels)

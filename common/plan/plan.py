@@ -313,7 +313,7 @@ def check_tolerances(plan: Plan) -> None:
 
 
 def uncertain(where: str, table: dict[str, Any]) -> list[str]:
-    """The parameters of a table that nobody knows exactly: its numbers without those that somebody chose."""
+    """The parameters of a table that are uncertain: its numbers without those that are chosen freely."""
     names = []
     for key, value in table.items():
         name = f"{where}.{key}"

@@ -42,7 +42,7 @@ def digest_of(text: str) -> str:
 def changed(plan: Plan) -> dict[str, str]:
     """Every key that is not at its default, by its dotted name, as JSON; and the version of the package.
 
-    Figures that follow from whether a rig is named are left out: nobody wrote them.
+    Figures that follow from whether a rig is named are left out, because no plan sets them.
     """
     defaults, own = (dict(leaves(strict(one).tables())) for one in (Plan(), plan))
     given = {name: text for name, text in own.items() if defaults.get(name) != text}

@@ -94,7 +94,7 @@ def unfit(method: object, parameters: Sequence[str]) -> str:
     if not callable(method):
         return f"has {method!r} for a method"
     if inspect.iscoroutinefunction(method):
-        return "has an async method, which nobody awaits"
+        return "has an async method, which is never awaited"
     try:
         inspect.signature(method).bind(*parameters)
     except TypeError as error:

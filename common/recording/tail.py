@@ -1,7 +1,7 @@
 """Following a recording while it is written: what has come since the last look, decoded like a whole one.
 
 The recorder hands whole records to the operating system some twenty times a second, so the file itself is the stream:
-nobody who writes it knows who reads, or waits for them.
+the writer neither knows its readers nor waits for them.
 """
 
 from __future__ import annotations

@@ -130,7 +130,7 @@ def named(temporary: Path, path: Path, place: Path, force: bool) -> None:
 
 
 def claim(path: Path) -> None:
-    """Make an empty file, which nobody else can do any more; raises InputError where one is there."""
+    """Make an empty file and so reserve its name; raises InputError where a file is there."""
     try:
         os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, MODE))
     except FileExistsError:

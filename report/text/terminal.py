@@ -29,7 +29,7 @@ def table(rows: Sequence[Sequence[str]], stream: TextIO | None = None) -> None:
 class Progress:
     """Progress of a test: a bar and sparklines on a terminal, plain lines now and then elsewhere (default: stderr).
 
-    A terminal that is closed, or a pipe that nobody reads, ends no test.
+    A terminal that is closed, or a pipe whose reader has gone, does not end a test.
     """
 
     def __init__(self, duration: float, stream: TextIO | None = None) -> None:

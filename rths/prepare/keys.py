@@ -98,7 +98,7 @@ def certificates(
     """An authority and the certificates that it signs, by role, valid from `begin` to `end`; new keys every time.
 
     Keys are ECDSA on P-256. The authority signs no others of its kind. The master's certificate serves to listen,
-    under the names of its host, the others' to dial: nobody can take the master's place with one of them.
+    under the names of its host, the others' to dial: no holder of one can take the master's place.
 
     Raises:
         InputError: a host is neither a name nor an address.

@@ -128,7 +128,7 @@ def test_an_exception_of_a_rig_is_located_in_its_own_file(tmp_path: Path) -> Non
         ("arm read write=3 disarm", "has 3 for a method, but must have write(command)"),
         ("arm read write() disarm", "has a method with other parameters (too many positional arguments)"),
         ("arm read(channel) write disarm", "(missing a required argument: 'channel'), but must have read()"),
-        ("arm async_read write disarm", "has an async method, which nobody awaits, but must have read()"),
+        ("arm async_read write disarm", "has an async method, which is never awaited, but must have read()"),
     ],
 )
 def test_a_rig_without_its_methods_is_refused_as_it_is_loaded(
