@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -23,6 +24,7 @@ from diagnosis.recorded.link import Finding
 from diagnosis.recorded.parts import Building, ColumnAlone, LaboratoryA, LaboratoryB, Part
 from diagnosis.recorded.record import LEAST_TICKS, Record
 from diagnosis.report.records import Report
+from models.system import System
 
 SHORTEST = 0.5  # s of a test that anything can be said of
 BUILDING = (
@@ -35,8 +37,12 @@ BUILDING = (
 AGAINST = -0.7  # correlation from which on a sign is doubted
 
 
-def diagnose(record: Record, validation: Sequence[Record] = (), tell: Tell = untold) -> Report:
-    """The report on a recording (contract, section 8), but for its verdict in words.
+def diagnose(
+    records: Mapping[str, Record], validation: Mapping[str, Sequence[Record]], tell: Tell = untold
+) -> dict[str, Report]:
+    """The reports on a test by role of the slave (contract, section 8), but for their verdicts in words.
+
+    Each is of the master and of one slave; in its closed loop the other slaves are what they were found to be.
 
     Raises:
         InputError: there is nothing in the recording that a model of the plan could be held against.
@@ -44,8 +50,24 @@ def diagnose(record: Record, validation: Sequence[Record] = (), tell: Tell = unt
     with threadpool_limits(
         limits=1, user_api="blas"
     ):  # small matrices: more threads only wait for each other
-        found = examine(record, tell)
-        return report.build(found, validation, tell)
+        found = {role: examine(record, tell) for role, record in records.items()}
+        systems = {role: item.system(noisy=False) for role, item in found.items()}
+        return {
+            role: report.build(
+                replace(item, record=among(item.record, systems)),
+                [among(other, systems) for other in validation.get(role, ())],
+                tell,
+            )
+            for role, item in found.items()
+        }
+
+
+def among(record: Record, systems: Mapping[str, System]) -> Record:
+    """The record of one slave, with the others as they were found."""
+    if record.whole is None:
+        return record
+    others = {role: system for role, system in systems.items() if role != record.whole.role}
+    return replace(record, whole=replace(record.whole, others=others))
 
 
 def examine(record: Record, tell: Tell = untold) -> Diagnosis:

@@ -18,6 +18,7 @@ from diagnosis.findings.where import Trace
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data, Fit
 from diagnosis.fits.search import remaining
+from diagnosis.recorded.loop import simulated
 from diagnosis.recorded.paths import force_path, paths
 from diagnosis.recorded.record import Record
 from diagnosis.report.evidence import (
@@ -39,8 +40,8 @@ from diagnosis.report.evidence import (
 from diagnosis.report.records import Candidate
 from diagnosis.signals import windows
 from models.effects import CATALOGUE
-from models.loop import closed_loop
 from models.registry import Array
+from models.system import System
 
 COORDINATES = {  # natural coordinates of a site: abscissa and ordinate
     "actuator": ("actuator_command", "column_displacement"),
@@ -114,9 +115,7 @@ def nominal_signals(found: Diagnosis) -> dict[str, Array] | None:
     record = found.record
     if record.ground is None or not record.has("displacement", "column_target"):
         return None
-    plan = record.plan.with_ticks(record.ticks)
-    rollout = closed_loop.simulate(plan, record.ground)
-    return closed_loop.signals(plan, rollout) if rollout.finite else None
+    return simulated(record, System(record.plan), record.ground)
 
 
 def part(found: Diagnosis, trace: Trace) -> PartSeen:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from common.recording.reader import share
 from common.roles import SLAVE
 from diagnosis.recorded.record import Record
 from diagnosis.signals.mask import Mask
@@ -39,13 +40,8 @@ class Loop:
         rows = substructure.shifted(
             self.ground * factor, system.effects.time_shift / system.plan.test.interval
         )
-        plan = system.plan.with_ticks(self.record.ticks)
-        exchange = {SLAVE: self.exchange} if linked and self.exchange else None
-        rollout = closed_loop.simulate(plan, rows, effects=system.effects, exchange=exchange, seed=seed)
-        if not rollout.finite:
-            return None
-        found = closed_loop.signals(plan, rollout)
-        return {name: found[name] for name in self.names}
+        found = simulated(self.record, system, rows, self.exchange if linked else None, seed)
+        return None if found is None else {name: found[name] for name in self.names}
 
     def gap(self, simulated: Mapping[str, Array] | None, mask: Mask | None = None) -> dict[str, float]:
         """rms(recorded − simulated)/rms(recorded) per signal over some of the ticks."""
@@ -78,6 +74,37 @@ class Loop:
                 level = float(np.mean(self.record.signals[name][there] ** 2)) or 1.0
                 squares[name] += float(np.mean((loud[name][there] - quiet[name][there]) ** 2)) / level / NOISY
         return {name: float(np.sqrt(value)) for name, value in squares.items()}
+
+
+def simulated(
+    record: Record, system: System, ground: Array, exchange: Exchange | None = None, seed: int | None = None
+) -> Signals | None:
+    """Signals of the closed loop of a record's test by name, None where it diverges.
+
+    Of a test with several slaves those of the master and of the slave that the record shows; the other slaves are what
+    they were found to be, or what the plan says.
+    """
+    whole, ticks = record.whole, record.ticks
+    if whole is None:
+        role, plan, slaves = SLAVE, system.plan.with_ticks(ticks), None
+    else:
+        role, plan = whole.role, whole.joined(system.plan).with_ticks(ticks)
+        slaves = {one: System(plan.of(one)) for one in plan.roles} | {
+            one: replace(given, plan=given.plan.with_ticks(ticks))
+            for one, given in (whole.others | {role: system}).items()
+        }
+    rollout = closed_loop.simulate(
+        plan,
+        ground,
+        effects=system.effects,
+        slaves=slaves,
+        exchange={role: exchange} if exchange else None,
+        seed=seed,
+    )
+    if not rollout.finite:
+        return None
+    master = rollout.master if whole is None else share(rollout.master, plan.roles.index(role))
+    return master | rollout.slaves[role]
 
 
 def noised(system: System, levels: Mapping[str, float]) -> System:

@@ -7,7 +7,7 @@ the sensors' noise alone as long as its model is right. A gap in one piece does 
 from __future__ import annotations
 
 import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from operator import attrgetter
 from typing import Any, ClassVar, Protocol
 
@@ -265,9 +265,9 @@ class Building:
     signals: tuple[str, ...] = ("displacement", "velocity", "acceleration")
 
     def __init__(self, record: Record) -> None:
-        self._inputs = tuple(
-            record.signals[name] for name in ("column_displacement", "column_force", "damper_force_used")
-        )
+        self._whole = record.whole
+        dampers = record.signals["damper_force_used"] if self._whole is None else self._whole.dampers
+        self._inputs = (record.signals["column_displacement"], record.signals["column_force"], dampers)
         here = record.signals["ground_acceleration"]
         self._ground = np.zeros((2, record.ticks + 1))
         self._ground[0, :-1] = here
@@ -287,6 +287,8 @@ class Building:
 
     def predict(self, system: System) -> Array:
         """Displacement, velocity and acceleration of every storey."""
+        if self._whole is not None:
+            system = replace(system, plan=self._whole.joined(system.plan))
         rows = replay.building(system, self._ground, *self._inputs)
         return np.column_stack([rows[name] for name in type(self).signals])
 

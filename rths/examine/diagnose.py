@@ -11,12 +11,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from common.errors import InputError
+from common.plan.schema import nearest
+from common.roles import name_of
 from common.terminal import cli, outputs
 from common.terminal.printable import all_shown
 from common.terminal.telling import Tell, untold
 from report.text.progress import Progress
 
 if TYPE_CHECKING:
+    from common.recording.reader import Run
     from diagnosis.report.records import Report
 
 
@@ -30,6 +33,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--ideal",
         action="store_true",
         help="hold the test against the pure simulation: transfer systems that follow their targets at once",
+    )
+    parser.add_argument(
+        "--name", metavar="NAME", help="the slave that is diagnosed, of several (default: each)"
     )
     parser.add_argument(
         "--json", type=Path, metavar="OUT", help="write the report as JSON; - for standard output"
@@ -50,9 +56,15 @@ def run(args: argparse.Namespace) -> int:
     """Diagnose and report; 0 whatever the verdict is."""
     check(args)
     with Progress("diagnosing") as progress:
-        report = diagnose_file(
-            args.file, plan=args.plan, validate=args.validate, against_ideal=args.ideal, tell=progress.tell
+        from common.recording.reader import read
+
+        recording = read(args.file)
+        names = chosen(recording, args)
+        found = diagnose_slaves(
+            recording, plan=args.plan, validate=args.validate, against_ideal=args.ideal, tell=progress.tell
         )
+        reports = [found[name] for name in names]
+        report = reports[0]
         if args.html:
             from report.gap import page
 
@@ -66,7 +78,8 @@ def run(args: argparse.Namespace) -> int:
         outputs.write_text(args.json, text, args.force)
     from report.gap import terminal
 
-    outputs.aside(args.html, args.json).write(terminal.summary(all_shown(report.plain())) + "\n")
+    texts = [terminal.summary(all_shown(one.plain())) for one in reports]
+    outputs.aside(args.html, args.json).write("\n\n".join(texts) + "\n")
     return 0
 
 
@@ -80,6 +93,19 @@ def check(args: argparse.Namespace) -> None:
         raise InputError(f"--html and --json both name {args.html}: give each a file of its own.")
 
 
+def chosen(recording: Run, args: argparse.Namespace) -> list[str]:
+    """Names of the slaves that are asked for, of which a file holds one; empty for the one without a name."""
+    names = [name_of(role) for role in recording.roles]
+    if args.name and args.name not in names:
+        hint = nearest(args.name, names) if any(names) else "leave out --name."
+        raise InputError(f"{args.file} has no slave '{args.name}': {hint}")
+    if len(names) > 1 and not args.name and (args.json or args.html):
+        raise InputError(
+            f"--json and --html hold one laboratory: say which one with --name ({', '.join(names)})."
+        )
+    return [args.name] if args.name else names
+
+
 def diagnose_file(
     path: Path,
     *,
@@ -88,7 +114,30 @@ def diagnose_file(
     against_ideal: bool = False,
     tell: Tell = untold,
 ) -> Report:
-    """The report on a recording.
+    """The report on a recording of a test with one slave.
+
+    Raises:
+        InputError: a file cannot be read, or holds nothing to diagnose.
+    """
+    from common.recording.reader import read
+
+    reports = diagnose_slaves(
+        read(path), plan=plan, validate=validate, against_ideal=against_ideal, tell=tell
+    )
+    return next(iter(reports.values()))
+
+
+def diagnose_slaves(
+    recording: Run,
+    *,
+    plan: str | None = None,
+    validate: Sequence[Path] = (),
+    against_ideal: bool = False,
+    tell: Tell = untold,
+) -> dict[str, Report]:
+    """The reports on a recording by the name of the slave, empty where there is one without.
+
+    Each is of the master and that slave, and its verdict begins with the laboratory's name where there are several.
 
     Raises:
         InputError: a file cannot be read, or holds nothing to diagnose.
@@ -97,11 +146,17 @@ def diagnose_file(
     from common.recording.reader import read
     from diagnosis.diagnose import diagnose
     from diagnosis.recorded import record
-
-    chosen = plans.load(cli.plan_path(plan)) if plan else None
-    own = record.build(read(path), chosen, against_ideal=against_ideal)
-    others = [record.build(read(other), chosen, against_ideal=against_ideal) for other in validate]
-    report = diagnose(own, others, tell)
     from report.gap import wording
 
-    return dataclasses.replace(report, verdict=wording.verdict(report.plain()))
+    believed = plans.load(cli.plan_path(plan)) if plan else None
+    own, *others = (
+        {role: record.build(run, believed, against_ideal=against_ideal, role=role) for role in run.roles}
+        for run in (recording, *map(read, validate))
+    )
+    further = {role: [other[role] for other in others if role in other] for role in own}
+    result = {}
+    for role, report in diagnose(own, further, tell).items():
+        name, words = name_of(role), wording.verdict(report.plain())
+        verdict = f"Laboratory {name}: {words}" if name else words
+        result[name] = dataclasses.replace(report, verdict=verdict)
+    return result

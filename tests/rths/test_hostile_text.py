@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -174,7 +175,7 @@ def test_a_command_prints_the_text_of_a_recording_as_letters(
 ) -> None:
     monkeypatch.setattr(drawing, "PICTURES", {})
     if verb == "diagnose":  # its search takes a minute and prints nothing of the recording
-        monkeypatch.setattr("diagnosis.diagnose.diagnose", said_of)
+        monkeypatch.setattr("rths.examine.diagnose.diagnose_slaves", said_of)
     if verb == "identify":
         monkeypatch.setattr("report.facts.identification.identify", identified)
     call(verb, hostile, *(word.format(tmp=tmp_path, file=hostile) for word in PRINTING[verb]))
@@ -190,15 +191,16 @@ def identified(*_: Any) -> dict[str, Any]:
     return {"part": HOSTILE, "parameters": parameters, "model": HOSTILE}
 
 
-def said_of(*_: Any) -> dict[str, Any]:
-    """A report that has the hostile text wherever one of a recording has text."""
-    return {
+def said_of(*_: Any, **__: Any) -> dict[str, Any]:
+    """The report on a test with one slave, which has the hostile text wherever one of a recording has text."""
+    report = {
         "status": "unknown_effect",
         "next_test": HOSTILE,
         "warnings": [HOSTILE],
         "gap": {"signals": {HOSTILE: {"nrmse": 0.1, "noise_floor": 0.01, "unit": HOSTILE}}},
         "details": {"test": {"name": HOSTILE}},
     }
+    return {"": SimpleNamespace(plain=lambda: report)}
 
 
 @pytest.mark.parametrize("verb", ["inspect", "replay", "budget", "diagnose"])

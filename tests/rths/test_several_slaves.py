@@ -209,13 +209,35 @@ def test_bench_wants_a_slaves_name_for_its_parts_and_identify_finds_them_again(
     assert parts["damper.cellar"]["parameters"]["mass"]["value"] == pytest.approx(20.0, rel=0.05)
 
 
-def test_a_diagnosis_of_several_is_refused_in_one_sentence(
-    call: Any, capsys: Any, recording: Path, virtual_recording: Path, plan_file: Path
+def test_a_diagnosis_says_in_which_laboratory_the_gap_lies(
+    two: Plan, call: Any, capsys: Any, tmp_path: Path
 ) -> None:
-    for words in ((recording,), (virtual_recording, "--plan", plan_file)):
+    friction = {"name": "damper.friction", "force": 3.0, "slave": "cellar"}
+    truth = reality.from_reality({"effect": [friction]}, two, Path())
+    path = tmp_path / "gap.mcap"
+    assert virtual.run(virtual.assemble(two, truth, path), str) is None
+    assert call("diagnose", path) == 0
+    roof, cellar = capsys.readouterr().out.split("\n\n")
+    assert "Laboratory roof: No gap beyond noise and tolerances" in roof
+    assert "Laboratory cellar: The gap of" in cellar
+    assert "damper friction: force 3." in cellar or "damper friction: force 2.9" in cellar
+
+
+def test_a_report_for_a_file_is_of_one_laboratory_of_the_recordings_own_slaves(
+    call: Any, capsys: Any, recording: Path, virtual_recording: Path, plan_file: Path, tmp_path: Path
+) -> None:
+    for words, sentence in (
+        ((recording, "--json", tmp_path / "a.json"), "say which one with --name (roof, cellar)"),
+        ((recording, "--name", "celar"), "has no slave 'celar': did you mean cellar?"),
+        ((virtual_recording, "--name", "roof"), "has no slave 'roof': leave out --name."),
+        (
+            (virtual_recording, "--plan", plan_file),
+            "but the plan is of the slave 'roof' and the slave 'cellar'",
+        ),
+    ):
         assert call("diagnose", *words) == 2
         err = capsys.readouterr().err
-        assert "only a test with one slave without a name can be diagnosed" in err
+        assert sentence in err
         assert err.count("\n") == 1
 
 
