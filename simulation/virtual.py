@@ -128,9 +128,18 @@ def play(bench: Bench, stopping: Callable[[], str] = str, pause: Callable[[], bo
 
 
 def _unattended(loop: MasterLoop | SlaveLoop, stopping: Callable[[], str]) -> Callable[[], str]:
-    """The wish to stop, also of a laboratory that would wait for an operator's reset for ever."""
-    safety = loop.lab.safety
-    return lambda: stopping() or (NO_OPERATOR if safety.latched else "")
+    """The wish to stop, also of a laboratory that would wait for an operator's reset for ever.
+
+    The handshake takes no time, so that a wish waits until all have agreed on the start and hear of the end.
+    """
+    lab = loop.lab
+
+    def wish() -> str:
+        if lab.running:
+            return stopping()
+        return NO_OPERATOR if lab.safety.latched else ""
+
+    return wish
 
 
 def _listening(bench: Bench, tell: Tell) -> dict[str, str]:

@@ -454,12 +454,13 @@ def test_a_plug_ins_delay_is_in_the_stamps_and_not_in_the_clocks_offset(
     assert np.all(latency["deadline_missed"])  # the answer was not there for the next tick
 
 
-def test_early_stop_by_the_user_is_orderly(short_plan: Plan, tmp_path: Path) -> None:
+@pytest.mark.parametrize("ticks", [0, 700])
+def test_early_stop_by_the_user_is_orderly(ticks: int, short_plan: Plan, tmp_path: Path) -> None:
     path = tmp_path / "stopped.mcap"
     bench = virtual.assemble(short_plan, reality.as_planned(short_plan), path)
-    error = virtual.run(bench, lambda: "stopped by the user." if bench.master.ticks == 700 else "")
+    error = virtual.run(bench, lambda: "stopped by the user." if bench.master.ticks >= ticks else "")
     found = read(path)
     assert str(error) == "stopped by the user."
     assert bench.master.lab.exchange.state is bench.slave.lab.exchange.state is State.DONE
-    assert found.ticks("master") == found.ticks("slave") == 700
+    assert found.ticks("master") == found.ticks("slave") == ticks
     assert found.metadata["summary"]["cause"] == "stopped by the user."
