@@ -43,7 +43,7 @@ def numbers(report: Report) -> str:
         ["noise floor", esc(percent(far.get("noise_floor")))],
     ]
     closed = wording.closed(report)
-    rows += [["closed, of what noise leaves to close", bar(far.get("closed"), closed)]] if closed else []
+    rows += [["closed, of the gap above the noise", bar(far.get("closed"), closed)]] if closed else []
     kept = rows if known(wording.nominal_gap(report)) else rows[1:]
     judged = f"{wording.judged_on(report)}." if far.get("judged_on") else ""
     return table(("", "overall gap"), kept) + paragraph(judged, "note")
@@ -114,7 +114,7 @@ def tolerances(report: Report) -> str:
         for name, item in entries
     ]
     text = (
-        "Nobody knows a laboratory exactly: these moves of nominal parameters are commissioning, not unmodelled "
+        "No laboratory is known exactly: these moves of nominal parameters are commissioning, not unmodelled "
         "effects. z counts standard deviations of the tolerance; beyond ±1 a move deserves a look."
     )
     picture = figure(pictures.tolerance_moves(entries), "Moves of the nominal parameters.")

@@ -17,11 +17,14 @@ GLOSSARY = (
     ("nominal model", "what the plan says that a laboratory is"),
     (
         "residual",
-        "what a part's model fails to predict at its exit when fed what was recorded at its entrance",
+        "recorded output of a part minus its model's prediction from the recorded input",
     ),
     ("share", "how much of the gap a site makes; shares sum to 100 % over sites with a gap"),
     ("effect", "something real that the nominal models leave out"),
-    ("probability", "how likely a candidate is among those tried, never beyond them"),
+    (
+        "probability",
+        "how likely a candidate is among those tried; causes that were not tried are not counted",
+    ),
     ("nats", "logarithm of a ratio of likelihoods; 3 nats worse is about 20 times less likely"),
     ("closed", "(before − after) / (before − noise floor), on data that the fit has not seen"),
     ("tolerance", "how well a nominal parameter is known beforehand"),

@@ -47,8 +47,8 @@ def sites(report: Report) -> str:
         return absent("No part leaves a residual above its noise: there is nothing to place.")
     if not rows:
         return absent(
-            "The gap could not be placed: that takes what goes into a part and what comes out of it, and this "
-            "recording does not hold both for any part with a gap."
+            "The gap could not be placed, because the recording holds input and output together of no part that "
+            "has a gap."
         )
     return table(("site", "share of the gap", "residual / noise", "when", "frequencies"), rows)
 
@@ -75,8 +75,8 @@ def residuals(details: Mapping[str, Any]) -> str:
         name = wording.site(str(part.get("site")))
         drawn.append(figure(pictures.residual_frequency(part), f"Residual of the {name} over frequency."))
     text = (
-        "Each part's nominal model is fed what was recorded at its entrance; the residual is what it then fails to "
-        f"predict at its exit. Parts with both ends recorded: {names}."
+        "Each part's nominal model is driven by the recorded input; the residual is the recorded output minus its "
+        f"prediction. Parts with input and output recorded: {names}."
     )
     missing = (
         absent("Their residuals over time and frequency are not in this report.") if not any(drawn) else ""

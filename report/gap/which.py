@@ -13,8 +13,8 @@ from report.text.formats import as_float, known, nats, percent, probability, qua
 Candidate = Mapping[str, Any]
 MOST_PICTURES = 6
 KINDS = (
-    ("physics", "Physics effects", "the machine does something that its model leaves out"),
-    ("measurement", "Measurement artefacts", "the machine does as believed, but a reading is off"),
+    ("physics", "Physics effects", "the rig does something that its model leaves out"),
+    ("measurement", "Measurement artefacts", "the rig behaves as modelled, but a reading is wrong"),
 )
 
 
@@ -114,7 +114,7 @@ def warnings(item: Candidate, names: Sequence[str], report: Report) -> str:
         if other not in names
     }
     if twins:
-        texts.append(f"Not told apart from {wording.joined(sorted(map(wording.effect, twins)), 'or')}.")
+        texts.append(f"Cannot be told apart from {wording.joined(sorted(map(wording.effect, twins)), 'or')}.")
     return "".join(paragraph(text, "warn") for text in texts)
 
 
@@ -131,7 +131,7 @@ def unknown(report: Report) -> str:
     if known(found.get("frequency")):
         facts.append(f"strongest at {quantity(found['frequency'], 'Hz')}")
     name = wording.site(str(found.get("site") or "an unknown part"))
-    text = f"At the {name} something works that no effect of the catalogue describes"
+    text = f"At the {name} an effect acts that is not in the catalogue"
     drawn = pictures.curve(found.get("curve") or {}, ("the catalogue's best", "a flexible curve"))
     picture = figure(drawn, "What the catalogue leaves over.")
     return (

@@ -181,7 +181,7 @@ def test_the_page_shows_every_picture_of_a_whole_report() -> None:
     assert html.index("Measurement artefacts") < html.index("sensor.damper_force.gain")
     for words in (
         "On the bound of its range: factor.",
-        "Not told apart from table friction.",
+        "Cannot be told apart from table friction.",
         "8.3 nats worse",
     ):
         assert words in html
