@@ -1,7 +1,7 @@
 """Trips without a cause in an hour of virtual time, over a link with 1 % loss and 1 ms of jitter, and the gap it adds.
 
 The loops, drive, endpoints and codec run on a simulated clock and link (`rths faults`) in pieces of a minute, each with
-seeds of its own for noise and link. A piece is held against the same test over a cable alone.
+seeds of its own for noise and link. A piece is compared with the same test over a cable alone.
 """
 
 from __future__ import annotations

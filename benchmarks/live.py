@@ -2,8 +2,7 @@
 
 With a browser the page is open in a headless Chromium on the same machine, which draws in software: more than a view
 on a desk costs. The tests go on where a busy machine holds a laboratory up: late ticks are counted and end nothing.
-Each test has a bare timing loop beside it, whose late ticks are those of the machine: what is held against each other
-is the rest.
+Each test has a bare timing loop beside it, whose late ticks are those of the machine: only the rest is compared.
 """
 
 from __future__ import annotations
@@ -125,7 +124,7 @@ def seconds_of(path: Path) -> float:
 
 
 def figures(kind: str, turns: list[Turn], without: list[Turn]) -> list[Figure]:
-    """Late ticks of one kind of test, and those beyond the bare loop's held against the tests without in each turn."""
+    """Late ticks of one kind of test; those beyond the bare loop's are compared with the tests without a view."""
     early = ended_early(f"test, {kind}", [turn.ending for turn in turns])
     tests = [turn.test for turn in turns if turn.test is not None]
     if not tests:

@@ -45,7 +45,7 @@ def diagnose(
     Each is of the master and of one slave; in its closed loop the other slaves are what they were found to be.
 
     Raises:
-        InputError: there is nothing in the recording that a model of the plan could be held against.
+        InputError: the recording holds nothing that a model of the plan could predict.
     """
     with threadpool_limits(
         limits=1, user_api="blas"

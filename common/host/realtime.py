@@ -61,7 +61,7 @@ def prepare(mode: str, processor: int | None) -> Granted:
     'off' takes only what costs no privilege and changes no scheduling. `processor` None leaves the process free.
 
     Raises:
-        InputError: there is no such mode, the processor is none that this process may use or is given with 'off',
+        InputError: there is no such mode, this process may not use the processor or it is given with 'off',
             or the mode is 'on' and something could not be had.
     """
     if mode not in MODES:

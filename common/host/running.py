@@ -100,7 +100,7 @@ def neighbours() -> list[Neighbour]:
 
 
 def neighbour(path: Path) -> Neighbour | None:
-    """The test behind a file; None where its process has ended, or where the file is none of ours."""
+    """The test behind a file; None where its process has ended, or where the file was not written by rths."""
     test, _, number = path.stem.rpartition("-")
     try:
         facts, process = path.stat(), int(number)

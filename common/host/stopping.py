@@ -55,7 +55,7 @@ class Stopper:
 
 
 def taken() -> list[signal.Signals]:
-    """The signals that mean a wish; a hang-up that was ignored from the start (`nohup`) is none."""
+    """The signals that mean a wish to stop; not a hang-up that was ignored from the start (`nohup`)."""
     numbers = [getattr(signal, name) for name in STOPPING if hasattr(signal, name)]
     hang_up = getattr(signal, "SIGHUP", None)
     return [one for one in numbers if one != hang_up or signal.getsignal(one) is not signal.SIG_IGN]

@@ -159,7 +159,7 @@ class Inlet:
         return items
 
     def _forget(self) -> None:
-        """Pieces that begin within others that were handed on are none of this stream."""
+        """Discard pieces that begin within others that were handed on: they do not belong to this stream."""
         for first in [first for first in self._early if first < self.next]:
             self._held -= self._early.pop(first)[1]
 

@@ -125,7 +125,7 @@ class Search:
 
 
 def answer(loop: Loop) -> str:
-    """What a laboratory says to a second wish to stop: what it is at, since that wish changes nothing."""
+    """The answer of a laboratory to a second wish to stop: what it is doing, since that wish changes nothing."""
     lab = loop.lab
     if lab.safety.mode is not Mode.RAMPING:
         return f"{lab.name}: is {lab.safety.mode.value.replace('_', ' ')}, and leaves as soon as it may."

@@ -107,7 +107,7 @@ def check_time(path: Path, found: x509.Certificate, now: datetime, lasting: time
 
 
 def check_key(found: Identity, own: x509.Certificate) -> None:
-    """Raises InputError where the private key is none, or another certificate's."""
+    """Raises InputError if the private key is not valid or belongs to another certificate."""
     try:
         key = load_pem_private_key(content(found.key), password=None)
     except (ValueError, TypeError, UnsupportedAlgorithm):

@@ -174,7 +174,8 @@ class _Channel:
     def take(self, reading: float, command: float) -> None:
         if reading != self.reading:
             change = abs(reading - self.reading)
-            self.step = min(self.step, change) if change > 0.0 else self.step  # the first reading is none
+            # the change at the first reading is NaN and gives no step
+            self.step = min(self.step, change) if change > 0.0 else self.step
             self.begin(reading, command)
             return
         self.same += 1

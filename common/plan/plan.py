@@ -253,7 +253,7 @@ def named_slaves(given: object) -> dict[str, dict[str, Any]]:
     """The slaves that [slave] names, none where it holds the rig of the only one.
 
     Raises:
-        PlanError: names and a rig are mixed, a name is none, or there are too many.
+        PlanError: names and a rig are mixed, a name is not valid, or there are too many.
     """
     if not isinstance(given, dict) or given.keys() <= {"rig"}:
         return {}

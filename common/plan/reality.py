@@ -47,7 +47,7 @@ class Reality:
     place: int = 0
 
     def of(self, role: str) -> Reality:
-        """The reality of one slave, as of a plan with no other; raises InputError where there is none such."""
+        """The reality of one slave, as of a plan with no other; raises InputError where there is no such slave."""
         plan = self.plan.of(role)
         if not self.slaves:
             return self
@@ -218,7 +218,7 @@ def within(planned: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, An
 
 
 def table_of(tables: Mapping[str, Any], name: str, where: str) -> dict[str, Any]:
-    """One table of several, empty where it is not given; raises PlanError where it is none."""
+    """One table of several, empty where it is not given; raises PlanError if it is not a table."""
     table = tables.get(name, {})
     if not isinstance(table, dict):
         raise PlanError(f"[{where}] must be a table, not {table!r}.")

@@ -220,7 +220,7 @@ def framed(source: Source, offset: int, end: int) -> tuple[int, int] | None:
 
 
 def chunk_end(source: Source, offset: int) -> int:
-    """Where a chunk ends whose head is whole, be its content or the file what it may; 0 where there is no such head."""
+    """The end of a chunk with a whole head, whatever its content and what follows it; 0 if there is none."""
     head = source.at(offset, HEAD.size + 40)
     if len(head) < HEAD.size + 40:
         return 0

@@ -22,7 +22,8 @@ LEFT, WELL, HALF = (
 # set on draws of `rths blind --set tune` (docs/decisions/0012-diagnosis.md)
 SMALL = 0.05  # of a signal's rms that may be left where a gap is called explained
 TEMPERATURE = 3.0  # by which score differences are divided before they are odds
-DOUBT = {"explained": 0.02, "partly": 0.12, "unknown": 0.9}  # that it is none of the catalogue
+# probability that the cause is not in the catalogue
+DOUBT = {"explained": 0.02, "partly": 0.12, "unknown": 0.9}
 CORRELATED = 2.0  # s, longer than what a model leaves is correlated
 COVER = 1.96  # standard deviations of an interval of 95 %
 

@@ -186,7 +186,8 @@ def on_a_virtual_clock(ticks: Ticks) -> bool:
 def late_ticks(ticks: Ticks, interval: float) -> Mask:
     """Ticks that the master did not command, and those at which it woke late, unless that is the rule.
 
-    A delay or loss by a plug-in is none of the wire's, and is not waited for; the wire's own lateness is scheduling
+    A delay or loss by a plug-in does not happen on the wire, and is not waited for;
+    the wire's own lateness is scheduling
     as long as it is an exception.
     """
     held = ticks.rows.get("command_sent_ns", np.ones(ticks.command.size)) == 0

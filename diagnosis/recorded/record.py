@@ -72,7 +72,7 @@ def build(run: Run, plan: Plan | None = None, *, against_ideal: bool = False, ro
     """The record of a recording under a plan, its own where none is given.
 
     Of a test with several slaves it shows the master and the slave whose `role` is given.
-    With `against_ideal` it is held against the pure simulation of that plan: transfer systems that do what
+    With `against_ideal` it is compared with the pure simulation of that plan: transfer systems that do what
     the building wants. Their command is then the target, and their compensation a part of them.
 
     Raises:

@@ -254,7 +254,7 @@ def follow(
 ) -> None:
     """Show what the processes say, and stop them where it is time, until all have ended.
 
-    A second wish to stop changes nothing, and is answered by what they are at.
+    A second wish to stop changes nothing; the answer says what the processes are doing.
     """
     from rths.perform.ending import killed
 

@@ -5,7 +5,7 @@
 on every route from one role to another, each with random draws of its own that depend on the seed and the route's name
 alone. Losses that come in runs follow the two-state chain of Gilbert (Bell Syst. Tech. J. 39 (1960) 1253-1265). Frames
 of a route keep their order, as zenoh and TCP keep it, but for those that `reorder` holds back. What became of every
-frame is counted here, by kind of message and by number: the truth that the loops' own accounts are held against.
+frame is counted here, by kind of message and by number: the truth with which the loops' own accounts are compared.
 """
 
 from __future__ import annotations
