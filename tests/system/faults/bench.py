@@ -36,6 +36,7 @@ WATCHDOG = 5 * INTERVAL  # W2
 AT = 1.3  # s of test at which faults come: the building moves as much as it ever does
 SPARE = 10_000  # entries of a rig's log beyond the ticks, for the ramp
 ATTEMPTS = 5
+REFUSED = 2  # exit code of what could not use a file, an option or a plan
 STILL = 0.2  # s for which nothing must move
 PAUSE = (
     0.9 * INTERVAL
@@ -160,9 +161,14 @@ class Process:
         os.kill(self.pid, number)
         return at
 
+    @property
+    def code(self) -> int | None:
+        """Its exit code, None where it has not ended."""
+        return self._popen.poll()
+
     def alive(self) -> bool:
         """Whether it has not ended."""
-        return self._popen.poll() is None
+        return self.code is None
 
     def finish(self, seconds: float = 20.0) -> int:
         """Its exit code, waited for."""
@@ -250,8 +256,18 @@ class Bench:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        refused = self._refused()
         for process in self.all:
             process.kill()
+        if isinstance(error, DisturbedError) and refused:
+            raise AssertionError(f"no pause of this machine: {refused}") from error
+
+    def _refused(self) -> list[str]:
+        """Who of the three takes no part because of a file, an option or a plan: no pause of a machine does that."""
+        there = [getattr(self, role, None) for role in (*LABS, "recorder")]
+        return [
+            f"{one.module}: {one.errors.strip()}" for one in there if one is not None and one.code == REFUSED
+        ]
 
     def start(self, role: str, *words: str | Path, module: str = "", listen: str = "") -> Process:
         """Start the process of a role."""
