@@ -25,6 +25,7 @@ from tests.limited import Left, adopt, children, descendants, end, look
 KEPT = ("joblib.externals.loky", "resource_tracker")
 OUT_OF_REACH_S = 60.0  # after its limit a test that no signal has ended takes its interpreter with it
 STDERR = pytest.StashKey[int]()
+SYSTEM = Path(__file__).with_name("system")
 
 settings.register_profile(
     "rths", deadline=None, derandomize=True, max_examples=50
@@ -87,6 +88,12 @@ def pytest_configure(config: pytest.Config) -> None:
     """Orphans of a test come to this process; the standard error stays in reach while a test's is caught."""
     adopt()
     config.stash[STDERR] = os.dup(2)
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Tests of whole processes come first: they wait while types are checked, and no long one is left to the end."""
+    items.sort(key=lambda item: SYSTEM not in item.path.parents)
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
