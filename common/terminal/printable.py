@@ -10,10 +10,11 @@ characters: it escapes all but line ends and tabs. The few sequences of our own 
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import re
 import sys
 from collections.abc import Iterator, Mapping
-from typing import Any, TextIO
+from typing import Any, TextIO, TypeVar, cast
 
 # control characters (C0 without tab and line feed, DEL, C1), what changes the direction of writing, line separators,
 # invisible characters, tags, and halves of characters that no encoding takes
@@ -35,15 +36,27 @@ def shown(text: str) -> str:
     return WITHIN_LINE.sub(written_out, text)
 
 
-def all_shown(value: Any) -> Any:
-    """Plain values, as JSON has them, with every text in them as one may print it."""
+Values = TypeVar("Values")
+
+
+def all_shown(value: Values) -> Values:
+    """Plain values, as JSON has them, or a record of them, with every text in them as one may print it."""
+    return cast("Values", _all_shown(value))
+
+
+def _all_shown(value: Any) -> Any:
     match value:
         case str():
             return shown(value)
         case Mapping():
-            return {all_shown(name): all_shown(item) for name, item in value.items()}
-        case list() | tuple():
-            return [all_shown(item) for item in value]
+            return {_all_shown(name): _all_shown(item) for name, item in value.items()}
+        case list():
+            return [_all_shown(item) for item in value]
+        case tuple():
+            return tuple(_all_shown(item) for item in value)
+        case _ if dataclasses.is_dataclass(value) and not isinstance(value, type):
+            found = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
+            return dataclasses.replace(value, **{name: _all_shown(item) for name, item in found.items()})
         case _:
             return value
 

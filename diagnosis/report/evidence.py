@@ -114,9 +114,9 @@ class Paths(Entry):
 class ForcePath(Entry):
     """The measured column force against that of the plan's specimen at the measured displacement."""
 
-    delay: Number = noted("Delay of the measured force", unit="s")
-    interval: Ends = noted("The delay's interval of 95 %", unit="s")
-    gain: Number = noted("Ratio of amplitudes")
+    delay: float = noted("Delay of the measured force", unit="s")
+    interval: tuple[float, float] = noted("The delay's interval of 95 %", unit="s")
+    gain: float = noted("Ratio of amplitudes")
     frequency: Number = noted("Frequency at which they are meant", unit="Hz")
 
 

@@ -1,11 +1,11 @@
-"""What the diagnosis cannot say, what to run next, warnings, and how to read the page."""
+"""What the diagnosis cannot say, what to run next, and how to read the page."""
 
 from __future__ import annotations
 
+from diagnosis.report.records import Report
 from report.gap import wording
-from report.gap.blocks import absent, bullets, esc, heading, paragraph, section, table
-from report.gap.wording import Report
-from report.text.formats import MISSING, as_float, known
+from report.gap.blocks import Rows, strong
+from report.text.formats import MISSING
 
 GLOSSARY = (
     ("gap", "recorded minus simulated; as a number, rms of the error over rms of the recorded signal"),
@@ -33,49 +33,26 @@ GLOSSARY = (
 )
 
 
-def equivalents(report: Report) -> str:
-    """Effects that cannot be told apart."""
-    found = [wording.equivalent(names) for names in wording.sets(report)]
-    none = absent("No such set of effects is listed in this report.")
-    return section("equivalent", "What cannot be told apart", bullets(found) or none)
+def equivalents(report: Report) -> list[str]:
+    """Effects that cannot be told apart, in sentences."""
+    return [wording.equivalent(names) for names in wording.sets(report)]
 
 
-def not_exercised(report: Report) -> str:
-    """Effects that this recording could not have shown."""
-    names = list(dict.fromkeys(report.get("not_exercised") or []))
-    items = "".join(
-        f"<li>{esc(wording.effect(name))} <code>{esc(name)}</code>"
-        f"{': ' + esc(wording.says(name)) if wording.says(name) else ''}</li>"
-        for name in names
-    )
-    text = paragraph("These effects may be there or not: this recording could not have shown them.")
-    none = absent("No such effect is listed in this report.")
-    return section("not-exercised", "Not exercised", text + f"<ul>{items}</ul>" if names else none)
+def not_exercised(report: Report) -> list[tuple[str, str, str]]:
+    """Effects that this recording could not have shown: in words, name, meaning."""
+    names = dict.fromkeys(report.not_exercised)
+    return [(wording.effect(name), name, wording.says(name)) for name in names]
 
 
-def next_test(report: Report) -> str:
-    """What to run next, and what it would tell apart."""
+def tests(report: Report) -> Rows:
+    """What could be run next, and what it would tell apart."""
     rows = [
         [
-            f"<b>{esc(item.get('test'))}</b>",
-            esc(wording.joined([wording.effect(str(name)) for name in item.get("pair") or []], "from")),
-            esc(f"{as_float(item['separation']):.1f} σ" if known(item.get("separation")) else MISSING),
-            esc(item.get("why") or ""),
+            strong(item.test),
+            wording.joined(list(map(wording.effect, item.pair or ())), "from"),
+            MISSING if item.separation is None else f"{item.separation:.1f} σ",
+            item.why,
         ]
-        for item in (report.get("details") or {}).get("next") or []
+        for item in report.details.next
     ]
-    text = paragraph(str(report.get("next_test") or "")) or absent("No further test is proposed.")
-    menu = table(("test", "tells", "separation", "why"), rows)
-    return section("next", "Next test", text, heading("Tests compared") + menu if rows else "")
-
-
-def warnings(report: Report) -> str:
-    """Warnings of the diagnosis."""
-    found = bullets([str(text) for text in report.get("warnings") or []])
-    return section("warnings", "Warnings", found or absent("No warnings."))
-
-
-def how_to_read() -> str:
-    """A short glossary."""
-    words = "".join(f"<dt>{esc(word)}</dt><dd>{esc(meaning)}</dd>" for word, meaning in GLOSSARY)
-    return section("reading", "How to read this", f'<dl class="glossary">{words}</dl>')
+    return Rows(("test", "tells", "separation", "why"), rows)

@@ -2,31 +2,73 @@
 
 from __future__ import annotations
 
-from markupsafe import Markup
+from typing import Any
 
-from report.gap import how_far, limits, overview
-from report.gap.where import where
-from report.gap.which import which
-from report.gap.wording import Report
-from report.page import frame
+from diagnosis.report.records import Report
+from report.gap import how_far, limits, overview, where, which, wording
+from report.gap.rig import rig
+from report.page import frame, render
 
 
 def page(report: Report) -> str:
     """The page's text; pictures stand inside."""
-    name = ((report.get("details") or {}).get("test") or {}).get("name")
-    sections = (
-        overview.overview,
-        overview.gap,
-        where,
-        which,
-        how_far.how_far,
-        how_far.paths,
-        how_far.tolerances,
-        limits.equivalents,
-        limits.not_exercised,
-        limits.next_test,
-        limits.warnings,
+    name = report.details.test.name
+    body = render(
+        "gap.html",
+        status=report.status,
+        status_text=wording.STATUS[report.status],
+        verdict=wording.verdict(report),
+        tiles=overview.tiles(report),
+        facts=overview.facts(report),
+        overall=overview.overall(report),
+        signals=overview.signals(report),
+        **placed(report),
+        **named(report),
+        **shrunk(report),
+        equivalents=limits.equivalents(report),
+        not_exercised=limits.not_exercised(report),
+        next_test=report.next_test,
+        tests=limits.tests(report),
+        warnings=report.warnings,
+        glossary=limits.GLOSSARY,
     )
-    body = "".join(section(report) for section in sections) + limits.how_to_read()
-    title = "Sim-to-real gap" + (f": {name}" if name else "")
-    return frame(title, Markup(body))  # noqa: S704 - made by blocks that escape what they are given
+    return frame("Sim-to-real gap" + (f": {name}" if name else ""), body)
+
+
+def placed(report: Report) -> dict[str, Any]:
+    """What the section on where the gap lies takes."""
+    return {
+        "rig": rig(report),
+        "sites": where.sites(report),
+        "unplaced": where.unplaced(report),
+        "parts": where.parts(report),
+        "residuals": where.residuals(report),
+        "loop_shares": where.loop_shares(report),
+        "ceiling": where.ceiling(report),
+    }
+
+
+def named(report: Report) -> dict[str, Any]:
+    """What the section on effects takes."""
+    unknown = report.details.unknown
+    return {
+        "kinds": which.kinds(report),
+        "nothing": which.nothing(report),
+        "unknown": which.unknown(unknown) if unknown else None,
+        "predictions": which.predictions(report),
+        "curves": which.curves(report),
+    }
+
+
+def shrunk(report: Report) -> dict[str, Any]:
+    """What the sections on how far the gap closes, on paths and tolerances take."""
+    return {
+        "numbers": how_far.numbers(report),
+        "judged_on": wording.judged_on(report) if report.how_far.judged_on else "",
+        "steps": how_far.steps(report),
+        "remaining": how_far.remaining(report),
+        "paths": how_far.paths(report),
+        "force_path": wording.force_path(report),
+        "tolerances": how_far.tolerances(report),
+        "moves": how_far.moves(report),
+    }

@@ -1,21 +1,23 @@
-"""The pictures of a diagnosis: each function takes its piece of the report and returns one SVG."""
+"""The pictures of a diagnosis: each function takes its part of the report and returns one SVG."""
 
 from __future__ import annotations
 
 import io
 import re
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.report.evidence import Curve, History, PartSeen, Reading, Step
+from diagnosis.report.fields import Series
+from diagnosis.report.records import Tolerance
 from report.gap import wording
 from report.pictures.figure import COLOURS, STAMPS, figure, fit_labels
 from report.text.formats import axis_unit, bare_percent, known, scale
 
-Piece = Mapping[str, Any]
 Values = NDArray[np.float64]
 
 WIDTH = 3.6  # inches: one column of the page, or the width of a phone, where text is read at its size
@@ -45,14 +47,14 @@ def svg(canvas: Any) -> str:
     return text.replace(f": {BLUE.lower()}", f": var(--curve, {BLUE.lower()})")
 
 
-def values(numbers: Sequence[object] | None) -> Values:
+def values(numbers: Sequence[object]) -> Values:
     """Numbers of a report as an array, NaN where one is missing."""
-    return np.array([item if known(item) else np.nan for item in numbers or []], dtype=float)
+    return np.array([item if known(item) else np.nan for item in numbers], dtype=float)
 
 
-def pair(piece: Piece, first: str, second: str) -> tuple[Values, Values]:
+def pair(first: Sequence[object], second: Sequence[object]) -> tuple[Values, Values]:
     """Two series of one length; both empty where one is absent or holds no number."""
-    one, two = values(piece.get(first)), values(piece.get(second))
+    one, two = values(first), values(second)
     size = min(one.size, two.size)
     usable = bool(np.isfinite(one[:size] + two[:size]).any())
     return (one[:size], two[:size]) if usable else (one[:0], two[:0])
@@ -111,18 +113,16 @@ def logarithmic(axis: Any, lowest: float | None = None) -> None:
     axis.yaxis.set_minor_formatter(NullFormatter())
 
 
-def residual_time(parts: Sequence[Piece]) -> str:
+def residual_time(parts: Sequence[PartSeen]) -> str:
     """Residual over noise of every part over time; empty where no part has windows."""
-    drawn = [(part, *pair(part.get("windows") or {}, "t", "ratio")) for part in parts]
+    drawn = [(part, *pair(part.windows.t, part.windows.ratio)) for part in parts]
     drawn = [item for item in drawn if item[1].size][:MOST_PARTS]
     if not drawn:
         return ""
     canvas = figure(WIDTH, 2.5)
     axis = canvas.subplots()
     for part, t, ratio in drawn:
-        axis.plot(
-            t, ratio, marker="." if t.size < 40 else "", label=literal(wording.site(str(part.get("site"))))
-        )
+        axis.plot(t, ratio, marker="." if t.size < 40 else "", label=literal(wording.site(part.site)))
     axis.set(xlabel="time, s", ylabel="residual / noise floor")
     logarithmic(axis, 0.3)
     floor_line(axis, 1.0, "noise floor")
@@ -130,10 +130,10 @@ def residual_time(parts: Sequence[Piece]) -> str:
     return svg(canvas)
 
 
-def residual_frequency(part: Piece) -> str:
+def residual_frequency(part: PartSeen) -> str:
     """Residual and noise of one part over frequency; empty where there is none."""
-    bands = part.get("bands") or {}
-    frequency, residual = pair(bands, "frequency", "residual")
+    bands = part.bands
+    frequency, residual = pair(bands.frequency, bands.residual)
     if not frequency.size:
         return ""
     canvas = figure(WIDTH, 2.4)
@@ -141,7 +141,7 @@ def residual_frequency(part: Piece) -> str:
     factor, unit = density_unit(part, float(np.max(residual)))
     residual = factor * residual
     axis.plot(frequency, residual, color=ORANGE, label="residual")
-    spots, noise = pair(bands, "frequency", "noise")
+    spots, noise = pair(bands.frequency, bands.noise)
     noise = factor * noise
     if spots.size:
         axis.plot(spots, noise, color=GREY, linestyle="--", label="noise floor")
@@ -154,18 +154,18 @@ def residual_frequency(part: Piece) -> str:
     return svg(canvas)
 
 
-def density_unit(part: Piece, most: float) -> tuple[float, str]:
+def density_unit(part: PartSeen, most: float) -> tuple[float, str]:
     """Factor and unit in which a part's amplitude density reads well, if its signals have a unit in common."""
-    units = {str(item.get("unit")) for item in part.get("signals") or []}
+    units = {item.unit for item in part.signals}
     if len(units) != 1:
         return 1.0, "SI"
     factor, unit = scale(most, units.pop())
     return factor, f"{unit or '1'}/√Hz"
 
 
-def residual_amplitude(parts: Sequence[Piece]) -> str:
+def residual_amplitude(parts: Sequence[PartSeen]) -> str:
     """Residual over noise against the amplitude of the motion; empty where no part has it."""
-    drawn = [(part, *pair(part.get("amplitudes") or {}, "amplitude", "ratio")) for part in parts]
+    drawn = [(part, *pair(part.amplitudes.amplitude, part.amplitudes.ratio)) for part in parts]
     drawn = [item for item in drawn if item[1].size][:MOST_PARTS]
     if not drawn:
         return ""
@@ -178,7 +178,7 @@ def residual_amplitude(parts: Sequence[Piece]) -> str:
             ratio,
             "o-",
             markersize=3,
-            label=literal(wording.site(str(part.get("site")))),
+            label=literal(wording.site(part.site)),
         )
     axis.set(xlabel="amplitude of the part's motion, % of its largest", ylabel="residual / noise floor")
     logarithmic(axis, 0.3)
@@ -199,36 +199,45 @@ def worst(t: Values, error: Values, length: float = ZOOM) -> slice:
     return slice(begin, begin + count)
 
 
-def prediction(signal: Piece) -> str:
+def prediction(item: Reading) -> str:
     """A part's reading against what its model predicts, without and with the effect, and what is left over."""
-    names = (("nominal", BEFORE, "without the effect"), ("corrected", AFTER, "with the effect"))
-    return overlay(signal, ("measured", "measured"), names)
+    models = (
+        (item.nominal, BEFORE, "without the effect"),
+        (item.corrected, AFTER, "with the effect"),
+    )
+    return overlay(item, "measured", item.measured, models, item.noise_floor)
 
 
-def history(item: Piece) -> str:
+def history(item: History) -> str:
     """A signal of the whole test as recorded, simulated before and after, at the worst seconds."""
-    names = (("before", BEFORE, "simulated before"), ("after", AFTER, "simulated after"))
-    return overlay(item, ("recorded", "recorded"), names)
+    models = ((item.before, BEFORE, "simulated before"), (item.after, AFTER, "simulated after"))
+    return overlay(item, "recorded", item.recorded, models)
 
 
-def overlay(item: Piece, truth: tuple[str, str], models: Sequence[tuple[str, str, str]]) -> str:
+def overlay(
+    item: Reading | History,
+    called: str,
+    truth: Series,
+    models: Sequence[tuple[Series, str, str]],
+    noise: float | None = None,
+) -> str:
     """Curves above, their errors below with the noise floor; empty where nothing is recorded."""
-    t, recorded = pair(item, "t", truth[0])
+    t, recorded = pair(item.t, truth)
     if not t.size:
         return ""
-    curves = [(values(item.get(key)), colour, label) for key, colour, label in models]
+    curves = [(values(series), colour, label) for series, colour, label in models]
     drawn = [(curve, colour, label) for curve, colour, label in curves if curve.size == t.size]
     part = worst(t, drawn[0][0] - recorded) if drawn else slice(0, t.size)
-    factor, unit = scale(float(np.nanmax(np.abs(recorded[part]))), str(item.get("unit") or ""))
+    factor, unit = scale(float(np.nanmax(np.abs(recorded[part]))), item.unit)
     canvas = figure(WIDTH, 3.2 if drawn else 2.0)
     upper, lower = panels(canvas, bool(drawn))
-    upper.plot(t[part], factor * recorded[part], color=RECORDED, linewidth=2.6, alpha=0.45, label=truth[1])
+    upper.plot(t[part], factor * recorded[part], color=RECORDED, linewidth=2.6, alpha=0.45, label=called)
     for curve, colour, label in drawn:
         style = "--" if colour == BEFORE else "-"
         upper.plot(t[part], factor * curve[part], style, color=colour, label=label)
         lower.plot(t[part], factor * (recorded - curve)[part], style, color=colour, linewidth=0.8)
-    upper.set_ylabel(literal(f"{wording.plain(str(item.get('signal') or ''))}\n{unit}"))
-    finish_errors(lower, factor, unit, item.get("noise_floor"), bool(drawn))
+    upper.set_ylabel(literal(f"{wording.plain(item.signal)}\n{unit}"))
+    finish_errors(lower, factor, unit, noise, bool(drawn))
     legend(canvas, upper, lower)
     return svg(canvas)
 
@@ -242,32 +251,32 @@ def panels(canvas: Any, errors: bool) -> tuple[Any, Any]:
     return axis, axis
 
 
-def finish_errors(axis: Any, factor: float, unit: str, noise: object, errors: bool) -> None:
+def finish_errors(axis: Any, factor: float, unit: str, noise: float | None, errors: bool) -> None:
     """Labels of the lower axes, and the noise floor as a band."""
     axis.set_xlabel("time, s")
     if not errors:
         return
-    if isinstance(noise, int | float) and known(noise):
+    if noise is not None:
         axis.axhspan(
             -factor * noise, factor * noise, color=GREY, alpha=0.35, linewidth=0, label="noise floor"
         )
     axis.set_ylabel(literal(f"left over\n{unit}"))
 
 
-def curve(item: Piece, names: tuple[str, str] = ("without the effect", "with the effect")) -> str:
+def curve(item: Curve, names: tuple[str, str] = ("without the effect", "with the effect")) -> str:
     """A relation in its natural coordinates: measured, before, after; empty where nothing is measured."""
-    x = values((item.get("x") or {}).get("values"))
+    x = values(item.x.values)
     series = [
-        (values(item.get("measured")), GREY, "measured"),
-        (values(item.get("before")), BEFORE, names[0]),
-        (values(item.get("after")), AFTER, names[1]),
+        (values(item.measured), GREY, "measured"),
+        (values(item.before), BEFORE, names[0]),
+        (values(item.after), AFTER, names[1]),
     ]
     drawn = [found for found in series if found[0].size == x.size and np.isfinite(found[0]).any()]
     if not x.size or not drawn:
         return ""
-    x_factor, x_label = axis_unit(str(item["x"].get("label", "")), float(np.nanmax(np.abs(x))))
+    x_factor, x_label = axis_unit(item.x.label, float(np.nanmax(np.abs(x))))
     most = max(float(np.nanmax(np.abs(y))) for y, _colour, _label in drawn)
-    y_factor, y_label = axis_unit(str((item.get("y") or {}).get("label", "")), most)
+    y_factor, y_label = axis_unit(item.y.label, most)
     x, drawn = x_factor * x, [(y_factor * y, colour, label) for y, colour, label in drawn]
     canvas = figure(WIDTH, 3.0)
     axis = canvas.subplots()
@@ -284,9 +293,9 @@ def curve(item: Piece, names: tuple[str, str] = ("without the effect", "with the
     return svg(canvas)
 
 
-def waterfall(steps: Sequence[Piece]) -> str:
+def waterfall(steps: Sequence[Step]) -> str:
     """The overall gap after each step, down to the noise floor; empty where there are no steps."""
-    found = [(str(item.get("label", "")), float(item["value"])) for item in steps if known(item.get("value"))]
+    found = [(item.label, item.value) for item in steps if item.value is not None]
     if not found:
         return ""
     canvas = figure(WIDTH, 0.7 + 0.36 * len(found))
@@ -318,9 +327,9 @@ def block(label: str, value: float, previous: float) -> tuple[float, float, str]
     return min(value, previous), max(value, previous), GREEN if value <= previous else ORANGE
 
 
-def tolerance_moves(entries: Sequence[tuple[str, Piece]]) -> str:
+def tolerance_moves(entries: Sequence[tuple[str, Tolerance]]) -> str:
     """How far nominal parameters moved, in standard deviations of their tolerances."""
-    found = [(name, float(item["z"])) for name, item in entries if known(item.get("z"))][:12]
+    found = [(name, item.z) for name, item in entries if item.z is not None][:12]
     if not found:
         return ""
     canvas = figure(WIDTH, 0.7 + 0.22 * len(found))

@@ -2,22 +2,13 @@
 
 from __future__ import annotations
 
-import html
-from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+from diagnosis.report.records import Report
 from report.gap import wording
-from report.text.formats import as_float, known, percent
+from report.text.formats import percent
 
-WIDTH, HEIGHT = 480, 352
-HALF_WIDTH, HALF_HEIGHT = 50, 27
-ACCENT = "#D55E00"
 STRONGEST = 0.7  # opacity of a site that holds the whole gap; text stays readable on it
-FONTS = {
-    "part": 'font-size="15"',
-    "share": 'font-size="14" font-weight="700"',
-    "note": 'font-size="12.5"',
-}
 
 
 class Sensor(NamedTuple):
@@ -61,62 +52,42 @@ SENSORS = {
 }
 
 
-def rig(report: Mapping[str, Any]) -> str:
-    """The diagram as inline SVG; text and lines take the page's colour."""
-    shares = {str(item.get("site")): as_float(item.get("share")) for item in report.get("where") or []}
-    parts = [arrow(*item) for item in ARROWS]
-    parts += [box(name, shares.get(name)) for name in SITES]
-    parts += [circle(name, shares.get(f"sensor.{name}")) for name in SENSORS]
-    named = ", ".join(f"{wording.site(name)} {percent(share)}" for name, share in shares.items()) or "none"
-    return (
-        f'<svg class="rig" viewBox="0 0 {WIDTH} {HEIGHT}" role="img" '
-        f'aria-label="{html.escape(f"The rig; shares of the gap: {named}")}">'
-        '<defs><marker id="tip" viewBox="0 0 8 8" refX="7" refY="4" markerWidth="7" markerHeight="7" '
-        'orient="auto"><path d="M0 0 L8 4 L0 8 Z" fill="currentColor"/></marker></defs>'
-        f"{''.join(parts)}</svg>"
-    )
+class Box(NamedTuple):
+    """A part of the rig with its share of the gap, empty where it has none."""
+
+    name: str
+    x: int
+    y: int
+    share: str
+    opacity: str
 
 
-def opacity(share: float | None) -> float:
-    """How strongly a site is coloured."""
-    return STRONGEST * max(min(share, 1.0), 0.08) if share is not None and known(share) else 0.0
-
-
-def arrow(path: str, label: str, x: int, y: int, anchor: str) -> str:
-    """A path between two parts."""
-    line = f'<path d="{path}" fill="none" stroke="currentColor" stroke-width="1.4" marker-end="url(#tip)"/>'
-    return line + (text(x, y, label, anchor, "note") if label else "")
-
-
-def box(name: str, share: float | None) -> str:
-    """A part with its share."""
-    x, y = SITES[name]
-    shape = (
-        f'<rect x="{x - HALF_WIDTH}" y="{y - HALF_HEIGHT}" width="{2 * HALF_WIDTH}" height="{2 * HALF_HEIGHT}" '
-        f'rx="6" fill="{ACCENT}" fill-opacity="{opacity(share):.2f}" stroke="currentColor" '
-        f'stroke-width="{2.2 if share is not None else 1.0}"/>'
-    )
-    if share is None:
-        return shape + text(x, y + 5, name, "middle", "part")
-    return shape + text(x, y - 3, name, "middle", "part") + text(x, y + 15, percent(share), "middle", "share")
-
-
-def circle(name: str, share: float | None) -> str:
+class Circle(NamedTuple):
     """A sensor; one with a share of the gap is larger and says it."""
-    item = SENSORS[name]
-    radius = 4.5 if share is None else 8.0
-    label = item.label if share is None else f"{item.label} {percent(share)}"
-    return (
-        f'<circle cx="{item.x}" cy="{item.y}" r="{radius}" style="fill: var(--back)"/>'
-        f'<circle cx="{item.x}" cy="{item.y}" r="{radius}" fill="{ACCENT}" fill-opacity="{opacity(share):.2f}" '
-        f'stroke="currentColor"/>'
-        + text(item.x + item.dx, item.y + item.dy, label, item.anchor, "note" if share is None else "share")
-    )
+
+    sensor: Sensor
+    share: str
+    opacity: str
 
 
-def text(x: int, y: int, words: str, anchor: str, style: str) -> str:
-    """A label."""
-    return (
-        f'<text x="{x}" y="{y}" text-anchor="{anchor}" fill="currentColor" {FONTS[style]}>'
-        f"{html.escape(words)}</text>"
-    )
+def rig(report: Report) -> dict[str, Any]:
+    """What the template of the diagram takes."""
+    shares = {item.site: item.share for item in report.where}
+    named = ", ".join(f"{wording.site(name)} {percent(share)}" for name, share in shares.items()) or "none"
+    return {
+        "said": f"The rig; shares of the gap: {named}",
+        "arrows": ARROWS,
+        "boxes": [
+            Box(name, x, y, percent(shares[name]) if name in shares else "", opacity(shares.get(name)))
+            for name, (x, y) in SITES.items()
+        ],
+        "circles": [
+            Circle(sensor, percent(shares[site]) if site in shares else "", opacity(shares.get(site)))
+            for site, sensor in ((f"sensor.{name}", item) for name, item in SENSORS.items())
+        ],
+    }
+
+
+def opacity(share: float | None) -> str:
+    """How strongly a site is coloured."""
+    return f"{STRONGEST * max(min(share, 1.0), 0.08) if share is not None else 0.0:.2f}"

@@ -5,9 +5,9 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Sequence
 
+from diagnosis.report.records import Report
 from report.gap import wording
-from report.gap.wording import Report
-from report.text.formats import as_float, known, percent, percent_interval, probability, span, times
+from report.text.formats import as_float, percent, percent_interval, probability, span, times
 
 WIDTH = 100
 LABEL = 12
@@ -28,7 +28,7 @@ def summary(report: Report) -> str:
         *tolerances(report),
         *equivalents(report),
         *not_exercised(report),
-        *row("next test", report.get("next_test") or "", 2),
+        *row("next test", report.next_test or "", 2),
         *warnings(report),
     ]
     return "\n".join(lines[:MOST])
@@ -59,23 +59,20 @@ def rows(label: str, texts: Sequence[str]) -> list[str]:
 
 def verdict(report: Report) -> list[str]:
     """Status and sentence."""
-    status = wording.STATUS.get(str(report.get("status")), str(report.get("status")))
-    text = f"{status.upper()}: {wording.verdict(report)}"
+    text = f"{wording.STATUS[report.status].upper()}: {wording.verdict(report)}"
     return textwrap.wrap(text, WIDTH, max_lines=3, placeholder=" …")
 
 
 def gap(report: Report) -> list[str]:
     """Overall gap and the signals farthest above their noise, each beside its floor."""
-    found = report.get("gap") or {}
-    signals = sorted((found.get("signals") or {}).items(), key=lambda item: -wording.above_floor(item[1]))
-    entries = [("overall", found.get("overall"), found.get("overall_noise_floor"))]
+    entries = [("overall", report.gap.overall, report.gap.overall_noise_floor)]
     entries += [
-        (wording.plain(name), item.get("nrmse"), item.get("noise_floor")) for name, item in signals[:4]
+        (wording.plain(name), item.nrmse, item.noise_floor) for name, item in wording.by_floor(report)[:4]
     ]
     lines = [
         f"{name:<22} {percent(value):>7}   noise floor {percent(floor)}"
         for name, value, floor in entries
-        if known(value)
+        if value is not None
     ]
     return rows("gap", lines or ["not determined"])
 
@@ -89,15 +86,12 @@ def bar(share: float) -> str:
 def where(report: Report) -> list[str]:
     """The foremost sites with their shares."""
     lines = []
-    for item in (report.get("where") or [])[:3]:
-        facts = [
-            f"{times(item.get('residual_to_noise'))} noise" if known(item.get("residual_to_noise")) else ""
-        ]
-        facts += [span(window, "s") for window in (item.get("when") or [])[:2]]
-        facts.append(span(item.get("frequency_band"), "Hz"))
-        share = item.get("share")
-        interval = percent_interval(item.get("share_interval"))
-        head = f"{wording.site(item['site']):<22} {bar(share or 0.0)} {percent(share)}"
+    for item in report.where[:3]:
+        facts = [f"{times(item.residual_to_noise)} noise" if item.residual_to_noise is not None else ""]
+        facts += [span(window, "s") for window in item.when[:2]]
+        facts.append(span(item.frequency_band, "Hz"))
+        interval = percent_interval(item.share_interval)
+        head = f"{wording.site(item.site):<22} {bar(item.share or 0.0)} {percent(item.share)}"
         lines.append(
             head + (f" ({interval})" if interval else "") + "".join(f"  {fact}" for fact in facts if fact)
         )
@@ -108,17 +102,17 @@ def where(report: Report) -> list[str]:
 
 def placed(report: Report) -> bool:
     """Whether an empty list of sites means that there is no gap."""
-    return report.get("status") == "no_gap"
+    return report.status == "no_gap"
 
 
 def which(report: Report) -> list[str]:
     """The foremost candidates with probability and parameters."""
     lines: list[str] = []
-    for item in wording.once(report.get("which") or [])[:3]:
+    for item in wording.once(report.which)[:3]:
         found = wording.parameters(item)
-        several = len(item.get("effects") or []) > 1
+        several = len(item.effects) > 1
         texts = [setting(*each, several=several) for each in found]
-        head = f"{probability(item.get('probability')):>6}  {wording.effects(item.get('effects') or [])}"
+        head = f"{probability(item.probability):>6}  {wording.effects(item.effects)}"
         text = head + (": " + ", ".join(texts) if texts else "")
         lines += textwrap.wrap(
             text,
@@ -140,17 +134,17 @@ def setting(name: str, parameter: str, value: str, *, several: bool) -> str:
 
 def how_far(report: Report) -> list[str]:
     """Gap before and after, the closed share, and what it was judged on."""
-    found = report.get("how_far") or {}
-    if not known(found.get("before")) or not known(found.get("after")):
+    found = report.how_far
+    if found.before is None or found.after is None:
         return row("how far", "not determined")
-    before, after = percent(found["before"]), percent(found["after"])
-    verb = "falls" if as_float(found["after"]) < as_float(found["before"]) else "goes"
+    before, after = percent(found.before), percent(found.after)
+    verb = "falls" if found.after < found.before else "goes"
     text = f"{wording.judged_on(report)}, the gap {verb} from {before} to {after} "
-    text += f"(noise {percent(found.get('noise_floor'))})"
+    text += f"(noise {percent(found.noise_floor)})"
     closed = wording.closed(report)
     text += f"; closed {closed}" if closed else ""
     nominal = wording.nominal_gap(report)
-    if known(nominal) and percent(nominal) != before:
+    if nominal is not None and percent(nominal) != before:
         text += f"; {percent(nominal)} before parameters were moved"
     return row("how far", f"{text}.", 3)
 
@@ -158,7 +152,7 @@ def how_far(report: Report) -> list[str]:
 def tolerances(report: Report) -> list[str]:
     """Parameters that moved notably inside their tolerances."""
     moved = [
-        f"{name} ×{as_float(item.get('factor')):.4g} (z {as_float(item.get('z')):+.1f})"
+        f"{name} ×{as_float(item.factor):.4g} (z {as_float(item.z):+.1f})"
         for name, item in wording.notable(report)
     ]
     return row("tolerances", ", ".join(moved[:4]) + (f", {len(moved) - 4} more" if len(moved) > 4 else ""), 2)
@@ -172,12 +166,12 @@ def equivalents(report: Report) -> list[str]:
 
 def not_exercised(report: Report) -> list[str]:
     """Effects that the recording could not have shown."""
-    names = list(dict.fromkeys(map(wording.effect, report.get("not_exercised") or [])))
+    names = list(dict.fromkeys(map(wording.effect, report.not_exercised)))
     return row("not shown", f"could not have appeared here: {', '.join(names)}" if names else "", 2)
 
 
 def warnings(report: Report) -> list[str]:
     """The first warnings."""
-    found = list(report.get("warnings") or [])
+    found = report.warnings
     shown = [line for text in found[:2] for line in row("warning", text, 1)]
     return shown + ([" " * LABEL + f"{len(found) - 2} more in the report"] if len(found) > 2 else [])

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
+from typing import TypeVar
 
+from diagnosis.report.evidence import Evidence
+from diagnosis.report.records import Candidate, Report, SignalGap, Tolerance
 from models.effects import CATALOGUE
 from report.text.force_path import sentence as force_sentence
-from report.text.formats import as_float, known, percent, percent_interval, quantity
+from report.text.formats import percent, percent_interval, quantity
 
-Report = Mapping[str, Any]
+Named = TypeVar("Named", Candidate, Evidence)
 
 STATUS = {
     "no_gap": "no gap",
@@ -64,35 +66,32 @@ def says(name: str) -> str:
     return entry.says if entry else ""
 
 
-def once(candidates: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+def once(candidates: Sequence[Named]) -> list[Named]:
     """Candidates, the most probable first; of those with the same effects the most probable one."""
-    ordered = sorted(candidates, key=lambda item: -(item.get("probability") or 0.0))
-    found: dict[tuple[str, ...], Mapping[str, Any]] = {}
-    for item in ordered:
-        found.setdefault(tuple(sorted(map(str, item.get("effects") or []))), item)
+    found: dict[tuple[str, ...], Named] = {}
+    for item in sorted(candidates, key=lambda item: -(item.probability or 0.0)):
+        found.setdefault(tuple(sorted(item.effects)), item)
     return list(found.values())
 
 
-def sets(report: Report) -> list[Sequence[str]]:
+def sets(report: Report) -> list[tuple[str, ...]]:
     """Sets of effects that cannot be told apart, each once."""
-    groups = report.get("equivalent") or []
-    return list({frozenset(names): names for names in reversed(groups)}.values())[::-1]
+    return list({frozenset(names): names for names in reversed(report.equivalent)}.values())[::-1]
 
 
-def kind(candidate: Mapping[str, Any]) -> str:
+def kind(candidate: Candidate | Evidence) -> str:
     """Whether a candidate is physics or measurement; a mixture counts as physics."""
-    if candidate.get("kind"):
-        return str(candidate["kind"])
-    names = candidate.get("effects") or []
-    kinds = {CATALOGUE[name].kind if name in CATALOGUE else "physics" for name in names}
+    if isinstance(candidate, Evidence):
+        return candidate.kind
+    kinds = {CATALOGUE[name].kind if name in CATALOGUE else "physics" for name in candidate.effects}
     return "measurement" if kinds == {"measurement"} else "physics"
 
 
-def parameters(candidate: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+def parameters(candidate: Candidate | Evidence) -> list[tuple[str, str, str]]:
     """A candidate's parameters: effect, parameter, value with interval and unit."""
     return [
-        (name, parameter, quantity(given.get("value"), str(given.get("unit") or ""), given.get("interval")))
-        for name, entries in (candidate.get("parameters") or {}).items()
+        (name, parameter, quantity(given.value, given.unit, given.interval))
+        for name, entries in candidate.parameters.items()
         for parameter, given in entries.items()
     ]
 
@@ -109,31 +108,27 @@ def equivalent(names: Sequence[str]) -> str:
     return f"These signals cannot tell {first} from {joined(others, 'or')}: naming one of them is naming all."
 
 
-def notable(report: Report) -> list[tuple[str, Mapping[str, Any]]]:
+def notable(report: Report) -> list[tuple[str, Tolerance]]:
     """Parameters that moved by more than one standard deviation of their tolerance, the farthest first."""
-    ordered = by_move(report)
-    return [(name, item) for name, item in ordered if abs(item.get("z") or 0.0) > NOTABLE]
+    return [(name, item) for name, item in by_move(report) if abs(item.z or 0.0) > NOTABLE]
 
 
-def by_move(report: Report) -> list[tuple[str, Mapping[str, Any]]]:
+def by_move(report: Report) -> list[tuple[str, Tolerance]]:
     """Parameters within tolerances, the one that moved farthest first."""
-    entries = (report.get("tolerances") or {}).items()
-    return sorted(entries, key=lambda entry: -abs(entry[1].get("z") or 0.0))
+    return sorted(report.tolerances.items(), key=lambda entry: -abs(entry[1].z or 0.0))
 
 
-def nominal_gap(report: Report) -> Any:
+def nominal_gap(report: Report) -> float | None:
     """The overall gap before parameters were moved inside their tolerances, None where it is not said."""
-    steps = (report.get("details") or {}).get("waterfall") or []
-    first = steps[0].get("value") if steps else None
-    return (report.get("how_far") or {}).get("nominal", first)
+    steps = report.details.waterfall
+    return steps[0].value if report.how_far.nominal is None and steps else report.how_far.nominal
 
 
 def verdict(report: Report) -> str:
     """The verdict in one sentence, the report's own if it has one."""
-    if report.get("verdict"):
-        return str(report["verdict"])
-    gap, status = report.get("gap") or {}, report.get("status")
-    size = f"{percent(gap.get('overall'))} (noise floor {percent(gap.get('overall_noise_floor'))})"
+    if report.verdict:
+        return report.verdict
+    size = f"{percent(report.gap.overall)} (noise floor {percent(report.gap.overall_noise_floor)})"
     sentences = {
         "no_gap": f"No gap beyond noise and tolerances: {size}.",
         "not_enough_data": "This recording holds too little to place or name a gap.",
@@ -141,31 +136,31 @@ def verdict(report: Report) -> str:
         "ambiguous": f"The gap of {size}{place(report)} has several causes that fit alike: {rivals(report)}.",
     }
     fallback = f"The gap of {size}{place(report)}: {cause(report)}."
-    return sentences.get(str(status), fallback)
+    return sentences.get(report.status, fallback)
 
 
 def place(report: Report) -> str:
     """Where most of the gap lies, as a part of a sentence."""
-    sites = report.get("where") or []
-    if not sites or not known(sites[0].get("share")) or sites[0]["share"] < DOMINANT:
+    share = report.where[0].share if report.where else None
+    if share is None or share < DOMINANT:
         return ""
-    return f", {percent(sites[0]['share'])} of it at the {site(sites[0]['site'])}"
+    return f", {percent(share)} of it at the {site(report.where[0].site)}"
 
 
 def rivals(report: Report) -> str:
     """The foremost candidates."""
-    names = [effects(item.get("effects") or []) for item in once(report.get("which") or [])[:3]]
+    names = [effects(item.effects) for item in once(report.which)[:3]]
     return joined(names, "or") or "none is named"
 
 
 def cause(report: Report) -> str:
     """The first candidate and what it closes."""
-    if not report.get("which"):
+    if not report.which:
         return "no cause is named"
-    share = (report.get("how_far") or {}).get("closed")
-    closes = f" closes {percent(min(as_float(share), 1.0))} of it" if known(share) else " explains it"
-    partly = " (only a part)" if report.get("status") == "partly_explained" else ""
-    return effects(report["which"][0].get("effects") or []) + closes + partly
+    share = report.how_far.closed
+    closes = " explains it" if share is None else f" closes {percent(min(share, 1.0))} of it"
+    partly = " (only a part)" if report.status == "partly_explained" else ""
+    return effects(report.which[0].effects) + closes + partly
 
 
 def closed(report: Report) -> str:
@@ -173,31 +168,35 @@ def closed(report: Report) -> str:
 
     What is left may by chance be below the noise floor: no more than all of the gap is said to be closed.
     """
-    far = report.get("how_far") or {}
-    if not known(far.get("closed")) or report.get("status") == "no_gap":
+    share = report.how_far.closed
+    if share is None or report.status == "no_gap":
         return ""
-    ends = [min(as_float(end), 1.0) for end in far.get("closed_interval") or () if known(end)]
+    ends = [min(end, 1.0) for end in report.how_far.closed_interval or () if end is not None]
     interval = percent_interval(ends)
-    return percent(min(as_float(far["closed"]), 1.0)) + (f" ({interval})" if interval else "")
+    return percent(min(share, 1.0)) + (f" ({interval})" if interval else "")
 
 
 def judged_on(report: Report) -> str:
     """The data on which the gap before and after is compared, as the beginning of a sentence."""
-    said = (report.get("how_far") or {}).get("judged_on")
-    return JUDGED.get(str(said), "In this recording")
+    return JUDGED.get(str(report.how_far.judged_on), "In this recording")
 
 
 def force_path(report: Report) -> str:
     """How late the column force is and its gain, as a sentence; empty where the report does not say."""
-    found = (report.get("details") or {}).get("force_path")
-    if not found:
+    found = report.details.force_path
+    if found is None:
         return ""
-    return force_sentence(found["delay"], found["interval"], found["gain"])
+    return force_sentence(found.delay, found.interval, found.gain)
 
 
-def above_floor(item: Mapping[str, Any]) -> float:
+def above_floor(item: SignalGap) -> float:
     """How many times its noise floor a signal's gap is; 0 where unknown."""
-    if not known(item.get("nrmse")):
+    if item.nrmse is None:
         return 0.0
-    floor = as_float(item.get("noise_floor"))
-    return as_float(item["nrmse"]) / floor if floor > 0.0 else as_float(item["nrmse"])
+    floor = item.noise_floor or 0.0
+    return item.nrmse / floor if floor > 0.0 else item.nrmse
+
+
+def by_floor(report: Report) -> list[tuple[str, SignalGap]]:
+    """The gaps of the signals, the one farthest above its noise floor first."""
+    return sorted(report.gap.signals.items(), key=lambda item: -above_floor(item[1]))

@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
             from report.gap import page
 
             progress.tell("page")
-            outputs.write_text(args.html, page.page(report.plain()), args.force)
+            outputs.write_text(args.html, page.page(report), args.force)
     if args.json:
         text = json.dumps(report.plain(), allow_nan=False) + "\n"
         if str(args.json) == "-":
@@ -78,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
         outputs.write_text(args.json, text, args.force)
     from report.gap import terminal
 
-    texts = [terminal.summary(all_shown(one.plain())) for one in reports]
+    texts = [terminal.summary(all_shown(one)) for one in reports]
     outputs.aside(args.html, args.json).write("\n\n".join(texts) + "\n")
     return 0
 
@@ -156,7 +156,7 @@ def diagnose_slaves(
     further = {role: [other[role] for other in others if role in other] for role in own}
     result = {}
     for role, report in diagnose(own, further, tell).items():
-        name, words = name_of(role), wording.verdict(report.plain())
+        name, words = name_of(role), wording.verdict(report)
         verdict = f"Laboratory {name}: {words}" if name else words
         result[name] = dataclasses.replace(report, verdict=verdict)
     return result

@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from diagnosis.report import read
 from diagnosis.report.schema import schema
 from report.gap import page
 from rths.examine.diagnose import diagnose_file
@@ -83,8 +84,8 @@ def adds_up(report: dict[str, Any]) -> None:
 
 def shows_on_a_page(report: dict[str, Any]) -> None:
     """One page that loads nothing, the same every time."""
-    text = page.page(report)
-    assert page.page(json.loads(json.dumps(report))) == text
+    text = page.page(read.report(report))
+    assert page.page(read.report(json.loads(json.dumps(report)))) == text
     assert text.startswith("<!doctype html>")
     assert text.rstrip().endswith("</html>")
     assert not re.search(r"\bnan\b", re.sub(r"base64,[^\"']*", "", text).lower())
@@ -101,7 +102,7 @@ def test_a_report_says_nothing_of_the_case_but_the_files_name(cases: Cases, tmp_
     less = json.loads(json.dumps(report))
     less["details"]["test"].pop("file")
     assert json.dumps(again) == json.dumps(less)  # to the last byte, and the same in a second run
-    for text in (json.dumps(less), page.page(report).replace(original.name, "")):
+    for text in (json.dumps(less), page.page(read.report(report)).replace(original.name, "")):
         assert str(cases.folder) not in text
         assert str(original) not in text
         assert "reality" not in text.lower()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -16,12 +15,15 @@ from common import signals
 from common.recording.schema import message_class, schema_file
 from common.terminal import cli
 from common.terminal.printable import ACTING, ANYWHERE, all_shown, escaping, shown
+from diagnosis.report.read import report as read_report
+from diagnosis.report.records import Report
 from report.run import drawing
 from report.text.progress import Progress as Working
 from report.text.terminal import Progress, table
 from rths.__main__ import VERBS
 from rths.perform.processes import TEXT, Said
 from rths.perform.run import tell
+from tests.rths.diagnosis_report.reports import bare
 
 READABLE = "µ²λ–Ωé"
 HOSTILE = (
@@ -191,16 +193,19 @@ def identified(*_: Any) -> dict[str, Any]:
     return {"part": HOSTILE, "parameters": parameters, "model": HOSTILE}
 
 
-def said_of(*_: Any, **__: Any) -> dict[str, Any]:
+def said_of(*_: Any, **__: Any) -> dict[str, Report]:
     """The report on a test with one slave, which has the hostile text wherever one of a recording has text."""
-    report = {
-        "status": "unknown_effect",
-        "next_test": HOSTILE,
-        "warnings": [HOSTILE],
-        "gap": {"signals": {HOSTILE: {"nrmse": 0.1, "noise_floor": 0.01, "unit": HOSTILE}}},
-        "details": {"test": {"name": HOSTILE}},
-    }
-    return {"": SimpleNamespace(plain=lambda: report)}
+    gap = {"nrmse": 0.1, "noise_floor": 0.01, "peak_error": None, "unit": HOSTILE}
+    report = read_report(
+        bare("unknown_effect")
+        | {
+            "next_test": HOSTILE,
+            "warnings": [HOSTILE],
+            "gap": {"signals": {HOSTILE: gap}, "overall": None, "overall_noise_floor": None},
+            "details": {"test": {"name": HOSTILE}},
+        }
+    )
+    return {"": report}
 
 
 @pytest.mark.parametrize("verb", ["inspect", "replay", "budget", "diagnose"])

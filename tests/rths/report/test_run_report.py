@@ -16,6 +16,7 @@ from common.plan import reality
 from common.plan.plan import from_tables
 from common.recording.reader import Run, read
 from common.terminal.telling import untold
+from diagnosis.report.read import report as read_report
 from report.facts.summary import summarize
 from report.gap.page import page as diagnosis_page
 from report.page import numeric
@@ -107,7 +108,7 @@ def test_in_a_browser(reported: Path, tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_diagnosis_in_a_browser(tmp_path: Path) -> None:
     path = tmp_path / "gap.html"
-    path.write_text(diagnosis_page(fresh("explained")), encoding="utf-8")
+    path.write_text(diagnosis_page(read_report(fresh("explained"))), encoding="utf-8")
     check_in_browser(path, tmp_path)
 
 
