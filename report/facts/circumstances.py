@@ -18,7 +18,7 @@ VIRTUAL, REAL, SIMULATION, IMPORT, UNKNOWN = "virtual", "real", "simulation", "i
 SENTENCES = {
     VIRTUAL: "Virtual time in one process, where nothing takes time and no latency is measured",
     REAL: "Real time, each laboratory in a process of its own on the network",
-    SIMULATION: "A simulation of the nominal models, in which no laboratory took part",
+    SIMULATION: "A simulation of the closed loop, in which no laboratory took part",
     IMPORT: "Imported data, which no test of rths recorded",
 }
 NO_LATENCY = "The test ran in virtual time, where no latency is measured"

@@ -1,4 +1,4 @@
-"""`rths simulate`: the closed loop of nominal models, without laboratories or network."""
+"""`rths simulate`: the closed loop of nominal models, or of those of a reality, computed in one rollout."""
 
 from __future__ import annotations
 
@@ -8,12 +8,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
+from common.errors import InputError
 from common.plan.plan import Plan, ideal
 from common.plan.tables import Compensator, Control
+from common.roles import MASTER
 from common.terminal import cli, outputs
 from report.text.progress import Progress
 
 if TYPE_CHECKING:
+    from common.plan.reality import Reality
     from models.loop.closed_loop import Rollout
 
 
@@ -25,6 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--uncompensated", action="store_true", help="the actuator without compensation")
     parser.add_argument("--no-amd", action="store_true", help="the building without the damper")
+    cli.reality_argument(parser)
     parser.add_argument("--noise", action="store_true", help="with the sensors' noise, from the plan's seed")
     parser.add_argument(
         "-o", "--output", type=Path, metavar="FILE", help="write the simulation as a recording"
@@ -37,7 +41,8 @@ def run(args: argparse.Namespace) -> int:
     """Simulate; 1 where the loop left the plan's limits."""
     plan = adapted(cli.load_plan(args), args)
     if args.output:
-        outputs.checked(args.output, args.force, [cli.plan_path(args.plan)])
+        inputs = [cli.plan_path(args.plan), *([args.reality] if args.reality else [])]
+        outputs.checked(args.output, args.force, inputs)
     with Progress("simulating") as progress:
         from models.loop import substructure
 
@@ -61,11 +66,46 @@ def rolled_out(plan: Plan, motion: Any, args: argparse.Namespace) -> tuple[dict[
     from models.loop.closed_loop import signals, simulate, stacked
 
     ground = substructure.ground_rows(plan, motion)
-    rollout = simulate(plan, ground, seed=plan.test.seed if args.noise else None)
+    if args.reality:
+        rollout = really(cli.load_reality(args.reality, plan), noise=args.noise)
+    else:
+        rollout = simulate(plan, ground, seed=plan.test.seed if args.noise else None)
     if args.output:
         with outputs.writing(args.output, args.force) as path:
             write(path, plan, rollout, motion, ground)
     return signals(plan, rollout), beyond(plan, stacked(rollout), rollout.ticks)
+
+
+def really(truth: Reality, *, noise: bool) -> Rollout:
+    """The rollout of the laboratories and the network as they really are.
+
+    Raises:
+        InputError: a laboratory is a plug-in, of which no model is known, or an effect cannot be laid.
+    """
+    from models.link.exchange import exchange
+    from models.link.links import link_model
+    from models.loop import substructure
+    from models.loop.closed_loop import simulate
+    from models.loop.realised import true_slaves, true_system
+
+    rigs = {MASTER: truth.master} | {role: truth.of(role).slave for role in truth.plan.roles}
+    for role, rig in rigs.items():
+        if rig.class_:
+            raise InputError(
+                f"[{role}.rig] is a plug-in, of which a simulation knows no model: use rths run --virtual."
+            )
+    system = true_system(truth)
+    plan, effects = system.plan, system.effects
+    ground = substructure.ground_rows(plan, substructure.motion(plan), effects.time_shift)
+    links = {role: link_model(truth.of(role)) for role in plan.roles}
+    return simulate(
+        plan,
+        ground,
+        effects=effects,
+        slaves=true_slaves(truth),
+        seed=truth.seed if noise else None,
+        exchange={role: exchange(plan.ticks, plan.test.interval, link) for role, link in links.items()},
+    )
 
 
 def adapted(plan: Plan, args: argparse.Namespace) -> Plan:
@@ -148,4 +188,4 @@ def write(path: Path, plan: Plan, rollout: Rollout, motion: Any, ground: Any) ->
     for topic, values in rows(plan, rollout):
         at = plan.tick_ns(values[0])
         recording.add(topic, at, at, values)
-    recording.close({"outcome": "simulation", "cause": "simulation of the nominal models"})
+    recording.close({"outcome": "simulation", "cause": "simulation of the closed loop"})

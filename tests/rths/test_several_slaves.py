@@ -160,6 +160,27 @@ def test_simulate_and_compare_take_a_plan_with_several(
     assert call("compare", recording, path, "--tolerance", "0") == 0
 
 
+def test_a_simulated_reality_is_the_test_to_the_last_bit(
+    two: Plan, call: Any, capsys: Any, plan_file: Path, tmp_path: Path
+) -> None:
+    truth = tmp_path / "truth.toml"
+    truth.write_text(
+        "[[effect]]\nname = 'damper.friction'\nforce = 3.0\nslave = 'cellar'\n"
+        "[[effect]]\nname = 'link.delay'\ndelay = 0.005\nslave = 'roof'\n"
+    )
+    played, computed = tmp_path / "played.mcap", tmp_path / "computed.mcap"
+    bench = virtual.assemble(two, reality.load(truth, two), played)
+    assert virtual.run(bench, str) is None
+    assert call("simulate", plan_file, "--reality", truth, "--noise", "-o", computed) == 0
+    capsys.readouterr()
+    assert call("compare", played, computed, "--tolerance", "0") == 0
+    assert call("compare", computed, plan_file, "--tolerance", "0") == 1
+    truth.write_text("[slave.roof.rig]\nclass = 'my_lab.py:Lab'\n")
+    capsys.readouterr()
+    assert call("simulate", plan_file, "--reality", truth) == 2
+    assert "[slave.roof.rig] is a plug-in" in capsys.readouterr().err
+
+
 def test_a_simulation_beyond_a_limit_is_exit_code_1(call: Any, capsys: Any, plan_file: Path) -> None:
     assert call("simulate", plan_file, "--uncompensated", "--no-amd", "--scale", "2.0", "--json") == 1
     assert "beyond its limit" in json.loads(capsys.readouterr().out)["beyond_limit"]
