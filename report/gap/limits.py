@@ -19,7 +19,7 @@ GLOSSARY = (
         "residual",
         "recorded output of a part minus its model's prediction from the recorded input",
     ),
-    ("share", "how much of the gap a site makes; shares sum to 100 % over sites with a gap"),
+    ("share", "part of the gap that a site causes; shares sum to 100 % over sites with a gap"),
     ("effect", "something real that the nominal models leave out"),
     (
         "probability",
