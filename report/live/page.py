@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +18,7 @@ from report.live.latency import Latency
 from report.live.motion import motions
 from report.live.status import ORANGE, Status
 from report.live.stream import Streams
+from report.page import block_of
 
 TEMPLATE = Path(__file__).with_name("page.html")
 TEXT = {"text_font_size": "12px"}
@@ -48,7 +48,7 @@ THEME = Theme(
 
 def parting(feed: Feed) -> Div:
     """The sentence that the page shows by itself when the server has ended."""
-    text = f"The view has ended. Again: <code>rths live {escape(str(feed.path))}</code>"
+    text = str(block_of("live.html", "parting", feed.path))
     style: dict[str, str | None] = {"color": ORANGE, "font-size": "14px", "overflow-wrap": "anywhere"}
     return Div(text=text, visible=False, sizing_mode="stretch_width", styles=style, name="parting")
 
@@ -119,7 +119,4 @@ class Page:
         title = f"{test}: {'ended' if feed.ended else 'live'}"
         if title != self._document.title:
             self._document.title = title
-        self._heading.text = (
-            f"<h1 style='font-size:20px;margin:0'>{escape(test)}</h1>"
-            f"<div style='font-size:13px;color:#595959;overflow-wrap:anywhere'>{escape(str(feed.path))}</div>"
-        )
+        self._heading.text = str(block_of("live.html", "heading", test, feed.path))

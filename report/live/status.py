@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from html import escape
-from typing import Any
+from typing import Any, NamedTuple
 
 from bokeh.models.widgets import Div
 
@@ -13,12 +12,12 @@ from common.roles import title
 from common.safety.modes import LATCHED, Mode
 from common.terminal.plain_report import microseconds
 from report.live.feed import SILENT_NS, Feed
+from report.page import block_of
 from report.pictures.figure import COLOURS
 from report.text.formats import percent
 
 SHOWN = 40  # events
 STOPS = 4  # causes in the banner: more than a test with a few laboratories has
-RESET = "Laboratories that are latched stay so until <code>rths reset</code>."
 GREY, BLUE, ORANGE, RED = "#595959", COLOURS[0], "#8a5a00", "#b3261e"  # legible on white
 IN_MODE = {
     Mode.ARMED.value: BLUE,
@@ -66,15 +65,10 @@ def banner(feed: Feed) -> str:
     emergency = Mode.EMERGENCY_STOP.value in feed.standing.modes.values() or any(
         stop.code == EMERGENCY for stop in stops
     )
-    causes = "".join(
-        f"<div><b>{escape(title(stop.lab))}</b>, t = {stop.t:.2f} s: {escape(stop.text)}</div>"
-        for stop in stops[:STOPS]
-    )
-    return (
-        "<div role='alert'><div style='font-size:18px;font-weight:bold'>"
-        f"{'EMERGENCY STOP' if emergency else 'TEST STOPPED'}</div>"
-        f"{causes}{f'<div>{RESET}</div>' if feed.standing.latched and not feed.ended else ''}</div>"
-    )
+    causes = [(title(stop.lab), f"{stop.t:.2f}", stop.text) for stop in stops[:STOPS]]
+    latched = feed.standing.latched and not feed.ended
+    called = "EMERGENCY STOP" if emergency else "TEST STOPPED"
+    return str(block_of("live.html", "banner", called, causes, latched))
 
 
 def tiles(feed: Feed, role: str) -> str:
@@ -89,12 +83,7 @@ def tiles(feed: Feed, role: str) -> str:
         ("round trip", f"{microseconds(timing.newest).strip()} µs", "", ""),
         ("longest round trip", f"{microseconds(timing.longest).strip()} µs", "", ""),
     ]
-    return (
-        f"<div style='font-size:15px;margin-bottom:8px'><b>{escape(heading(feed))}</b></div>"
-        "<div style='display:flex;flex-wrap:wrap;gap:8px'>"
-        + "".join(tile(*fact) for fact in facts)
-        + "</div>"
-    )
+    return str(block_of("live.html", "tiles", heading(feed), facts))
 
 
 def heading(feed: Feed) -> str:
@@ -116,39 +105,27 @@ def standing(feed: Feed, lab: str) -> tuple[str, str, str]:
     return said, colour if colour == RED else ORANGE, f"no news for {age:.0f} s, since t = {t:.2f} s"
 
 
-def tile(name: str, value: str, colour: str, below: str) -> str:
-    """One fact as HTML, with a line in small letters below it."""
-    edge = colour or "#c8c8c8"
-    return (
-        f"<div style='border-left:4px solid {edge};padding:2px 12px 2px 8px;min-width:92px'>"
-        f"<div style='font-size:12px;color:{GREY}'>{escape(name)}</div>"
-        f"<div style='font-size:17px;font-variant-numeric:tabular-nums;color:{colour or '#1a1a1a'}'>"
-        f"{escape(value)}</div>"
-        f"<div style='font-size:12px;color:{GREY}'>{escape(below)}</div></div>"
-    )
+class Line(NamedTuple):
+    """An event as the page lists it."""
+
+    t: str
+    lab: str
+    word: str  # its level, where it is no plain news
+    text: str
+    colour: str
 
 
 def listing(feed: Feed) -> str:
     """The newest events as HTML, the newest first; those of several laboratories come in no order of time."""
-    rows = "".join(row(event) for event in sorted(feed.events, key=lambda item: item["t"])[: -SHOWN - 1 : -1])
-    return (
-        "<table style='border-collapse:collapse;font-size:13px;line-height:1.5'>"
-        f"{rows or '<tr><td>nothing yet</td></tr>'}</table>"
-    )
+    newest = sorted(feed.events, key=lambda item: item["t"])[: -SHOWN - 1 : -1]
+    return str(block_of("live.html", "listing", [line(event) for event in newest]))
 
 
-def row(event: Mapping[str, Any]) -> str:
-    """One event as a row of a table."""
+def line(event: Mapping[str, Any]) -> Line:
+    """One event."""
     level = str(event["level"])
-    word = "" if level == "info" else f"<b>{escape(level)}:</b> "
-    colour = AT_LEVEL.get(level, GREY)
-    cells = (f"{event['t']:.2f}&nbsp;s", escape(title(str(event["lab"]))), word + escape(str(event["text"])))
-    styles = (f"text-align:right;color:{GREY}", f"color:{GREY}", f"color:{'#1a1a1a' if not word else colour}")
-    return (
-        "<tr style='vertical-align:top'>"
-        + "".join(
-            f"<td style='padding:0 10px 0 0;{style}'>{cell}</td>"
-            for style, cell in zip(styles, cells, strict=True)
-        )
-        + "</tr>"
+    plain = level == "info"
+    colour = "#1a1a1a" if plain else AT_LEVEL.get(level, GREY)
+    return Line(
+        f"{event['t']:.2f}", title(str(event["lab"])), "" if plain else level, str(event["text"]), colour
     )

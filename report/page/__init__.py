@@ -44,7 +44,12 @@ def render(template: str, **values: Any) -> Markup:
 
 def block(name: str, *values: Any, **named: Any) -> Markup:
     """One block of `blocks.html` filled in; texts are escaped."""
-    module: Any = environment().get_template("blocks.html").module
+    return block_of("blocks.html", name, *values, **named)
+
+
+def block_of(template: str, name: str, *values: Any, **named: Any) -> Markup:
+    """One block of a template of this folder filled in; texts are escaped."""
+    module: Any = environment().get_template(template).module
     return Markup(getattr(module, name)(*values, **named).strip())  # noqa: S704 - of autoescape
 
 
