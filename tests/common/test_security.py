@@ -216,7 +216,14 @@ def test_an_endpoint_on_loopback_is_known_as_such() -> None:
 def test_an_open_link_that_others_reach_is_warned_of(
     endpoint: str, warned: bool, default_plan: Plan, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("common.link.zenoh_link.ZenohLink", lambda *args, **_: args)
+    class Link:
+        def __init__(self, *_: Any, **__: Any) -> None:
+            pass
+
+        def watch(self, _: Any) -> None:
+            pass
+
+    monkeypatch.setattr("common.link.zenoh_link.ZenohLink", Link)
     told: list[Any] = []
     join(default_plan, "master", str, lambda *words: told.append(words), listen=endpoint)
     assert [data["code"] for _, data in told if "code" in data] == ["open_link"] * warned

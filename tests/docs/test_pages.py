@@ -44,7 +44,10 @@ UNRUN = {
         "rths slave two_dampers --name roof --connect tcp/192.0.2.1:7447",
         "rths slave two_dampers --name middle --connect tcp/192.0.2.1:7447",
     ],
-    "docs/reference/blind.md": ["rths blind --cases 240 --set judge --seed 2026 --jobs 2 -o runs/blind"],
+    "docs/reference/blind.md": [
+        "rths blind --cases 240 --set judge --seed 2026 --jobs 2 -o runs/blind",
+        "rths blind --cases 40 --set judge --seed 2026 --duration 20",
+    ],
     "docs/reference/faults.md": [
         "make test",
         "make faults",
