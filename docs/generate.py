@@ -64,6 +64,7 @@ def parts() -> dict[str, dict[str, str]]:
             "motions": reference_tables.motions(),
         },
         "reference/exit-codes.md": {"exits": reference_tables.exits()},
+        "reference/diagnosis-report.md": {"records": reference_tables.report()},
         "reference/budget.md": {"budget": reference_tables.budget()},
         "reference/rooms.md": {"rooms": reference_tables.rooms()},
     }

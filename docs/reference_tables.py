@@ -15,6 +15,7 @@ from common import errors
 from common.plan.patience import FIGURES
 from common.plan.plan import TABLES, Plan
 from common.plan.schema import Rule, required, table_fields
+from diagnosis.report import schema
 from docs.markdown import quantity, table
 from models.compensators import COMPENSATORS
 from models.effects import of_site
@@ -264,3 +265,54 @@ def rooms() -> str:
 def first_sentence(path: Path) -> str:
     """The first line of the text that a file begins with."""
     return (ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "").splitlines()[0]
+
+
+def report() -> str:
+    """The records of a diagnosis report, each with its keys."""
+    found = schema.schema()
+    records = {"Report": found} | found["$defs"]
+    texts = []
+    for name, record in records.items():
+        rows = (
+            (
+                f"`{key}`",
+                kind(value),
+                "" if key in record["required"] else "may be absent",
+                value["description"],
+            )
+            for key, value in record["properties"].items()
+        )
+        texts.append(
+            f"## {name}\n\n{record['description']}\n\n{table(('key', 'holds', '', 'meaning'), rows)}"
+        )
+    return "\n".join(texts)
+
+
+def kind(value: dict[str, Any]) -> str:
+    """What a JSON schema lets a value be, in words."""
+    if "anyOf" in value:
+        return " or ".join(kind(item) for item in value["anyOf"])
+    if "$ref" in value:
+        name = value["$ref"].rpartition("/")[2]
+        return f"[{name}](#{name.lower()})"
+    if "const" in value or "enum" in value:
+        return ", ".join(f"`{item}`" for item in value.get("enum", [value.get("const")]))
+    types = value["type"] if isinstance(value["type"], list) else [value["type"]]
+    if "array" in types:
+        return " or ".join([several(value), *types[1:]])
+    if "additionalProperties" in value:
+        return f"object of {kind(value['additionalProperties'])}"
+    return "empty object" if types == ["object"] else " or ".join(types)
+
+
+NAMES = {"number": "numbers", "string": "texts"}
+
+
+def several(value: dict[str, Any]) -> str:
+    """A list of a JSON schema in words; its numbers may be null."""
+    items = value["items"]
+    if items.get("type") == "array":
+        return f"list of {several(items).replace('pair', 'pairs', 1).replace('list', 'lists', 1)}"
+    single = items["type"][0] if isinstance(items.get("type"), list) else items.get("type")
+    inner = NAMES[single] if single in NAMES else kind(items)
+    return f"{'pair' if 'maxItems' in value else 'list'} of {inner}"

@@ -44,7 +44,7 @@ class Gap(Entry):
 class Place(Entry):
     """A site with its share of the gap."""
 
-    site: Site = noted("Part of the test, or sensor.<signal>")
+    site: Site = noted("Part of the test, or sensor and the signal of a reading")
     residual_to_noise: Number = noted("Rms of what the site does to its signal, over that of the noise")
     when: tuple[Ends, ...] = noted("Windows of time in which it stands out of the noise", unit="s")
     frequency_band: Ends | None = noted("Band that holds most of it", unit="Hz")
