@@ -9,7 +9,7 @@ from diagnosis.recorded.record import Record
 from diagnosis.report.evidence import ForcePath, Path, Paths
 from models import indicators
 from models.indicators import FrequencyEvaluation
-from models.labs import force_path as force
+from models.loop import force_path as force
 from models.registry import Array
 from models.structures.partition import damping_lost
 

@@ -14,7 +14,7 @@ from common.recording.reader import Run, Values
 from common.roles import LATENCY, MASTER, SLAVE, kind_of, latency_topic, name_of
 from common.signals import Kind
 from models import indicators
-from models.labs.force_path import force_path as force_path_of
+from models.loop.force_path import force_path as force_path_of
 from models.structures.partition import storey_stiffness
 from report.facts import circumstances, storeys
 from report.facts import late as lateness

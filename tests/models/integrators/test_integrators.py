@@ -572,7 +572,8 @@ class TestRungeKutta:
     def test_a_numerical_part_that_a_specimen_must_hold_is_none_that_the_step_makes_diverge(self) -> None:
         M, K = np.diag([1e3, 1e3]), np.array([[1e6, -1e6], [-1e6, 1e6]])
         for stiffness in (K, K - 1e5 * np.eye(2)):
-            integrators.build("rk4", M, np.zeros((2, 2)), stiffness, 0.01)
+            method = integrators.build("rk4", M, np.zeros((2, 2)), stiffness, 0.01)
+            assert method.code == integrators.INTEGRATORS["rk4"].code
 
     @pytest.mark.parametrize("omega_h", [0.1, 0.2, 0.3])
     def test_it_damps_low_modes_by_the_fifth_power(self, omega_h: float) -> None:
