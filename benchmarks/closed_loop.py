@@ -12,8 +12,8 @@ from benchmarks.opensees_peer import Answer, Case
 from benchmarks.result import Figure, rate_figure, rates
 from common.plan.plan import Plan, ideal
 from common.plan.tables import Control, Recording
-from models.loop import substructure
-from models.loop.closed_loop import signals, simulate
+from loop import substructure
+from loop.closed_loop import signals, simulate
 from models.registry import Array
 
 TARGET = 5e6

@@ -20,10 +20,11 @@ from benchmarks.result import Figure
 from common.plan import reality
 from common.plan.plan import Plan, ideal
 from common.plan.tables import Recording, SlaveLaboratory
-from models.loop import substructure
-from models.loop.closed_loop import simulate
+from loop import substructure
+from loop.closed_loop import simulate
+from loop.nominal import partition
 from models.registry import Array
-from models.structures import partition, shear_building
+from models.structures import shear_building
 from simulation import virtual
 
 STOREYS = (1, 2, 5, 10, 20, 50, 100)

@@ -17,11 +17,11 @@ from common.plan.plan import TABLES, Plan
 from common.plan.schema import Rule, required, table_fields
 from diagnosis.report import schema
 from docs.markdown import quantity, table
+from laboratories.effects import of_site
+from laboratories.effects.effect import Effect, Parameter
+from laboratories.effects.reading import SIGNALS
+from laboratories.effects.sites import SITES
 from models.compensators import COMPENSATORS
-from models.effects import of_site
-from models.effects.effect import Effect, Parameter
-from models.effects.reading import SIGNALS
-from models.effects.sites import SITES
 from models.ground_motion import MOTIONS
 from models.integrators import INTEGRATORS
 from models.specimens import SPECIMENS

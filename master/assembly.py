@@ -14,17 +14,18 @@ from common.plan.plan import Plan
 from common.plan.plugins import construct, find
 from common.plan.reality import Reality
 from common.rig import METHODS, AtRest, ColumnMeasurement, GuardedRig
+from laboratories.column import model as column_lab
+from laboratories.kinds import COLUMN
+from laboratories.sensors import noise, readings
+from loop import substructure
+from loop.links import link_model
+from loop.nominal import preflight as nominal
+from loop.realised import true_system
 from master.limits import MasterLimits
 from master.loop import MasterLoop
 from master.rig import ColumnLab
 from master.step import MasterStep
 from models.compiled import plain
-from models.labs import column_lab, noise, readings
-from models.labs.kinds import COLUMN
-from models.link.links import link_model
-from models.loop import preflight as nominal
-from models.loop import substructure
-from models.loop.realised import true_system
 from models.registry import Array
 from models.system import System
 

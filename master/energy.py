@@ -9,11 +9,11 @@ import numpy as np
 from common.plan.limits import Violation, violated
 from common.plan.plan import Plan
 from common.rig import ColumnMeasurement
+from loop.nominal.partition import felt, storey_stiffness
 from master.step import Outputs
 from models import energy_balance
 from models.compiled import plain
 from models.energy_balance import ACCELERATION, DISPLACEMENT, DRIFT_SHARE, ERROR_SHARE, VELOCITY
-from models.structures.partition import felt, storey_stiffness
 
 # of the largest displacement allowed: with less motion a share of the ground's energy says nothing
 FLOOR_SHARE = 0.01

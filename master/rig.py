@@ -9,9 +9,10 @@ from typing import Any
 from common.plan import schema
 from common.plan.tables import Actuator, Column, Sensors
 from common.rig import ColumnCommand, ColumnMeasurement
+from laboratories.column import model as column_lab
+from laboratories.kinds import COLUMN
+from laboratories.sensors import noise, readings
 from models.compiled import plain
-from models.labs import column_lab, noise, readings
-from models.labs.kinds import COLUMN
 from models.system import Effects
 
 

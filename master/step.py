@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from common.plan.plan import Plan
+from loop import substructure
 from models.compiled import plain
-from models.loop import substructure
 from models.registry import Array
 
 Values = float | list[float]

@@ -1,7 +1,7 @@
 """Where compiled kernels are kept between processes.
 
 Numba's on-disk cache looks at a function's own file only, so a kernel whose callee changed would be
-served stale. The folder is therefore named after the content of every file of `models`.
+served stale. The folder is therefore named after the content of every file of the rooms that hold kernels.
 """
 
 from __future__ import annotations
@@ -14,12 +14,13 @@ from functools import cache
 from pathlib import Path
 
 READY = "ready"
+ROOMS = ("models", "laboratories", "loop")
 
 
-def fingerprint(root: Path) -> str:
-    """Sixteen hex digits that change with the name or content of any Python file below `root`."""
+def fingerprint(root: Path, rooms: tuple[str, ...] = ROOMS) -> str:
+    """Sixteen hex digits that change with the name or content of any Python file in these folders of `root`."""
     digest = hashlib.blake2b(sys.version.encode(), digest_size=8)
-    for path in sorted(root.rglob("*.py")):
+    for path in sorted(path for room in rooms for path in (root / room).rglob("*.py")):
         digest.update(path.relative_to(root).as_posix().encode())
         digest.update(path.read_bytes())
     return digest.hexdigest()
@@ -28,7 +29,7 @@ def fingerprint(root: Path) -> str:
 @cache
 def folder() -> Path:
     """Folder for compiled kernels: in the user's cache, or in a temporary folder where that is not writable."""
-    name = fingerprint(Path(__file__).parent)
+    name = fingerprint(Path(__file__).parent.parent)
     chosen = of_user(name)
     if chosen is None:
         chosen = Path(tempfile.gettempdir()) / f"rths-kernels-{os.getuid()}-{name}"

@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
 
 def record(args: argparse.Namespace, plan: Plan, path: Path) -> int:
     """Record a test into a file; the exit code."""
-    from models.loop import substructure
+    from loop import substructure
     from recorder import files, space
     from recorder.loop import RecorderLoop
     from recorder.sink import FileSink, ThreadedSink

@@ -43,8 +43,8 @@ def columns(name: str, tell: Tell = untold) -> Source:
 
 def simulated(path: Path) -> Source:
     """The simulation of a plan."""
-    from models.loop import substructure
-    from models.loop.closed_loop import signals, simulate
+    from loop import substructure
+    from loop.closed_loop import signals, simulate
 
     test = plan.load(path)
     record = substructure.motion(test)

@@ -16,9 +16,9 @@ from common.plan.reality import Reality
 from common.reporting import Report, silent
 from common.roles import MASTER, RECORDER
 from common.terminal.telling import Tell, untold
+from loop import substructure
 from master.assembly import build_loop as build_master
 from master.loop import MasterLoop
-from models.loop import substructure
 from recorder import files
 from recorder.loop import CONSEQUENCE, RecorderLoop
 from recorder.sink import FileSink

@@ -14,11 +14,12 @@ from common.plan.plugins import construct, find
 from common.plan.reality import Reality
 from common.rig import METHODS, AtRest, GuardedRig, TableMeasurement
 from common.roles import name_of, title
+from laboratories.kinds import TABLE
+from laboratories.sensors import noise, readings
+from laboratories.table import model as table_lab
+from loop.links import link_model
+from loop.realised import true_system
 from models.compiled import plain
-from models.labs import noise, readings, table_lab
-from models.labs.kinds import TABLE
-from models.link.links import link_model
-from models.loop.realised import true_system
 from slave.loop import NO_COMMAND, SlaveLoop
 from slave.rig import TableLab
 from slave.step import SlaveStep

@@ -9,9 +9,10 @@ from typing import Any
 from common.plan import schema
 from common.plan.tables import Damper, Sensors, Table
 from common.rig import TableCommand, TableMeasurement
+from laboratories.kinds import TABLE
+from laboratories.sensors import noise, readings
+from laboratories.table import model as table_lab
 from models.compiled import plain
-from models.labs import noise, readings, table_lab
-from models.labs.kinds import TABLE
 from models.system import Effects
 
 

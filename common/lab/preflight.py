@@ -1,6 +1,6 @@
 """What must hold before anything moves: risks by name, who takes them, and what sensors and link must pass.
 
-The partition and the simulated peaks are judged in `models/loop/preflight.py`, the disk by the recorder.
+The partition and the simulated peaks are judged in `loop/nominal/preflight.py`, the disk by the recorder.
 """
 
 from __future__ import annotations

@@ -39,7 +39,7 @@ from diagnosis.report.evidence import (
 )
 from diagnosis.report.records import Candidate
 from diagnosis.signals import windows
-from models.effects import CATALOGUE
+from laboratories.effects import CATALOGUE
 from models.registry import Array
 from models.system import System
 

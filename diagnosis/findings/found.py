@@ -11,7 +11,7 @@ from diagnosis.findings.verdict import Verdict
 from diagnosis.fits.fitting import Values
 from diagnosis.recorded.link import Finding
 from diagnosis.recorded.record import Record
-from models.effects import CATALOGUE
+from laboratories.effects import CATALOGUE
 from models.system import System
 
 

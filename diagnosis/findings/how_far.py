@@ -19,7 +19,7 @@ from diagnosis.recorded.record import Record
 from diagnosis.report.evidence import History, LoopShare, Step
 from diagnosis.report.records import Gap, HowFar, SignalGap
 from diagnosis.signals.mask import Mask
-from models.effects import CATALOGUE
+from laboratories.effects import CATALOGUE
 from models.registry import Array
 
 QUIET = 0.2  # noise over a signal's rms from which on a part alone is not judged by it

@@ -9,7 +9,7 @@ import numpy as np
 from diagnosis.fits.fitting import Data
 from diagnosis.recorded.record import Record
 from diagnosis.signals.noise import quantum
-from models.labs.kinds import COLUMN, TABLE
+from laboratories.kinds import COLUMN, TABLE
 from models.registry import Array
 
 LOUDER = 2.5  # noise over what the plan and the other sensors' noise make expected

@@ -15,7 +15,7 @@ from diagnosis.fits.search import gap
 from diagnosis.recorded.parts import LaboratoryB
 from diagnosis.recorded.record import Record
 from diagnosis.signals import windows
-from models.effects import CATALOGUE
+from laboratories.effects import CATALOGUE
 from models.registry import Array
 
 # set on draws of `rths blind --set tune` (docs/decisions/0012-diagnosis.md)

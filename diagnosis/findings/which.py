@@ -14,7 +14,7 @@ from diagnosis.fits.fitting import Values
 from diagnosis.fits.search import MATERIAL, PRIOR_GAIN, gaps
 from diagnosis.report.records import Candidate
 from diagnosis.report.values import Parameters, Value
-from models.effects import CATALOGUE
+from laboratories.effects import CATALOGUE
 
 MOST_OTHERS = 5  # alternatives listed
 

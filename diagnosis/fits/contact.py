@@ -12,7 +12,7 @@ import numpy as np
 
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data, Fit, Values
-from models.effects.effect import Effect
+from laboratories.effects.effect import Effect
 
 FIRST = 0.02  # of the largest residual, from which on the stop has been met
 INSIDE = 0.97  # of the largest stroke before that

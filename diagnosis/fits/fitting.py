@@ -22,8 +22,8 @@ from common.errors import InputError
 from diagnosis.recorded.parts import EXACT, MODEL_ERROR, Part
 from diagnosis.recorded.record import Record
 from diagnosis.signals.mask import Mask
-from models.effects import CATALOGUE
-from models.effects.effect import Effect, Parameter
+from laboratories.effects import CATALOGUE
+from laboratories.effects.effect import Effect, Parameter
 from models.registry import Array
 from models.system import System
 

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from diagnosis.recorded.record import Record
-from models.effects.effect import Effect, Parameter
+from laboratories.effects.effect import Effect, Parameter
 
 USUAL = {  # what the default test reaches
     ("a", "m"): 2.4e-3,

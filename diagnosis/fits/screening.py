@@ -13,7 +13,7 @@ from scipy.optimize import lsq_linear
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.scales import Scales
-from models.effects.effect import Effect
+from laboratories.effects.effect import Effect
 from models.registry import Array
 
 WORKERS = 2  # threads: kernels release the interpreter's lock

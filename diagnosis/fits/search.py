@@ -17,7 +17,7 @@ from diagnosis.fits import contact, fitting
 from diagnosis.fits.fitting import Data, Fit, Values, excess
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.screening import WORKERS, Candidate, screen
-from models.effects import CATALOGUE
+from laboratories.effects import CATALOGUE
 from models.registry import Array
 
 # The figures below were set on draws of `rths blind --set tune` (docs/decisions/0012-diagnosis.md), as a compromise

@@ -6,7 +6,7 @@ import numpy as np
 
 from diagnosis.recorded.parts import Nuisance, of_sites
 from diagnosis.recorded.record import Record
-from models.loop import substructure
+from loop import substructure
 from models.registry import Array
 from models.system import System
 

@@ -23,7 +23,7 @@ from scipy.stats import beta
 from common.recording.reader import Run
 from diagnosis.recorded.record import laid_out
 from diagnosis.signals.mask import Mask
-from models.loop.closed_loop import Exchange
+from loop.closed_loop import Exchange
 from models.registry import Array
 
 Index = NDArray[np.int64]

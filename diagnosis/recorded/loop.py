@@ -11,8 +11,8 @@ from common.recording.reader import share
 from common.roles import SLAVE
 from diagnosis.recorded.record import Record
 from diagnosis.signals.mask import Mask
-from models.loop import closed_loop, substructure
-from models.loop.closed_loop import Exchange
+from loop import closed_loop, substructure
+from loop.closed_loop import Exchange
 from models.registry import Array
 from models.system import System
 

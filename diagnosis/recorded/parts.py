@@ -16,10 +16,10 @@ import numpy as np
 from common.plan.plan import Plan
 from diagnosis.recorded.record import Record
 from diagnosis.signals.mask import Mask
-from models import effects
-from models.effects.effect import Effect
-from models.labs.kinds import COLUMN, TABLE
-from models.loop import replay
+from laboratories import effects
+from laboratories.effects.effect import Effect
+from laboratories.kinds import COLUMN, TABLE
+from loop import replay
 from models.registry import Array
 from models.system import System
 

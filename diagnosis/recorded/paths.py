@@ -7,11 +7,11 @@ import numpy as np
 from common.errors import InputError
 from diagnosis.recorded.record import Record
 from diagnosis.report.evidence import ForcePath, Path, Paths
+from loop import force_path as force
+from loop.nominal.partition import damping_lost
 from models import indicators
 from models.indicators import FrequencyEvaluation
-from models.loop import force_path as force
 from models.registry import Array
-from models.structures.partition import damping_lost
 
 
 def paths(record: Record, nominal: dict[str, Array] | None) -> Paths:

@@ -12,7 +12,7 @@ from common.plan.plan import Plan, ideal, parse
 from common.recording.reader import GROUND, Run
 from common.roles import MASTER, SLAVE, title
 from diagnosis.signals.mask import Mask
-from models.loop import substructure
+from loop import substructure
 from models.registry import Array
 from models.system import System
 

@@ -10,9 +10,9 @@ import numpy as np
 
 from common.errors import InputError
 from common.recording.reader import Run
+from laboratories.identification import actuator, column, damper, step_response, table
+from laboratories.identification.estimate import Estimate
 from models.excitation import Segment
-from models.identification import actuator, column, damper, step_response, table
-from models.identification.estimate import Estimate
 from models.registry import Array
 from report.facts.summary import plan_of
 

@@ -10,8 +10,8 @@ import numpy as np
 from common.plan.plan import Plan
 from common.recording.reader import Run, Values
 from common.roles import MASTER
+from loop.nominal.partition import matrices
 from models.structures import shear_building
-from models.structures.partition import matrices
 
 UNITS = {"drift": "m", "displacement": "m", "absolute_acceleration": "m/s²", "shear": "N"}
 

@@ -13,9 +13,9 @@ from common.plan.plan import Plan, parse
 from common.recording.reader import Run, Values
 from common.roles import LATENCY, MASTER, SLAVE, kind_of, latency_topic, name_of
 from common.signals import Kind
+from loop.force_path import force_path as force_path_of
+from loop.nominal.partition import storey_stiffness
 from models import indicators
-from models.loop.force_path import force_path as force_path_of
-from models.structures.partition import storey_stiffness
 from report.facts import circumstances, storeys
 from report.facts import late as lateness
 from report.facts.accounts import accounts

@@ -7,7 +7,7 @@ from typing import TypeVar
 
 from diagnosis.report.evidence import Evidence
 from diagnosis.report.records import Candidate, Report, SignalGap, Tolerance
-from models.effects import CATALOGUE
+from laboratories.effects import CATALOGUE
 from report.text.force_path import sentence as force_sentence
 from report.text.formats import percent, percent_interval, quantity
 

@@ -150,8 +150,8 @@ def averaged(frequency: Values, density: Values) -> tuple[Values, Values]:
 
 def natural_frequencies(recording: Run) -> list[float]:
     """The first undamped ones of the planned building (Hz); none where the recording is not of one that shook."""
+    from loop.nominal.partition import matrices
     from models.structures import shear_building
-    from models.structures.partition import matrices
 
     plan = plan_of(recording)
     if plan is None or curve(recording, "ground_acceleration") is None:

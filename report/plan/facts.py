@@ -8,11 +8,11 @@ from typing import Any
 
 from common.lab.preflight import Check
 from common.plan.plan import Plan
+from loop import substructure
+from loop.nominal.partition import felt, matrices, taken_over
+from loop.nominal.preflight import LIMITS, Findings, expected_delay, findings
 from models.ground_motion import GroundMotion
-from models.loop import substructure
-from models.loop.preflight import LIMITS, Findings, expected_delay, findings
 from models.structures import shear_building
-from models.structures.partition import felt, matrices, taken_over
 from recorder import space
 from report.plan import classes, slips
 

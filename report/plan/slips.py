@@ -6,10 +6,10 @@ import math
 from typing import NamedTuple
 
 from common.plan.plan import Plan
+from loop.nominal.partition import felt, matrices, taken_over
+from loop.nominal.preflight import LIMITS, Findings
 from models.ground_motion import MOTIONS, STANDARD_GRAVITY, GroundMotion
-from models.loop.preflight import LIMITS, Findings
 from models.structures import shear_building
-from models.structures.partition import felt, matrices, taken_over
 
 SHORTEST, LONGEST = (
     0.05,

@@ -128,7 +128,7 @@ def before_the_start(plan: Plan, output: Path, gate: Gate) -> list[str]:
 
 def checks(plan: Plan, output: Path) -> list[Check]:
     """What is judged before anything starts."""
-    from models.loop import preflight
+    from loop.nominal import preflight
     from recorder import space
 
     return [*preflight.checks(plan), space.check(plan, output.parent)]
@@ -195,7 +195,7 @@ def check(reality: Reality) -> None:
     """Raise InputError where a laboratory could not be built or not show who it is, before any process starts."""
     import master.assembly
     import slave.assembly
-    from models.link.links import link_model
+    from loop.links import link_model
 
     if reality.plan.link.security.folder:
         from common.link import security
@@ -214,7 +214,7 @@ def warm_up(progress: Progress) -> None:
 
     if not cache.warm():
         progress.say("compiling the kernels, once on this machine (about half a minute)")
-        from models.warm import compile_all
+        from loop.warm import compile_all
 
         compile_all()
 

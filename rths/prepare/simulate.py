@@ -17,7 +17,7 @@ from report.text.progress import Progress
 
 if TYPE_CHECKING:
     from common.plan.reality import Reality
-    from models.loop.closed_loop import Rollout
+    from loop.closed_loop import Rollout
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -44,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
         inputs = [cli.plan_path(args.plan), *([args.reality] if args.reality else [])]
         outputs.checked(args.output, args.force, inputs)
     with Progress("simulating") as progress:
-        from models.loop import substructure
+        from loop import substructure
 
         motion = substructure.motion(plan)
         progress.tell(plan.test.name)
@@ -62,8 +62,8 @@ def run(args: argparse.Namespace) -> int:
 
 def rolled_out(plan: Plan, motion: Any, args: argparse.Namespace) -> tuple[dict[str, Any], str]:
     """Signals of the compiled rollout, written where a file is wanted; the first value beyond the plan's limits."""
-    from models.loop import substructure
-    from models.loop.closed_loop import signals, simulate, stacked
+    from loop import substructure
+    from loop.closed_loop import signals, simulate, stacked
 
     ground = substructure.ground_rows(plan, motion)
     if args.reality:
@@ -82,11 +82,11 @@ def really(truth: Reality, *, noise: bool) -> Rollout:
     Raises:
         InputError: a laboratory is a plug-in, of which no model is known, or an effect cannot be laid.
     """
-    from models.link.exchange import exchange
-    from models.link.links import link_model
-    from models.loop import substructure
-    from models.loop.closed_loop import simulate
-    from models.loop.realised import true_slaves, true_system
+    from loop import substructure
+    from loop.closed_loop import simulate
+    from loop.exchange import exchange
+    from loop.links import link_model
+    from loop.realised import true_slaves, true_system
 
     rigs = {MASTER: truth.master} | {role: truth.of(role).slave for role in truth.plan.roles}
     for role, rig in rigs.items():
@@ -145,7 +145,7 @@ def beyond(plan: Plan, columns: dict[str, Any], ticks: int) -> str:
     """A sentence on the first value beyond a limit of the plan, empty where there is none."""
     import numpy as np
 
-    from models.loop import limited
+    from loop.nominal import limited
 
     first = (ticks, "")
     for name, values in limited.magnitudes(plan, columns).items() if ticks else ():
@@ -181,7 +181,7 @@ def show(plan: Plan, summary: dict[str, Any], stream: TextIO) -> None:
 
 def write(path: Path, plan: Plan, rollout: Rollout, motion: Any, ground: Any) -> None:
     """The simulation as a recording: the topics of master and slaves."""
-    from models.loop.closed_loop import rows
+    from loop.closed_loop import rows
     from recorder import files
 
     recording = files.begin(path, plan, motion, ground)

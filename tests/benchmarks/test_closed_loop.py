@@ -11,8 +11,8 @@ import pytest
 from benchmarks import closed_loop, opensees_peer
 from benchmarks.opensees_peer import PYTHON, Answer, Case
 from common.plan.plan import Plan
-from models.loop import substructure
-from models.loop.closed_loop import signals, simulate
+from loop import substructure
+from loop.closed_loop import signals, simulate
 
 CASE = Case(160e3, 25e6, 200e3, 0.002, [0.0, 1.0, 0.5, 0.0], repeats=2)
 

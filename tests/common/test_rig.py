@@ -14,7 +14,7 @@ from common.plan.plan import Plan
 from common.plan.plugins import construct, find
 from common.plan.reality import as_planned
 from common.rig import METHODS, ColumnCommand, ColumnMeasurement, GuardedRig
-from models.link.links import link_model
+from loop.links import link_model
 
 
 class Fake:

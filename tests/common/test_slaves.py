@@ -22,7 +22,7 @@ from common.recording.reader import read
 from common.recording.writer import Recording
 from common.signals import topics
 from common.terminal import cli
-from models.link.links import seed_of
+from loop.links import seed_of
 
 TWO = "[slave.roof.damper]\nmass = 20.0\n[slave.cellar.control]\ngain = 1.0\n"
 

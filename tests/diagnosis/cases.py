@@ -15,7 +15,7 @@ from common.recording.reader import read
 from common.terminal import cli
 from diagnosis.recorded import record
 from diagnosis.recorded.record import Record
-from models.effects import CATALOGUE
+from laboratories.effects import CATALOGUE
 from models.registry import Array
 from rths.examine.diagnose import diagnose_file
 from simulation import virtual

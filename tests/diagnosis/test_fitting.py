@@ -18,7 +18,7 @@ from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data, Fit
 from diagnosis.recorded import record
 from diagnosis.recorded.parts import MODEL_ERROR, Building, LaboratoryA, LaboratoryB, Part
-from models.effects import CATALOGUE
+from laboratories.effects import CATALOGUE
 from models.registry import Array
 from models.system import System
 from tests.diagnosis import cases as made

@@ -16,9 +16,9 @@ from common.plan.plan import Plan
 from common.plan.tables import Rig
 from common.recording.reader import Run, read
 from diagnosis.recorded.link import Finding, account, exchange_of, findings
-from models.link.exchange import exchange
+from loop.closed_loop import on_time
+from loop.exchange import exchange
 from models.link.impaired import ImpairedLink
-from models.loop.closed_loop import on_time
 from simulation import virtual
 
 DT = 0.002

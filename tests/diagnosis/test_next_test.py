@@ -12,7 +12,7 @@ from diagnosis.findings.next_test import Choice
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data, Values
 from diagnosis.recorded.parts import LaboratoryA
-from models.effects import CATALOGUE, checked
+from laboratories.effects import CATALOGUE, checked
 from tests.diagnosis.cases import Cases
 
 

@@ -16,7 +16,7 @@ from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data
 from diagnosis.recorded.parts import Building, LaboratoryA, LaboratoryB, Part
 from diagnosis.recorded.record import Record
-from models.effects import CATALOGUE, checked, lay
+from laboratories.effects import CATALOGUE, checked, lay
 from models.registry import Array
 from tests.diagnosis.cases import Cases, white
 

@@ -15,11 +15,11 @@ from common.plan.plan import Plan
 from common.recording.reader import Run, read
 from common.rig import ColumnMeasurement
 from common.terminal import cli
+from loop.nominal.partition import matrices
 from master.energy import EnergyMonitor, floor
 from master.step import Outputs
 from models import indicators
 from models.energy_balance import ERROR
-from models.structures.partition import matrices
 from simulation import virtual
 from tests.helpers import largest, with_table
 

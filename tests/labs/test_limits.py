@@ -19,9 +19,9 @@ from common.plan.reality import Reality, from_reality
 from common.plan.tables import Limits
 from common.recording.reader import Run, read
 from common.terminal import cli
+from loop import substructure
+from loop.closed_loop import signals, simulate
 from models import integrators
-from models.loop import substructure
-from models.loop.closed_loop import signals, simulate
 from simulation import virtual
 from simulation.virtual import Bench
 from tests.helpers import largest, running, with_table, without_recorder

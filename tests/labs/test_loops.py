@@ -21,8 +21,8 @@ from common.protocol.messages import Command, Feedback, Register, Stop, SyncRepl
 from common.recording.reader import Run, read
 from common.safety.modes import Mode
 from common.signals import TOPICS
-from models.loop import substructure
-from models.loop.closed_loop import rows, signals, simulate
+from loop import substructure
+from loop.closed_loop import rows, signals, simulate
 from rths.examine.replay import replay_master, replay_slave
 from simulation import virtual
 from simulation.virtual import Bench
@@ -396,7 +396,7 @@ class SlowLink:
 
 
 def test_a_link_plug_in_delays_and_loses_messages(short_plan: Plan, tmp_path: Path, monkeypatch: Any) -> None:
-    monkeypatch.setattr("models.link.links.find", lambda *_: SlowLink)
+    monkeypatch.setattr("loop.links.find", lambda *_: SlowLink)
     real = dataclasses.replace(reality.as_planned(short_plan), link=Rig("x:SlowLink"))
     found, error, _ = run(short_plan, tmp_path / "slow.mcap", real)
     assert error is None
@@ -439,7 +439,7 @@ class OneWay:
 def test_a_plug_ins_delay_is_in_the_stamps_and_not_in_the_clocks_offset(
     short_plan: Plan, tmp_path: Path, monkeypatch: Any
 ) -> None:
-    monkeypatch.setattr("models.link.links.find", lambda *_: OneWay)
+    monkeypatch.setattr("loop.links.find", lambda *_: OneWay)
     real = dataclasses.replace(reality.as_planned(short_plan), link=Rig("x:OneWay"))
     path = tmp_path / "one_way.mcap"
     bench = virtual.assemble(short_plan, real, path, drifts={"slave": Drift(1_000_000_000)})

@@ -11,7 +11,7 @@ import pytest
 from common.lab.outlet import kept_seconds
 from common.plan import reality
 from common.plan.plan import Plan
-from models.labs.noise import BLOCK
+from laboratories.sensors.noise import BLOCK
 from simulation import virtual
 from tests.helpers import with_table
 

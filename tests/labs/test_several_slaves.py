@@ -21,8 +21,8 @@ from common.protocol.exchange import State
 from common.protocol.messages import Arm, Feedback, Recorder, Register, Start, Sync, Waiting
 from common.recording.reader import Run, read
 from common.terminal import cli
-from models.loop import substructure
-from models.loop.closed_loop import signals, simulate
+from loop import substructure
+from loop.closed_loop import signals, simulate
 from rths.examine.replay import replay_master, replay_slave
 from simulation import virtual
 from simulation.virtual import Bench
@@ -143,7 +143,7 @@ class LateRoof:
 
 
 def test_late_messages_of_one_slave_affect_that_one_alone(tmp_path: Path, monkeypatch: Any) -> None:
-    monkeypatch.setattr("models.link.links.find", lambda *_: LateRoof)
+    monkeypatch.setattr("loop.links.find", lambda *_: LateRoof)
     real = dataclasses.replace(reality.as_planned(TWO), link=Rig("x:LateRoof"))
     found, error, _ = run(TWO, tmp_path / "late.mcap", real)
     assert error is None

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.signal import StateSpace, lsim
 
 from common.plan.plan import Plan, from_tables, ideal
-from models.loop import substructure
-from models.loop.closed_loop import simulate, stacked
+from loop import substructure
+from loop.closed_loop import simulate, stacked
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ import pytest
 
 from common.plan import plan as plans
 from common.terminal import cli
-from models.loop import preflight
+from loop.nominal import preflight
 from report.plan import classes
 from rths.perform.run import checks
 

@@ -12,10 +12,10 @@ from common.plan import plan as plans
 from common.plan.plan import Plan
 from common.plan.tables import Compensator
 from common.terminal import cli
-from models.loop import substructure
-from models.loop.closed_loop import signals, simulate
-from models.loop.preflight import partition_text
-from models.structures.partition import assess, critical_delay_of
+from loop import substructure
+from loop.closed_loop import signals, simulate
+from loop.nominal.partition import assess, critical_delay_of
+from loop.nominal.preflight import partition_text
 from tests.helpers import with_table
 from validation.paper.experiments import delayed, pulse
 

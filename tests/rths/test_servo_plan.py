@@ -15,7 +15,7 @@ from common.plan.plan import parse
 from common.recording.reader import Run, read
 from diagnosis.recorded import record
 from diagnosis.recorded.parts import Building, LaboratoryA
-from models.loop import closed_loop, substructure
+from loop import closed_loop, substructure
 from models.system import System
 from simulation import virtual
 from tests.helpers import SERVO_PLAN

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from common.plan.plan import Plan, ideal
-from models.loop.closed_loop import simulate
+from loop.closed_loop import simulate
+from loop.nominal.partition import critical_delay_of
 from models.registry import Array
-from models.structures.partition import critical_delay_of
 from models.system import Effects, SensorEffects
 from validation.benchmark2020.problem import CASES, EL_CENTRO, Case, planned
 

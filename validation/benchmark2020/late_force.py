@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from common.terminal.telling import Tell, untold
+from laboratories.kinds import COLUMN
+from loop.force_path import force_path
 from models.indicators import ForcePath
-from models.labs.kinds import COLUMN
-from models.loop.force_path import force_path
 from models.system import Effects, SensorEffects
 from validation.benchmark2020.problem import EL_CENTRO, SETTINGS, with_compensator
 from validation.benchmark2020.runs import Result, Stage, play

@@ -10,7 +10,7 @@ import numpy as np
 
 from common.plan.plan import Plan, load
 from common.plan.tables import Compensator
-from models.loop import substructure
+from loop import substructure
 
 PLAN = Path(__file__).resolve().parents[2] / "rths" / "plans" / "benchmark2020.toml"
 REST = 10.0  # s of still ground after the record

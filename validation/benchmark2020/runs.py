@@ -14,13 +14,14 @@ from common.plan.plan import Plan
 from common.plan.tables import Compensator
 from common.roles import MASTER
 from common.terminal.telling import Tell, untold
+from laboratories.column import specimen
+from laboratories.kinds import COLUMN
+from laboratories.sensors import noise
+from loop import substructure
+from loop.closed_loop import Rollout, simulate
+from loop.nominal import response
 from models import indicators
-from models.labs import noise, specimen
-from models.labs.kinds import COLUMN
-from models.loop import substructure
-from models.loop.closed_loop import Rollout, simulate
 from models.registry import Array
-from models.structures import response
 from models.system import Effects
 from validation.benchmark2020.criteria import Criteria, criteria, near, peak, rms
 from validation.benchmark2020.problem import (

@@ -23,8 +23,8 @@ from common.plan import plan as plans
 from common.plan.plan import Plan
 from common.plan.schema import nearest
 from common.terminal import cli
-from models.effects.effect import Parameter
-from models.effects.sites import SITES
+from laboratories.effects.effect import Parameter
+from laboratories.effects.sites import SITES
 from models.ground_motion.motions import MOTIONS
 from models.system import Effects, System
 from validation.blind import library as libraries
@@ -213,7 +213,7 @@ def peak_drift(record: str, damper: bool) -> float:
     """Peak drift (m) of the default test's linear building under an unscaled record; the damper as a dashpot."""
     from scipy.signal import lsim
 
-    from models.loop import substructure
+    from loop import substructure
 
     tables = _default().tables()
     tables["ground_motion"] = {"record": record, "scale": 1.0}

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from models.effects.effect import Effect
+from laboratories.effects.effect import Effect
 
 LABS = {
     "master": "validation.blind.labs.column_lab:ColumnLab",
@@ -38,7 +38,7 @@ class Library:
 
 def shipped() -> Library:
     """What the catalogue and the independent laboratories of this package let a trial hide."""
-    from models.effects import CATALOGUE
+    from laboratories.effects import CATALOGUE
     from validation.blind.labs import FORMULAS, UNCATALOGUED
 
     strangers = {

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 
 from diagnosis.report.records import Candidate
 from diagnosis.report.values import Value
-from models.effects import CATALOGUE, of_site
+from laboratories.effects import CATALOGUE, of_site
 from validation.blind.draw import Case, Laid
 from validation.blind.judge import NONE, Answer
 from validation.blind.record import Recorded

@@ -16,7 +16,7 @@ from common.recording.reader import Run, Values, read
 from common.rig import ColumnCommand, TableCommand
 from common.roles import MASTER, SLAVE
 from common.signals import MEASURED
-from models.effects.sites import SITES
+from laboratories.effects.sites import SITES
 from validation.blind.draw import Case, Laid
 
 FORCE_NOISE = "damper_force"

@@ -16,9 +16,9 @@ from common.plan.reality import Reality
 from common.plan.tables import Rig
 from common.reporting import Report
 from common.roles import MASTER, RECORDER
+from loop import substructure
 from master import assembly as master_assembly
 from master.loop import MasterLoop
-from models.loop import substructure
 from recorder import files
 from recorder.loop import RecorderLoop
 from recorder.sink import FileSink

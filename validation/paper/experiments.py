@@ -17,11 +17,12 @@ from common.plan.tables import Actuator, Compensator, Control, GroundMotion, Tab
 from common.recording.reader import Run, read
 from common.terminal import cli
 from common.terminal.telling import Tell
+from loop import substructure
+from loop.closed_loop import signals, simulate
+from loop.nominal import preflight
+from loop.nominal.partition import felt, storey_stiffness
 from models import indicators
-from models.loop import preflight, substructure
-from models.loop.closed_loop import signals, simulate
 from models.registry import Array
-from models.structures.partition import felt, storey_stiffness
 from simulation import benches, virtual
 from simulation.benches import Order
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from common.plan.plan import Plan
 from common.recording.reader import Run
+from loop.nominal.partition import critical_delay_of, damping_lost
 from models import indicators
 from models.registry import Array
-from models.structures.partition import critical_delay_of, damping_lost
 from report.facts.identification import identify, segments
 from report.text.formats import quantity, signed
 from validation.paper.experiments import DELAYS, Evidence

@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from common.plan.tables import Actuator, Column
+from laboratories.column import model as column_lab
 from models import compensators
 from models.compensators import Built, Wanted
-from models.labs import column_lab
 from models.registry import Array
 
 DT = 0.002

@@ -7,8 +7,8 @@ import pytest
 
 from common.errors import InputError
 from common.plan.plan import Plan
+from loop.force_path import force_path
 from models import indicators
-from models.loop.force_path import force_path
 from models.registry import Array
 from tests.models.compensators import benchmark
 

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from common.errors import InputError
 from common.link.mailbox import Mailbox, PerfectLink
-from models.link.exchange import exchange
+from loop.closed_loop import on_time
+from loop.exchange import exchange
 from models.link.impaired import ImpairedLink
-from models.loop.closed_loop import on_time
 
 MESSAGES = 40_000
 INTERVAL = 0.002

@@ -17,7 +17,7 @@ from diagnosis.report.fields import Entry, shapes
 from diagnosis.report.read import report as read
 from diagnosis.report.records import Candidate, Tolerance
 from diagnosis.report.schema import schema
-from models.effects import CATALOGUE
+from laboratories.effects import CATALOGUE
 from report.gap import pictures, which, wording
 from report.gap.page import page
 from report.gap.terminal import summary

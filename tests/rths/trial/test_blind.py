@@ -21,7 +21,7 @@ from common.recording.reader import read
 from common.terminal import cli
 from diagnosis.report.read import report as read_report
 from diagnosis.report.records import Report
-from models.effects import CATALOGUE
+from laboratories.effects import CATALOGUE
 from rths.prove import blind
 from tests.rths.diagnosis_report.reports import bare
 from validation.blind import library as libraries

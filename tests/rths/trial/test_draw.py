@@ -13,9 +13,9 @@ import pytest
 from common.errors import InputError
 from common.plan import plan as plans
 from common.plan import reality as realities
-from models.effects.damper.friction import EFFECT as FRICTION
-from models.effects.effect import Effect, Parameter
-from models.effects.reading import SIGNALS
+from laboratories.effects.effect import Effect, Parameter
+from laboratories.effects.reading import SIGNALS
+from laboratories.table.effects.damper.friction import EFFECT as FRICTION
 from models.system import System
 from validation.blind import lots
 from validation.blind.draw import (

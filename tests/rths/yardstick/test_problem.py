@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from loop.nominal import partition, preflight
 from models.compensators import COMPENSATORS
-from models.loop import preflight
-from models.structures import partition, shear_building
+from models.structures import shear_building
 from validation.benchmark2020.problem import (
     CASES,
     EL_CENTRO,

@@ -1,0 +1,1 @@
+"""Kinds of laboratory: what is known of each stands in its own folder."""

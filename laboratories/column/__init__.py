@@ -1,0 +1,1 @@
+"""The kind `column`: a hydraulic actuator that deforms a specimen."""

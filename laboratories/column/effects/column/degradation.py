@@ -1,0 +1,38 @@
+"""The specimen loses stiffness with the largest deformation it has seen, and does not get it back.
+
+    f = (1 − rate·(1 − exp(−δ_max/δ_ref)))·f_column,    δ_max = largest |δ| so far, δ_ref = 2 mm
+
+`rate` is the share that is lost in the end. Not to be confused with `column.yielding`, which dissipates
+in every cycle, or `column.stiffness`, which is there from the beginning.
+"""
+
+from __future__ import annotations
+
+from laboratories.effects.effect import Effect, Parameter
+from models.system import System
+
+
+def apply(system: System, rate: float) -> System:
+    """Loss of the share `rate` of the stiffness, well past the reference deformation."""
+    return system.laid("column", degradation=rate)
+
+
+EFFECT = Effect(
+    name="column.degradation",
+    site="column",
+    kind="physics",
+    says="stiffness is lost with the largest deformation seen",
+    parameters=(
+        Parameter(
+            "rate",
+            "",
+            null=0.0,
+            least=0.0,
+            most=0.95,
+            sizes=(0.03, 0.08, 0.2, 0.4),
+            says="share lost in the end",
+        ),
+    ),
+    reference="f = (1 − rate·(1 − exp(−δ_max/2 mm)))·f_column",
+    apply=apply,
+)

@@ -1,0 +1,63 @@
+"""Cracks close: little stiffness around the origin, more farther out.
+
+    f = (1 − factor·w + hardening·(1 − w))·f_column,    w = exp(−(δ/width)²)
+
+`width` is the deformation at which the pinch has faded to 1/e, counted from the origin to one side. With
+factor 0 there is no pinching and no hardening. Not to be confused with `column.slip`, which has a sharp
+edge and no force at all inside, or with `actuator.backlash`.
+"""
+
+from __future__ import annotations
+
+from laboratories.effects.effect import Effect, Parameter
+from models.system import ColumnEffects, System
+
+
+def apply(system: System, factor: float, hardening: float, width: float) -> System:
+    """Pinching by `factor` over `width` m, then `hardening`; without it the shape leaves no trace."""
+    if factor == 0.0:
+        hardening, width = ColumnEffects.pinching_hardening, ColumnEffects.pinching_width
+    return system.laid("column", pinching=factor, pinching_hardening=hardening, pinching_width=width)
+
+
+EFFECT = Effect(
+    name="column.pinching",
+    site="column",
+    kind="physics",
+    says="little stiffness until cracks have closed",
+    parameters=(
+        Parameter(
+            "factor",
+            "",
+            null=0.0,
+            least=0.0,
+            most=0.95,
+            sizes=(0.05, 0.15, 0.35, 0.6),
+            says="share of the force missing at the origin",
+        ),
+        Parameter(
+            "hardening",
+            "",
+            null=0.0,
+            least=0.0,
+            most=0.3,
+            sizes=(0.0, 0.1, 0.3),
+            says="share of force added far out",
+            shape=True,
+            default=0.0,
+        ),
+        Parameter(
+            "width",
+            "m",
+            null=0.001,
+            least=1e-05,
+            most=0.05,
+            sizes=(0.0003, 0.001, 0.003),
+            says="from the origin to where 1/e is left",
+            shape=True,
+            default=0.001,
+        ),
+    ),
+    reference="f = (1 − factor·w + hardening·(1 − w))·f_column, w = exp(−(δ/width)²)",
+    apply=apply,
+)

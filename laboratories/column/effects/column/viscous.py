@@ -1,0 +1,37 @@
+"""The specimen's force depends on the rate of deformation.
+
+    f = f_column + coefficient·δ̇
+
+Not to be confused with a lag of the load cell or of the displacement reading, which turns a linear
+specimen's loop alike; nor with `column.friction`, whose force does not grow with speed.
+"""
+
+from __future__ import annotations
+
+from laboratories.effects.effect import Effect, Parameter
+from models.system import System
+
+
+def apply(system: System, coefficient: float) -> System:
+    """Viscous force of `coefficient` N·s/m."""
+    return system.laid("column", viscous=coefficient)
+
+
+EFFECT = Effect(
+    name="column.viscous",
+    site="column",
+    kind="physics",
+    says="force that grows with the rate of deformation",
+    parameters=(
+        Parameter(
+            "coefficient",
+            "N·s/m",
+            null=0.0,
+            least=0.0,
+            most=2000000.0,
+            sizes=(3000.0, 10000.0, 40000.0, 150000.0),
+        ),
+    ),
+    reference="f = f_column + coefficient·δ̇",
+    apply=apply,
+)

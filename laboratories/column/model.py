@@ -1,0 +1,237 @@
+"""Laboratory A: a hydraulic actuator deforms the column specimen.
+
+The actuator is a first-order lag with dead time, whose motion does not depend on the specimen, or servo-hydraulics that
+move the specimen's mass by their force. Effects are laid over either: a band of the loop's error may be lost (valve
+overlap), the piston is no faster than its valve lets oil through, under load it yields by the oil's and the frame's
+compliance, and play in the clevis of the lag lies between it and the specimen.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from common.errors import InputError
+from common.plan.tables import Actuator, Column
+from laboratories.column import specimen
+from laboratories.column.specimen import REACTION, Specimen
+from models.compiled import jit
+from models.registry import Array
+from models.system import ActuatorEffects, ColumnEffects
+from models.transfer_systems import delay, first_order, servo_hydraulic
+
+SUBSTEP = 0.25e-3  # s, longest step where an effect is no matter of straight lines
+FINE_SUBSTEP = 0.05e-3  # s, the same where forces act back on the actuator
+SETTLING = 1.0  # s, in which servo-hydraulics are brought to a command that has been there for long
+
+# places in `state`: the lag's piston before compliance and play m, specimen m, load cell N, states of servo-hydraulics
+SERVO, DISPLACEMENT, FORCE, STATES = range(4)
+
+# places in `limits`; of servo-hydraulics the gain is that of the command, and what the highest speed is as flow
+PRESENT, VELOCITY_LIMIT, BACKLASH, COMPLIANCE, DEADBAND, GAIN, STIFFNESS, HELD, HYDRAULIC, BEYOND = range(10)
+
+
+class ColumnLab(NamedTuple):
+    """The laboratory with its memories, which `advance` moves on."""
+
+    taps: Array  # of the delayed command
+    rows: Array  # of the actuator's propagation
+    lengths: Array  # of the segments, s
+    limits: Array  # effects on the actuator
+    history: Array  # commands written, newest first
+    state: Array
+    specimen: Specimen
+
+
+def build(
+    interval: float,
+    actuator: Actuator,
+    column: Column,
+    actuator_effects: ActuatorEffects | None = None,
+    column_effects: ColumnEffects | None = None,
+) -> ColumnLab:
+    """Laboratory at rest with the nominal or true parameters given, and what is laid over them.
+
+    Raises:
+        InputError: the specimen cannot be, or servo-hydraulics have an effect that they cannot have.
+    """
+    on_actuator, on_column = actuator_effects or ActuatorEffects(), column_effects or ColumnEffects()
+    if actuator.model == "servo_hydraulic":
+        return hydraulic(interval, actuator, column, on_actuator, on_column)
+    present = on_actuator != ActuatorEffects()
+    rated = actuator.time_constant > 0.0 and bool(column.mass or column.damping)
+    short = present or rated or specimen.needs_substeps(on_column)
+    segments = delay.split(
+        interval, actuator.delay, substeps(interval) if short else 1, held=actuator.command == "held"
+    )
+    rows = first_order.propagators(actuator.gain, actuator.time_constant, segments.lengths)
+    limits = [float(present), on_actuator.velocity_limit, on_actuator.backlash, on_actuator.compliance]
+    limits += [on_actuator.deadband, actuator.gain, column.stiffness, float(actuator.command == "held")]
+    return ColumnLab(
+        segments.taps,
+        rows,
+        segments.lengths,
+        np.array([*limits, 0.0, 0.0]),
+        np.zeros(segments.memory),
+        np.zeros(STATES),
+        specimen.build(column, on_column),
+    )
+
+
+def hydraulic(
+    interval: float,
+    actuator: Actuator,
+    column: Column,
+    on_actuator: ActuatorEffects,
+    on_column: ColumnEffects,
+) -> ColumnLab:
+    """The laboratory with servo-hydraulics: mass, dashpot and first stiffness of the specimen are in their loop."""
+    servo, mass, damping = actuator.servo, column.mass + on_column.inertia, column.damping + on_column.viscous
+    if mass <= 0.0:
+        raise InputError("mass in [column] must be above 0 kg, as 'servo_hydraulic' moves it by its force.")
+    if on_actuator.backlash:
+        raise InputError(
+            "The actuator 'servo_hydraulic' has no play: its piston carries the specimen's mass."
+        )
+    bare = replace(column, mass=0.0, damping=0.0)
+    on_column = replace(on_column, viscous=0.0, inertia=0.0)
+    a, b = servo_hydraulic.rates(servo, column.stiffness, damping, mass, on_actuator.compliance)
+    beyond = column.model != "linear" or on_column != ColumnEffects()
+    limited = math.isfinite(on_actuator.velocity_limit) or on_actuator.deadband > 0.0
+    steps = max(1, math.ceil(interval / FINE_SUBSTEP - 1e-9)) if beyond or limited else 1
+    held = actuator.command == "held"
+    segments = delay.split(interval, servo.delay, steps, held=held)
+    limits = [float(limited), on_actuator.velocity_limit * servo.piston, 0.0, on_actuator.compliance]
+    limits += [on_actuator.deadband, servo.gain, column.stiffness, float(held), 1.0, float(beyond)]
+    return ColumnLab(
+        segments.taps,
+        servo_hydraulic.propagators(a, b, segments.lengths),
+        segments.lengths,
+        np.array(limits),
+        np.zeros(segments.memory),
+        np.zeros(STATES + servo_hydraulic.STATES),
+        specimen.build(bare, on_column),
+    )
+
+
+def substeps(interval: float) -> int:
+    """Steps of an interval where effects need short ones."""
+    return max(1, math.ceil(interval / SUBSTEP - 1e-9))
+
+
+def begin(lab: ColumnLab, command: float, interval: float) -> None:
+    """Bring a laboratory at rest to a command (m) that has been there for long; `interval` s."""
+    if lab.limits[HYDRAULIC] != 0.0:
+        ticks = math.ceil(SETTLING / interval)
+        for tick in range(2 * ticks):
+            advance(lab, command * min(tick / ticks, 1.0))
+        return
+    lab.history[:] = command
+    there = lab.limits[GAIN] * command
+    lab.state[:FORCE] = there
+    lab.state[FORCE] = specimen.force(lab.specimen, there, interval)
+    lab.specimen.cell[specimen.RATE] = lab.specimen.cell[specimen.LAST_STEP] = 0.0
+
+
+@jit
+def enter(lab: tuple[Any, ...], command: float) -> tuple[float, float]:
+    """`advance` for a caller outside compiled code, which holds the laboratory as `compiled.plain` gives it."""
+    taps, rows, lengths, limits, history, state, tested = lab
+    return advance(ColumnLab(taps, rows, lengths, limits, history, state, Specimen(*tested)), command)
+
+
+@jit
+def advance(lab: ColumnLab, command: float) -> tuple[float, float]:
+    """Displacement (m) and force (N) one interval later, the command ramped to `command` (m) by then or held."""
+    taps, rows, lengths, limits, history, state = (
+        lab.taps,
+        lab.rows,
+        lab.lengths,
+        lab.limits,
+        lab.history,
+        lab.state,
+    )
+    tested = lab.specimen
+    cell = tested.cell
+    delay.remember(history, command)
+    servo, displacement, force = state[SERVO], state[DISPLACEMENT], state[FORCE]
+    before = delay.delayed(history, taps, 0)
+    for i in range(rows.shape[0]):
+        after = delay.delayed(history, taps, i + 1)
+        if limits[HELD] != 0.0:
+            before = after
+        if limits[HYDRAULIC] != 0.0:
+            excess = cell[REACTION] - limits[STIFFNESS] * displacement if limits[BEYOND] != 0.0 else 0.0
+            lost = overlapped(limits, state, 0.5 * (before + after))
+            servo_hydraulic.step(rows[i], state, STATES, before - lost, after - lost, excess)
+            choked(limits, state)
+            displacement = state[STATES + servo_hydraulic.POSITION]
+            force = state[STATES + servo_hydraulic.FORCE]
+            if limits[BEYOND] != 0.0:
+                specimen.force(tested, displacement, lengths[i])
+        else:
+            ahead = first_order.step(rows[i], servo, before, after)
+            if limits[PRESENT] != 0.0:
+                servo += limited(limits, ahead - servo, 0.5 * (before + after), servo, lengths[i])
+                displacement = loaded(limits, servo, displacement, cell[REACTION])
+            else:
+                servo = ahead
+                displacement = ahead
+            force = specimen.force(tested, displacement, lengths[i])
+        before = after
+    state[SERVO] = servo
+    state[DISPLACEMENT] = displacement
+    state[FORCE] = force
+    return displacement, force
+
+
+@jit
+def overlapped(limits: Array, state: Array, command: float) -> float:
+    """Part of the command (m) that the overlap of a servo-hydraulic valve swallows of its loop's error."""
+    half = 0.5 * limits[DEADBAND]
+    if half == 0.0:
+        return 0.0
+    piston = (
+        state[STATES + servo_hydraulic.POSITION] + limits[COMPLIANCE] * state[STATES + servo_hydraulic.FORCE]
+    )
+    error = limits[GAIN] * command - piston
+    return min(max(error, -half), half) / limits[GAIN]
+
+
+@jit
+def choked(limits: Array, state: Array) -> None:
+    """Keep the flow of a servo-hydraulic valve within what its opening lets through."""
+    if limits[PRESENT] == 0.0:
+        return
+    flow, most = state[STATES + servo_hydraulic.FLOW], limits[VELOCITY_LIMIT]
+    if abs(flow) > most:
+        state[STATES + servo_hydraulic.FLOW] = most if flow > 0.0 else -most
+        state[STATES + servo_hydraulic.FLOW_RATE] = 0.0
+
+
+@jit
+def limited(limits: Array, way: float, command: float, servo: float, length: float) -> float:
+    """Way of the piston (m) within a segment, from the `way` of a valve without overlap or end."""
+    error = abs(limits[GAIN] * command - servo)
+    half = 0.5 * limits[DEADBAND]
+    if half > 0.0:
+        way *= max(error - half, 0.0) / error if error > 0.0 else 0.0
+    longest = limits[VELOCITY_LIMIT] * length
+    return min(max(way, -longest), longest)
+
+
+@jit
+def loaded(limits: Array, servo: float, displacement: float, reaction: float) -> float:
+    """Deformation (m) of the specimen where the piston yields by `c·f` and the clevis has play.
+
+    The force of the new deformation is `reaction + k·Δδ` with the specimen's first stiffness, which solves
+    a linear specimen at once and a yielding one to within one short step.
+    """
+    compliance, stiffness = limits[COMPLIANCE], limits[STIFFNESS]
+    pushed = servo - compliance * (reaction - stiffness * displacement)
+    wanted = pushed / (1.0 + compliance * stiffness)
+    half = 0.5 * limits[BACKLASH] / (1.0 + compliance * stiffness)
+    return min(max(displacement, wanted - half), wanted + half)

@@ -1,0 +1,91 @@
+"""What an entry of the catalogue says of itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from common.plan.plan import Plan
+from models.system import System
+
+Kind = Literal["physics", "measurement"]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of an effect."""
+
+    name: str
+    unit: str
+    null: float  # the value at which the effect is not there
+    least: float  # bounds that are physically possible
+    most: float
+    sizes: tuple[float, ...]  # from barely visible to strong, where a search starts
+    says: str = ""
+    shape: bool = False  # not how strong the effect is but what it looks like; it has no null value
+    default: float | None = None  # of a parameter that need not be given
+    follows: str = (
+        ""  # recorded signal whose peak scales the sizes; empty: the site's signal of the same unit
+    )
+    smoothing: float = (
+        0.0  # of a velocity that smooths a law at rest: its share of the peak velocity in a search
+    )
+
+
+@dataclass(frozen=True)
+class Contact:
+    """An end stop that a motion hits: where a search finds its place and from which stiffness it starts."""
+
+    motion: str  # reading that shows how far the moving part got, m
+    force: str  # reading of the force on it, N
+    place: str  # parameter: from the middle to the stop, m
+    stiffness: str  # parameter, N/m
+    starts: tuple[float, ...]  # stiffness from which a fit starts, soft to hard
+
+
+def no_starts(_plan: Plan) -> tuple[float, ...]:
+    """No sizes of its own for any plan."""
+    return ()
+
+
+@dataclass(frozen=True)
+class Effect:
+    """An effect that a plan's nominal models leave out.
+
+    Whoever asks something of an effect (a search, a page, the blind trial) asks these fields, never its name.
+    """
+
+    name: str
+    site: str  # one of `laboratories.effects.sites.SITES`
+    kind: Kind
+    says: str
+    parameters: tuple[Parameter, ...]
+    reference: str
+    apply: Callable[..., System]  # lays it over a system; takes the parameters by name
+    actuators: tuple[str, ...] = ()  # models of [actuator] that can have it, empty for any
+    signal: str = ""  # the reading that it falsifies, empty where the machine itself differs
+    fault: str = ""  # what is wrong with that reading, in words; one effect per signal shares it
+    in_samples: bool = False  # told from single samples (noise, rounding): no fit of waveforms looks for it
+    random: bool = False  # noise: a prediction without noise leaves it out
+    contact: Contact | None = None  # an end stop: each impact depends on the ones before it
+    shifts_time: bool = False  # moves a motion in time: a search starts at the shift that correlation shows
+    starts: Callable[[Plan], tuple[float, ...]] = no_starts  # sizes for plans where the parameter's own fail
+
+    @property
+    def family(self) -> str:
+        """The effect's name, or the one name of all effects that do the same to different readings."""
+        return f"sensor: {self.fault}" if self.signal else self.name
+
+    def fits(self, plan: Plan) -> bool:
+        """Whether what the plan describes can have it."""
+        return not self.actuators or plan.actuator.model in self.actuators
+
+    def values(self, given: Mapping[str, float]) -> dict[str, float]:
+        """All parameters by name, those not given at their default."""
+        defaults = {item.name: item.default for item in self.parameters if item.default is not None}
+        return defaults | dict(given)
+
+    def is_called_by(self, parameter: str) -> bool:
+        """Whether the effect's name says this parameter already, as `table.delay` does of its delay."""
+        return self.name.replace(".", "_").endswith(f"_{parameter}")

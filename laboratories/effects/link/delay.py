@@ -1,0 +1,38 @@
+"""Messages take longer than the plan believes, in both directions alike.
+
+    a message sent at t is there from the first tick at or after its nominal time + delay
+
+so the round trip is longer by two delays, each rounded up to whole intervals. Not to be confused with
+`table.delay`: the messages' own stamps tell them apart.
+"""
+
+from __future__ import annotations
+
+from laboratories.effects.effect import Effect, Parameter
+from models.system import System
+
+
+def apply(system: System, delay: float) -> System:
+    """Each message later by `delay` s."""
+    return system.laid("link", delay=delay)
+
+
+EFFECT = Effect(
+    name="link.delay",
+    site="link",
+    kind="physics",
+    says="messages take longer",
+    parameters=(
+        Parameter(
+            "delay",
+            "s",
+            null=0.0,
+            least=0.0,
+            most=1.0,
+            sizes=(0.001, 0.003, 0.007, 0.015, 0.03),
+            says="added to each direction",
+        ),
+    ),
+    reference="there from the first tick at or after nominal time + delay",
+    apply=apply,
+)

@@ -1,0 +1,39 @@
+"""Messages take varying times.
+
+    delay of a message = delay + n,    n exponential: mean and standard deviation are std
+
+with the delay of `link.delay`, which no message beats, each direction alike. What counts is how many
+intervals a message is late. Not to be confused with noise of the damper's force: the age of each message
+tells them apart.
+"""
+
+from __future__ import annotations
+
+from laboratories.effects.effect import Effect, Parameter
+from models.system import System
+
+
+def apply(system: System, std: float) -> System:
+    """Delays that vary by `std` s."""
+    return system.laid("link", jitter=std)
+
+
+EFFECT = Effect(
+    name="link.jitter",
+    site="link",
+    kind="physics",
+    says="messages take varying times",
+    parameters=(
+        Parameter(
+            "std",
+            "s",
+            null=0.0,
+            least=0.0,
+            most=0.2,
+            sizes=(0.0003, 0.001, 0.003, 0.01),
+            says="standard deviation",
+        ),
+    ),
+    reference="delay of a message = delay + n, n exponential of standard deviation std",
+    apply=apply,
+)

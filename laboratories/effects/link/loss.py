@@ -1,0 +1,51 @@
+"""Messages are lost, alone or several in a row; the last one received is used on.
+
+    P(lost) = probability,    mean run of lost messages = burst
+
+a two-state chain (Gilbert): from good to bad with p = r·probability/(1 − probability), back with
+r = 1/burst. Not to be confused with `link.jitter`: late messages come after all.
+"""
+
+from __future__ import annotations
+
+from laboratories.effects.effect import Effect, Parameter
+from models.system import LinkEffects, System
+
+
+def apply(system: System, probability: float, burst: float) -> System:
+    """Share `probability` of messages lost, `burst` in a row; without it the shape leaves no trace."""
+    if probability == 0.0:
+        burst = LinkEffects.burst
+    return system.laid("link", loss=probability, burst=burst)
+
+
+EFFECT = Effect(
+    name="link.loss",
+    site="link",
+    kind="physics",
+    says="messages are lost",
+    parameters=(
+        Parameter(
+            "probability",
+            "",
+            null=0.0,
+            least=0.0,
+            most=0.95,
+            sizes=(0.002, 0.01, 0.05, 0.2),
+            says="share of messages lost",
+        ),
+        Parameter(
+            "burst",
+            "",
+            null=1.0,
+            least=1.0,
+            most=500.0,
+            sizes=(1.0, 5.0, 20.0),
+            says="mean messages lost in a row",
+            shape=True,
+            default=1.0,
+        ),
+    ),
+    reference="Gilbert, Bell Syst. Tech. J. 39 (1960) 1253-1265",
+    apply=apply,
+)

@@ -1,0 +1,32 @@
+"""A reading goes astray steadily: thermal drift, charge leaking.
+
+    reading = value + rate·t
+
+Not to be confused with `sensor.<signal>.bias`, which is there from the beginning.
+"""
+
+from __future__ import annotations
+
+from laboratories.effects.effect import Parameter
+from laboratories.effects.reading import Signal, on_each, sized
+
+
+def parameter(signal: Signal) -> Parameter:
+    """Its one parameter, sized for a signal."""
+    return Parameter(
+        "rate",
+        f"{signal.unit}/s",
+        null=0.0,
+        least=-0.5 * signal.typical,
+        most=0.5 * signal.typical,
+        sizes=sized(signal.typical, -1e-3, 1e-4, 1e-3, 4e-3),
+        says="offset per second",
+    )
+
+
+EFFECTS = on_each(
+    "drift",
+    parameter,
+    says="the reading goes astray steadily",
+    reference="reading = value + rate·t",
+)

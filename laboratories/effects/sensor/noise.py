@@ -1,0 +1,34 @@
+"""A reading is noisier than the plan believes.
+
+    reading = value + n + n',    n' white and normal with an rms beside the plan's n
+
+Not to be confused with `link.jitter`, which scatters what is used, not what was read.
+"""
+
+from __future__ import annotations
+
+from laboratories.effects.effect import Parameter
+from laboratories.effects.reading import Signal, on_each, sized
+
+
+def parameter(signal: Signal) -> Parameter:
+    """Its one parameter, sized for a signal."""
+    return Parameter(
+        "rms",
+        signal.unit,
+        null=0.0,
+        least=0.0,
+        most=signal.typical,
+        sizes=sized(signal.noise, 0.7, 2.0, 6.0, 20.0),
+        says="beside the plan's noise",
+    )
+
+
+EFFECTS = on_each(
+    "noise",
+    parameter,
+    says="the reading is noisier than believed",
+    reference="reading = value + white noise",
+    in_samples=True,
+    random=True,
+)

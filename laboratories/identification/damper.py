@@ -1,0 +1,209 @@
+"""Mass, dashpot, spring, motor and friction of the active mass damper.
+
+    m·(s̈ + ÿ) = −k·s − c·ṡ − F_c·sgn(ṡ) + u,    T·u̇ + u = gain·command
+    force on the table = k·s + c·ṡ + F_c·sgn(ṡ) − u = −m·(s̈ + ÿ)
+
+The sign of the friction is regularised to `tanh(ṡ/v₀)`, v₀ = 0.5 mm/s. On a still table the stroke alone
+shows ratios only (gain/m, c/m, k/m, F_c/m): the mass, and with it the gain, comes from the force. Without
+a measured force those intervals are infinite.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from common.errors import InputError
+from common.plan.schema import nearest
+from common.plan.tables import Damper
+from laboratories.identification import checks, estimate
+from laboratories.identification.estimate import Estimate
+from models.compiled import jit
+from models.registry import Array
+
+LEAST = 100  # samples
+SUBSTEP = 0.25e-3  # s
+CREEP = 5e-4  # v₀, m/s
+NAMES = ("mass", "damping", "stiffness", "motor_time_constant", "gain", "friction")
+UNITS = ("kg", "N·s/m", "N/m", "s", "", "N")
+
+
+@dataclass(frozen=True)
+class DamperFit:
+    """What was identified: `parameters` has an estimate for each free name."""
+
+    parameters: dict[str, Estimate]
+    stroke_nrmse: float
+    force_nrmse: float  # nan without a force
+    stroke: Array  # (n,) m, fitted
+    force: Array  # (n,) N, fitted
+
+    def __getitem__(self, name: str) -> Estimate:
+        return self.parameters[name]
+
+
+class Record(NamedTuple):
+    """Tick by tick what moves a damper, and what it answers; (n,) each."""
+
+    command: Array  # N, of the motor
+    ground: Array  # m/s², acceleration of the table
+    stroke: Array  # m
+    force: Array  # N
+
+
+@jit
+def respond(p: Array, interval: float, substeps: int, record: Record, begin: tuple[float, float]) -> None:
+    """Fill stroke (m) and force (N) of a record; `p` in the order of NAMES, `begin` the stroke and its rate (m/s).
+
+    Runge-Kutta of fourth order; the motor's lag is exact for its held command, the table's acceleration a
+    straight line from tick to tick.
+    """
+    command, ground, stroke, force = record.command, record.ground, record.stroke, record.force
+    mass, damping, stiffness, lag, gain, friction = p[0], p[1], p[2], p[3], p[4], p[5]
+    h = interval / substeps
+    fade = np.exp(-0.5 * h / lag) if lag > 0.0 else 0.0
+    x, v, u = begin[0], begin[1], 0.0
+    for k in range(command.size):
+        stroke[k] = x
+        force[k] = stiffness * x + damping * v + friction * np.tanh(v / CREEP) - u
+        if k == command.size - 1:
+            break
+        target = gain * command[k]
+        slope = (ground[k + 1] - ground[k]) / substeps
+        if lag <= 0.0:
+            u = target
+        for i in range(substeps):
+            u_middle = target + (u - target) * fade
+            u_end = target + (u_middle - target) * fade
+            y0 = ground[k] + slope * i
+            a1 = (u - stiffness * x - damping * v - friction * np.tanh(v / CREEP)) / mass - y0
+            xm, vm = x + 0.5 * h * v, v + 0.5 * h * a1
+            drive = u_middle / mass - y0 - 0.5 * slope
+            a2 = drive - (stiffness * xm + damping * vm + friction * np.tanh(vm / CREEP)) / mass
+            xn, vn = x + 0.5 * h * vm, v + 0.5 * h * a2
+            a3 = drive - (stiffness * xn + damping * vn + friction * np.tanh(vn / CREEP)) / mass
+            xe, ve = x + h * vn, v + h * a3
+            drive = u_end / mass - y0 - slope
+            a4 = drive - (stiffness * xe + damping * ve + friction * np.tanh(ve / CREEP)) / mass
+            x += h * (v + 2.0 * vm + 2.0 * vn + ve) / 6.0
+            v += h * (a1 + 2.0 * a2 + 2.0 * a3 + a4) / 6.0
+            u = u_end
+
+
+def response(
+    values: Array, command: Array, ground: Array, interval: float, start: float = 0.0, rate: float = 0.0
+) -> tuple[Array, Array]:
+    """Stroke (m) and force (N), each (n,), for parameters (6,) in the order of NAMES."""
+    stroke, force = np.empty(command.size), np.empty(command.size)
+    substeps = max(int(np.ceil(interval / SUBSTEP - 1e-9)), 1)
+    respond(values, interval, substeps, Record(command, ground, stroke, force), (start, rate))
+    return stroke, force
+
+
+def least_squares(
+    damper_command: Array,
+    stroke: Array,
+    force: Array | None,
+    table_acceleration: Array | None,
+    interval: float,
+    free: Sequence[str] = NAMES,
+    nominal: Damper | None = None,
+) -> DamperFit:
+    """Parameters of damper and motor from stroke and force under a motor command or a moving table.
+
+    `damper_command` (N, held from tick k to k + 1), `stroke` (m), `force` (N, on the table; None where not
+    measured) and `table_acceleration` (m/s²; None on a still table) have one value per tick of `interval`
+    (s). `free` names what is fitted, of mass (kg), damping (N·s/m), stiffness (N/m), motor_time_constant
+    (s), gain and friction (N); the others keep the `nominal` damper's values, gain 1 and friction 0, from
+    which the fit starts too. The state at the beginning is fitted beside. Output error, both signals
+    weighted by their scatter; intervals from Jacobian and residual, corrected for autocorrelation signal by
+    signal (`estimate.of_fit`). A friction near zero may come out negative within its interval. What the
+    record cannot separate (mass and gain without a force) has infinite intervals.
+
+    Raises:
+        InputError: too short, unequal lengths, not finite, no excitation, constant stroke, or a free name
+            that is none of the parameters.
+
+    Source: Ljung, System Identification (1999), section 7.
+    """
+    checks.positive("interval", interval)
+    given = {"damper_command": damper_command, "stroke": stroke}
+    if force is not None:
+        given["force"] = force
+    if table_acceleration is not None:
+        given["table_acceleration"] = table_acceleration
+    signals = dict(zip(given, checks.signals(LEAST, **given), strict=True))
+    command = signals["damper_command"]
+    ground = signals.get("table_acceleration", np.zeros(command.size))
+    if float(np.abs(command).max()) == 0.0:
+        checks.moves("table_acceleration" if table_acceleration is not None else "damper_command", ground)
+    outputs = [signals[name] for name in ("stroke", "force") if name in signals]
+    for name in ("stroke", "force"):
+        if name in signals:
+            checks.moves(name, signals[name])
+    return fit(command, ground, outputs, interval, chosen(free), nominal if nominal is not None else Damper())
+
+
+def chosen(free: Sequence[str]) -> list[int]:
+    """Places of the free names among NAMES."""
+    if not free:
+        raise InputError("No parameter of the damper is free: name at least one.")
+    for name in free:
+        if name not in NAMES:
+            raise InputError(f"Unknown parameter '{name}' of the damper: {nearest(name, NAMES)}")
+    return [NAMES.index(name) for name in free]
+
+
+def fit(
+    command: Array, ground: Array, outputs: list[Array], interval: float, places: list[int], nominal: Damper
+) -> DamperFit:
+    """The fit itself: once with both signals weighted alike, then by the scatter left over."""
+    from scipy import optimize
+
+    values = np.array(
+        [nominal.mass, nominal.damping, nominal.stiffness, nominal.motor_time_constant, 1.0, 0.0]
+    )
+    effort = max(float(np.std(command)), nominal.mass * float(np.std(ground)))
+    scales = np.where(values > 0.0, values, [1.0, 1.0, 1.0, interval, 1.0, 0.05 * effort])
+    travel = float(np.std(outputs[0]))
+    speed = max(float(np.std(np.gradient(outputs[0], interval))), 1e-9)
+    nuisance = np.array([travel, speed])
+
+    def model(x: Array) -> tuple[Array, Array]:
+        now = values.copy()
+        now[places] = x[:-2] * scales[places]
+        begin = x[-2:] * nuisance
+        return response(now, command, ground, interval, float(begin[0]), float(begin[1]))
+
+    x = np.append(values[places] / scales[places], [outputs[0][0] / travel, 0.0])
+    least = np.array([1e-2, 0.0, 0.0, 0.0, 1e-3, -1e3])[places]
+    low = np.append(least, [-np.inf, -np.inf])
+    high = np.append(np.full(len(places), 1e3), [np.inf, np.inf])
+    weights = [1.0 / float(np.std(output)) for output in outputs]
+    for _ in range(3):
+
+        def residual(x: Array, weights: list[float] = weights) -> Array:
+            parts = zip(model(x), outputs, weights, strict=False)
+            return np.concatenate([(fitted - output) * weight for fitted, output, weight in parts])
+
+        x = optimize.least_squares(residual, np.clip(x, low, high), bounds=(low, high), x_scale="jac").x
+        left = [float(np.std(fitted - output)) for fitted, output in zip(model(x), outputs, strict=False)]
+        least_left = [1e-9 * float(np.std(output)) for output in outputs]
+        last, weights = weights, [1.0 / max(pair) for pair in zip(left, least_left, strict=True)]
+        if np.allclose(last, weights, rtol=0.1):
+            break
+    # the Jacobian again with smaller steps, which shows parameters that cannot be separated
+    result = optimize.least_squares(
+        lambda x: residual(x, weights), x, bounds=(low, high), x_scale="jac", jac="3-point", max_nfev=1
+    )
+    names, units = [NAMES[i] for i in places], [UNITS[i] for i in places]
+    blocks = [output.size for output in outputs]
+    parameters = estimate.of_fit(result, names, units, scales[places], blocks)
+    fitted_stroke, fitted_force = model(x)
+    misfit = estimate.nrmse(outputs[1], fitted_force) if len(outputs) > 1 else float("nan")
+    return DamperFit(
+        parameters, estimate.nrmse(outputs[0], fitted_stroke), misfit, fitted_stroke, fitted_force
+    )

@@ -1,0 +1,230 @@
+"""Dead time, time constant and gain from a step by the tangent at the inflection, as in the paper.
+
+The tangent meets the start level at L and the steady level T later; K is the final over the commanded
+step. The step as the actuator sees it is a ramp of one interval, so times count from the ramp's middle; of a
+held command they count from the step's tick.
+Smoothing: behind the onset the response is fitted by a polynomial of second order in `e^(−t/T₀)`, T₀ being
+a first guess from the times at 28 % and 63 % (Smith 1957). That is free of bias for a first-order lag and
+bends with responses of higher order. Source: section 3.2 of Yokoyama et al. (17WCEE, 2020).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from common.errors import InputError
+from laboratories.identification import checks
+from laboratories.identification.estimate import Estimate, around
+from models.registry import Array
+
+BEFORE = 5  # samples of the start level that are needed
+MOST_BEFORE = 200  # that are used
+LEAST_AFTER = 20
+STEADY = 0.2  # share of the record behind the step that is averaged for the steady level
+UNSTEADY = 0.003  # share of the rise by which the halves of that may differ, beside noise
+LEVELS = (0.283, 0.632)  # of the rise, a third of T and T behind L
+WINDOW = 2.0  # times T₀
+ORDER = 2
+BACK = 2.5  # ticks over which the fitted curve is followed back to the start level
+
+
+class StepResponse(NamedTuple):
+    """What the tangent gives."""
+
+    delay: Estimate  # L, s
+    time_constant: Estimate  # T, s
+    gain: Estimate  # K
+
+
+class Curve(NamedTuple):
+    """The smoothed rise: times in s from the ramp's middle, heights as share of the rise."""
+
+    base: float  # time of the window's first sample
+    earliest: float
+    end: float
+    fade: float  # T₀
+    weights: Array  # (ORDER + 1,)
+    covariance: Array  # of the weights
+
+
+def tangent(t: Array, command: Array, measured: Array, begin: int, *, held: bool = False) -> StepResponse:
+    """L (s), T (s) and K from one step by the tangent at the inflection.
+
+    `t` (s), `command` (m) and `measured` (m) have one value per tick; `command` stands still but for its
+    step from tick `begin` − 1 to tick `begin`; the record ends in the steady state. Intervals by
+    propagation of the measured noise and of the place of the smoothing window.
+
+    Raises:
+        InputError: too short, not finite, no step at `begin`, another step beside it, or no steady end.
+
+    Source: section 3.2 of Yokoyama et al. (17WCEE, 2020).
+    """
+    t, command, measured = checks.signals(
+        BEFORE + LEAST_AFTER, time=t, command=command, displacement=measured
+    )
+    if np.any(np.diff(t) <= 0.0):
+        raise InputError("The time does not increase from tick to tick: give the ticks in their order.")
+    size = checked_step(command, begin)
+    interval = float(t[-1] - t[0]) / (t.size - 1)
+    before = measured[max(begin - MOST_BEFORE, 0) : begin + 1]
+    after = measured[begin:]
+    tail = after[-max(int(STEADY * after.size), 5) :]
+    start, steady = float(before.mean()), float(tail.mean())
+    rise = steady - start
+    noise = float(np.sqrt((before.var(ddof=1) + tail.var(ddof=1)) / 2.0))
+    if abs(rise) < 10.0 * noise or rise == 0.0:
+        raise InputError(
+            f"The step at tick {begin} moves the displacement by no more than its noise: step further."
+        )
+    white = float(np.std(np.diff(tail))) / np.sqrt(2.0)  # without what drifts
+    drift = float(tail[tail.size // 2 :].mean() - tail[: tail.size // 2].mean())
+    if abs(drift) > UNSTEADY * abs(rise) + 8.0 * white / np.sqrt(tail.size):
+        raise InputError(
+            f"The displacement is not steady at the end of the step at tick {begin}: record longer."
+        )
+    times = t[begin:] - t[begin] - (0.0 if held else interval / 2.0)
+    share = (after - start) / rise
+    relative = noise / abs(rise)
+    near, far = (smooth(times, share, relative, interval, guard) for guard in (1, 2))
+    lag, constant, gradient = read(near)
+    other = read(far)
+    variance = np.einsum("ij,jk,ik->i", gradient, near.covariance, gradient)
+    level, end = relative**2 / before.size, relative**2 / tail.size
+    # a raised start level moves L by T per unit; either level moves T by T per unit
+    spread_delay = np.sqrt(variance[0] + constant**2 * level + (other[0] - lag) ** 2 / 2.0)
+    spread_constant = np.sqrt(variance[1] + constant**2 * (level + end) + (other[1] - constant) ** 2 / 2.0)
+    spread_gain = abs(rise / size) * np.sqrt(level + end)
+    return StepResponse(
+        around(lag, float(spread_delay), "s"),
+        around(constant, float(spread_constant), "s"),
+        around(rise / size, float(spread_gain), ""),
+    )
+
+
+def tangents(
+    t: Array, command: Array, measured: Array, steps: Sequence[int], length: int, *, held: bool = False
+) -> StepResponse:
+    """Mean L (s), T (s) and K of several steps in one record, with intervals from their scatter.
+
+    Arrays as for `tangent`; `steps` are the ticks at which a step begins, `length` the ticks (behind the
+    beginning) that belong to each. A single step gives what `tangent` gives.
+
+    Raises:
+        InputError: as `tangent`, or no step given, or a step that reaches over the record's end.
+    """
+    if not steps:
+        raise InputError("No step is given: name the ticks at which the command steps.")
+    t, command, measured = checks.signals(
+        BEFORE + LEAST_AFTER, time=t, command=command, displacement=measured
+    )
+    found = []
+    for begin in steps:
+        if begin < 1 or begin + length > command.size:
+            raise InputError(
+                f"The step at tick {begin} with {length} ticks reaches over the record of {command.size} ticks."
+            )
+        still = begin - 1
+        while still > 0 and begin - still < MOST_BEFORE // 4 and command[still - 1] == command[begin - 1]:
+            still -= 1
+        part = slice(still, begin + length)
+        found.append(tangent(t[part], command[part], measured[part], begin - still, held=held))
+    if len(found) == 1:
+        return found[0]
+    return StepResponse(*(mean([step[i] for step in found]) for i in range(len(found[0]))))
+
+
+def mean(values: Sequence[Estimate]) -> Estimate:
+    """Mean of repeated estimates with the interval of their scatter."""
+    numbers = np.array([value.value for value in values])
+    deviation = float(numbers.std(ddof=1)) / np.sqrt(numbers.size)
+    return around(float(numbers.mean()), deviation, values[0].unit, numbers.size - 1)
+
+
+def checked_step(command: Array, begin: int) -> float:
+    """Height of the only step of the command, at tick `begin`."""
+    if not BEFORE <= begin <= command.size - LEAST_AFTER:
+        raise InputError(
+            f"The step at tick {begin} needs {BEFORE} ticks before and {LEAST_AFTER} behind it in the record."
+        )
+    jumps = np.flatnonzero(np.diff(command)) + 1
+    if begin not in jumps:
+        raise InputError(
+            f"The command does not step at tick {begin}: name the tick that holds the new value."
+        )
+    if jumps.size > 1:
+        other = int(jumps[jumps != begin][0])
+        raise InputError(
+            f"The command moves at tick {other} too: cut the record to one step or use tangents."
+        )
+    return float(command[begin] - command[begin - 1])
+
+
+def smooth(times: Array, share: Array, noise: float, interval: float, guard: int) -> Curve:
+    """Fit of the first window behind the onset that the curve follows within the noise, `guard` ticks on."""
+    passed = [int(np.argmax(share >= level)) for level in LEVELS]
+    crossed = [
+        float(np.interp(level, share[k - 1 : k + 1], times[k - 1 : k + 1])) if k > 0 else float(times[0])
+        for k, level in zip(passed, LEVELS, strict=True)
+    ]
+    fade = max(1.5 * (crossed[1] - crossed[0]), interval)
+    count = max(round(WINDOW * fade / interval), 4 * (ORDER + 1))
+    onset = passed[0]
+    while onset > 0 and share[onset - 1] > 4.0 * noise + 1e-6:
+        onset -= 1
+    misfits = [fit(times, share, first, count, fade)[1] for first in range(onset, passed[1] + 1)]
+    sizes = np.array([np.sqrt(np.mean(misfit**2)) for misfit in misfits])
+    heads = np.array([np.abs(misfit[:3]).max() for misfit in misfits])
+    tolerance = max(1.5 * noise, 7.5e-4, 1.2 * float(sizes.min()))
+    fits = (sizes <= tolerance) & (heads <= max(2.5 * tolerance, 1.2 * float(heads.min())))
+    first = onset + int(np.argmax(fits if fits.any() else sizes <= tolerance))
+    weights, misfit, base = fit(times, share, first + guard, count, fade)
+    variance = float(misfit @ misfit) / max(misfit.size - ORDER - 1, 1)
+    covariance = np.asarray(np.linalg.pinv(base.T @ base) * variance, dtype=np.float64)
+    begin = float(times[first + guard])
+    return Curve(begin, begin - BACK * interval, begin + misfit.size * interval, fade, weights, covariance)
+
+
+def fit(times: Array, share: Array, first: int, count: int, fade: float) -> tuple[Array, Array, Array]:
+    """Weights, misfit and base of the polynomial in `e^(−t/T₀)` over `count` ticks from `first` on."""
+    window = slice(first, first + count)
+    base = np.vander(np.exp(-(times[window] - times[first]) / fade), ORDER + 1, increasing=True)
+    weights = np.asarray(np.linalg.lstsq(base, share[window], rcond=None)[0], dtype=np.float64)
+    return weights, base @ weights - share[window], base
+
+
+def heights(curve: Curve, weights: Array, time: Array) -> tuple[Array, Array]:
+    """Height and slope (1/s) of the smoothed rise."""
+    x = np.exp(-(time - curve.base) / curve.fade)
+    powers = np.arange(ORDER + 1)
+    table = x[:, None] ** powers
+    return table @ weights, -(table * powers) @ weights / curve.fade
+
+
+def draw(curve: Curve, weights: Array) -> Array:
+    """L and T of the tangent at the steepest place, sought back to the start level; (2,)."""
+    grid = np.linspace(curve.earliest, curve.end, 1500)
+    height, slope = heights(curve, weights, grid)
+    under = np.flatnonzero((height <= 0.0) & (grid < curve.base))
+    from_here = int(under[-1]) if under.size else 0
+    if not under.size:  # a smooth onset: nothing to be followed back to
+        from_here = int(np.argmax(grid >= curve.base))
+    place = from_here + int(np.argmax(slope[from_here:]))
+    steepest = float(slope[place])
+    if steepest <= 0.0:
+        raise InputError("The displacement does not rise behind the step: check the record.")
+    return np.array([grid[place] - height[place] / steepest, 1.0 / steepest])
+
+
+def read(curve: Curve) -> tuple[float, float, Array]:
+    """L, T and their gradient by the curve's weights (2, ORDER + 1)."""
+    middle = draw(curve, curve.weights)
+    gradient = np.empty((2, ORDER + 1))
+    for i in range(ORDER + 1):
+        nudge = np.zeros(ORDER + 1)
+        nudge[i] = max(2.0 * float(np.sqrt(curve.covariance[i, i])), 1e-6)
+        above, below = draw(curve, curve.weights + nudge), draw(curve, curve.weights - nudge)
+        gradient[:, i] = (above - below) / (2.0 * nudge[i])
+    return float(middle[0]), float(middle[1]), gradient

@@ -1,0 +1,1 @@
+"""Sensors of an emulated laboratory: what they read, and their noise."""

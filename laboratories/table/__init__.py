@@ -1,0 +1,1 @@
+"""The kind `table`: a shaking table that carries an active mass damper."""

@@ -1,0 +1,1 @@
+"""Effects on laboratories of the kind `table`, by site."""

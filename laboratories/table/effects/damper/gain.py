@@ -1,0 +1,28 @@
+"""The motor gives more or less force than told: motor constant, calibration of the drive.
+
+    T_m·u̇ + u = factor·damper_command
+
+Not to be confused with `damper.mass`, or with a wrong force reading (`sensor.damper_force.gain`), which
+leaves the stroke as it was.
+"""
+
+from __future__ import annotations
+
+from laboratories.effects.factor import factor_on
+from models.system import System
+
+
+def apply(system: System, factor: float) -> System:
+    """Motor command multiplied by `factor`."""
+    return system.laid("damper", gain=factor)
+
+
+EFFECT = factor_on(
+    "damper",
+    "gain",
+    apply,
+    says="the motor gives more or less force than told",
+    reference="T_m·u̇ + u = factor·damper_command",
+    bounds=(0.0, 3.0),
+    sizes=(0.85, 0.93, 0.97, 1.03, 1.07, 1.15),
+)

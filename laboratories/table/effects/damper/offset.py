@@ -1,0 +1,37 @@
+"""A constant force on the damper's moving mass: a rail that is not level, a cable, an offset of the drive.
+
+    m·(s̈ + ÿ) = … + force
+
+Felt on the table as its reaction. Not to be confused with `sensor.damper_force.bias`, which moves nothing.
+"""
+
+from __future__ import annotations
+
+from laboratories.effects.effect import Effect, Parameter
+from models.system import System
+
+
+def apply(system: System, force: float) -> System:
+    """A constant `force` N on the moving mass."""
+    return system.laid("damper", offset=force)
+
+
+EFFECT = Effect(
+    name="damper.offset",
+    site="damper",
+    kind="physics",
+    says="a constant force on the moving mass",
+    parameters=(
+        Parameter(
+            "force",
+            "N",
+            null=0.0,
+            least=-500.0,
+            most=500.0,
+            sizes=(-3.0, -0.5, -0.1, 0.1, 0.5, 3.0),
+            says="along +x",
+        ),
+    ),
+    reference="m·(s̈ + ÿ) = … + force",
+    apply=apply,
+)

@@ -1,0 +1,21 @@
+"""The damper's spring is stiffer or softer than believed.
+
+    m·(s̈ + ÿ) = −factor·k·s − c·ṡ + u
+
+Nothing changes where the plan has k = 0. Not to be confused with `damper.mass`: both move the damper's
+period, but only the mass changes how far the motor and the table throw it.
+"""
+
+from __future__ import annotations
+
+from laboratories.effects.factor import factor_on, of_plan
+
+EFFECT = factor_on(
+    "damper",
+    "stiffness",
+    of_plan("damper", "stiffness"),
+    says="the damper's spring is stiffer or softer",
+    reference="k_true = factor·k",
+    bounds=(0.0, 20.0),
+    sizes=(0.5, 0.75, 0.9, 1.1, 1.4, 2.0),
+)

@@ -1,0 +1,60 @@
+"""End stops of the damper's guide rail: springs that it hits beyond a stroke.
+
+    m·(s̈ + ÿ) = −k·s − c·ṡ + u − stiffness·(|s| − stroke)·sgn(s) where |s| > stroke
+
+`stroke` counts from the middle to one stop. Not to be confused with `damper.force_limit`: a stop shows in
+the force at the largest strokes, and not at all below.
+"""
+
+from __future__ import annotations
+
+import math
+
+from laboratories.effects.effect import Contact, Effect, Parameter
+from models.system import DamperEffects, System
+
+
+def apply(system: System, stroke: float, stiffness: float) -> System:
+    """Stops of `stiffness` N/m at `stroke` m; without them the shape leaves no trace."""
+    if math.isinf(stroke):
+        stiffness = DamperEffects.stop_stiffness
+    return system.laid("damper", stop_stroke=stroke, stop_stiffness=stiffness)
+
+
+EFFECT = Effect(
+    name="damper.stroke_stop",
+    site="damper",
+    kind="physics",
+    says="the damper hits its end stops",
+    parameters=(
+        Parameter(
+            "stroke",
+            "m",
+            null=math.inf,
+            least=0.001,
+            most=1.0,
+            sizes=(0.046, 0.04, 0.03, 0.02),
+            says="from the middle to one stop",
+        ),
+        Parameter(
+            "stiffness",
+            "N/m",
+            null=2000.0,
+            least=200.0,
+            most=1000000.0,
+            sizes=(500.0, 2000.0, 20000.0),
+            says="of the stop",
+            shape=True,
+            default=2000.0,
+        ),
+    ),
+    reference="contact spring: stiffness·(|s| − stroke) beyond the stop",
+    apply=apply,
+    contact=Contact(
+        motion="damper_stroke",
+        force="damper_force",
+        place="stroke",
+        stiffness="stiffness",
+        starts=(500.0, 5000.0, 50000.0),
+    ),
+)

@@ -1,0 +1,21 @@
+"""The damper's dashpot is stronger or weaker than believed.
+
+    m·(s̈ + ÿ) = −k·s − factor·c·ṡ + u
+
+Nothing changes where the plan has c = 0. Not to be confused with `damper.friction`: the decay of a free
+oscillation is exponential here, straight there.
+"""
+
+from __future__ import annotations
+
+from laboratories.effects.factor import factor_on, of_plan
+
+EFFECT = factor_on(
+    "damper",
+    "viscous",
+    of_plan("damper", "damping"),
+    says="the damper's dashpot is stronger or weaker",
+    reference="c_true = factor·c",
+    bounds=(0.0, 50.0),
+    sizes=(0.4, 0.7, 0.9, 1.15, 1.6, 2.5),
+)

@@ -1,0 +1,38 @@
+"""Play in the table's drive.
+
+    |u_true − u| ≤ width/2, and u_true moves only when the play is used up
+
+`width` is the whole play, from one flank to the other; it lies before the table's own dynamics. Not to be
+confused with `table.friction`, which also distorts reversals but grows no smaller with large motion.
+"""
+
+from __future__ import annotations
+
+from laboratories.effects.effect import Effect, Parameter
+from models.system import System
+
+
+def apply(system: System, width: float) -> System:
+    """Whole play of `width` m."""
+    return system.laid("table", backlash=width)
+
+
+EFFECT = Effect(
+    name="table.backlash",
+    site="table",
+    kind="physics",
+    says="play in the table's drive",
+    parameters=(
+        Parameter(
+            "width",
+            "m",
+            null=0.0,
+            least=0.0,
+            most=0.02,
+            sizes=(3e-05, 0.0001, 0.0004, 0.0015),
+            says="whole play",
+        ),
+    ),
+    reference="Nordin, Gutman, Controlling mechanical systems with backlash: a survey, Automatica 38 (2002) 1633-1649",
+    apply=apply,
+)

@@ -1,0 +1,28 @@
+"""The table goes farther or less far than told: calibration of its loop.
+
+    u_true = factor·u
+
+Not to be confused with wrong readings (`sensor.table_displacement.gain`, `sensor.table_acceleration.gain`):
+the damper feels the table's true motion, and both of its readings change together.
+"""
+
+from __future__ import annotations
+
+from laboratories.effects.factor import factor_on
+from models.system import System
+
+
+def apply(system: System, factor: float) -> System:
+    """Table command multiplied by `factor`."""
+    return system.laid("table", gain=factor)
+
+
+EFFECT = factor_on(
+    "table",
+    "gain",
+    apply,
+    says="the table goes farther or less far than told",
+    reference="Y(s) = G(s)·factor·U(s)",
+    bounds=(0.0, 3.0),
+    sizes=(0.85, 0.93, 0.97, 1.03, 1.07, 1.15),
+)

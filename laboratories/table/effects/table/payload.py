@@ -1,0 +1,32 @@
+"""Control-structure interaction: the damper's force moves the table.
+
+    Y(s) = G(s)·(e^(−L·s)·U(s) + compliance·damper_force(s))
+
+with G the second order of the table's loop: the force meets no dead time. Not to be confused with
+`table.gain` or `table.bandwidth`, which are there without any force of the damper too.
+"""
+
+from __future__ import annotations
+
+from laboratories.effects.effect import Effect, Parameter
+from models.system import System
+
+
+def apply(system: System, compliance: float) -> System:
+    """Table moved by `compliance` m per newton of the damper's force."""
+    return system.laid("table", compliance=compliance)
+
+
+EFFECT = Effect(
+    name="table.payload",
+    site="table",
+    kind="physics",
+    says="the damper's force moves the table",
+    parameters=(
+        Parameter(
+            "compliance", "m/N", null=0.0, least=0.0, most=0.002, sizes=(3e-07, 1.5e-06, 6e-06, 2.5e-05)
+        ),
+    ),
+    reference="Dyke, Spencer, Quast, Sain, J. Eng. Mech. 121 (1995) 322-338",
+    apply=apply,
+)

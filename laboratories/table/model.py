@@ -1,0 +1,285 @@
+"""Laboratory B: a shaking table carries the active mass damper.
+
+Table `Y = e^(−Ls)·ω²/(s² + 2ζωs + ω²)·U`; damper `m·(s̈ + ÿ) = −k·s − c·ṡ − g + u`, motor `T·u̇ + u = F`;
+force on the table `k·s + c·ṡ + g − u`, with g what end stops and the rail's friction add. Without such
+effects all of it is linear, so one matrix carries table, damper and motor over each segment without
+error, for a table command that is a straight line and a motor command that is held. With them g is held
+over short segments; friction is what it takes to stop the motion within a segment, up to its size, so it
+neither chatters nor creeps (the budget of Duclusaud et al., arXiv 2410.08650).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from common.errors import InputError
+from common.plan.tables import Damper, Table
+from laboratories.column.model import substeps
+from models.compiled import jit
+from models.registry import Array
+from models.system import DamperEffects, TableEffects
+from models.transfer_systems import delay
+
+TABLE, TABLE_RATE, STROKE, STROKE_RATE, MOTOR, ACCELERATION = range(6)
+BASE, BASE_RATE = 6, 7  # the table below an oil column's resonance, where there is one
+RAMP, PUSH, RAIL, DRAG = range(4)  # inputs: table command, motor force N, force g N, table friction m/s²
+INPUTS = 5  # columns behind the states: command before and after, motor command, g, table friction
+
+# places in `limits`
+PRESENT, TABLE_GAIN, PLAY, TABLE_FRICTION, MOTOR_GAIN, FORCE_LIMIT, FRICTION, STOP, STOP_STIFFNESS = range(9)
+TABLE_VELOCITY, VELOCITY = 9, 10  # below which the frictions fall off
+OFFSET = 12
+IDEAL = 11  # interval (s) of a table that follows at once, 0 for any other
+
+
+class TableLab(NamedTuple):
+    """The laboratory with its memories, which `advance` moves on."""
+
+    taps: Array  # of the delayed command
+    matrices: (
+        Array  # (m, n, n + 5): next state from state, command before and after, motor command, g, friction
+    )
+    spring: Array  # (stiffness N/m, dashpot N·s/m) of the damper
+    limits: Array  # effects that no matrix holds
+    history: Array  # table commands written, newest first
+    state: Array  # (n,), n = 6, or 8 with an oil column
+    scratch: Array  # (n + 7,), the last two the command behind the play and an ideal table's last velocity
+
+
+def build(
+    interval: float,
+    table: Table,
+    damper: Damper,
+    table_effects: TableEffects | None = None,
+    damper_effects: DamperEffects | None = None,
+) -> TableLab:
+    """Laboratory at rest with the nominal or true parameters given, and what is laid over them.
+
+    Raises:
+        InputError: an effect that an ideal table cannot have.
+    """
+    on_table, on_damper = table_effects or TableEffects(), damper_effects or DamperEffects()
+    present = on_table != TableEffects() or on_damper != DamperEffects()
+    short = on_table.backlash or on_table.friction or on_damper.friction or on_damper.stop_stiffness
+    segments = delay.split(interval, table.delay, substeps(interval) if short else 1)
+    alike: dict[float, Array] = {}  # equal steps differ by rounding only
+    for length in segments.lengths:
+        if (key := round(float(length), 12)) not in alike:
+            alike[key] = propagation(float(length), table, damper, on_table)
+    matrices = np.stack([alike[round(float(length), 12)] for length in segments.lengths])
+    size = matrices.shape[1]
+    limits = [float(present), on_table.gain, on_table.backlash, on_table.friction, on_damper.gain]
+    limits += [on_damper.force_limit, on_damper.friction, on_damper.stop_stroke, on_damper.stop_stiffness]
+    limits += [on_table.friction_velocity, on_damper.friction_velocity]
+    limits += [interval if math.isinf(table.frequency) else 0.0, on_damper.offset]
+    return TableLab(
+        segments.taps,
+        matrices,
+        np.array([damper.stiffness, damper.damping]),
+        np.array(limits),
+        np.zeros(segments.memory),
+        np.zeros(size),
+        np.zeros(size + INPUTS + 2),
+    )
+
+
+def propagation(length: float, table: Table, damper: Damper, effects: TableEffects) -> Array:
+    """Propagation over one segment; shape (n, n + 5)."""
+    if not math.isinf(table.frequency):
+        return lagging_matrix(length, table, damper, effects)
+    for name, null in (("compliance", 0.0), ("friction", 0.0), ("oil_frequency", math.inf)):
+        if getattr(effects, name) != null:
+            raise InputError(f"An ideal table (frequency inf) cannot have the effect '{name}'.")
+    return ideal_matrix(length, damper)
+
+
+@jit
+def enter(lab: tuple[Any, ...], command: float, motor_command: float) -> tuple[float, float, float, float]:
+    """`advance` for a caller outside compiled code, which holds the laboratory as `compiled.plain` gives it."""
+    return advance(TableLab(*lab), command, motor_command)
+
+
+@jit
+def advance(lab: TableLab, command: float, motor_command: float) -> tuple[float, float, float, float]:
+    """Table displacement (m) and acceleration (m/s²), stroke (m) and force (N) one interval later.
+
+    The table's command is ramped to `command` (m) by then, the motor's (N) is held.
+    """
+    taps, matrices, spring, limits = lab.taps, lab.matrices, lab.spring, lab.limits
+    history, state, scratch = lab.history, lab.state, lab.scratch
+    size = state.size
+    before, after, motor, rail, drag, played = size, size + 1, size + 2, size + 3, size + 4, size + 5
+    start = state[TABLE]
+    present = limits[PRESENT] != 0.0
+    scratch[motor] = motor_command
+    scratch[rail] = 0.0
+    scratch[drag] = 0.0
+    if present:
+        most = limits[FORCE_LIMIT]
+        scratch[motor] = min(max(limits[MOTOR_GAIN] * motor_command, -most), most)
+        command *= limits[TABLE_GAIN]
+    delay.remember(history, command)
+    scratch[after] = delay.delayed(history, taps, 0)
+    if limits[PLAY] > 0.0:
+        scratch[after] = scratch[played]
+    for i in range(matrices.shape[0]):
+        for row in range(size):
+            scratch[row] = state[row]
+        scratch[before] = scratch[after]
+        scratch[after] = delay.delayed(history, taps, i + 1)
+        if present:
+            half = 0.5 * limits[PLAY]
+            if half > 0.0:
+                wanted = scratch[after]
+                scratch[played] = min(max(scratch[played], wanted - half), wanted + half)
+                scratch[after] = scratch[played]
+            resist(matrices[i], limits, scratch, size)
+        for row in range(size):
+            value = 0.0
+            for column in range(size + INPUTS):
+                value += matrices[i, row, column] * scratch[column]
+            state[row] = value
+    if limits[IDEAL] > 0.0:  # its velocity steps, and an accelerometer reads the mean over the interval
+        velocity = (state[TABLE] - start) / limits[IDEAL]
+        state[ACCELERATION] = (velocity - scratch[played + 1]) / limits[IDEAL]
+        scratch[played + 1] = velocity
+    force = spring[0] * state[STROKE] + spring[1] * state[STROKE_RATE] + scratch[rail] - state[MOTOR]
+    return state[TABLE], state[ACCELERATION], state[STROKE], force
+
+
+@jit
+def resist(matrix: Array, limits: Array, scratch: Array, size: int) -> None:
+    """Forces of a segment that oppose motion: table friction, then end stop and friction of the damper."""
+    rail, drag = size + 3, size + 4
+    scratch[rail] = -limits[OFFSET]
+    scratch[drag] = 0.0
+    middle = scratch[STROKE] + 0.5 * matrix[STROKE, STROKE_RATE] * scratch[STROKE_RATE]
+    over = abs(middle) - limits[STOP]
+    if over > 0.0:  # at the segment's middle, which keeps the energy of a bounce
+        scratch[rail] += limits[STOP_STIFFNESS] * (over if middle > 0.0 else -over)
+    if limits[TABLE_FRICTION] > 0.0:
+        base = BASE_RATE if size > BASE else TABLE_RATE
+        most = limits[TABLE_FRICTION] * falling(scratch[base], limits[TABLE_VELOCITY])
+        scratch[drag] = stopping(matrix, scratch, base, drag, most)
+    if limits[FRICTION] > 0.0:
+        most = limits[FRICTION] * falling(scratch[STROKE_RATE], limits[VELOCITY])
+        scratch[rail] += stopping(matrix, scratch, STROKE_RATE, rail, most)
+
+
+@jit
+def falling(rate: float, velocity: float) -> float:
+    """Share of a friction that is left at a rate (m/s) where it falls off below a velocity; none falls off at 1e-6."""
+    return 1.0 if velocity <= 1e-6 else np.tanh(abs(rate) / velocity)
+
+
+@jit
+def stopping(matrix: Array, scratch: Array, rate: int, place: int, most: float) -> float:
+    """What must be added to input `place` so that state `rate` is zero at the segment's end, up to `most`."""
+    free = 0.0
+    for column in range(scratch.size - 2):
+        free += matrix[rate, column] * scratch[column]
+    return min(max(-free / matrix[rate, place], -most), most)
+
+
+def damper_rows(a: Array, b: Array, damper: Damper) -> None:
+    """Fill the damper's and the motor's rows of the rate matrices, the table's acceleration left out."""
+    a[STROKE, STROKE_RATE] = 1.0
+    a[STROKE_RATE, STROKE] = -damper.stiffness / damper.mass
+    a[STROKE_RATE, STROKE_RATE] = -damper.damping / damper.mass
+    b[STROKE_RATE, RAIL] = -1.0 / damper.mass
+    if damper.motor_time_constant == 0.0:
+        b[STROKE_RATE, PUSH] = 1.0 / damper.mass
+    else:
+        a[STROKE_RATE, MOTOR] = 1.0 / damper.mass
+        a[MOTOR, MOTOR] = -1.0 / damper.motor_time_constant
+        b[MOTOR, PUSH] = 1.0 / damper.motor_time_constant
+
+
+def lagging_matrix(length: float, table: Table, damper: Damper, effects: TableEffects) -> Array:
+    """Propagation over one segment of `length` s behind a table of second order; shape (n, n + 5).
+
+    Under the damper's force F the table gives way as if its command were moved by compliance·F.
+    With an oil column the platform follows the table below it as a second oscillator.
+    """
+    size = 6 if math.isinf(effects.oil_frequency) else 8
+    place, rate = (TABLE, TABLE_RATE) if size == 6 else (BASE, BASE_RATE)
+    omega = 2.0 * math.pi * table.frequency
+    a, b = np.zeros((size, size)), np.zeros((size, 4))
+    a[place, rate] = 1.0
+    a[rate, place], a[rate, rate] = -(omega**2), -2.0 * table.damping_ratio * omega
+    b[rate, RAMP], b[rate, DRAG] = omega**2, 1.0
+    yielding = effects.compliance * omega**2
+    a[rate, STROKE] += yielding * damper.stiffness
+    a[rate, STROKE_RATE] += yielding * damper.damping
+    b[rate, RAIL] += yielding
+    if damper.motor_time_constant == 0.0:
+        b[rate, PUSH] -= yielding
+    else:
+        a[rate, MOTOR] -= yielding
+    if size == 8:
+        oil = 2.0 * math.pi * effects.oil_frequency
+        a[TABLE, TABLE_RATE] = 1.0
+        a[TABLE_RATE, TABLE], a[TABLE_RATE, TABLE_RATE] = -(oil**2), -2.0 * effects.oil_damping * oil
+        a[TABLE_RATE, BASE] = oil**2
+    damper_rows(a, b, damper)
+    a[STROKE_RATE] -= a[TABLE_RATE]
+    b[STROKE_RATE] -= b[TABLE_RATE]
+    result = propagate_ramp(a, b, length, damper)
+    result[ACCELERATION] = a[TABLE_RATE] @ result
+    result[ACCELERATION, size + 1] += b[TABLE_RATE, RAMP]
+    if damper.motor_time_constant == 0.0:
+        result[ACCELERATION, size + 2] += b[TABLE_RATE, PUSH]
+    result[ACCELERATION, size + 3] += b[TABLE_RATE, RAIL]
+    result[ACCELERATION, size + 4] += b[TABLE_RATE, DRAG]
+    return result
+
+
+def ideal_matrix(length: float, damper: Damper) -> Array:
+    """Propagation behind a table that follows its ramped command at once; shape (6, 11).
+
+    The table's velocity is constant over a segment and steps at its beginning, which steps the stroke's
+    velocity the other way; the acceleration is that step over the segment's length.
+    """
+    size = 6
+    a, b = np.zeros((size, size)), np.zeros((size, 4))
+    damper_rows(a, b, damper)
+    width = size + INPUTS
+    slope = np.zeros(width)
+    slope[size], slope[size + 1] = -1.0 / length, 1.0 / length
+    step = np.eye(width)
+    step[STROKE_RATE] += step[TABLE_RATE] - slope
+    result: Array = propagate_ramp(a, b, length, damper) @ step
+    result[TABLE] = np.eye(width)[size + 1]
+    result[TABLE_RATE] = slope
+    result[ACCELERATION] = (slope - np.eye(width)[TABLE_RATE]) / length
+    return result
+
+
+def propagate_ramp(a: Array, b: Array, length: float, damper: Damper) -> Array:
+    """Exact propagation of `ż = a·z + b·(v, F, g, d)` with v moving from v0 to v1 and the others held.
+
+    By one matrix exponential with the inputs as further states (Van Loan 1978); shape (n, n + 5). A motor
+    without lag has its command for its force. The row of the acceleration is left empty.
+    """
+    from scipy.linalg import expm
+
+    size = a.shape[0]
+    big = np.zeros((size + 5, size + 5))
+    big[:size, :size] = a
+    big[:size, size] = b[:, RAMP]
+    big[size, size + 1] = 1.0 / length
+    big[:size, size + 2 :] = b[:, PUSH:]
+    whole = expm(big * length)
+    result = np.zeros((size, size + INPUTS))
+    result[:, :size] = whole[:size, :size]
+    result[:, ACCELERATION] = 0.0
+    result[ACCELERATION] = 0.0
+    result[:, size] = whole[:size, size] - whole[:size, size + 1]
+    result[:, size + 1] = whole[:size, size + 1]
+    result[:, size + 2 :] = whole[:size, size + 2 :]
+    if damper.motor_time_constant == 0.0:
+        result[MOTOR] = np.eye(size + INPUTS)[size + 2]
+    return result

@@ -1,0 +1,104 @@
+"""The column's path: from the building's target to what the compensated nominal actuator achieves of it."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from common.plan.plan import Plan
+from laboratories.column import model as column_lab
+from models import excitation, indicators
+from models.compensators.follower import Follower
+from models.compiled import plain
+from models.excitation import Programme, join
+from models.excitation.pieces import Piece, sine
+from models.indicators.growth import grows
+from models.registry import Array
+
+CYCLES = 12  # of the sine at which amplitude and delay are found
+LEAST_CYCLES = 2.0  # s, as many cycles of it as that where they are more
+AMPLITUDE = 1e-3  # m, of sine and pulse: so small that no limit of the actuator is met
+PULSE = 0.5  # of a period: the pulse's spectrum then has its first zero at four times the frequency
+LEAST_PULSE = 8  # ticks
+WATCHED = (
+    50  # of the actuator's own delay after the pulse: ten turns of the slowest loop that it can make unstable
+)
+LEAST_WATCHED, MOST_WATCHED = 2.0, 40.0  # s
+LOWEST = 0.2  # Hz, below which a transfer system is late by as much as there
+FARTHEST = 1e6  # m, from where on the motion has diverged: no laboratory is as large
+
+
+class Path(NamedTuple):
+    """What the path makes of a motion at one frequency."""
+
+    amplitude: float  # achieved over target, –
+    delay: float  # s, negative where it leads; inf where the path is unstable
+    stable: bool  # whether the actuator comes to rest under its compensator, without the building
+
+
+UNSTABLE = Path(math.inf, math.inf, stable=False)
+
+
+def path_at(plan: Plan, frequency: float) -> Path:
+    """Amplitude and delay of the column's path for a sine of that frequency (Hz).
+
+    The path is the compensated nominal actuator, and the interval by which `unit_delay` holds back the force. The
+    delay follows the phase continuously from frequency zero, so that it may be longer than half a period.
+    """
+    interval, frequency = plan.test.interval, max(frequency, LOWEST)
+    programme = join([pulse(interval, frequency)], interval, still=watched(plan, frequency))
+    target, achieved = follow(plan, programme)
+    begin = programme.segments[0].end
+    if achieved.size != target.size or grows(achieved[begin:]):
+        return UNSTABLE
+    whole = phase_delay(target, achieved, interval, frequency)
+    cycles = max(CYCLES, round(LEAST_CYCLES * frequency))
+    piece = sine(interval, frequency, amplitude=AMPLITUDE, cycles=cycles)
+    found = indicators.frequency_evaluation_index(*follow(plan, join([piece], interval)), interval)
+    turns = round((whole - found.delay) * found.frequency)
+    delay = found.delay + turns / found.frequency
+    return Path(found.amplitude, delay + interval * plan.compensator.force.unit_delay, stable=True)
+
+
+def watched(plan: Plan, frequency: float) -> float:
+    """Time (s) after a pulse in which a stable path comes to rest and an unstable one is seen to grow."""
+    actuator = plan.actuator
+    own = actuator.delay + actuator.time_constant
+    if actuator.model == "servo_hydraulic":
+        own = actuator.servo.delay
+    return min(max(LEAST_WATCHED, 4.0 / frequency, WATCHED * own), MOST_WATCHED)
+
+
+def pulse(interval: float, frequency: float) -> Piece:
+    """One smooth pulse that moves at all frequencies from zero to beyond the given one (Hz)."""
+    count = max(LEAST_PULSE, round(PULSE / frequency / interval))
+    values = AMPLITUDE * np.sin(np.pi * np.arange(count) / count) ** 2
+    return Piece("pulse", values, True, {"amplitude": AMPLITUDE})
+
+
+def phase_delay(target: Array, achieved: Array, interval: float, frequency: float) -> float:
+    """Delay (s) at a frequency (Hz) whose phase is followed from frequency zero, where target and answer are in phase.
+
+    Both are at rest at the end, so that their transforms are those of the whole motion.
+    """
+    frequencies = np.fft.rfftfreq(target.size, interval)
+    part = frequencies <= 1.5 * frequency
+    spectrum = np.fft.rfft(achieved)[part] * np.conj(np.fft.rfft(target)[part])
+    phase = float(np.interp(frequency, frequencies[part], np.unwrap(np.angle(spectrum))))
+    return -phase / (2.0 * math.pi * frequency)
+
+
+def follow(plan: Plan, programme: Programme) -> tuple[Array, Array]:
+    """Target and achieved displacement of the compensated nominal actuator, m; the latter ends where it diverges."""
+    follower = Follower(plan.compensator, programme, plan.test.interval)
+    lab = plain(column_lab.build(plan.test.interval, plan.actuator, plan.column))
+    target = programme.motion[excitation.POSITION]
+    achieved = np.zeros(target.size)
+    for tick in range(target.size - 1):
+        _, command = follower(tick, float(achieved[tick]))
+        if not abs(command) <= FARTHEST:
+            return target, achieved[: tick + 1]
+        achieved[tick + 1] = column_lab.enter(lab, command)[0]
+    return target, achieved

@@ -1,0 +1,267 @@
+"""Risks of a test that nominal models show: too little margin of delay, peaks too near to the limits."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from common.lab.preflight import Check
+from common.plan import patience
+from common.plan.plan import Plan
+from common.plan.tables import Limits
+from common.safety.risks import Risk
+from loop import substructure
+from loop.closed_loop import simulate, stacked
+from loop.nominal import free_motion, limited
+from loop.nominal.partition import Partition, assess
+from models.compensators import COMPENSATORS
+from models.registry import Array
+
+MOST_TICKS = 1_000_000  # of the simulation, which is kept in memory
+AMPLITUDE_ERROR = (
+    0.2  # of the compensated actuator's amplitude: a stiffness wrong by a fifth is another specimen
+)
+LIMITS: dict[str, Any] = {name: field.metadata["rule"] for name, field in Limits.__dataclass_fields__.items()}
+
+
+class Findings(NamedTuple):
+    """What nominal models say of a plan: the partition, the peaks of the simulated test, and both as checks."""
+
+    partition: Partition
+    peaks: Peaks | None  # None where the simulated loop has no finite command
+    unstable: bool  # whether the simulated loop is, so that no peak means anything
+    checks: list[Check]
+
+
+def findings(plan: Plan) -> Findings:
+    """What nominal models say of a plan; raises InputError where a model or parameter cannot be.
+
+    Peaks are judged by the limits that hold beside a rig, also where those of emulated laboratories are larger.
+    """
+    plan = patience.strict(plan)
+    found = assess(plan)
+    top, unstable, check = simulated_peaks(plan, known_unstable=found.unstable)
+    return Findings(found, top, unstable, [partition_check(plan, found), check])
+
+
+def checks(plan: Plan) -> list[Check]:
+    """Partition and peaks of a plan, for a gate; raises InputError where a model or parameter cannot be."""
+    return findings(plan).checks
+
+
+# -- partition ------------------------------------------------------------------------------------
+
+
+def expected_delay(plan: Plan, found: Partition) -> float:
+    """Delay (s) to expect in the column's path: the compensated actuator's, and one interval for a late tick."""
+    return found.delay + plan.test.interval
+
+
+def partition_check(plan: Plan, found: Partition) -> Check:
+    """The partition's check, for a gate."""
+    return Check(partition_text(plan, found), partition_risk(plan, found))
+
+
+def partition_risk(plan: Plan, found: Partition) -> Risk | None:
+    """The risk of a delay too near to what the partition bears; None where the plan's margin is kept."""
+    if not found.stable:
+        return Risk("partition", unstable_path(plan))
+    if keeps_margin(plan, found):
+        return None
+    expected, margin = expected_delay(plan, found), plan.preflight.delay_margin
+    return Risk(
+        "partition",
+        f"the column's path is unstable beyond {found.critical_delay * 1e3:.1f} ms of delay, and "
+        f"{expected * 1e3:.1f} ms are expected with a required margin of {margin:g}, so "
+        f"{compensation(plan, found.delay)}, give the structure more mass or damping, or let the specimen stand for "
+        "less of its stiffness",
+    )
+
+
+def keeps_margin(plan: Plan, found: Partition) -> bool:
+    """Whether the partition bears the plan's margin of the delay that is to be expected."""
+    expected = expected_delay(plan, found)
+    return expected <= 0.0 or found.critical_delay >= plan.preflight.delay_margin * expected
+
+
+def unstable_path(plan: Plan) -> str:
+    """What is wrong with an actuator that is unstable under its compensator, and what to change."""
+    chosen, actuator = plan.compensator, plan.actuator
+    late = actuator.servo.delay if actuator.model == "servo_hydraulic" else actuator.delay
+    gains = ", ".join(f"{name} = {value:g}" for name, value in chosen.parameters.items()) or "its defaults"
+    return (
+        f"the column's path is unstable by itself: the actuator, with {late * 1e3:.1f} ms of dead time, does not come "
+        f"to rest under compensator '{chosen.kind}' ({gains}), so lower the feedback's gains in [compensator] or take "
+        "one that only feeds forward, lower the delay in [actuator], or shorten interval in [test]"
+    )
+
+
+def compensation(plan: Plan, left: float) -> str:
+    """What to change in [compensator] to take away the delay (s) that it leaves; a lead only where it then serves."""
+    chosen = plan.compensator
+    lead = chosen.parameters.get("lead", 0.0)
+    if chosen.kind == "none":
+        return "compensate the actuator in [compensator]"
+    if "lead" not in chosen.parameters or left <= 0.0:
+        return "compensate the actuator better in [compensator]"
+    longer = round(lead + left * (1.0 + chosen.parameters.get("proportional", 0.0)), 4)
+    if not serves(plan, longer):
+        return (
+            "lower the delay in [actuator] (no lead in [compensator] makes up for the "
+            f"{left * 1e3:.1f} ms that are left)"
+        )
+    return (
+        f"raise lead in [compensator] from {lead * 1e3:.1f} ms to {longer * 1e3:.1f} ms, which takes away the "
+        f"{left * 1e3:.1f} ms that are left"
+    )
+
+
+def serves(plan: Plan, lead: float) -> bool:
+    """Whether the plan's compensator with that lead (s) keeps margin and amplitude."""
+    chosen = plan.compensator
+    if not COMPENSATORS[chosen.kind].rules["lead"].admits(lead):
+        return False
+    led = replace(plan, compensator=replace(chosen, parameters=chosen.parameters | {"lead": lead}))
+    found = assess(led)
+    return found.stable and keeps_margin(led, found) and abs(found.amplitude - 1.0) <= AMPLITUDE_ERROR
+
+
+def partition_text(plan: Plan, found: Partition) -> str:
+    """What the partition bears and what is to be expected, in words."""
+    if not found.stable:
+        return "The actuator is unstable under its compensator"
+    expected, points = expected_delay(plan, found), found.damping_points * 100.0
+    cost = f"{'costing' if points >= 0.0 else 'adding'} {abs(points):.2f} points of damping at {found.frequency:.2f} Hz"
+    if math.isinf(found.critical_delay):
+        return f"Stable at any delay; {expected * 1e3:.1f} ms expected, {cost}"
+    figures = f"{found.critical_delay * 1e3:.1f} ms of delay; {expected * 1e3:.1f} ms expected"
+    if found.unstable:
+        return f"Unstable beyond {figures}"
+    ratio = f" (margin {times(found.critical_delay / expected)})" if expected > 0.0 else ""
+    return f"Stable up to {figures}{ratio}, {cost}"
+
+
+def times(ratio: float) -> str:
+    """A margin as a factor, with a digit behind the point where it is small enough to matter."""
+    return f"{ratio:.0f}" if ratio >= 10.0 else f"{ratio:.1f}"
+
+
+# -- peaks ----------------------------------------------------------------------------------------
+
+
+class Peaks(NamedTuple):
+    """How near the simulated test comes to its limits."""
+
+    share: float  # largest peak over its limit
+    name: str  # of that quantity
+    first: str  # quantity that first exceeds its share of the limit, empty where none does
+    tick: int  # at which it does
+    peak: float  # of that quantity, in its unit
+    every: dict[str, float]  # peak of each limited quantity, in its unit
+
+
+def peaks_check(plan: Plan) -> Check:
+    """The check of the simulated peaks, for a gate."""
+    return simulated_peaks(plan)[2]
+
+
+def simulated_peaks(plan: Plan, *, known_unstable: bool = False) -> tuple[Peaks | None, bool, Check]:
+    """Peaks of the simulated test, whether its loop is unstable, and the check of both.
+
+    Of a loop that is `known_unstable`, which another check refuses, only peaks beyond their share are refused.
+    """
+    short = plan.with_ticks(min(plan.ticks, MOST_TICKS // len(plan.roles)))
+    columns, finite = simulated(short)
+    if not columns["actuator_command"].size:
+        risk = Risk("peaks", "the simulated test has no finite command at all, so look at [structure]")
+        return None, True, Check("", risk)
+    found = peaks(short, columns)
+    grows = not finite or free_motion.unstable(plan)
+    if grows and (found.first or not finite or not known_unstable):
+        return (
+            found,
+            True,
+            Check(
+                "The peaks are not known, because the simulated loop is unstable", unstable_risk(plan, found)
+            ),
+        )
+    return found, grows, Check(peaks_text(plan, found, short.ticks), peaks_risk(plan, found))
+
+
+def simulated(plan: Plan) -> tuple[dict[str, Array], bool]:
+    """Signals of the nominal test with its sensors' noise, and whether they are finite to its end."""
+    ground = substructure.ground_rows(plan, substructure.motion(plan))
+    rollout = simulate(plan, ground, seed=plan.test.seed)
+    return stacked(rollout), rollout.finite
+
+
+def peaks(plan: Plan, columns: dict[str, Array]) -> Peaks:
+    """Peaks of simulated signals over the plan's limits."""
+    most = vars(plan.limits)
+    magnitudes = limited.magnitudes(plan, columns)
+    shares = {name: values / most[name] for name, values in magnitudes.items()}
+    tops = {name: float(np.max(share)) for name, share in shares.items()}
+    over = {
+        name: int(np.argmax(~(share <= plan.preflight.peak_share)))
+        for name, share in shares.items()
+        if not tops[name] <= plan.preflight.peak_share
+    }
+    name = max(tops, key=lambda one: tops[one])
+    first = min(over, key=lambda one: over[one], default="")
+    every = {name: float(np.max(values)) for name, values in magnitudes.items()}
+    return Peaks(tops[name], name, first, over.get(first, 0), every.get(first, 0.0), every)
+
+
+def unstable_risk(plan: Plan, found: Peaks) -> Risk:
+    """The risk of a loop that is unstable, of which no peak means anything and no limit would help."""
+    share = plan.preflight.peak_share
+    seen = ""
+    if found.first:
+        limit, unit = getattr(plan.limits, found.first), LIMITS[found.first].unit
+        seen = (
+            f": {found.first} exceeds {share:.0%} of its limit of {limit:g} {unit} at "
+            f"t = {found.tick * plan.test.interval:.3f} s and grows on"
+        )
+    return Risk(
+        "peaks",
+        f"the simulated loop is unstable{seen}, so {remedy(plan)}; no limit would help",
+    )
+
+
+def remedy(plan: Plan) -> str:
+    """What to change in a plan whose loop is unstable."""
+    calm = plan.everywhere(control=replace(plan.control, amd=False))
+    if any(one.control.amd for one in map(plan.of, plan.roles)) and not free_motion.unstable(calm):
+        return (
+            f"lower gain in [control], {plan.control.gain:g} N·s/m, or quicken the shaking table (delay and frequency "
+            "in [table], its compensator), as the loop is stable without the damper"
+        )
+    found = assess(plan)
+    if not found.stable:
+        return "lower the feedback's gains in [compensator], or the delay in [actuator]"
+    if found.unstable:
+        return compensation(plan, found.delay)
+    return "look at [compensator] and [table.compensator], or shorten interval in [test]"
+
+
+def peaks_risk(plan: Plan, found: Peaks) -> Risk | None:
+    """The risk of a peak of a stable loop too near to its limit; None where all keep their distance."""
+    if not found.first:
+        return None
+    unit = LIMITS[found.first].unit
+    limit, share = getattr(plan.limits, found.first), plan.preflight.peak_share
+    return Risk(
+        "peaks",
+        f"the simulated {found.first} exceeds {share:.0%} of its limit of {limit:g} {unit} at "
+        f"t = {found.tick * plan.test.interval:.3f} s and peaks at {found.peak:.4g} {unit}, so lower scale in "
+        f"[ground_motion], look at [compensator], or raise {found.first} in [limits] where the laboratory allows it",
+    )
+
+
+def peaks_text(plan: Plan, found: Peaks, ticks: int) -> str:
+    """How near the simulated test comes to its limits, in words."""
+    part = f" in the first {ticks * plan.test.interval:g} s" if ticks < plan.ticks else ""
+    return f"Simulated peaks reach {found.share * 100.0:.0f} % of their limits at most ({found.name}){part}"

@@ -1,0 +1,67 @@
+"""The whole building under the ground, nothing of it in a laboratory: what a hybrid test should find."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from common.errors import InputError
+from common.plan.plan import Plan
+from loop.nominal.partition import matrices
+from models import integrators
+from models.compiled import jit
+from models.integrators.state import NEXT_DISPLACEMENT
+from models.registry import Array
+
+
+class Whole(NamedTuple):
+    """The whole building with its memories, which `march` moves on."""
+
+    code: int  # of the integrator
+    coefficients: Array  # of the integrator
+    K: Array  # (n, n) N/m
+    mass: Array  # (n,) kg
+    state: Array  # (rows, n) of the integrator
+    balance: Array  # (n,) external minus restoring force, N
+
+
+def response(plan: Plan, ground: Array) -> Array:
+    """Displacements (ticks, n) m of the floors relative to the ground, from rest, by the plan's integrator.
+
+    `M·ẍ + C·ẋ + K·x = −M·1·z̈` with the whole building's matrices of `[structure]`, in which the specimen is what it
+    takes over. `ground` (2, ticks + 1) as `substructure.ground_rows` gives it.
+
+    Raises:
+        InputError: the method is unknown or would diverge, or the numerical columns are not linear.
+    """
+    structure = plan.structure
+    if structure.columns.model != "linear":
+        raise InputError(
+            f"The whole building is known with linear columns only, not '{structure.columns.model}': leave "
+            "[structure.columns] linear."
+        )
+    M, C, K = matrices(plan)
+    method = integrators.build(structure.integrator, M, C, K, plan.test.interval, structure.rho_infinity)
+    n = plan.storeys
+    mass = np.diag(M).copy()
+    result = np.zeros((plan.ticks, n))
+    state = method.start(np.zeros(n), np.zeros(n), -mass * ground[0, 0])
+    numerical = Whole(method.code, method.coefficients, np.ascontiguousarray(K), mass, state, np.zeros(n))
+    march(numerical, ground, plan.test.interval, result)
+    return result
+
+
+@jit
+def march(whole: Whole, ground: Array, interval: float, result: Array) -> None:
+    """Fill `result` (ticks, n) m from the ground's acceleration."""
+    K, mass, state, balance = whole.K, whole.mass, whole.state, whole.balance
+    n = mass.size
+    for tick in range(result.shape[0]):
+        for i in range(n):
+            force = -mass[i] * ground[0, tick]
+            for j in range(n):
+                force -= K[i, j] * state[NEXT_DISPLACEMENT, j]
+            balance[i] = force
+            result[tick, i] = state[NEXT_DISPLACEMENT, i]
+        integrators.step(whole.code, whole.coefficients, state, balance, interval)

@@ -1,0 +1,60 @@
+"""A laboratory in a simulated test: its kernel, its sensors and what they read at every tick.
+
+The same steps play a laboratory in the closed loop and alone behind recorded commands.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from laboratories import kinds
+from laboratories.kinds import Kind
+from laboratories.sensors import noise, readings
+from laboratories.sensors.readings import Readings
+from models.compiled import jit
+from models.registry import Array
+from models.system import System
+
+
+class Site(NamedTuple):
+    """A laboratory with its sensors, which `read` and `play` move on."""
+
+    lab: Any  # record of its kind
+    sensors: Readings
+    errors: Array  # (ticks, channels) what errs in the readings
+    truth: Array  # (channels,) what sensors without error would read now
+    measured: Array  # (ticks, channels), filled tick by tick
+
+
+def build(kind: Kind, system: System, errors: Array) -> Site:
+    """A laboratory of a system at rest, for as many ticks as `errors` (ticks, channels) has rows."""
+    sensors = readings.build(system.plan.test.interval, kind.measured, system.effects.sensors)
+    return Site(kind.build(system), sensors, errors, np.zeros(len(kind.measured)), np.zeros(errors.shape))
+
+
+def errors(kind: Kind, system: System, ticks: int, seed: int | None = None) -> Array:
+    """Noise of a laboratory's readings, (ticks, channels), under the seed of that laboratory; zero without one."""
+    if seed is None:
+        return np.zeros((ticks, len(kind.measured)))
+    nominal = noise.levels(system.plan.sensors, kind.measured)
+    levels = readings.levels(kind.measured, nominal, system.effects.sensors)
+    return noise.Noise(seed, levels).rows(ticks)
+
+
+@jit
+def read(site: Site, tick: int, t: float) -> None:
+    """The readings at a tick, `t` s, into its row of `measured`."""
+    for channel in range(site.truth.size):
+        site.measured[tick, channel] = readings.step(
+            site.sensors, channel, site.truth[channel], site.errors[tick, channel], t
+        )
+
+
+@jit
+def play(site: Site, drive: Array, interval: float, start: int, stop: int) -> None:
+    """The readings at the ticks from `start` to before `stop` under commands; `drive` (ticks, 2): m and N."""
+    for tick in range(start, stop):
+        read(site, tick, tick * interval)
+        kinds.advance(site.lab, site.truth, drive[tick, 0], drive[tick, 1])

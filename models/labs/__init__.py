@@ -1,1 +1,0 @@
-"""The two laboratories as kernels: command in, true motion and force at the next tick out."""

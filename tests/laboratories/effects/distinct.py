@@ -1,0 +1,19 @@
+"""Effects of the catalogue that differ by more than the signal that they falsify: readings share their code."""
+
+from __future__ import annotations
+
+from laboratories.effects import CATALOGUE
+from laboratories.effects.effect import Effect
+from laboratories.effects.reading import SIGNALS
+
+
+def _distinct() -> dict[str, Effect]:
+    """All effects on physics, and each kind of falsified reading on one signal, another one for each kind."""
+    physics = {name: effect for name, effect in CATALOGUE.items() if not effect.signal}
+    signals = list(SIGNALS)
+    faults = dict.fromkeys(effect.fault for effect in CATALOGUE.values() if effect.signal)
+    chosen = [f"sensor.{signals[place % len(signals)]}.{fault}" for place, fault in enumerate(faults)]
+    return physics | {name: CATALOGUE[name] for name in chosen}
+
+
+DISTINCT = _distinct()

@@ -1,0 +1,216 @@
+"""One part alone under a recorded input gives the readings that the whole test had."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from common.plan.plan import Plan
+from laboratories.effects import CATALOGUE, lay
+from laboratories.effects.effect import Effect
+from laboratories.kinds import COLUMN, TABLE
+from loop import replay, substructure
+from loop.closed_loop import Rollout, signals, simulate
+from models import indicators
+from models.system import ColumnEffects, Effects, System
+from tests.laboratories.effects.distinct import DISTINCT
+
+Array = NDArray[np.float64]
+
+EACH = pytest.mark.parametrize("effect", DISTINCT.values(), ids=list(DISTINCT))
+IN_SHORT_STEPS = ("viscous", "friction", "inertia")  # of the column: rates count
+
+
+@pytest.fixture(scope="module")
+def plan(default_plan: Plan) -> Plan:
+    return default_plan.with_test(duration=3.0)
+
+
+def ground(system: System) -> Array:
+    motion = substructure.motion(system.plan)
+    return substructure.ground_rows(system.plan, motion, system.effects.time_shift)
+
+
+def rollout(system: System) -> Rollout:
+    return simulate(system.plan, ground(system), effects=system.effects)
+
+
+def measured(found: Rollout) -> tuple[Array, Array]:
+    """Displacement and force of the column as read."""
+    displacement, force = (found.master[name] for name in COLUMN.measured)
+    return displacement, force
+
+
+def alone(system: System, found: Rollout) -> tuple[Array, Array]:
+    """Both laboratories alone, behind the commands that they had in the loop."""
+    slave = found.slaves["slave"]
+    return (
+        replay.laboratory_a(system, found.master["actuator_command"]),
+        replay.laboratory_b(system, slave["table_command"], found.master["damper_command"]),
+    )
+
+
+def assert_computed(system: System, found: Rollout) -> None:
+    """The building alone computes to the last bit what it computed in the loop."""
+    got = replay.building(system, ground(system), *measured(found), found.master["damper_force_used"])
+    for name, values in got.items():
+        assert np.array_equal(values, found.master[name]), name
+
+
+def strong(effect: Effect) -> dict[str, float]:
+    """The strongest size, the shape at its default."""
+    item = next(item for item in effect.parameters if not item.shape)
+    null = 0.0 if math.isinf(item.null) else item.null
+    sizes = sorted(item.sizes, key=lambda size: abs(size - null))
+    return {item.name: sizes[0] if math.isinf(item.null) else sizes[-1]}
+
+
+@EACH
+def test_each_laboratory_alone_reads_to_the_bit_what_it_read_in_the_loop(effect: Effect, plan: Plan) -> None:
+    system = lay(System(plan), [(effect.name, strong(effect))])
+    found = rollout(system)
+    assert found.finite
+    a, b = alone(system, found)
+    assert a.tobytes() == np.column_stack(measured(found)).tobytes()
+    assert b.tobytes() == np.column_stack([found.slaves["slave"][name] for name in TABLE.measured]).tobytes()
+
+
+@EACH
+def test_the_building_alone_computes_what_it_computed_in_the_loop(effect: Effect, plan: Plan) -> None:
+    system = lay(System(plan), [(effect.name, strong(effect))])
+    found = rollout(system)
+    assert_computed(system, found)
+
+
+def test_a_building_of_three_storeys_too(plan: Plan) -> None:
+    tables = {"mass": (1.6e5,) * 3, "stiffness": (9e7,) * 3, "damping": (4e5,) * 3}
+    system = System(plan).moved("structure", **tables).moved("column", storey=2).moved("damper", floor=3)
+    system = lay(system, [("structure.p_delta", {"stiffness": -1e6}), ("ground.time_shift", {"shift": 0.01})])
+    found = rollout(system)
+    assert_computed(system, found)
+
+
+def rest(system: System, force: Array, displacement: Array) -> float:
+    """Rms of what the specimen's force has beyond that of the plan's linear model."""
+    return float(np.std(force - system.plan.column.stiffness * displacement))
+
+
+@pytest.mark.parametrize(
+    "name",
+    [name for name in CATALOGUE if name.startswith("column.") and name.split(".")[1] not in IN_SHORT_STEPS],
+)
+def test_the_specimen_alone_feels_what_it_felt_in_the_loop(name: str, plan: Plan) -> None:
+    """Where only the deformation counts, to rounding."""
+    system = lay(System(plan), [(name, strong(CATALOGUE[name]))])
+    found = rollout(system)
+    displacement, force = measured(found)
+    got = replay.column(system, displacement)
+    assert np.allclose(got, force, rtol=1e-9, atol=1e-6 * np.max(np.abs(force)))
+
+
+@pytest.mark.parametrize(
+    ("effects", "share"),
+    [
+        (ColumnEffects(viscous=40e3), 0.02),
+        (ColumnEffects(friction=900.0), 0.02),
+        (ColumnEffects(friction=900.0, friction_velocity=0.003), 0.02),
+        pytest.param(
+            ColumnEffects(inertia=2000.0),
+            0.2,
+            marks=pytest.mark.xfail(
+                strict=True, reason="straight lines between ticks have no acceleration there"
+            ),
+        ),
+    ],
+    ids=["viscous", "friction", "falling friction", "inertia"],
+)
+def test_the_specimen_alone_with_rates_from_the_ticks(
+    effects: ColumnEffects, share: float, plan: Plan
+) -> None:
+    """Rates come from straight lines between the ticks: near what the servo loop's finer motion gave."""
+    system = System(plan, Effects(column=effects))
+    found = rollout(system)
+    displacement, force = measured(found)
+    got = replay.column(system, displacement)
+    assert np.std(got - force) < share * rest(system, force, displacement)
+
+
+def test_the_plans_mass_and_dashpot_move_as_the_whole_motion_says(plan: Plan) -> None:
+    """Against derivatives written out, to the error of central differences, through a load cell with a gain."""
+    mass, damping, omega, dt = 2000.0, 5e4, 2.0 * math.pi * 3.0, plan.test.interval
+    system = System(plan).moved("column", mass=mass, damping=damping)
+    system = lay(system, [("sensor.column_force.gain", {"factor": 1.07})])
+    t = dt * np.arange(2000)
+    got = replay.column(system, 1e-3 * np.sin(omega * t))
+    stiffness = plan.column.stiffness - mass * omega**2
+    wanted = 1.07e-3 * (stiffness * np.sin(omega * t) + damping * omega * np.cos(omega * t))
+    scale = 1.07e-3 * (mass * omega**2 + damping * omega)
+    assert np.max(np.abs(got - wanted)[2:-2]) < 0.5 * (omega * dt) ** 2 * scale
+
+
+def test_a_column_with_a_dashpot_alone_feels_what_it_felt_in_the_loop(plan: Plan) -> None:
+    """The loop's own short steps beside differences over the ticks."""
+    system = System(plan).moved("column", damping=5e4)
+    found = rollout(system)
+    displacement, force = measured(found)
+    got = replay.column(system, displacement)
+    assert np.std(got - force) < 2e-4 * np.std(force)
+    path = indicators.force_path(got, force, plan.test.interval)
+    assert path.delay == pytest.approx(0.0, abs=2e-6)
+
+
+def test_the_specimen_alone_reads_through_its_load_cell(plan: Plan) -> None:
+    system = lay(
+        System(plan),
+        [
+            ("sensor.column_force.gain", {"factor": 1.07}),
+            ("sensor.column_force.lag", {"time_constant": 0.008}),
+            ("sensor.column_force.bias", {"offset": 300.0}),
+            ("sensor.column_force.drift", {"rate": 30.0}),
+            ("sensor.column_force.quantization", {"step": 100.0}),
+        ],
+    )
+    found = rollout(system)
+    got = replay.column(system, found.master["column_displacement"])
+    # the loop's deformation is that of the ticks too, so rounding to a step can differ by rounding only
+    assert np.mean(got == found.master["column_force"]) > 0.999
+    assert np.max(np.abs(got - found.master["column_force"])) <= 100.0 + 1e-6
+
+
+def test_a_laboratory_that_begins_at_a_command_stays_there(plan: Plan) -> None:
+    got = replay.laboratory_a(System(plan), np.full(50, 2e-3), 2e-3)
+    assert np.allclose(got[:, 0], 2e-3, rtol=1e-12)
+    assert np.allclose(got[1:, 1], 12.5e6 * 2e-3, rtol=1e-12)
+
+
+@pytest.mark.parametrize("tick", [0, 40])
+def test_a_damper_that_begins_anew_swings_freely_from_there(tick: int, plan: Plan) -> None:
+    anew, none = np.array([[tick, 0.03, 0.1]]), np.zeros(800)
+    got = replay.laboratory_b(System(plan), none, none, anew)[:, 2]
+    assert not got[:tick].any()
+    natural, rate = math.sqrt(56.8 / 16.0), 6.0 / 32.0
+    damped, t = math.sqrt(natural**2 - rate**2), plan.test.interval * np.arange(800 - tick)
+    swing = 0.03 * np.cos(damped * t) + (0.1 + rate * 0.03) / damped * np.sin(damped * t)
+    assert np.allclose(got[tick:], np.exp(-rate * t) * swing, atol=1e-12)
+
+
+def test_the_noise_alone_lies_between_a_noisy_loop_and_its_replay(plan: Plan) -> None:
+    found = simulate(plan, ground(System(plan)), seed=8)
+    system = System(plan)
+    a, b = alone(system, found)
+    nominal = signals(plan, found)
+    for name, truth in (
+        ("column_displacement", a[:, 0]),
+        ("column_force", a[:, 1]),
+        ("table_displacement", b[:, 0]),
+        ("table_acceleration", b[:, 1]),
+        ("damper_stroke", b[:, 2]),
+        ("damper_force", b[:, 3]),
+    ):
+        residual = nominal[name] - truth
+        assert residual.std() == pytest.approx(getattr(plan.sensors, name), rel=0.06), name
+        neighbours = np.corrcoef(residual[1:], residual[:-1])[0, 1]
+        assert abs(neighbours) < 4.0 / math.sqrt(residual.size), name
