@@ -14,6 +14,7 @@ import tomli_w
 
 from common.errors import InputError, PlanError
 from common.plan import building, patience
+from common.plan.kinds import NONE, TABLES_OF_KIND, check_kind, known_kind, planned
 from common.plan.schema import fill, nearest, plain
 from common.plan.tables import (
     Actuator,
@@ -21,6 +22,7 @@ from common.plan.tables import (
     Compensator,
     Control,
     Damper,
+    Device,
     GroundMotion,
     Laboratory,
     Limits,
@@ -36,7 +38,7 @@ from common.plan.tables import (
     Test,
     Tolerances,
 )
-from common.roles import name_of, slave_role
+from common.roles import MASTER, name_of, slave_role
 
 PROTOCOL_VERSION = 5
 # eight laboratories on one master take 0.17 ms of a tick of 2 ms (docs/reference/benchmarks.md)
@@ -64,6 +66,7 @@ class Plan:
     table: Table = Table()
     damper: Damper = Damper()
     control: Control = Control()
+    device: Device = Device()
     sensors: Sensors = Sensors()
     link: Link = Link()
     safety: Safety = Safety()
@@ -111,14 +114,26 @@ class Plan:
     @property
     def roles(self) -> tuple[str, ...]:
         """The role of every slave, in the order of the file."""
+        if not self.slaves and self.slave.kind == NONE:
+            return ()
         return tuple(map(slave_role, self.slaves or [""]))
 
+    @property
+    def kinds(self) -> dict[str, str]:
+        """The kind of laboratory of each role that has one, the master's first: a name, or a class of the user's."""
+        slaves = {slave_role(name): lab.kind for name, lab in self.slaves.items()}
+        slaves = slaves or dict.fromkeys(self.roles, self.slave.kind)
+        given = {MASTER: self.master.kind} | slaves
+        return {role: kind for role, text in given.items() if (kind := planned(role, text)) != NONE}
+
     def of(self, role: str) -> Plan:
-        """The plan as one slave sees it: its own table, damper, control and rig in the usual places.
+        """The plan as the master or one slave sees it: what is its laboratory's own stands in the usual places.
 
         Raises:
             InputError: the plan has no such slave.
         """
+        if role == MASTER:
+            return self
         self.slave_role(name_of(role))
         if not self.slaves:
             return self
@@ -126,7 +141,7 @@ class Plan:
         parts = {name: getattr(lab, name) for name in INTERFACE}
         own = lab.table.compensator != self.table.compensator
         follows_in = f"{role}.{FOLLOWS_IN}" if own else FOLLOWS_IN
-        return replace(self, slave=Laboratory(lab.rig), slaves={}, follows_in=follows_in, **parts)
+        return replace(self, slave=Laboratory(lab.rig, lab.kind), slaves={}, follows_in=follows_in, **parts)
 
     def slave_role(self, name: str) -> str:
         """The role of the slave of that name, empty for the one without.
@@ -157,8 +172,19 @@ class Plan:
         """The plan as nested plain values, all defaults written out."""
         tables = {name: plain(getattr(self, name)) for name in TABLES}
         if self.slaves:
-            tables["slave"] = {name: plain(lab) for name, lab in self.slaves.items()}
+            tables["slave"] = {name: self.tables_of(name) for name in self.slaves}
+        for lab in (tables["master"], tables["slave"]):
+            if lab.get("kind") == "":
+                del lab["kind"]
+        if self.device == Device():
+            del tables["device"]
         return tables
+
+    def tables_of(self, name: str) -> dict[str, Any]:
+        """The tables of a named slave: those that its kind of laboratory takes, and its kind where it is given."""
+        lab = plain(self.slaves[name])
+        wanted = (*TABLES_OF_KIND[known_kind(planned(slave_role(name), lab["kind"]))], "rig")
+        return {part: lab[part] for part in (*(["kind"] if lab["kind"] else []), *wanted)}
 
     def written(self) -> dict[str, Any]:
         """As `tables`, without the figures that were eased: beside a rig they are strict again."""
@@ -197,7 +223,8 @@ class Plan:
 
 BESIDE = ("slaves", "base", "follows_in", "eased")  # no tables of a file
 TABLES = tuple(name for name in Plan.__dataclass_fields__ if name not in BESIDE)
-INTERFACE = ("table", "damper", "control")  # what a named slave may have of its own
+INTERFACE = tuple(dict.fromkeys(name for names in TABLES_OF_KIND.values() for name in names))
+"""The tables that a named slave may have of its own, those of all kinds."""
 
 
 def load(path: Path) -> Plan:
@@ -240,6 +267,7 @@ def from_tables(tables: dict[str, Any], base: Path) -> Plan:
         given["structure"] = building.with_modal_damping(given["structure"], tables["structure"])
     plan = Plan(base=base, **given)
     plan = replace(plan, slaves={name: slave_laboratory(plan, name, slaves[name]) for name in slaves})
+    check_laboratories(plan)
     building.check(plan)
     if plan.ticks < 1:
         raise PlanError(f"duration in [test] is {plan.test.duration} s, shorter than one interval.")
@@ -249,13 +277,23 @@ def from_tables(tables: dict[str, Any], base: Path) -> Plan:
     return plan
 
 
+def check_laboratories(plan: Plan) -> None:
+    """Raise PlanError where a kind is none, or no process would have a laboratory."""
+    for role in (MASTER, "slave"):
+        check_kind(getattr(plan, role).kind, role)
+    if not plan.kinds:
+        raise PlanError(
+            "Neither [master] nor [slave] has a laboratory: give one of them a kind other than 'none'."
+        )
+
+
 def named_slaves(given: object) -> dict[str, dict[str, Any]]:
     """The slaves that [slave] names, none where it holds the rig of the only one.
 
     Raises:
         PlanError: names and a rig are mixed, a name is not valid, or there are too many.
     """
-    if not isinstance(given, dict) or given.keys() <= {"rig"}:
+    if not isinstance(given, dict) or given.keys() <= {"rig", "kind"}:
         return {}
     for name, table in given.items():
         if not isinstance(table, dict):
@@ -280,7 +318,8 @@ def named_slaves(given: object) -> dict[str, dict[str, Any]]:
 def slave_laboratory(plan: Plan, name: str, given: dict[str, Any]) -> SlaveLaboratory:
     """The laboratory of a named slave, on top of the plan's own tables."""
     where = f"slave.{name}"
-    known = (*INTERFACE, "rig")
+    kind = check_kind(given.get("kind", ""), where)
+    known = (*TABLES_OF_KIND[known_kind(planned(slave_role(name), kind))], "rig", "kind")
     for entry in given:
         if entry not in known:
             raise PlanError(f"Unknown key '{entry}' in [{where}]: {nearest(entry, known)}")
@@ -289,7 +328,7 @@ def slave_laboratory(plan: Plan, name: str, given: dict[str, Any]) -> SlaveLabor
         own, common = given.get(part, {}), getattr(plan, part)
         merged = plain(common) | own if isinstance(own, dict) else own
         parts[part] = fill(type(common), merged, f"{where}.{part}")
-    return SlaveLaboratory(rig=fill(Rig, given.get("rig", {}), f"{where}.rig"), **parts)
+    return SlaveLaboratory(rig=fill(Rig, given.get("rig", {}), f"{where}.rig"), kind=kind, **parts)
 
 
 def check_tolerances(plan: Plan) -> None:

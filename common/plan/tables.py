@@ -419,24 +419,49 @@ class Rig:
 
 
 @dataclass(frozen=True)
+class Device:
+    """What a laboratory of a kind of the user's takes from the plan, beside that kind's own class."""
+
+    place: int = key("storey whose drift, or floor whose motion, the device follows", default=1, least=1)
+    ratio: float = key("target of the device over that motion", default=1.0, above=0.0)
+    scale: float = key("force on the building over force in the laboratory", default=1.0)
+    compensator: TableCompensator = field(
+        default_factory=TableCompensator, metadata={"table": TableCompensator, "more": False}
+    )
+    parameters: dict[str, Any] = key("nominal parameters in place of those of the class", default={})
+    limits: dict[str, Any] = key("limits in place of those of the class", default={})
+    noise: dict[str, Any] = key("rms noise of readings in place of that of the class", default={})
+
+
+@dataclass(frozen=True)
 class Laboratory:
     """Master or slave: what stands in its laboratory."""
 
     rig: Rig = field(default_factory=Rig, metadata={"table": Rig, "more": False})
+    kind: str = key(
+        "kind of laboratory: column, table, none, or 'file.py:Class' of one's own; empty: a master's is column, a "
+        "slave's table",
+        default="",
+    )
 
 
 @dataclass(frozen=True)
 class SlaveLaboratory:
     """One of several slaves: what stands in its laboratory, and its interface to the structure.
 
-    A key that the plan gives in `[slave.NAME.table]`, `.damper` or `.control` holds for this slave; the others are
-    those of the plan's own tables. A table's compensator is taken whole.
+    A key that the plan gives in a table of this slave, `[slave.NAME.table]` for example, holds for this slave; the
+    others are those of the plan's own table of that name. A compensator is taken whole.
     """
 
     table: Table = Table()
     damper: Damper = Damper()
     control: Control = Control()
     rig: Rig = field(default_factory=Rig)
+    kind: str = ""
+    actuator: Actuator = Actuator()
+    column: Column = Column()
+    compensator: Compensator = Compensator()
+    device: Device = Device()
 
 
 @dataclass(frozen=True)
