@@ -1,98 +1,79 @@
-"""Kinds of laboratory: what the simulated loop must know of a laboratory, one entry each, listed here.
+"""The kinds of laboratory by name, those of users included, and the kernel that moves a laboratory of any kind on.
 
-A kind is a record of arrays with a kernel that moves it on by one interval. The compiled loop chooses the kernel by the
-record's class, so that laboratories of different kinds stand in one loop without a table of functions at run time. A
-further kind is one record, one kernel and one entry.
+A laboratory at work is a record of arrays. The compiled loop chooses the kernel by the record's class, so that
+laboratories of different kinds stand in one loop without a table of functions at run time. All kinds of users share one
+record, which carries its kernel as an address: no kernel of the loop has to be compiled anew for them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from functools import cache
+from pathlib import Path
+from typing import Any
 
 from numba.core import types
 from numba.extending import overload
 
+from common.errors import InputError
 from common.plan.plan import Plan
-from common.signals import MEASURED
-from laboratories.column import model as column_lab
-from laboratories.column.model import ColumnLab
-from laboratories.table import model as table_lab
-from laboratories.table.model import TableLab
+from common.plan.plugins import construct, find
+from common.roles import MASTER
+from laboratories.column.kind import COLUMN
+from laboratories.device import Device, DeviceRecord, advance_device
+from laboratories.kind import Kind
+from laboratories.table.kind import TABLE
 from models.compiled import MERGED
 from models.registry import Array
-from models.system import System
+
+KINDS: dict[str, Kind] = {kind.name: kind for kind in (COLUMN, TABLE)}
+"""The kinds that ship, by the names that a plan gives them."""
+
+KERNELS: dict[type[Any], Callable[..., None]] = {kind.record: kind.advance for kind in KINDS.values()} | {
+    DeviceRecord: advance_device
+}
 
 
-class Kind(NamedTuple):
-    """One kind of laboratory; signals by the names of the one table."""
+def kind_of(plan: Plan, role: str) -> Kind:
+    """The kind of laboratory that a role of the plan hosts.
 
-    name: str
-    record: type[Any]  # NamedTuple of the laboratory at work, which `advance` moves on
-    build: Callable[[System], Any]  # that record at rest, of a system
-    advance: Callable[..., None]  # (record, truth, command, effort): one interval, see `advance`
-    drives: tuple[str, ...]  # commands that move it: the transfer system's, and a motor's where it has one
-    measured: tuple[str, ...]  # channels, in the order of the kernel's
-    follows: str  # of these, what a compensator compares with the target
-    force: str  # of these, the force that goes back to the building
-    scale: Callable[[Plan], float]  # the building feels that force times this
+    Raises:
+        InputError: it hosts none, or the class that the plan names cannot be loaded or is no kind.
+    """
+    if role not in plan.kinds:
+        raise InputError(f"The plan gives the {role} no laboratory: look at its kind.")
+    return named(plan.kinds[role], plan.base, f"[{role}] kind")
 
 
-def build_column(system: System) -> ColumnLab:
-    """Actuator and column of a system, at rest."""
-    plan, effects = system.plan, system.effects
-    return column_lab.build(plan.test.interval, plan.actuator, plan.column, effects.actuator, effects.column)
+def kinds_of(plan: Plan) -> dict[str, Kind]:
+    """The kind of every role that has a laboratory, the master's first; raises InputError as `kind_of`."""
+    return {role: kind_of(plan, role) for role in plan.kinds}
 
 
-def build_table(system: System) -> TableLab:
-    """Shaking table and damper of a system, at rest."""
-    plan, effects = system.plan, system.effects
-    return table_lab.build(plan.test.interval, plan.table, plan.damper, effects.table, effects.damper)
+def own(plan: Plan) -> Kind | None:
+    """The kind that the master hosts, None where it has no laboratory; raises InputError as `kind_of`."""
+    return kind_of(plan, MASTER) if MASTER in plan.kinds else None
 
 
-def advance_column(lab: ColumnLab, truth: Array, command: float, effort: float) -> None:
-    """An actuator and its column: displacement (m) and force (N); the actuator's command alone moves it."""
-    truth[0], truth[1] = column_lab.advance(lab, command)
+def named(name: str, base: Path, where: str) -> Kind:
+    """The kind of that name, or the class 'file.py:Class', whose path starts from `base`; `where` stands in errors.
+
+    Raises:
+        InputError: the class cannot be loaded or is no kind.
+    """
+    return KINDS[name] if name in KINDS else _loaded(name, base, where)
 
 
-def advance_table(lab: TableLab, truth: Array, command: float, effort: float) -> None:
-    """A table and its damper: displacement, acceleration, stroke, force; `effort` is the motor's command (N)."""
-    truth[0], truth[1], truth[2], truth[3] = table_lab.advance(lab, command, effort)
-
-
-def column_scale(plan: Plan) -> float:
-    """Columns of the storey that the specimen stands for."""
-    return float(plan.column.represents)
-
-
-def table_scale(plan: Plan) -> float:
-    """Scale of the damper's force; zero where the building does without the damper."""
-    return plan.damper.force_scale if plan.control.amd else 0.0
-
-
-COLUMN = Kind(
-    "column",
-    ColumnLab,
-    build_column,
-    advance_column,
-    ("actuator_command",),
-    MEASURED["master"],
-    "column_displacement",
-    "column_force",
-    column_scale,
-)
-TABLE = Kind(
-    "table",
-    TableLab,
-    build_table,
-    advance_table,
-    ("table_command", "damper_command"),
-    MEASURED["slave"],
-    "table_displacement",
-    "damper_force",
-    table_scale,
-)
-KINDS = {kind.name: kind for kind in (COLUMN, TABLE)}
+@cache
+def _loaded(reference: str, base: Path, where: str) -> Kind:
+    found = find(reference, base, where)
+    if not issubclass(found, Device):
+        raise InputError(
+            f"{found.__name__} named in {where} is no kind of laboratory: derive it from laboratories.device.Device."
+        )
+    kind: Device = construct(found, {}, where)
+    kind.check(where)
+    return kind
 
 
 def advance(lab: Any, truth: Array, command: float, effort: float) -> None:
@@ -107,5 +88,4 @@ def advance(lab: Any, truth: Array, command: float, effort: float) -> None:
 @overload(advance, jit_options=MERGED, strict=False)  # strict compares annotations too
 def _kernel(lab: types.Type, truth: Any, command: Any, effort: Any) -> Callable[..., None] | None:
     """The kernel of a record's class."""
-    found = [kind.advance for kind in KINDS.values() if kind.record is getattr(lab, "instance_class", None)]
-    return found[0] if found else None
+    return KERNELS.get(getattr(lab, "instance_class", None))  # type: ignore[arg-type]

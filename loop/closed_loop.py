@@ -18,8 +18,10 @@ from common.errors import InputError
 from common.plan.plan import Plan
 from common.roles import MASTER, name_of
 from laboratories import kinds
-from laboratories.kinds import COLUMN, TABLE, Kind
+from laboratories.column.kind import COLUMN
+from laboratories.kind import Kind
 from laboratories.sensors import noise
+from laboratories.table.kind import TABLE
 from loop import site, substructure
 from loop.site import Site
 from loop.substructure import (
@@ -42,7 +44,9 @@ from models.system import Effects, System
 Index = NDArray[np.int64]
 
 LARGEST = float(np.finfo(np.float64).max)  # m: every command that is a finite number is below
-DISPLACEMENT, FORCE = map(COLUMN.measured.index, (COLUMN.follows, COLUMN.force))  # of the master's laboratory
+DISPLACEMENT, FORCE = map(
+    COLUMN.channels.names.index, (COLUMN.channels.position, COLUMN.channels.force)
+)  # of the master's laboratory
 
 
 class Exchange(NamedTuple):
@@ -173,8 +177,8 @@ def follower(kind: Kind, system: System, errors: Array) -> Slave:
     return Slave(
         site.build(kind, system, errors),
         compensators.build(chosen.kind, chosen.parameters, plan.test.interval, plan.follows_in),
-        kind.measured.index(kind.follows),
-        kind.measured.index(kind.force),
+        kind.channels.names.index(kind.channels.position),
+        kind.channels.names.index(kind.channels.force),
         np.zeros(ticks),
         np.zeros(1),
     )
@@ -197,7 +201,7 @@ def errors(systems: Mapping[str, System], seed: int | None, given: Mapping[str, 
         if given[role].shape != result[role].shape:
             raise InputError(
                 f"The noise has the shape {given[role].shape}: give one row per tick, {ticks}, "
-                f"with {', '.join(kind.measured)}."
+                f"with {', '.join(kind.channels.names)}."
             )
         result[role] = np.ascontiguousarray(given[role], dtype=np.float64)
     return result
@@ -278,15 +282,15 @@ def master_signals(plan: Plan, loop: Loop, ticks: int) -> dict[str, Array]:
     """What the master computed, measured and used."""
     slaves = len(loop.slaves)
     computed = substructure.named(loop.traffic.outputs[:ticks], slaves, plan.storeys)
-    measured = dict(zip(COLUMN.measured, loop.own.measured[:ticks].T, strict=True))
+    measured = dict(zip(COLUMN.channels.names, loop.own.measured[:ticks].T, strict=True))
     used = loop.traffic.used[:ticks]
     return computed | measured | {"damper_force_used": used[:, 0] if slaves == 1 else used}
 
 
 def slave_signals(slave: Slave, ticks: int) -> dict[str, Array]:
     """What a slave wrote and measured."""
-    measured = dict(zip(TABLE.measured, slave.site.measured[:ticks].T, strict=True))
-    return {TABLE.drives[0]: slave.written[:ticks]} | measured
+    measured = dict(zip(TABLE.channels.names, slave.site.measured[:ticks].T, strict=True))
+    return {TABLE.channels.drives[0]: slave.written[:ticks]} | measured
 
 
 def signals(plan: Plan, rollout: Rollout) -> dict[str, Array]:

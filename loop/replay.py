@@ -11,11 +11,13 @@ import numpy as np
 
 from laboratories.column import model as column_lab
 from laboratories.column import specimen
+from laboratories.column.kind import COLUMN
 from laboratories.column.specimen import Specimen
-from laboratories.kinds import COLUMN, TABLE, Kind
+from laboratories.kind import Kind
 from laboratories.sensors import readings
 from laboratories.sensors.readings import Readings
 from laboratories.table import model as table_lab
+from laboratories.table.kind import TABLE
 from loop import site, substructure
 from loop.site import Site
 from loop.substructure import Substructure
@@ -23,7 +25,7 @@ from models.compiled import jit
 from models.registry import Array
 from models.system import System
 
-STROKE = TABLE.measured.index("damper_stroke")  # channel
+STROKE = TABLE.channels.names.index("damper_stroke")  # channel
 
 
 def laboratory_a(system: System, command: Array, start: float = 0.0) -> Array:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from laboratories import kinds
-from laboratories.kinds import Kind
+from laboratories.kind import Kind
 from laboratories.sensors import noise, readings
 from laboratories.sensors.readings import Readings
 from models.compiled import jit
@@ -30,16 +30,18 @@ class Site(NamedTuple):
 
 def build(kind: Kind, system: System, errors: Array) -> Site:
     """A laboratory of a system at rest, for as many ticks as `errors` (ticks, channels) has rows."""
-    sensors = readings.build(system.plan.test.interval, kind.measured, system.effects.sensors)
-    return Site(kind.build(system), sensors, errors, np.zeros(len(kind.measured)), np.zeros(errors.shape))
+    sensors = readings.build(system.plan.test.interval, kind.channels.names, system.effects.sensors)
+    return Site(
+        kind.build(system), sensors, errors, np.zeros(len(kind.channels.names)), np.zeros(errors.shape)
+    )
 
 
 def errors(kind: Kind, system: System, ticks: int, seed: int | None = None) -> Array:
     """Noise of a laboratory's readings, (ticks, channels), under the seed of that laboratory; zero without one."""
     if seed is None:
-        return np.zeros((ticks, len(kind.measured)))
-    nominal = noise.levels(system.plan.sensors, kind.measured)
-    levels = readings.levels(kind.measured, nominal, system.effects.sensors)
+        return np.zeros((ticks, len(kind.channels.names)))
+    nominal = noise.levels(system.plan.sensors, kind.channels.names)
+    levels = readings.levels(kind.channels.names, nominal, system.effects.sensors)
     return noise.Noise(seed, levels).rows(ticks)
 
 

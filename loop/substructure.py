@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from common.plan.building import is_matrix
 from common.plan.plan import Plan, resolve
 from common.signals import OF_BUILDING, OF_STOREYS, SENT
-from laboratories import kinds
+from laboratories.column.kind import COLUMN
+from laboratories.table.kind import TABLE
 from loop.nominal import partition
 from models import compensators, force_correction, integrators, specimens, trend
 from models.compensators import Built as Compensator
@@ -116,7 +117,7 @@ def build(plan: Plan, rows: Array, p_delta: float = 0.0, *, slaves: bool = True)
     scalars = [
         plan.test.interval,
         column.deformation_ratio,
-        kinds.COLUMN.scale(plan),
+        COLUMN.coupling(plan).scale,
         *force_correction.coefficients(chosen.force, plan.test.interval),
         p_delta,
         float(chosen.force.unit_delay),
@@ -173,7 +174,7 @@ def integration(plan: Plan) -> integrators.Method:
 
 def damper(plan: Plan) -> tuple[float, float, float]:
     """A slave's column of `dampers`; zero where the building does without the damper."""
-    force_scale = kinds.TABLE.scale(plan)
+    force_scale = TABLE.coupling(plan).scale
     return force_scale, plan.control.gain / plan.damper.force_scale if force_scale else 0.0, 0.0
 
 

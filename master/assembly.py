@@ -15,7 +15,7 @@ from common.plan.plugins import construct, find
 from common.plan.reality import Reality
 from common.rig import METHODS, AtRest, ColumnMeasurement, GuardedRig
 from laboratories.column import model as column_lab
-from laboratories.kinds import COLUMN
+from laboratories.column.kind import COLUMN
 from laboratories.sensors import noise, readings
 from loop import substructure
 from loop.links import link_model

@@ -38,7 +38,7 @@ from common.rig import ColumnCommand, ColumnMeasurement, GuardedRig
 from common.roles import MASTER, RECORDER
 from common.safety.modes import Turn
 from common.safety.watchdog import Finding
-from master.descent import ColumnRamp
+from laboratories.column.descent import ColumnRamp
 from master.handshake import Handshake
 from master.limits import MasterLimits
 from master.partner import Partner

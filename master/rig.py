@@ -10,7 +10,7 @@ from common.plan import schema
 from common.plan.tables import Actuator, Column, Sensors
 from common.rig import ColumnCommand, ColumnMeasurement
 from laboratories.column import model as column_lab
-from laboratories.kinds import COLUMN
+from laboratories.column.kind import COLUMN
 from laboratories.sensors import noise, readings
 from models.compiled import plain
 from models.system import Effects
@@ -29,7 +29,7 @@ class ColumnLab:
         effects: Effects | None = None,
     ) -> None:
         more = effects or Effects()
-        levels = noise.levels(schema.fill(Sensors, sensors or {}, "sensors"), COLUMN.measured)
+        levels = noise.levels(schema.fill(Sensors, sensors or {}, "sensors"), COLUMN.channels.names)
         lab = column_lab.build(
             interval,
             schema.fill(Actuator, actuator or {}, "actuator"),
@@ -38,8 +38,8 @@ class ColumnLab:
             more.column,
         )
         self._lab = plain(lab)
-        self._readings = readings.build(interval, COLUMN.measured, more.sensors)
-        self._noise = noise.Noise(seed, readings.levels(COLUMN.measured, levels, more.sensors))
+        self._readings = readings.build(interval, COLUMN.channels.names, more.sensors)
+        self._noise = noise.Noise(seed, readings.levels(COLUMN.channels.names, levels, more.sensors))
         self._plain = not more.sensors  # a reading is value plus noise
         self._interval, self._tick = interval, 0
         self._true = (0.0, 0.0)

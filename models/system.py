@@ -104,6 +104,9 @@ class Effects:
     damper: DamperEffects = DamperEffects()
     link: LinkEffects = LinkEffects()
     sensors: dict[str, SensorEffects] = field(default_factory=dict)
+    device: dict[str, float] = field(
+        default_factory=dict
+    )  # what effects set on a device of a user's kind, by name
 
 
 def times(factor: float, value: Any) -> Any:

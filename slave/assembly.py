@@ -14,9 +14,9 @@ from common.plan.plugins import construct, find
 from common.plan.reality import Reality
 from common.rig import METHODS, AtRest, GuardedRig, TableMeasurement
 from common.roles import name_of, title
-from laboratories.kinds import TABLE
 from laboratories.sensors import noise, readings
 from laboratories.table import model as table_lab
+from laboratories.table.kind import TABLE
 from loop.links import link_model
 from loop.realised import true_system
 from models.compiled import plain

@@ -34,7 +34,7 @@ from common.rig import GuardedRig, TableCommand, TableMeasurement
 from common.roles import MASTER, SLAVE
 from common.safety.modes import Turn
 from common.safety.watchdog import Finding, Watchdog
-from slave.descent import TableRamp
+from laboratories.table.descent import TableRamp
 from slave.handshake import Handshake
 from slave.limits import SlaveLimits
 from slave.step import SlaveStep

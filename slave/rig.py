@@ -9,9 +9,9 @@ from typing import Any
 from common.plan import schema
 from common.plan.tables import Damper, Sensors, Table
 from common.rig import TableCommand, TableMeasurement
-from laboratories.kinds import TABLE
 from laboratories.sensors import noise, readings
 from laboratories.table import model as table_lab
+from laboratories.table.kind import TABLE
 from models.compiled import plain
 from models.system import Effects
 
@@ -29,7 +29,7 @@ class TableLab:
         effects: Effects | None = None,
     ) -> None:
         more = effects or Effects()
-        levels = noise.levels(schema.fill(Sensors, sensors or {}, "sensors"), TABLE.measured)
+        levels = noise.levels(schema.fill(Sensors, sensors or {}, "sensors"), TABLE.channels.names)
         lab = table_lab.build(
             interval,
             schema.fill(Table, table or {}, "table"),
@@ -38,8 +38,8 @@ class TableLab:
             more.damper,
         )
         self._lab = plain(lab)
-        self._readings = readings.build(interval, TABLE.measured, more.sensors)
-        self._noise = noise.Noise(seed, readings.levels(TABLE.measured, levels, more.sensors))
+        self._readings = readings.build(interval, TABLE.channels.names, more.sensors)
+        self._noise = noise.Noise(seed, readings.levels(TABLE.channels.names, levels, more.sensors))
         self._plain = not more.sensors  # a reading is value plus noise
         self._interval, self._tick = interval, 0
         self._true = (0.0, 0.0, 0.0, 0.0)

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, Generic, NamedTuple, Protocol, TypeVar
+from typing import Generic, NamedTuple, TypeVar
 
 from common.errors import EmergencyStopError, RigError
 from common.lab.laboratory import Laboratory
 from common.protocol.exchange import Event
 from common.rig import GuardedRig
 from common.roles import ramp_topic
+from common.safety.ramp import Ramp
 
 Command = TypeVar("Command", bound=tuple[float, ...])
-Command_co = TypeVar("Command_co", bound=tuple[float, ...], covariant=True)
 
 
 class Resting(NamedTuple):
@@ -23,28 +23,6 @@ class Resting(NamedTuple):
     text: str  # what it does, and how long at most
 
 
-class Ramp(Protocol[Command_co]):
-    """Commands that bring a rig to rest."""
-
-    def step(self, measured: Any | None) -> Command_co:
-        """The command for the coming interval; `measured` is what the rig reads, None where it gives nothing."""
-
-    @property
-    def done(self) -> bool:
-        """Whether the commands are at rest."""
-
-    @property
-    def travel(self) -> float:
-        """How far apart the displacement commands have been, m."""
-
-    @property
-    def left(self) -> float:
-        """How long it takes at most from here on, s."""
-
-    def doing(self, measured: Any | None) -> str:
-        """What it does, in words, with what is left by a measurement."""
-
-
 class Descent(Generic[Command]):
     """Knows the last two commands written, from which `begin` makes a ramp when the rig is to come to rest."""
 
@@ -52,7 +30,7 @@ class Descent(Generic[Command]):
         self,
         lab: Laboratory,
         rig: GuardedRig,
-        begin: Callable[[Command, Command], Ramp[Command]],
+        begin: Callable[[tuple[float, ...], tuple[float, ...]], Ramp],
         zero: Command,
         readings: int,
     ) -> None:
@@ -60,8 +38,9 @@ class Descent(Generic[Command]):
         self._rig = rig
         self._make = begin
         self._last = self._before = zero
+        self._command: Callable[..., Command] = type(zero)
         self._blank = (math.nan,) * readings
-        self._ramp: Ramp[Command] | None = None
+        self._ramp: Ramp | None = None
         self._begun = 0
         self._settling = 0  # intervals at rest
         self._measured: tuple[float, ...] | None = None
@@ -104,7 +83,7 @@ class Descent(Generic[Command]):
     def step(self, tick: int, measured: tuple[float, ...] | None) -> None:
         """One interval of which the measurement is known, None where the rig gives none."""
         ramp = self._ramp or self._begin(tick)
-        command = ramp.step(measured)
+        command = self._command(*ramp.step(measured))
         self._measured = measured
         over = self._written(command, tick)
         self._settling += ramp.done
@@ -132,7 +111,7 @@ class Descent(Generic[Command]):
         if self._lab.safety.cause is None:
             self._lab.fail(Event.TRIP, error, code="rig", tick=tick)
 
-    def _begin(self, tick: int) -> Ramp[Command]:
+    def _begin(self, tick: int) -> Ramp:
         self._begun = tick
         self._ramp = self._make(self._last, self._before)
         return self._ramp

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from enum import Enum, auto
+from typing import Any, Protocol
 
 from common.plan.tables import Safety
 from common.safety.speed_change import SpeedChange
@@ -11,6 +12,28 @@ from common.safety.speed_change import SpeedChange
 UNLOADED = 0.01  # of the force at the hold: below it the specimen counts as unloaded
 STEPS = 4  # intervals at most in which a phase ends beside its profile: one each, and the last command
 SLOWEST = 1 / 64  # of the ramp's velocity: a shorter way is not worth a movement
+
+
+class Ramp(Protocol):
+    """Commands that bring a rig to rest."""
+
+    def step(self, measured: Any | None) -> tuple[float, ...]:
+        """The command for the coming interval; `measured` is what the rig reads, None where it gives nothing."""
+
+    @property
+    def done(self) -> bool:
+        """Whether the commands are at rest."""
+
+    @property
+    def travel(self) -> float:
+        """How far apart the displacement commands have been, m."""
+
+    @property
+    def left(self) -> float:
+        """How long it takes at most from here on, s."""
+
+    def doing(self, measured: Any | None) -> str:
+        """What it does, in words, with what is left by a measurement."""
 
 
 class _Phase(Enum):

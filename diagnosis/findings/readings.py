@@ -9,7 +9,8 @@ import numpy as np
 from diagnosis.fits.fitting import Data
 from diagnosis.recorded.record import Record
 from diagnosis.signals.noise import quantum
-from laboratories.kinds import COLUMN, TABLE
+from laboratories.column.kind import COLUMN
+from laboratories.table.kind import TABLE
 from models.registry import Array
 
 LOUDER = 2.5  # noise over what the plan and the other sensors' noise make expected
@@ -30,7 +31,7 @@ class Reading(NamedTuple):
 def steps(record: Record) -> dict[str, float]:
     """Step of every reading that is rounded to one."""
     found = {}
-    for name in (*COLUMN.measured, *TABLE.measured):
+    for name in (*COLUMN.channels.names, *TABLE.channels.names):
         if record.has(name):
             there = record.signals[name][record.present[name]]
             if np.ptp(there) > 0.0 and (step := quantum(there)) > 0.0:
@@ -41,7 +42,7 @@ def steps(record: Record) -> dict[str, float]:
 def held(record: Record, rounded: dict[str, float]) -> dict[str, float]:
     """Share of samples that repeat the one before to the last bit, of sensors whose noise rules that out."""
     found = {}
-    for name in (*COLUMN.measured, *TABLE.measured):
+    for name in (*COLUMN.channels.names, *TABLE.channels.names):
         if record.has(name) and name not in rounded and np.ptp(record.signals[name]) > 0.0:
             there = record.signals[name][record.present[name]]
             share = float(np.mean(there[1:] == there[:-1]))

@@ -17,8 +17,9 @@ from common.plan.plan import Plan
 from diagnosis.recorded.record import Record
 from diagnosis.signals.mask import Mask
 from laboratories import effects
+from laboratories.column.kind import COLUMN
 from laboratories.effects.effect import Effect
-from laboratories.kinds import COLUMN, TABLE
+from laboratories.table.kind import TABLE
 from loop import replay
 from models.registry import Array
 from models.system import System
@@ -128,7 +129,7 @@ class LaboratoryA:
 
     name = "laboratory A"
     exact = False
-    signals: tuple[str, ...] = COLUMN.measured
+    signals: tuple[str, ...] = COLUMN.channels.names
 
     devices: ClassVar[dict[str, str]] = {"actuator_command": "actuator"}
     units: ClassVar[dict[str, str]] = {"actuator_command": "m"}
@@ -137,12 +138,12 @@ class LaboratoryA:
         self.inputs = {"actuator_command": record.signals["actuator_command"]}
         first, most = self.inputs["actuator_command"][0], np.max(np.abs(self.inputs["actuator_command"]))
         self._start = float(first) if abs(first) > UNREST * most else 0.0
-        self.measured, self.present = outputs(record, COLUMN.measured)
+        self.measured, self.present = outputs(record, COLUMN.channels.names)
         self.nuisances = nuisances(
             record,
             tuple(("actuator", name) for name in ACTUATOR[record.plan.actuator.model]) + OF_COLUMN,
         )
-        sites = ["actuator", *(f"sensor.{name}" for name in COLUMN.measured if record.has(name))]
+        sites = ["actuator", *(f"sensor.{name}" for name in COLUMN.channels.names if record.has(name))]
         with_column = (*sites, "column") if record.has("column_force") else tuple(sites)
         self.candidates = of_sites(with_column, record.plan)
 
@@ -188,18 +189,20 @@ class LaboratoryB:
 
     name = "laboratory B"
     exact = False
-    signals: tuple[str, ...] = TABLE.measured
+    signals: tuple[str, ...] = TABLE.channels.names
     devices: ClassVar[dict[str, str]] = {"table_command": "table", "damper_command": "damper's motor"}
     units: ClassVar[dict[str, str]] = {"table_command": "m", "damper_command": "N"}
 
     def __init__(self, record: Record) -> None:
         none = np.zeros(record.ticks)
         self.inputs = {name: record.signals.get(name, none) for name in self.devices}
-        self.measured, self.present = outputs(record, TABLE.measured)
+        self.measured, self.present = outputs(record, TABLE.channels.names)
         driven = record.has("table_command") and float(np.ptp(self.inputs["table_command"])) > 0.0
         self.nuisances = nuisances(record, (*OF_TABLE, *OF_DAMPER) if driven else OF_DAMPER)
         moving = [
-            name for name, values in zip(TABLE.measured, self.measured.T, strict=True) if np.ptp(values) > 0.0
+            name
+            for name, values in zip(TABLE.channels.names, self.measured.T, strict=True)
+            if np.ptp(values) > 0.0
         ]
         sites = [f"sensor.{name}" for name in moving if record.has(name)] + (["table"] if driven else [])
         self.anew = self.beginnings(record)

@@ -22,10 +22,11 @@ from common.plan.tables import Actuator, Column, Damper, Table
 from common.rig import ColumnCommand, TableCommand
 from laboratories.column import model as column_lab
 from laboratories.column import specimen
+from laboratories.column.kind import COLUMN
 from laboratories.effects import CATALOGUE, lay, null_parameters
 from laboratories.effects.effect import Effect, Parameter
-from laboratories.kinds import COLUMN, TABLE
 from laboratories.table import model as table_lab
+from laboratories.table.kind import TABLE
 from loop import substructure
 from loop.closed_loop import Rollout, signals, simulate, stacked
 from master.rig import ColumnLab
@@ -121,7 +122,7 @@ def test_an_effect_in_the_rigs_shows_only_at_its_laboratory(plan: Plan) -> None:
         differs = np.any(np.array(rigs(changed)) != before, axis=0)
         part, _, signal = effect.site.partition(".")
         if part == "sensor":
-            place = (*COLUMN.measured, *TABLE.measured).index(signal)
+            place = (*COLUMN.channels.names, *TABLE.channels.names).index(signal)
             assert np.flatnonzero(differs).tolist() == [place], effect.name
         else:
             in_a, in_b = part in ("actuator", "column"), part in ("table", "damper")

@@ -15,9 +15,9 @@ from scipy.integrate import solve_ivp
 
 from common.plan.tables import Actuator, Column, Damper, Sensors, Table
 from laboratories.column import model as column_lab
-from laboratories.kinds import TABLE
 from laboratories.sensors import noise
 from laboratories.table import model as table_lab
+from laboratories.table.kind import TABLE
 from models.transfer_systems import delay
 
 DT = 0.002
@@ -192,7 +192,7 @@ def test_the_dampers_force_balances_its_motion() -> None:
 
 
 def test_noise_is_the_same_one_by_one_and_at_once() -> None:
-    levels = noise.levels(Sensors(), TABLE.measured)
+    levels = noise.levels(Sensors(), TABLE.channels.names)
     single, whole = noise.Noise(3, levels), noise.Noise(3, levels)
     rows = whole.rows(2500)
     assert np.array_equal(rows, [single.row() for _ in range(2500)])

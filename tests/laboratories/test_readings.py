@@ -15,9 +15,10 @@ from scipy.integrate import solve_ivp
 from common.plan.plan import Plan
 from common.plan.tables import Sensors
 from common.rig import ColumnCommand, TableCommand
+from laboratories.column.kind import COLUMN
 from laboratories.effects import CATALOGUE, lay
-from laboratories.kinds import COLUMN, TABLE
 from laboratories.sensors import noise, readings
+from laboratories.table.kind import TABLE
 from loop import substructure
 from loop.closed_loop import Rollout, simulate
 from master.rig import ColumnLab
@@ -150,9 +151,9 @@ def test_quantisation_errors_are_those_of_widrow() -> None:
     assert abs(error.mean()) < 4.0 * error.std() / math.sqrt(values.size)
 
 
-@pytest.mark.parametrize("name", [*COLUMN.measured, *TABLE.measured])
+@pytest.mark.parametrize("name", [*COLUMN.channels.names, *TABLE.channels.names])
 def test_levels_add_as_independent_noises_do(name: str) -> None:
-    names = COLUMN.measured if name in COLUMN.measured else TABLE.measured
+    names = COLUMN.channels.names if name in COLUMN.channels.names else TABLE.channels.names
     nominal = noise.levels(Sensors(), names)
     found = readings.levels(names, nominal, {name: SensorEffects(noise=3.0)})
     for place, other in enumerate(names):
@@ -178,13 +179,13 @@ SIZES = {"gain": 1.1, "bias": 0.02, "drift": 0.01, "lag": 0.005, "delay": 0.0071
 
 
 @pytest.mark.parametrize("kind", SIZES)
-@pytest.mark.parametrize("name", [*COLUMN.measured, *TABLE.measured])
+@pytest.mark.parametrize("name", [*COLUMN.channels.names, *TABLE.channels.names])
 def test_the_rigs_falsify_the_reading_named_and_the_truth_stays(name: str, kind: str) -> None:
     """From one laboratory's readings without the effect, those with it by the formula."""
     effect = CATALOGUE[f"sensor.{name}.{kind}"]
     size = SIZES[kind] * (1.0 if kind in ("gain", "lag", "delay") else min(effect.parameters[0].most, 1.0))
     system = lay(System(Plan()), [(effect.name, {effect.parameters[0].name: size})])
-    quiet = dict.fromkeys((*COLUMN.measured, *TABLE.measured), 0.0)
+    quiet = dict.fromkeys((*COLUMN.channels.names, *TABLE.channels.names), 0.0)
     rows: list[list[tuple[float, ...]]] = []
     for effects in (Effects(), system.effects):
         lab_a = ColumnLab(DT, 1, sensors=quiet, effects=effects)
@@ -195,7 +196,7 @@ def test_the_rigs_falsify_the_reading_named_and_the_truth_stays(name: str, kind:
             lab_a.write(ColumnCommand(2e-3 * math.sin(0.03 * tick)))
             lab_b.write(TableCommand(1e-2 * math.sin(0.02 * tick), 30.0 * math.sin(0.04 * tick)))
     plain, falsified = np.array(rows[0]), np.array(rows[1])
-    place = (*COLUMN.measured, *TABLE.measured).index(name)
+    place = (*COLUMN.channels.names, *TABLE.channels.names).index(name)
     t, value = DT * np.arange(300), plain[:, place]
     expected = {
         "gain": size * value,

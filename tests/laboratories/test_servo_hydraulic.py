@@ -15,8 +15,8 @@ from scipy.integrate import solve_ivp
 from common.errors import InputError
 from common.plan.plan import Plan, parse
 from common.plan.tables import Actuator, Column, ServoHydraulics
-from laboratories import kinds
 from laboratories.column import model as column_lab
+from laboratories.column.kind import COLUMN as KIND
 from laboratories.effects import lay
 from loop import closed_loop, replay, substructure
 from models.system import ActuatorEffects, ColumnEffects, System
@@ -261,5 +261,5 @@ def test_the_plan_of_the_laboratory_alone_reads_what_the_loop_read(plan: Plan) -
         ground = substructure.ground_rows(base, substructure.motion(base))
         found = closed_loop.simulate(base, ground)
         again = replay.laboratory_a(System(base), found.master["actuator_command"])
-        for values, name in zip(again.T, kinds.COLUMN.measured, strict=True):
+        for values, name in zip(again.T, KIND.channels.names, strict=True):
             assert np.array_equal(values, found.master[name])

@@ -12,7 +12,7 @@ from common.plan.plan import Plan, from_tables, ideal
 from common.plan.tables import Actuator, Compensator, Control
 from common.roles import SLAVE
 from common.signals import TOPICS
-from laboratories.kinds import COLUMN
+from laboratories.column.kind import COLUMN
 from loop import substructure
 from loop.closed_loop import Exchange, on_time, rows, signals, simulate
 from models.structures import shear_building
@@ -117,7 +117,7 @@ def test_the_damper_adds_three_points_of_damping(default_plan: Plan) -> None:
 def test_noise_comes_from_the_seed_alone(short_plan: Plan) -> None:
     rows_ = ground(short_plan)
     first, again, other = (simulate(short_plan, rows_, seed=seed) for seed in (1, 1, 2))
-    for name in COLUMN.measured:
+    for name in COLUMN.channels.names:
         assert np.array_equal(first.master[name], again.master[name])
         assert not np.array_equal(first.master[name], other.master[name])
 

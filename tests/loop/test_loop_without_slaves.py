@@ -18,7 +18,7 @@ from common.plan.tables import Compensator
 from common.roles import MASTER
 from common.signals import OF_BUILDING, OF_STOREYS
 from laboratories import effects
-from laboratories.kinds import COLUMN
+from laboratories.column.kind import COLUMN
 from laboratories.sensors import noise
 from loop import closed_loop, site, substructure
 from loop.closed_loop import Rollout
@@ -46,7 +46,7 @@ def alone(plan: Plan, ground: Array, **options: Any) -> Rollout:
 def assert_same(found: Rollout, whole: Rollout) -> None:
     assert (found.finite, found.ticks) == (whole.finite, whole.ticks)
     assert not found.slaves
-    for name in (*OF_BUILDING, *COLUMN.measured, *OF_STOREYS):
+    for name in (*OF_BUILDING, *COLUMN.channels.names, *OF_STOREYS):
         assert np.array_equal(found.master[name], whole.master[name]), name
 
 

@@ -9,9 +9,10 @@ import pytest
 from numpy.typing import NDArray
 
 from common.plan.plan import Plan
+from laboratories.column.kind import COLUMN
 from laboratories.effects import CATALOGUE, lay
 from laboratories.effects.effect import Effect
-from laboratories.kinds import COLUMN, TABLE
+from laboratories.table.kind import TABLE
 from loop import replay, substructure
 from loop.closed_loop import Rollout, signals, simulate
 from models import indicators
@@ -40,7 +41,7 @@ def rollout(system: System) -> Rollout:
 
 def measured(found: Rollout) -> tuple[Array, Array]:
     """Displacement and force of the column as read."""
-    displacement, force = (found.master[name] for name in COLUMN.measured)
+    displacement, force = (found.master[name] for name in COLUMN.channels.names)
     return displacement, force
 
 
@@ -75,7 +76,10 @@ def test_each_laboratory_alone_reads_to_the_bit_what_it_read_in_the_loop(effect:
     assert found.finite
     a, b = alone(system, found)
     assert a.tobytes() == np.column_stack(measured(found)).tobytes()
-    assert b.tobytes() == np.column_stack([found.slaves["slave"][name] for name in TABLE.measured]).tobytes()
+    assert (
+        b.tobytes()
+        == np.column_stack([found.slaves["slave"][name] for name in TABLE.channels.names]).tobytes()
+    )
 
 
 @EACH

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from common.terminal.telling import Tell, untold
-from laboratories.kinds import COLUMN
+from laboratories.column.kind import COLUMN
 from loop.force_path import force_path
 from models.indicators import ForcePath
 from models.system import Effects, SensorEffects
@@ -40,5 +40,7 @@ def late_force(on: Stage, delay: float) -> Late:
     plan = with_compensator(on.plants[0], SETTINGS[SETTING])
     effects = Effects(sensors={"column_force": SensorEffects(delay=delay)})
     result, rollout = play(on, SETTING, plan, effects=effects)
-    path = force_path(plan, *(rollout.master[name] for name in COLUMN.measured)) if result.stable else None
+    path = (
+        force_path(plan, *(rollout.master[name] for name in COLUMN.channels.names)) if result.stable else None
+    )
     return Late(delay, result, path)

@@ -15,7 +15,7 @@ from common.plan.tables import Compensator
 from common.roles import MASTER
 from common.terminal.telling import Tell, untold
 from laboratories.column import specimen
-from laboratories.kinds import COLUMN
+from laboratories.column.kind import COLUMN
 from laboratories.sensors import noise
 from loop import substructure
 from loop.closed_loop import Rollout, simulate
@@ -71,7 +71,7 @@ def stage(case: Case, motion: Motion, plants: int, seed: int) -> Stage:
     """A case under a motion, its reference computed, its plants and its noise drawn."""
     plan = planned(case, motion)
     ground = substructure.ground_rows(plan, substructure.motion(plan))
-    levels = noise.levels(plan.sensors, COLUMN.measured)
+    levels = noise.levels(plan.sensors, COLUMN.channels.names)
     rows = noise.Noise(noise.lab_seed(plan.test.seed, noise.LAB_A), levels).rows(plan.ticks)
     others = [with_plant(plan, plant) for plant in draw(plan, plants, seed)]
     reference = response.response(plan, ground)

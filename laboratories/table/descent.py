@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 from common.plan.plan import Plan
-from common.rig import TableCommand, TableMeasurement
 from common.safety.ramp import ForceRelease, MotionRamp
 
 
 class TableRamp:
     """The table's and the motor's commands from the last two written on."""
 
-    def __init__(self, plan: Plan, last: TableCommand, before: TableCommand) -> None:
+    def __init__(self, plan: Plan, last: tuple[float, ...], before: tuple[float, ...]) -> None:
         safety, interval = plan.safety, plan.test.interval
-        position = last.table_command
-        velocity = (position - before.table_command) / interval
-        self._table = MotionRamp(safety, interval, position, velocity, unload=False)
-        self._motor = ForceRelease(safety, interval, last.damper_command)
+        velocity = (last[0] - before[0]) / interval
+        self._table = MotionRamp(safety, interval, last[0], velocity, unload=False)
+        self._motor = ForceRelease(safety, interval, last[1])
 
-    def step(self, measured: TableMeasurement | None) -> TableCommand:
+    def step(self, measured: tuple[float, ...] | None) -> tuple[float, ...]:
         """The command for the coming interval, whatever is measured."""
-        return TableCommand(self._table.step(None), self._motor.step())
+        return self._table.step(None), self._motor.step()
 
     @property
     def done(self) -> bool:
@@ -31,7 +29,7 @@ class TableRamp:
         """How long it takes at most from here on, s."""
         return max(self._table.left, self._motor.left)
 
-    def doing(self, measured: TableMeasurement | None) -> str:
+    def doing(self, measured: tuple[float, ...] | None) -> str:
         """What it does, in words, with the force that the motor still has, whatever is measured."""
         return f"bringing the table to a halt: {abs(self._motor.command):.0f} N of motor force left"
 

@@ -1,0 +1,87 @@
+"""The kind `column`: what a plan says of an actuator and its specimen."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+
+from common.plan.plan import Plan
+from common.signals import Signal
+from laboratories.column import model
+from laboratories.column.descent import ColumnRamp
+from laboratories.column.model import ColumnLab
+from laboratories.kind import Channels, Chosen, Coupling, Follows, Kind, Limited, Sensed
+from laboratories.sensors import noise
+from models.registry import Array
+from models.system import System
+
+
+class ColumnKind(Kind):
+    """A hydraulic actuator deforms a specimen, which stands for columns of a storey."""
+
+    name = "column"
+    says = "actuator and column"
+    channels = Channels(
+        target=Signal("column_target", "m", "specimen deformation wanted"),
+        command=Signal(
+            "actuator_command",
+            "m",
+            "command written, to be reached at the end of the interval, or held from the tick on",
+        ),
+        measured=(
+            Signal("column_displacement", "m", "specimen deformation measured"),
+            Signal("column_force", "N", "restoring force of the specimen measured"),
+        ),
+        position="column_displacement",
+        force="column_force",
+    )
+    limited = Limited("actuator_step", "actuator_velocity", "actuator_acceleration", "", "column_error")
+    sensed = (Sensed(("column_displacement", "column_force"), "column_displacement"),)
+    sites = ("actuator", "column")
+    record = ColumnLab
+
+    def build(self, system: System) -> ColumnLab:
+        """Actuator and column of a system, at rest."""
+        plan, effects = system.plan, system.effects
+        return model.build(plan.test.interval, plan.actuator, plan.column, effects.actuator, effects.column)
+
+    @staticmethod
+    def advance(lab: ColumnLab, truth: Array, command: float, effort: float) -> None:
+        """Displacement (m) and force (N); the actuator's command alone moves it."""
+        truth[0], truth[1] = model.advance(lab, command)
+
+    def coupling(self, plan: Plan) -> Coupling:
+        """The specimen's storey; its force resists the drift, `represents` times."""
+        column = plan.column
+        felt = column.deformation_ratio * column.represents
+        return Coupling(
+            follows=Follows.DRIFT,
+            place=column.storey,
+            ratio=column.deformation_ratio,
+            scale=float(column.represents),
+            effort=0.0,
+            correction=plan.compensator.force,
+            stiffness=felt * column.stiffness,
+            damping=felt * column.damping,
+            mass=felt * column.mass,
+            share=column.represents / column.columns_per_storey,
+        )
+
+    def compensator(self, plan: Plan) -> Chosen:
+        """That of `[compensator]`."""
+        return Chosen(plan.compensator.kind, plan.compensator.parameters, "compensator")
+
+    def noise(self, plan: Plan) -> Array:
+        """As `[sensors]` has it."""
+        return noise.levels(plan.sensors, self.channels.names)
+
+    def limits(self, plan: Plan) -> Mapping[str, float]:
+        """As `[limits]` has them."""
+        return {field.name: getattr(plan.limits, field.name) for field in dataclasses.fields(plan.limits)}
+
+    def ramp(self, plan: Plan, last: tuple[float, ...], before: tuple[float, ...]) -> ColumnRamp:
+        """The actuator comes to a hold, then unloads the specimen."""
+        return ColumnRamp(plan, last, before)
+
+
+COLUMN = ColumnKind()

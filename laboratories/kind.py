@@ -1,0 +1,143 @@
+"""What a kind of laboratory says of itself: its channels, its place in the building, its model, its way to rest.
+
+Every laboratory is driven alike. At each tick it is told a target for the interval's end with the target's rates, and
+a force for its motor where it has one. Its compensator makes of that a command, which its transfer system follows;
+what it measures goes back, and one of the measured forces enters the building.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, NamedTuple
+
+from common.plan.plan import Plan
+from common.plan.tables import ForceCorrection
+from common.safety.ramp import Ramp
+from common.signals import Signal
+from models.registry import Array
+from models.system import System
+
+RATES = ("velocity", "acceleration", "jerk")  # of a target, each a signal of its own
+UNITS_OF_RATES = ("m/s", "m/s²", "m/s³")
+
+
+class Follows(Enum):
+    """What of the building's motion a laboratory follows, and with it how its force acts on the building."""
+
+    DRIFT = "drift"  # of a storey; the force resists it, between the storey's two floors
+    FLOOR = "floor"  # absolute displacement of a floor; the force pushes that floor
+
+
+class Coupling(NamedTuple):
+    """The place of a laboratory in the building of a plan."""
+
+    follows: Follows
+    place: int  # storey or floor, from 1
+    ratio: float  # target over that motion
+    scale: float  # force on the building over force measured
+    effort: (
+        float  # motor's force in the laboratory over velocity of the floor or drift, N·s/m; 0 without a motor
+    )
+    correction: ForceCorrection  # of the measured force before it enters the equation of motion
+    stiffness: float  # N/m, nominal, of what the building feels against that motion; 0 where it is none
+    damping: float  # N·s/m, likewise
+    mass: float  # kg, likewise
+    share: float  # of the storey's numerical columns, which the specimen stands for
+
+
+class Chosen(NamedTuple):
+    """The compensator that a plan chooses for a laboratory."""
+
+    kind: str
+    parameters: Mapping[str, float]
+    where: str  # table of the plan's file, for sentences about it
+
+
+class Limited(NamedTuple):
+    """The names of limits on how a laboratory's command may move, empty for none."""
+
+    step: str = ""  # largest change of the command within an interval
+    velocity: str = ""
+    acceleration: str = ""
+    effort_step: str = ""  # largest change of the motor's force within an interval
+    error: str = ""  # of the measured position beside its target, lasting
+
+
+class Sensed(NamedTuple):
+    """Readings that must go on to differ while a command moves: one part of a rig."""
+
+    channels: tuple[str, ...]
+    moved: str  # the channel that reads what the command is about
+    by_effort: bool = False  # whether it is the motor's force that moves them, not the command
+
+
+@dataclass(frozen=True)
+class Channels:
+    """The signals of a kind, each with its unit and meaning."""
+
+    target: Signal
+    command: Signal
+    measured: tuple[Signal, ...]
+    position: str  # of those measured: what a compensator compares with the target
+    force: str  # of those measured: what goes back to the building
+    effort: Signal | None = None  # force of a motor, where the kind has one
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the measured channels, in the order of the kernel's."""
+        return tuple(signal.name for signal in self.measured)
+
+    @property
+    def drives(self) -> tuple[str, ...]:
+        """The names of the commands that a rig is written: the transfer system's, and the motor's."""
+        return (self.command.name, *([self.effort.name] if self.effort else []))
+
+    @property
+    def rates(self) -> tuple[str, ...]:
+        """The names of the target's rates."""
+        return tuple(f"{self.target.name}_{rate}" for rate in RATES)
+
+    @property
+    def sent(self) -> tuple[str, ...]:
+        """The names of what a laboratory is told at a tick: target, motor's force where it has one, target's rates."""
+        return (self.target.name, *([self.effort.name] if self.effort else []), *self.rates)
+
+
+class Kind(ABC):
+    """One kind of laboratory. A kind of a user's is a subclass of `laboratories.device.Device` in a file of its own."""
+
+    name: str
+    says: str  # what stands in the laboratory, in a few words
+    channels: Channels
+    limited: Limited = Limited()
+    sensed: tuple[Sensed, ...] = ()
+    sites: tuple[str, ...] = ()  # where effects can be, sensors apart
+    record: type[Any]  # NamedTuple of the laboratory at work
+    advance: Callable[..., None]  # (record, truth, command, effort): one interval, see `kinds.advance`
+
+    @abstractmethod
+    def build(self, system: System) -> Any:
+        """The laboratory of a system at rest, as its `record`; raises InputError where it cannot be."""
+
+    @abstractmethod
+    def coupling(self, plan: Plan) -> Coupling:
+        """Its place in the building of a plan, as `plan.of(role)` shows it to the role that hosts it."""
+
+    @abstractmethod
+    def compensator(self, plan: Plan) -> Chosen:
+        """The compensator that the plan chooses for it."""
+
+    @abstractmethod
+    def noise(self, plan: Plan) -> Array:
+        """Nominal rms noise of its measured channels, (channels,), each in its signal's unit."""
+
+    @abstractmethod
+    def limits(self, plan: Plan) -> Mapping[str, float]:
+        """Largest magnitudes by signal, and of those that `limited` names; what is not in it has no limit."""
+
+    @abstractmethod
+    def ramp(self, plan: Plan, last: tuple[float, ...], before: tuple[float, ...]) -> Ramp:
+        """The way to rest from the last two commands written, in the order of `channels.drives`."""

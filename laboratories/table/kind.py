@@ -1,0 +1,94 @@
+"""The kind `table`: what a plan says of a shaking table and the active mass damper on it."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+
+from common.plan.plan import Plan
+from common.plan.tables import ForceCorrection
+from common.signals import Signal
+from laboratories.kind import Channels, Chosen, Coupling, Follows, Kind, Limited, Sensed
+from laboratories.sensors import noise
+from laboratories.table import model
+from laboratories.table.descent import TableRamp
+from laboratories.table.model import TableLab
+from models.registry import Array
+from models.system import System
+
+UNCORRECTED = ForceCorrection()
+
+
+class TableKind(Kind):
+    """A shaking table follows a floor and carries an active mass damper, whose force acts on that floor."""
+
+    name = "table"
+    says = "shaking table and active mass damper"
+    channels = Channels(
+        target=Signal("table_target", "m", "absolute floor displacement wanted"),
+        command=Signal(
+            "table_command", "m", "command written to the table, to be reached at the end of the interval"
+        ),
+        measured=(
+            Signal("table_displacement", "m", "table displacement measured"),
+            Signal("table_acceleration", "m/s²", "table acceleration measured"),
+            Signal("damper_stroke", "m", "stroke of the damper measured"),
+            Signal("damper_force", "N", "force of the damper on the table measured"),
+        ),
+        position="table_displacement",
+        force="damper_force",
+        effort=Signal("damper_command", "N", "motor force of the damper"),
+    )
+    limited = Limited("table_step", "table_velocity", "", "damper_step", "table_error")
+    sensed = (
+        Sensed(("table_displacement", "table_acceleration"), "table_displacement"),
+        Sensed(("damper_stroke", "damper_force"), "damper_force", by_effort=True),
+    )
+    sites = ("table", "damper")
+    record = TableLab
+
+    def build(self, system: System) -> TableLab:
+        """Shaking table and damper of a system, at rest."""
+        plan, effects = system.plan, system.effects
+        return model.build(plan.test.interval, plan.table, plan.damper, effects.table, effects.damper)
+
+    @staticmethod
+    def advance(lab: TableLab, truth: Array, command: float, effort: float) -> None:
+        """Displacement, acceleration, stroke, force; `effort` is the motor's command (N)."""
+        truth[0], truth[1], truth[2], truth[3] = model.advance(lab, command, effort)
+
+    def coupling(self, plan: Plan) -> Coupling:
+        """The damper's floor; neither force nor motor where the building does without the damper."""
+        scale = plan.damper.force_scale if plan.control.amd else 0.0
+        return Coupling(
+            follows=Follows.FLOOR,
+            place=plan.damper.floor,
+            ratio=1.0,
+            scale=scale,
+            effort=plan.control.gain / plan.damper.force_scale if scale else 0.0,
+            correction=UNCORRECTED,
+            stiffness=0.0,
+            damping=0.0,
+            mass=0.0,
+            share=0.0,
+        )
+
+    def compensator(self, plan: Plan) -> Chosen:
+        """That of `[table.compensator]`."""
+        chosen = plan.table.compensator
+        return Chosen(chosen.kind, chosen.parameters, plan.follows_in)
+
+    def noise(self, plan: Plan) -> Array:
+        """As `[sensors]` has it."""
+        return noise.levels(plan.sensors, self.channels.names)
+
+    def limits(self, plan: Plan) -> Mapping[str, float]:
+        """As `[limits]` has them."""
+        return {field.name: getattr(plan.limits, field.name) for field in dataclasses.fields(plan.limits)}
+
+    def ramp(self, plan: Plan, last: tuple[float, ...], before: tuple[float, ...]) -> TableRamp:
+        """The table comes to a hold, the motor's force goes to zero."""
+        return TableRamp(plan, last, before)
+
+
+TABLE = TableKind()
