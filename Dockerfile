@@ -20,6 +20,8 @@ WORKDIR /opt/rths
 COPY pyproject.toml README.md ./
 COPY common common
 COPY models models
+COPY laboratories laboratories
+COPY loop loop
 COPY master master
 COPY slave slave
 COPY recorder recorder
