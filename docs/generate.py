@@ -15,11 +15,10 @@ from common.plan.tables import Limits, Preflight, Safety
 from common.protocol.messages import Command
 from common.rig import ColumnMeasurement, TableCommand, TableMeasurement
 from common.safety.modes import MEANING, TURNS, mermaid
-from common.signals import TOPICS
+from common.signals import OF_STOREYS, SENT, TOPICS
 from diagnosis.report import schema
 from docs import reference_tables
 from docs.markdown import quantity, table
-from master.step import Outputs
 
 FOLDER = Path(__file__).resolve().parent
 
@@ -35,7 +34,7 @@ MASTER_DERIVED = (
 SLAVE_DERIVED = ("table_velocity", "table_step", "table_error", "damper_step")
 
 CHECKED_BY = {
-    "A": frozenset({*ColumnMeasurement._fields, *Outputs._fields, *MASTER_DERIVED}),
+    "A": frozenset({*ColumnMeasurement._fields, "actuator_command", *SENT, *OF_STOREYS, *MASTER_DERIVED}),
     "B": frozenset({*TableMeasurement._fields, *Command._fields, *TableCommand._fields, *SLAVE_DERIVED}),
 }
 

@@ -53,8 +53,8 @@ class EnergyMonitor:
             motion[VELOCITY, 0] = outputs.velocity
             motion[ACCELERATION, 0] = outputs.acceleration
         else:
-            motion[: ACCELERATION + 1] = outputs[8:11]
-        self._enter(self._sums, outputs.ground_acceleration, outputs.column_target, *measured)
+            motion[: ACCELERATION + 1] = outputs[5:8]
+        self._enter(self._sums, outputs.ground_acceleration, outputs.target, *measured)
         error, drift = self.error_energy, self.numerical_drift
         if abs(error) <= self._limits.error_energy and abs(drift) <= self._limits.numerical_drift:
             return None

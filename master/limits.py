@@ -5,8 +5,11 @@ from __future__ import annotations
 from common.plan.limits import Change, Frozen, Guard, Lasting, Standstill, Violation
 from common.plan.plan import Plan
 from common.rig import ColumnCommand, ColumnMeasurement
+from common.signals import OF_STOREYS, SENT
 from master.energy import EnergyMonitor
 from master.step import Outputs
+
+STOREYS = Outputs._fields.index(OF_STOREYS[0])
 
 
 class MasterLimits:
@@ -17,10 +20,11 @@ class MasterLimits:
 
     def __init__(self, plan: Plan) -> None:
         limits = plan.limits
-        per_storey = Outputs._fields[8:] if plan.storeys > 1 else ()
-        per_slave = Outputs._fields[3:8] if len(plan.roles) > 1 else ()  # what is sent to each
+        several = OF_STOREYS if plan.storeys > 1 else ()
         self._measurements = Guard(limits, ColumnMeasurement._fields)
-        self._outputs = Guard(limits, Outputs._fields, (*per_storey, *per_slave))
+        self._command = Guard(limits, ("actuator_command",))
+        self._sent = Guard(limits, SENT)
+        self._storeys = Guard(limits, OF_STOREYS, several)
         self._actuator = Change(
             limits,
             plan.test.interval,
@@ -35,14 +39,16 @@ class MasterLimits:
 
     def violation(self, measured: ColumnMeasurement, outputs: Outputs) -> Violation | Standstill | None:
         """The first value beyond its limit, None where there is none."""
-        error = outputs.column_target - measured.column_displacement
+        error = outputs.target - measured.column_displacement
         lasting = self._error.violation(error)
         energy = self._energy.violation(measured, outputs)
         frozen = self._frozen.violation(measured, self._present)
         return (
             self._measurements.violation(measured)
-            or self._outputs.violation(outputs)
-            or self._actuator.violation(outputs.actuator_command)
+            or self._command.violation((outputs.command,))
+            or next(filter(None, map(self._sent.violation, outputs.sent)), None)
+            or self._storeys.violation(outputs[STOREYS:])
+            or self._actuator.violation(outputs.command)
             or lasting
             or energy
             or frozen

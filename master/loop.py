@@ -159,7 +159,7 @@ class MasterLoop(RigLoop):
         if lab.recorded:
             self._sample(tick, measured, outputs)
         self.ticks = tick + 1
-        self._drift = outputs.column_target / lab.plan.column.deformation_ratio
+        self._drift = outputs.target / lab.plan.column.deformation_ratio
         self._column_force = measured.column_force
         self._watch(tick, wake)
 
@@ -173,8 +173,8 @@ class MasterLoop(RigLoop):
     def _write(self, outputs: Outputs, *, held: bool) -> None:
         """Move to the tick's command, or stay where it came too late."""
         if not held:
-            self._command = outputs.actuator_command
-            for partner, sent in zip(self._partners, outputs.sent(), strict=True):
+            self._command = outputs.command
+            for partner, sent in zip(self._partners, outputs.sent, strict=True):
                 partner.sent = sent
         command = ColumnCommand(self._command)
         self._descent.wrote(command)
@@ -221,7 +221,7 @@ class MasterLoop(RigLoop):
             outputs.velocity,
             outputs.acceleration,
             outputs.absolute_acceleration,
-            outputs.column_target,
+            outputs.target,
             self._command,
             *measured,
             outputs.numerical_force,

@@ -3,71 +3,60 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from common.plan.plan import Plan
+from common.signals import OF_STOREYS, SENT
 from loop import substructure
 from models.compiled import plain
 from models.registry import Array
 
 Values = float | list[float]
-Sent = tuple[float, float, float, float, float]
+Sent = tuple[float, ...]  # target m, motor force N, and the rates of the target m/s, m/s², m/s³
 
 
 class Outputs(NamedTuple):
-    """What a tick computes: the building at t_k, and the commands for the interval's end.
+    """What a tick computes: the building and the targets at t_k, and the commands for the interval's end.
 
-    What goes to the slaves is one value each where there are several, what concerns storeys likewise.
+    What concerns storeys is one value each where there are several. Of a master without a laboratory target, command
+    and effort are zero.
     """
 
     ground_acceleration: float
-    column_target: float  # of t_k
-    actuator_command: float
-    table_target: Values
-    damper_command: Values
-    table_target_velocity: Values
-    table_target_acceleration: Values
-    table_target_jerk: Values
+    target: float  # of its own laboratory at t_k, m
+    command: float  # of its transfer system, m
+    effort: float  # of its motor, N
+    sent: list[Sent]  # to each slave, in the plan's order
     displacement: Values
     velocity: Values
     acceleration: Values
     absolute_acceleration: Values
     numerical_force: Values
 
-    def sent(self) -> list[Sent]:
-        """The command for each slave in its message's order: the target, the motor's force, the target's rates."""
-        values: Any = (
-            self.table_target,
-            self.damper_command,
-            self.table_target_velocity,
-            self.table_target_acceleration,
-            self.table_target_jerk,
-        )
-        return [values] if type(self.table_target) is float else list(zip(*values, strict=True))
-
 
 class MasterStep:
-    """The numerical substructure, the compensator and the dampers' control, moving on tick by tick."""
+    """The numerical substructure with the control of every laboratory, moving on tick by tick."""
 
     def __init__(self, plan: Plan, ground: Array, p_delta: float = 0.0) -> None:
         building = substructure.build(plan, ground, p_delta)
         self._building, self._output = plain(building), building.output
         self._forces = building.dampers[substructure.FORCE_USED]
         self._plain = plan.storeys == len(plan.roles) == 1
-        self._places = list(substructure.layout(len(plan.roles), plan.storeys).values())
+        places = substructure.layout(len(plan.roles), plan.storeys)
+        self._sent = [places[name] for name in SENT]
+        self._storeys = [places[name] for name in OF_STOREYS]
         self._advance = substructure.enter
 
-    def __call__(
-        self, tick: int, column_displacement: float, column_force: float, damper_forces: Sequence[float]
-    ) -> Outputs:
-        """One tick; displacement m, forces N, all as measured, each slave's damper force at its own scale."""
-        for place, force in enumerate(damper_forces):
-            self._forces[place] = force
-        self._advance(self._building, tick, column_displacement, column_force)
+    def __call__(self, tick: int, position: float, force: float, forces: Sequence[float]) -> Outputs:
+        """One tick, from the master's own position (m) and force (N) as measured and each slave's force (N)."""
+        for place, used in enumerate(forces):
+            self._forces[place] = used
+        self._advance(self._building, tick, position, force)
         row = self._output.tolist()
-        return Outputs(*row) if self._plain else self._grouped(row)
-
-    def _grouped(self, row: list[float]) -> Outputs:
-        """The values of a row by name, those of several slaves or storeys together."""
-        groups = (row[place] for place in self._places)
-        return Outputs(*(values if len(values) > 1 else values[0] for values in groups))  # type: ignore[arg-type]
+        ground, target, command = row[: substructure.OF_SLAVES]
+        if self._plain:
+            return Outputs(ground, target, command, 0.0, [tuple(row[3:8])], *row[8:])
+        sent = list(zip(*(row[place] for place in self._sent), strict=True))
+        storeys = (row[place] for place in self._storeys)
+        values = (of if len(of) > 1 else of[0] for of in storeys)
+        return Outputs(ground, target, command, 0.0, sent, *values)

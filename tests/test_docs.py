@@ -19,6 +19,7 @@ from common.protocol.exchange import Event
 from common.protocol.messages import Command
 from common.rig import ColumnMeasurement, TableCommand, TableMeasurement
 from common.safety.modes import TURNS, Mode, Turn
+from common.signals import SENT
 from docs import generate
 from master.limits import MasterLimits
 from master.step import Outputs
@@ -76,7 +77,8 @@ def master_trips(name: str) -> bool:
     checks, draw = MasterLimits(only(name)), random.Random(1)
     for _ in range(10):
         measured = ColumnMeasurement(*(draw.random() * 0.1 for _ in ColumnMeasurement._fields))
-        outputs = Outputs(*(draw.random() * 0.1 for _ in Outputs._fields))
+        drawn = Outputs(*(draw.random() * 0.1 for _ in Outputs._fields))  # type: ignore[arg-type]
+        outputs = drawn._replace(sent=[tuple(draw.random() * 0.1 for _ in SENT)])
         violation = checks.violation(measured, outputs)
         if violation is not None:
             assert violation.name == name

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from common.errors import InputError
 from common.roles import MASTER, SLAVE, latency_topic, title
+from common.signals import OF_STOREYS, SENT
 from common.terminal import cli
 from common.terminal.printable import shown
 from common.terminal.telling import Tell, untold
@@ -18,14 +19,8 @@ from report.text.progress import Progress
 
 if TYPE_CHECKING:
     from common.recording.reader import Run
+    from master.step import Outputs
 
-SENT = (
-    "table_target",
-    "damper_command",
-    "table_target_velocity",
-    "table_target_acceleration",
-    "table_target_jerk",
-)
 HELD = ("actuator_command", *SENT)
 
 
@@ -76,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
 
 def replay_master(recording: Run, tell: Tell = untold) -> dict[str, Match]:
     """The building, the compensator and the damper's control again, from the first tick to the first hole."""
-    from master.step import MasterStep, Outputs
+    from master.step import MasterStep
     from report.facts.summary import plan_of
 
     plan = plan_of(recording)
@@ -85,24 +80,38 @@ def replay_master(recording: Run, tell: Tell = untold) -> dict[str, Match]:
     columns = {name: values.tolist() for name, values in recording.columns["master"].items()}
     step = MasterStep(plan, ground_of(recording))
     held = held_ticks(recording)
-    matches = {name: Match() for name in Outputs._fields}
+    matches: dict[str, Match] = {}
     command = dict.fromkeys(HELD, 0.0)
     for tick, seq in enumerate(columns["seq"]):
         if seq != tick:
             break
         tell("the master's ticks", tick, len(columns["seq"]))
-        outputs = step(
-            tick,
-            columns["column_displacement"][tick],
-            columns["column_force"][tick],
-            per_slave(columns["damper_force_used"][tick]),
-        )._asdict()
+        outputs = named(
+            step(
+                tick,
+                columns["column_displacement"][tick],
+                columns["column_force"][tick],
+                per_slave(columns["damper_force_used"][tick]),
+            )
+        )
         if tick in held:
             outputs |= command
         command = {name: outputs[name] for name in HELD}
-        for name, match in matches.items():
-            match.take(columns["t"][tick], outputs[name], columns[name][tick])
+        for name, value in outputs.items():
+            matches.setdefault(name, Match()).take(columns["t"][tick], value, columns[name][tick])
     return {f"master/{name}": match for name, match in matches.items()}
+
+
+def named(outputs: Outputs) -> dict[str, Any]:
+    """What the master computed, by the signals of its topic."""
+    sent = outputs.sent[0] if len(outputs.sent) == 1 else map(list, zip(*outputs.sent, strict=True))
+    return {
+        "ground_acceleration": outputs.ground_acceleration,
+        "column_target": outputs.target,
+        "actuator_command": outputs.command,
+        **dict(zip(SENT, sent, strict=True)),
+        **{name: getattr(outputs, name) for name in OF_STOREYS},
+    }
 
 
 def per_slave(values: float | list[float]) -> list[float]:

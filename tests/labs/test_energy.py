@@ -27,10 +27,7 @@ KINDS = ("newmark_explicit", "central_difference", "cr", "kr_alpha")
 
 
 def outputs(target: float, displacement: Any = 0.0, velocity: Any = 0.0, acceleration: Any = 0.0) -> Outputs:
-    still = Outputs(*[0.0] * len(Outputs._fields))
-    return still._replace(
-        column_target=target, displacement=displacement, velocity=velocity, acceleration=acceleration
-    )
+    return Outputs(0.0, target, 0.0, 0.0, [], displacement, velocity, acceleration, 0.0, 0.0)
 
 
 def replayed(chosen: Plan, run: Run) -> tuple[Any, Any]:

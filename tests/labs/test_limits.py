@@ -212,7 +212,7 @@ def test_a_step_of_ten_millimetres_is_never_written(short_plan: Plan) -> None:
 
     def stepping(tick: int, *measured: Any) -> Any:
         outputs = step(tick, *measured)
-        return outputs._replace(actuator_command=outputs.actuator_command + (0.01 if tick >= 500 else 0.0))
+        return outputs._replace(command=outputs.command + (0.01 if tick >= 500 else 0.0))
 
     bench.master._step = stepping  # type: ignore[assignment]
     error = virtual.run(bench, str)
