@@ -1,14 +1,18 @@
 """The one table of signals: what a recording holds, in which unit, and what each signal means.
 
-The MCAP schemas, the listings, the plots, the exports and the limits all derive from this table.
+The MCAP schemas, the listings, the plots, the exports and the limits all derive from this table. A laboratory's part
+of it follows from the channels of its kind.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple
 
+from common.errors import InputError
 from common.roles import MASTER as MASTER_ROLE
 from common.roles import SLAVE as SLAVE_ROLE
 from common.roles import kind_of, latency_topic, ramp_topic
@@ -34,13 +38,90 @@ class Signal(NamedTuple):
     unit: str
     text: str
     kind: Kind = Kind.NUMBER
-    per_slave: bool = False  # one value per slave, in the plan's order, where a test has several
+    slaves: tuple[str, ...] = ()  # roles of those of which it has a value each; a scalar where it is one
+
+    def count(self, storeys: int) -> int:
+        """How many numbers it holds in a building of so many storeys."""
+        return storeys if self.kind is Kind.STOREYS else max(len(self.slaves), 1)
+
+
+RATES = ("velocity", "acceleration", "jerk")  # of a target, each a signal of its own
+UNITS_OF_RATES = ("m/s", "m/s²", "m/s³")
+
+
+@dataclass(frozen=True)
+class Channels:
+    """The signals of a kind of laboratory, each with its unit and meaning."""
+
+    target: Signal
+    command: Signal
+    measured: tuple[Signal, ...]
+    position: str  # of those measured: what a compensator compares with the target
+    force: str  # of those measured: what goes back to the building
+    effort: Signal | None = None  # force of a motor, where the kind has one
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the measured channels, in the order of the kernel's."""
+        return tuple(signal.name for signal in self.measured)
+
+    @property
+    def driving(self) -> tuple[Signal, ...]:
+        """The target, and the motor's force where the kind has one."""
+        return (self.target, *([self.effort] if self.effort else []))
+
+    @property
+    def drives(self) -> tuple[str, ...]:
+        """The names of the commands that a rig is written: the transfer system's, and the motor's."""
+        return (self.command.name, *([self.effort.name] if self.effort else []))
+
+    @property
+    def rates(self) -> tuple[str, ...]:
+        """The names of the target's rates."""
+        return tuple(f"{self.target.name}_{rate}" for rate in RATES)
+
+    @property
+    def sent(self) -> tuple[str, ...]:
+        """The names of what a laboratory is told at a tick: target, motor's force where it has one, target's rates."""
+        return (*(signal.name for signal in self.driving), *self.rates)
+
+
+COLUMN_CHANNELS = Channels(
+    target=Signal("column_target", "m", "specimen deformation wanted"),
+    command=Signal(
+        "actuator_command",
+        "m",
+        "command written, to be reached at the end of the interval, or held from the tick on",
+    ),
+    measured=(
+        Signal("column_displacement", "m", "specimen deformation measured"),
+        Signal("column_force", "N", "restoring force of the specimen measured"),
+    ),
+    position="column_displacement",
+    force="column_force",
+)
+
+TABLE_CHANNELS = Channels(
+    target=Signal("table_target", "m", "absolute floor displacement wanted"),
+    command=Signal(
+        "table_command", "m", "command written to the table, to be reached at the end of the interval"
+    ),
+    measured=(
+        Signal("table_displacement", "m", "table displacement measured"),
+        Signal("table_acceleration", "m/s²", "table acceleration measured"),
+        Signal("damper_stroke", "m", "stroke of the damper measured"),
+        Signal("damper_force", "N", "force of the damper on the table measured"),
+    ),
+    position="table_displacement",
+    force="damper_force",
+    effort=Signal("damper_command", "N", "motor force of the damper"),
+)
 
 
 SEQ = Signal("seq", "", "tick number", Kind.COUNT)
 TIME = Signal("t", "s", "test time of the tick")
 
-MASTER = (
+BUILDING = (
     SEQ,
     TIME,
     Signal("ground_acceleration", "m/s²", "ground acceleration"),
@@ -48,55 +129,13 @@ MASTER = (
     Signal("velocity", "m/s", "velocity relative to the ground", Kind.STOREYS),
     Signal("acceleration", "m/s²", "acceleration relative to the ground", Kind.STOREYS),
     Signal("absolute_acceleration", "m/s²", "absolute acceleration", Kind.STOREYS),
-    Signal("column_target", "m", "specimen deformation wanted at this tick"),
-    Signal(
-        "actuator_command",
-        "m",
-        "command written, to be reached at the end of the interval, or held from the tick on",
-    ),
-    Signal("column_displacement", "m", "specimen deformation measured"),
-    Signal("column_force", "N", "restoring force of the specimen measured"),
-    Signal(
-        "numerical_force",
-        "N",
-        "restoring force of the numerical columns of the storey; of a matrix the sum of the floors' from above",
-        Kind.STOREYS,
-    ),
-    Signal("damper_force_used", "N", "damper force used, at the damper's own scale", per_slave=True),
-    Signal(
-        "damper_force_seq",
-        "",
-        "tick at which that force was measured, -1 for none yet",
-        Kind.INDEX,
-        per_slave=True,
-    ),
-    Signal("damper_force_age", "s", "its age at use", per_slave=True),
-    Signal(
-        "table_target",
-        "m",
-        "absolute floor displacement wanted at the end of the interval, as sent",
-        per_slave=True,
-    ),
-    Signal("damper_command", "N", "motor force of the damper, as sent", per_slave=True),
-    Signal("table_target_velocity", "m/s", "velocity of the table's target, as sent", per_slave=True),
-    Signal("table_target_acceleration", "m/s²", "its acceleration, as sent", per_slave=True),
-    Signal("table_target_jerk", "m/s³", "the rate of that acceleration, as sent", per_slave=True),
 )
 
-SLAVE = (
-    SEQ,
-    TIME,
-    Signal("command_seq", "", "tick of the command in force, -1 for none yet", Kind.INDEX),
-    Signal("table_target", "m", "absolute floor displacement wanted, as received"),
-    Signal("damper_command", "N", "motor force of the damper, as received"),
-    Signal("table_command", "m", "command written to the table, to be reached at the end of the interval"),
-    Signal("table_displacement", "m", "table displacement measured"),
-    Signal("table_acceleration", "m/s²", "table acceleration measured"),
-    Signal("damper_stroke", "m", "stroke of the damper measured"),
-    Signal("damper_force", "N", "force of the damper on the table measured"),
-    Signal("table_target_velocity", "m/s", "velocity of the table's target, as received"),
-    Signal("table_target_acceleration", "m/s²", "its acceleration, as received"),
-    Signal("table_target_jerk", "m/s³", "the rate of that acceleration, as received"),
+NUMERICAL = Signal(
+    "numerical_force",
+    "N",
+    "restoring force of the numerical columns of the storey; of a matrix the sum of the floors' from above",
+    Kind.STOREYS,
 )
 
 LATENCY = (
@@ -132,27 +171,6 @@ LATENCY = (
 
 MODE = Signal("mode", "", "safety mode after the tick", Kind.TEXT)
 
-MASTER_RAMP = (
-    SEQ,
-    TIME,
-    MODE,
-    Signal("actuator_command", "m", "command written on the ramp to rest"),
-    Signal("column_displacement", "m", "specimen deformation measured"),
-    Signal("column_force", "N", "restoring force of the specimen measured"),
-)
-
-SLAVE_RAMP = (
-    SEQ,
-    TIME,
-    MODE,
-    Signal("table_command", "m", "command written to the table on the ramp to rest"),
-    Signal("damper_command", "N", "motor force written on the way to zero"),
-    Signal("table_displacement", "m", "table displacement measured"),
-    Signal("table_acceleration", "m/s²", "table acceleration measured"),
-    Signal("damper_stroke", "m", "stroke of the damper measured"),
-    Signal("damper_force", "N", "force of the damper on the table measured"),
-)
-
 EVENT = (
     TIME,
     Signal("lab", "", "master, slave or recorder", Kind.TEXT),
@@ -162,41 +180,128 @@ EVENT = (
     Signal("values", "", "numbers that belong to it", Kind.VALUES),
 )
 
-MASTER_RAMP_TOPIC, SLAVE_RAMP_TOPIC = ramp_topic(MASTER_ROLE), ramp_topic(SLAVE_ROLE)
-
-TOPICS: dict[str, tuple[Signal, ...]] = {
-    "master": MASTER,
-    "slave": SLAVE,
-    "latency": LATENCY,
-    MASTER_RAMP_TOPIC: MASTER_RAMP,
-    SLAVE_RAMP_TOPIC: SLAVE_RAMP,
-    "event": EVENT,
-}
-
 TICK_TOPICS = ("master", "slave", "latency")
+SENT_ = "sent_"  # before the name of a signal that is sent, where the master's own laboratory has one of that name
 
 
-def topics(slaves: Sequence[str]) -> dict[str, tuple[Signal, ...]]:
-    """What a recording of a test holds; `slaves` are the roles of its slaves."""
-    found: dict[str, tuple[Signal, ...]] = {"master": MASTER} | dict.fromkeys(slaves, SLAVE)
+def topics(laboratories: Mapping[str, Channels]) -> dict[str, tuple[Signal, ...]]:
+    """What a recording of a test holds; `laboratories` are the channels of each role that hosts one.
+
+    The slaves stand in the plan's order; a master without a laboratory of its own is not among the roles.
+
+    Raises:
+        InputError: two signals of one topic have one name.
+    """
+    own = laboratories.get(MASTER_ROLE)
+    slaves = {role: channels for role, channels in laboratories.items() if role != MASTER_ROLE}
+    found = {MASTER_ROLE: _master(own, alike(slaves))}
+    found |= {role: _slave(channels) for role, channels in slaves.items()}
     found |= dict.fromkeys(map(latency_topic, slaves), LATENCY)
-    found |= {MASTER_RAMP_TOPIC: MASTER_RAMP} | dict.fromkeys(map(ramp_topic, slaves), SLAVE_RAMP)
+    found |= {ramp_topic(MASTER_ROLE): _ramp(own)} if own else {}
+    found |= {ramp_topic(role): _ramp(channels) for role, channels in slaves.items()}
+    for topic, rows in found.items():
+        _check(topic, rows)
     return found | {"event": EVENT}
 
 
-MEASURED = {
-    "master": ("column_displacement", "column_force"),
-    "slave": ("table_displacement", "table_acceleration", "damper_stroke", "damper_force"),
-}
+def shared(rows: tuple[Signal, ...]) -> dict[str, tuple[str, ...]]:
+    """The roles of the slaves of which a signal has a value each, by the name of the signal."""
+    return {row.name: row.slaves for row in rows if row.slaves}
+
+
+def alike(slaves: Mapping[str, Channels]) -> dict[Channels, tuple[str, ...]]:
+    """The slaves that have the same channels, and so share fields of the master's topic, in the plan's order."""
+    found: dict[Channels, tuple[str, ...]] = {}
+    for role, channels in slaves.items():
+        found[channels] = (*found.get(channels, ()), role)
+    return found
+
+
+def _master(own: Channels | None, slaves: Mapping[Channels, tuple[str, ...]]) -> tuple[Signal, ...]:
+    """The building, its own laboratory, and of each kind of slave what was used and what was sent."""
+    rows = [*BUILDING, *(_own(own) if own else ()), NUMERICAL]
+    taken = {row.name for row in rows}
+    for channels, roles in slaves.items():
+        sent = [row._replace(text=f"{row.text}, as sent") for row in (*_at_end(channels), *_rates(channels))]
+        named = [row._replace(name=SENT_ + row.name) if row.name in taken else row for row in sent]
+        rows += [row._replace(slaves=roles) for row in (*_used(channels.force), *named)]
+    return tuple(rows)
+
+
+def _own(channels: Channels) -> tuple[Signal, ...]:
+    target, *effort = channels.driving
+    target = target._replace(text=f"{target.text} at this tick")
+    return (target, *effort, channels.command, *channels.measured)
+
+
+def _at_end(channels: Channels) -> tuple[Signal, ...]:
+    target, *effort = channels.driving
+    return (target._replace(text=f"{target.text} at the end of the interval"), *effort)
+
+
+def _used(force: str) -> tuple[Signal, ...]:
+    """The force of a slave that a tick uses."""
+    words = force.replace("_", " ")
+    device = words.removesuffix(" force") if words.endswith(" force") else "laboratory"
+    return (
+        Signal(f"{force}_used", "N", f"{words} used, at the {device}'s own scale"),
+        Signal(f"{force}_seq", "", "tick at which that force was measured, -1 for none yet", Kind.INDEX),
+        Signal(f"{force}_age", "s", "its age at use"),
+    )
+
+
+def _rates(channels: Channels) -> tuple[Signal, ...]:
+    device = channels.target.name.removesuffix("_target").replace("_", " ")
+    texts = (f"velocity of the {device}'s target", "its acceleration", "the rate of that acceleration")
+    return tuple(map(Signal, channels.rates, UNITS_OF_RATES, texts))
+
+
+def _slave(channels: Channels) -> tuple[Signal, ...]:
+    """What was received, what was written, what was measured."""
+    target, *effort = (row._replace(text=f"{row.text}, as received") for row in channels.driving)
+    rates = (row._replace(text=f"{row.text}, as received") for row in _rates(channels))
+    seq = Signal("command_seq", "", "tick of the command in force, -1 for none yet", Kind.INDEX)
+    return (SEQ, TIME, seq, target, *effort, channels.command, *channels.measured, *rates)
+
+
+def _ramp(channels: Channels) -> tuple[Signal, ...]:
+    """The way to rest."""
+    command, effort = channels.command, channels.effort
+    written = [command._replace(text=f"{command.text.partition(',')[0]} on the ramp to rest")]
+    if effort:
+        written += [effort._replace(text=f"{effort.text.partition(' of ')[0]} written on the way to zero")]
+    return (SEQ, TIME, MODE, *written, *channels.measured)
+
+
+def _check(topic: str, rows: tuple[Signal, ...]) -> None:
+    name, times = Counter(row.name for row in rows).most_common(1)[0]
+    if times > 1:
+        raise InputError(
+            f"The topic {topic} would have {times} signals called '{name}': rename that channel in the kind of "
+            "laboratory of your own."
+        )
+
+
+# -- of the default plan: a column at the master, a table at the slave -------------------------------
+
+
+def default_topics(slaves: Sequence[str] = (SLAVE_ROLE,)) -> dict[str, tuple[Signal, ...]]:
+    """What a recording holds of a test with a column at the master and a table at each slave."""
+    return topics({MASTER_ROLE: COLUMN_CHANNELS} | dict.fromkeys(slaves, TABLE_CHANNELS))
+
+
+TOPICS = default_topics()
+
+MEASURED = {"master": COLUMN_CHANNELS.names, "slave": TABLE_CHANNELS.names}
 
 # What the master computes at a tick, by name in the order of the table: of the building, for each slave, of each storey
 OF_BUILDING = tuple(
     row.name
-    for row in MASTER
-    if row.kind is Kind.NUMBER and not row.per_slave and row.name not in (TIME.name, *MEASURED["master"])
+    for row in TOPICS["master"]
+    if row.kind is Kind.NUMBER and not row.slaves and row.name not in (TIME.name, *MEASURED["master"])
 )
-SENT = tuple(row.name for row in MASTER if row.per_slave and row.name in {other.name for other in SLAVE})
-OF_STOREYS = tuple(row.name for row in MASTER if row.kind is Kind.STOREYS)
+SENT = TABLE_CHANNELS.sent
+OF_STOREYS = tuple(row.name for row in TOPICS["master"] if row.kind is Kind.STOREYS)
 
 RESPONSES = ("column_displacement", "column_force", "table_acceleration", "damper_force")
 

@@ -9,19 +9,15 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from enum import Enum
 from typing import Any, NamedTuple
 
 from common.plan.plan import Plan
 from common.plan.tables import ForceCorrection
 from common.safety.ramp import Ramp
-from common.signals import Signal
+from common.signals import Channels
 from models.registry import Array
 from models.system import System
-
-RATES = ("velocity", "acceleration", "jerk")  # of a target, each a signal of its own
-UNITS_OF_RATES = ("m/s", "m/s²", "m/s³")
 
 
 class Follows(Enum):
@@ -72,38 +68,6 @@ class Sensed(NamedTuple):
     channels: tuple[str, ...]
     moved: str  # the channel that reads what the command is about
     by_effort: bool = False  # whether it is the motor's force that moves them, not the command
-
-
-@dataclass(frozen=True)
-class Channels:
-    """The signals of a kind, each with its unit and meaning."""
-
-    target: Signal
-    command: Signal
-    measured: tuple[Signal, ...]
-    position: str  # of those measured: what a compensator compares with the target
-    force: str  # of those measured: what goes back to the building
-    effort: Signal | None = None  # force of a motor, where the kind has one
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The names of the measured channels, in the order of the kernel's."""
-        return tuple(signal.name for signal in self.measured)
-
-    @property
-    def drives(self) -> tuple[str, ...]:
-        """The names of the commands that a rig is written: the transfer system's, and the motor's."""
-        return (self.command.name, *([self.effort.name] if self.effort else []))
-
-    @property
-    def rates(self) -> tuple[str, ...]:
-        """The names of the target's rates."""
-        return tuple(f"{self.target.name}_{rate}" for rate in RATES)
-
-    @property
-    def sent(self) -> tuple[str, ...]:
-        """The names of what a laboratory is told at a tick: target, motor's force where it has one, target's rates."""
-        return (self.target.name, *([self.effort.name] if self.effort else []), *self.rates)
 
 
 class Kind(ABC):

@@ -15,10 +15,12 @@ from typing import Any
 from numba.core import types
 from numba.extending import overload
 
+from common import signals
 from common.errors import InputError
 from common.plan.plan import Plan
 from common.plan.plugins import construct, find
 from common.roles import MASTER
+from common.signals import Signal
 from laboratories.column.kind import COLUMN
 from laboratories.device import Device, DeviceRecord, advance_device
 from laboratories.kind import Kind
@@ -48,6 +50,11 @@ def kind_of(plan: Plan, role: str) -> Kind:
 def kinds_of(plan: Plan) -> dict[str, Kind]:
     """The kind of every role that has a laboratory, the master's first; raises InputError as `kind_of`."""
     return {role: kind_of(plan, role) for role in plan.kinds}
+
+
+def topics(plan: Plan) -> dict[str, tuple[Signal, ...]]:
+    """What a recording of the plan's test holds; raises InputError as `kind_of`, or as `common.signals.topics`."""
+    return signals.topics({role: kind.channels for role, kind in kinds_of(plan).items()})
 
 
 def own(plan: Plan) -> Kind | None:

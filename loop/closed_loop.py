@@ -299,7 +299,7 @@ def signals(plan: Plan, rollout: Rollout) -> dict[str, Array]:
     Those of a named slave are called `NAME.signal`.
     """
     result: dict[str, Array] = {}
-    order = table.topics(list(rollout.slaves))
+    order = kinds.topics(plan)
     for topic, columns in topics(plan, rollout).items():
         name = name_of(topic)
         for key in (row.name for row in order[topic] if row.kind in (table.Kind.NUMBER, table.Kind.STOREYS)):
@@ -340,7 +340,7 @@ def topics(plan: Plan, rollout: Rollout) -> dict[str, dict[str, Any]]:
 
 def rows(plan: Plan, rollout: Rollout) -> Iterator[tuple[str, tuple[Any, ...]]]:
     """The rollout's messages as a recording holds them: topic and values in the order of the signal table."""
-    order = table.topics(list(rollout.slaves))
+    order = kinds.topics(plan)
     tables = {
         topic: list(zip(*(columns[row.name].tolist() for row in order[topic]), strict=True))
         for topic, columns in topics(plan, rollout).items()

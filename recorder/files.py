@@ -18,8 +18,8 @@ from common.plan.plan import Plan
 from common.recording.reader import CLOCK, GROUND
 from common.recording.writer import Recording
 from common.safety.risks import Risk
-from common.signals import topics
 from common.terminal import outputs
+from laboratories.kinds import topics
 from models.ground_motion import GroundMotion
 from models.registry import Array
 
@@ -78,8 +78,9 @@ def begin(
     Raises:
         InputError: the disk does not take it.
     """
-    recording = Recording(path, plan.test.name, plan.storeys, topics(plan.roles), plan.roles)
+    recording = Recording(path, plan.test.name, plan.storeys, topics(plan), plan.roles)
     recording.metadata("plan", {"toml": plan.toml(), "digest": plan.digest()})
+    recording.describe()
     recording.metadata("versions", {name: metadata.version(name) for name in PACKAGES})
     recording.metadata("host", host() | facts())
     recording.metadata(CLOCK, {"kind": clock})

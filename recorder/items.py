@@ -8,11 +8,11 @@ from typing import Any
 
 import msgpack
 
-from common import signals
 from common.lab.outlet import PIECE
 from common.plan.plan import Plan
 from common.roles import MASTER, latency_topic, ramp_topic
 from common.signals import Kind, Signal
+from laboratories import kinds
 
 Item = list[Any]
 Check = Callable[[Any], bool]
@@ -25,7 +25,7 @@ class Items:
     """What one laboratory of a plan may send to the recorder."""
 
     def __init__(self, plan: Plan, lab: str) -> None:
-        topics = signals.topics(plan.roles)
+        topics = kinds.topics(plan)
         own = {"event", lab, ramp_topic(lab), *(map(latency_topic, plan.roles) if lab == MASTER else ())}
         self._ticks = range(plan.ticks)
         self._unbounded = ("event", ramp_topic(lab))  # the ramp to rest goes on after the last tick
@@ -78,24 +78,18 @@ class Plain:
 
 def is_plain(rows: tuple[Signal, ...], plan: Plan) -> bool:
     """Whether a topic has one number per signal."""
-    several = plan.storeys > 1, len(plan.roles) > 1
-    return all(
-        row.kind in PLAIN
-        and not (row.kind is Kind.STOREYS and several[0])
-        and not (row.per_slave and several[1])
-        for row in rows
-    )
+    return all(row.kind in PLAIN and row.count(plan.storeys) == 1 for row in rows)
 
 
 def checks(rows: tuple[Signal, ...], plan: Plan) -> list[Check]:
     """What each value of a topic must be, in the order of the signal table."""
-    return [value_check(row, plan.storeys, len(plan.roles)) for row in rows]
+    return [value_check(row, plan.storeys) for row in rows]
 
 
-def value_check(row: Signal, storeys: int, slaves: int) -> Check:
+def value_check(row: Signal, storeys: int) -> Check:
     """What the value of a signal must be to be recorded."""
     one = CHECKS[row.kind]
-    count = storeys if row.kind is Kind.STOREYS else slaves if row.per_slave else 1
+    count = row.count(storeys)
     if count == 1:
         return one
     return lambda value: type(value) is list and len(value) == count and all(map(one, value))

@@ -18,6 +18,7 @@ from common.plan.plan_difference import differences, digest_of, said
 from common.protocol.messages import Finished, Message, Recorder, Register, Resend, Samples
 from common.reporting import Report
 from common.roles import LATENCY, MASTER, RECORDER, kind_of, title
+from laboratories import kinds
 from recorder.items import Items
 from recorder.sink import Item, Sink
 
@@ -65,7 +66,7 @@ class RecorderLoop:
         self._filled_ns = -ASK_NS
         self._seen = {
             topic: bytearray(setting.plan.ticks)
-            for topic in signals.topics(setting.plan.roles)
+            for topic in kinds.topics(setting.plan)
             if kind_of(topic) in signals.TICK_TOPICS
         }
         self._missed = 0

@@ -11,6 +11,7 @@ from common.plan.plan import Plan
 from common.roles import kind_of
 from common.safety.risks import Risk
 from common.signals import Kind, Signal
+from laboratories import kinds
 
 # bytes of a protobuf field: its value, with a stamp's at seven bytes of seven bits, and of flags and texts none
 VALUES = {Kind.NUMBER: 8, Kind.STOREYS: 8, Kind.COUNT: 2, Kind.INDEX: 2, Kind.STAMP: 7, Kind.FLAG: -1}
@@ -26,22 +27,22 @@ SPARE = 1.1  # for events and the index
 def need(plan: Plan) -> float:
     """Expected size of a test's recording, bytes."""
     per_tick = sum(
-        COMPRESSED * (MESSAGE_HEAD + payload(rows, plan.storeys, len(plan.roles))) + INDEX_ENTRY
-        for topic, rows in signals.topics(plan.roles).items()
+        COMPRESSED * (MESSAGE_HEAD + payload(rows, plan.storeys)) + INDEX_ENTRY
+        for topic, rows in kinds.topics(plan).items()
         if kind_of(topic) in signals.TICK_TOPICS
     )
     return FIXED + SPARE * plan.ticks * (per_tick + GROUND_ROWS)
 
 
-def payload(rows: tuple[Signal, ...], storeys: int, slaves: int) -> int:
+def payload(rows: tuple[Signal, ...], storeys: int) -> int:
     """Bytes of a message."""
-    return sum(field(number, row, storeys, slaves) for number, row in enumerate(rows, start=1))
+    return sum(field(number, row, storeys) for number, row in enumerate(rows, start=1))
 
 
-def field(number: int, row: Signal, storeys: int, slaves: int) -> int:
+def field(number: int, row: Signal, storeys: int) -> int:
     """Bytes of one of its fields; several values stand behind one tag and their length."""
     tag = 1 if number <= ONE_BYTE_TAGS else 2
-    count = storeys if row.kind is Kind.STOREYS else slaves if row.per_slave else 1
+    count = row.count(storeys)
     value = VALUES.get(row.kind, 0)
     return max(tag + value, 0) if count == 1 else tag + 1 + (count * value >= 128) + count * value
 

@@ -193,6 +193,7 @@ def begin(
     topics = {bench.topic: rows, "event": signals.EVENT}
     recording = Recording(path, plan.test.name, plan.storeys, topics)
     recording.metadata("plan", {"toml": plan.toml(), "digest": plan.digest()})
+    recording.describe()
     recording.metadata("versions", {name: metadata.version(name) for name in files.PACKAGES})
     recording.metadata("host", files.host())
     recording.metadata(CLOCK, {"kind": "real" if order.real_time else "virtual"})

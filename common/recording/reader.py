@@ -6,7 +6,7 @@ import io
 import json
 import os
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
@@ -28,7 +28,8 @@ from common.recording.bounds import Bounds
 from common.recording.checksums import CHECKSUMS, fits, opened
 from common.recording.salvage import DAMAGE, HEAD, KINDS, MESSAGE, RECORD_LIMIT, inner
 from common.recording.schema import message_class
-from common.roles import LATENCY, MASTER, SLAVE, latency_topic, ramps_of, title
+from common.recording.writer import SHARED, SIGNALS
+from common.roles import LATENCY, MASTER, SLAVE, kind_of, latency_topic, ramps_of, title
 
 Values = NDArray[Any]
 
@@ -58,6 +59,12 @@ class Run:
     sequences: dict[str, Values] = field(default_factory=dict)
     log_ns: dict[str, Values] = field(default_factory=dict)
     units: dict[str, dict[str, str]] = field(default_factory=dict)
+    texts: dict[str, dict[str, str]] = field(
+        default_factory=dict
+    )  # meaning of each signal, by topic and name
+    shared: dict[str, tuple[str, ...]] = field(
+        default_factory=dict
+    )  # the master's of a value per slave: roles
     events: list[dict[str, Any]] = field(default_factory=list)
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
     attachments: dict[str, bytes] = field(default_factory=dict)
@@ -79,14 +86,15 @@ class Run:
             InputError: the test has no such slave.
         """
         if role not in self.roles:
-            raise InputError(f"{self.path} has no {title(role)}; it has {', '.join(map(title, self.roles))}.")
+            there = ", ".join(map(title, self.roles)) or "no slave"
+            raise InputError(f"{self.path} has no {title(role)}; it has {there}.")
         if self.roles == (SLAVE,):
             return self
         own = {MASTER: MASTER, SLAVE: role, LATENCY: latency_topic(role)}
         here = {kind: topic for kind, topic in own.items() if topic in self.columns}
         columns = {kind: self.columns[topic] for kind, topic in here.items()}
         if MASTER in columns and len(self.roles) > 1:
-            columns[MASTER] = share(columns[MASTER], self.roles.index(role))
+            columns[MASTER] = share(columns[MASTER], self.shared, role)
         return replace(
             self,
             roles=(SLAVE,),
@@ -95,22 +103,30 @@ class Run:
             sequences={kind: self.sequences[topic] for kind, topic in here.items()},
             log_ns={kind: self.log_ns[topic] for kind, topic in here.items()},
             units={kind: self.units[topic] for kind, topic in here.items()},
+            texts={kind: self.texts[topic] for kind, topic in here.items()},
+            shared={},
         )
 
     def signal(self, name: str) -> Values | None:
         """A signal by name from the laboratory that knows it at first hand, None where it is not recorded."""
-        order = ("slave", "master", "latency") if name in signals.MEASURED["slave"] else signals.TICK_TOPICS
-        for topic in order:
+        for topic in signals.TICK_TOPICS:  # what a slave measures stands in no other topic
             if name in self.columns.get(topic, {}):
                 return self.columns[topic][name]
         return None
 
 
-def share(columns: dict[str, Values], place: int) -> dict[str, Values]:
-    """The master's columns with those that have one value per slave reduced to one of them."""
-    each = {row.name for row in signals.MASTER if row.per_slave}
+def share(
+    columns: Mapping[str, Values], shared: Mapping[str, tuple[str, ...]], role: str
+) -> dict[str, Values]:
+    """The master's columns as of one slave: of those that hold a value per slave its own, without others' alone.
+
+    `shared` are the roles of the slaves by the name of such a column.
+    """
+    mine = {name: roles.index(role) for name, roles in shared.items() if role in roles and len(roles) > 1}
     return {
-        name: column[:, place] if name in each and column.size else column for name, column in columns.items()
+        name: column[:, mine[name]] if name in mine and column.size else column
+        for name, column in columns.items()
+        if name not in shared or role in shared[name]
     }
 
 
@@ -277,7 +293,7 @@ def _take(run: Run, channel: Channel, schemas: dict[int, Schema], messages: list
 
 def _decode(run: Run, channel: Channel, schema: Schema, messages: list[Message]) -> None:
     _, run.test, topic = channel.topic.split("/", 2)
-    run.roles = tuple(channel.metadata.get("slaves", SLAVE).split()) or (SLAVE,)
+    run.roles = tuple(channel.metadata.get("slaves", SLAVE).split())
     kind = _described(schema.data, schema.name)
     decoded = [kind.FromString(message.data) for message in messages]
     if topic == "event":
@@ -289,9 +305,27 @@ def _decode(run: Run, channel: Channel, schema: Schema, messages: list[Message])
         run.ramps[ramps_of(topic)] = columns
         return
     run.units[topic] = json.loads(channel.metadata.get("units", "{}"))
+    run.texts[topic] = _texts(run, topic)
+    if topic == MASTER:
+        run.shared = _shared(run, channel)
     run.columns[topic] = columns
     run.sequences[topic] = np.array([message.sequence for message in messages], dtype=np.int64)
     run.log_ns[topic] = np.array([message.log_time for message in messages], dtype=np.int64)
+
+
+def _texts(run: Run, topic: str) -> dict[str, str]:
+    """The meaning of a topic's signals, as the recording has it; of one that says nothing, as kinds that ship do."""
+    said = run.metadata.get(SIGNALS)
+    if said is None:
+        return {row.name: row.text for row in signals.TOPICS.get(kind_of(topic), ())}
+    return {name: str(text) for name, (_, text) in json.loads(said.get(topic, "{}")).items()}
+
+
+def _shared(run: Run, channel: Channel) -> dict[str, tuple[str, ...]]:
+    """The fields with a value per slave; a recording that does not say it has tables at all slaves."""
+    if SHARED in channel.metadata:
+        return {name: tuple(map(str, roles)) for name, roles in json.loads(channel.metadata[SHARED]).items()}
+    return dict.fromkeys(signals.shared(signals.TOPICS[MASTER]), run.roles)
 
 
 @lru_cache(maxsize=32)

@@ -22,17 +22,20 @@ _TYPES = {
 
 
 def message_name(topic: str) -> str:
-    """The message of a topic; those of several slaves have one in common."""
+    """The message of a topic; those of slaves of one kind have one in common."""
     return "".join(map(str.capitalize, kind_of(topic).split("_")))
 
 
 def schema_file(
-    topic: str, rows: tuple[Signal, ...], storeys: int, slaves: int = 1
+    topic: str, rows: tuple[Signal, ...], storeys: int, variant: str = ""
 ) -> descriptor_pb2.FileDescriptorProto:
-    """Protobuf description of a topic's message, fields in the order of the signal table."""
-    name = message_name(topic)
+    """Protobuf description of a topic's message, fields in the order of the signal table.
+
+    `variant` ends the names of file and message where topics of the same kind hold different fields.
+    """
+    name = message_name(topic) + variant
     file = descriptor_pb2.FileDescriptorProto(
-        name=f"rths/{kind_of(topic)}.proto", package="rths", syntax="proto3"
+        name=f"rths/{kind_of(topic)}{variant}.proto", package="rths", syntax="proto3"
     )
     message = file.message_type.add(name=name)
     for number, row in enumerate(rows, start=1):
@@ -49,8 +52,7 @@ def schema_file(
                 label=_FIELD.LABEL_REPEATED,
             )
             continue
-        several = (row.kind is Kind.STOREYS and storeys > 1) or (row.per_slave and slaves > 1)
-        label = _FIELD.LABEL_REPEATED if several else _FIELD.LABEL_OPTIONAL
+        label = _FIELD.LABEL_REPEATED if row.count(storeys) > 1 else _FIELD.LABEL_OPTIONAL
         message.field.add(name=row.name, number=number, type=_TYPES[row.kind], label=label)
     return file
 

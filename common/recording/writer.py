@@ -22,10 +22,12 @@ from common.recording.chunks import pack_messages
 from common.recording.index import pack_index
 from common.recording.schema import message_class, message_name, schema_file
 from common.roles import SLAVE
-from common.signals import Signal
+from common.signals import Signal, shared
 
 CHUNK_SIZE = 64 * 1024  # bytes, unpacked: so little is lost with a damaged chunk, and it still packs well
 REPEAT_BYTES = 1 << 20  # schemas and channels, some kilobytes, stand in the file again after so much of it
+SIGNALS = "signals"  # metadata: by topic, JSON of name -> [unit, text]
+SHARED = "shared"  # of a channel: JSON of the fields that hold a value per slave -> the slaves' roles
 SYNC = getattr(os, "fdatasync", os.fsync)  # not every system has the cheaper one
 
 
@@ -61,6 +63,11 @@ class Spool:
             raise
         self._drained += written
         self._held.clear()
+
+
+def packed(values: Mapping[str, Any]) -> str:
+    """A table as it stands in a recording."""
+    return json.dumps(values, ensure_ascii=False)
 
 
 class Recording:
@@ -101,19 +108,36 @@ class Recording:
         self._checksums: dict[str, str] = {}
         self._sealed = True
         self._definitions: list[McapRecord] = []
-        schemas: dict[bytes, int] = {}
+        self._described_as: set[str] = set()  # names of messages
+        self._schemas: dict[bytes, int] = {}
         for topic, rows in topics.items():
-            file, name = schema_file(topic, rows, storeys, len(slaves)), f"rths.{message_name(topic)}"
-            self._classes[topic] = message_class(file, name)
-            description = descriptor_pb2.FileDescriptorSet(file=[file]).SerializeToString()
-            if description not in schemas:
-                schemas[description] = self._schema(name, description)
-            units = json.dumps({row.name: row.unit for row in rows}, ensure_ascii=False)
+            units = {"units": packed({row.name: row.unit for row in rows})}
             named = {"slaves": " ".join(slaves)} if list(slaves) != [SLAVE] else {}
+            each = shared(rows) if len(slaves) > 1 else {}
+            about = units | named | ({SHARED: packed(each)} if each else {})
             self._channels[topic] = self._channel(
-                f"rths/{test}/{topic}", schemas[description], {"units": units} | named
+                f"rths/{test}/{topic}", self._described(topic, rows, storeys), about
             )
         self._define()
+        self._meanings = {
+            topic: packed({row.name: (row.unit, row.text) for row in rows}) for topic, rows in topics.items()
+        }
+
+    def _described(self, topic: str, rows: tuple[Signal, ...], storeys: int) -> int:
+        """The schema of a topic; topics with the same fields share one, others of its kind have a number."""
+        number = 1
+        while True:
+            variant = str(number) if number > 1 else ""
+            file, name = schema_file(topic, rows, storeys, variant), f"rths.{message_name(topic)}{variant}"
+            description = descriptor_pb2.FileDescriptorSet(file=[file]).SerializeToString()
+            if description in self._schemas or name not in self._described_as:
+                break
+            number += 1
+        self._classes[topic] = message_class(file, name)
+        if description not in self._schemas:
+            self._described_as.add(name)
+            self._schemas[description] = self._schema(name, description)
+        return self._schemas[description]
 
     def _schema(self, name: str, description: bytes) -> int:
         number: int = self._writer.register_schema(name, "protobuf", description)
@@ -146,6 +170,10 @@ class Recording:
             sequence=int(sequence) & 0xFFFFFFFF,
             data=message.SerializeToString(),
         )
+
+    def describe(self) -> None:
+        """Write the unit and the meaning of every signal."""
+        self.metadata(SIGNALS, self._meanings)
 
     def metadata(self, name: str, values: Mapping[str, str]) -> None:
         """Write a metadata record."""

@@ -8,9 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from common.recording.reader import share
-from common.roles import SLAVE
+from common.roles import MASTER, SLAVE
+from common.signals import shared
 from diagnosis.recorded.record import Record
 from diagnosis.signals.mask import Mask
+from laboratories.kinds import topics
 from loop import closed_loop, substructure
 from loop.closed_loop import Exchange
 from models.registry import Array
@@ -103,8 +105,9 @@ def simulated(
     )
     if not rollout.finite:
         return None
-    master = rollout.master if whole is None else share(rollout.master, plan.roles.index(role))
-    return master | rollout.slaves[role]
+    if whole is None:
+        return rollout.master | rollout.slaves[role]
+    return share(rollout.master, shared(topics(plan)[MASTER]), role) | rollout.slaves[role]
 
 
 def noised(system: System, levels: Mapping[str, float]) -> System:

@@ -6,11 +6,11 @@ import dataclasses
 from collections.abc import Mapping
 
 from common.plan.plan import Plan
-from common.signals import Signal
+from common.signals import COLUMN_CHANNELS
 from laboratories.column import model
 from laboratories.column.descent import ColumnRamp
 from laboratories.column.model import ColumnLab
-from laboratories.kind import Channels, Chosen, Coupling, Follows, Kind, Limited, Sensed
+from laboratories.kind import Chosen, Coupling, Follows, Kind, Limited, Sensed
 from laboratories.sensors import noise
 from models.registry import Array
 from models.system import System
@@ -21,20 +21,7 @@ class ColumnKind(Kind):
 
     name = "column"
     says = "actuator and column"
-    channels = Channels(
-        target=Signal("column_target", "m", "specimen deformation wanted"),
-        command=Signal(
-            "actuator_command",
-            "m",
-            "command written, to be reached at the end of the interval, or held from the tick on",
-        ),
-        measured=(
-            Signal("column_displacement", "m", "specimen deformation measured"),
-            Signal("column_force", "N", "restoring force of the specimen measured"),
-        ),
-        position="column_displacement",
-        force="column_force",
-    )
+    channels = COLUMN_CHANNELS
     limited = Limited("actuator_step", "actuator_velocity", "actuator_acceleration", "", "column_error")
     sensed = (Sensed(("column_displacement", "column_force"), "column_displacement"),)
     sites = ("actuator", "column")

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 
 from common.plan.plan import Plan
 from common.plan.tables import ForceCorrection
-from common.signals import Signal
-from laboratories.kind import Channels, Chosen, Coupling, Follows, Kind, Limited, Sensed
+from common.signals import TABLE_CHANNELS
+from laboratories.kind import Chosen, Coupling, Follows, Kind, Limited, Sensed
 from laboratories.sensors import noise
 from laboratories.table import model
 from laboratories.table.descent import TableRamp
@@ -24,21 +24,7 @@ class TableKind(Kind):
 
     name = "table"
     says = "shaking table and active mass damper"
-    channels = Channels(
-        target=Signal("table_target", "m", "absolute floor displacement wanted"),
-        command=Signal(
-            "table_command", "m", "command written to the table, to be reached at the end of the interval"
-        ),
-        measured=(
-            Signal("table_displacement", "m", "table displacement measured"),
-            Signal("table_acceleration", "m/s²", "table acceleration measured"),
-            Signal("damper_stroke", "m", "stroke of the damper measured"),
-            Signal("damper_force", "N", "force of the damper on the table measured"),
-        ),
-        position="table_displacement",
-        force="damper_force",
-        effort=Signal("damper_command", "N", "motor force of the damper"),
-    )
+    channels = TABLE_CHANNELS
     limited = Limited("table_step", "table_velocity", "", "damper_step", "table_error")
     sensed = (
         Sensed(("table_displacement", "table_acceleration"), "table_displacement"),

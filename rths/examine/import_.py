@@ -126,7 +126,7 @@ def load_map(path: Path) -> Mapping:
     for name in sources:
         row = signals.signal(known_signals[name], bare(name))
         per = "storey" if plan.storeys > 1 and row.kind is Kind.STOREYS else ""
-        per = "slave" if len(plan.roles) > 1 and row.per_slave else per
+        per = "slave" if len(plan.roles) > 1 and row.slaves else per
         if per:
             raise InputError(
                 f"{path}: '{name}' has one value per {per} here and cannot be given as one column."
@@ -211,6 +211,7 @@ def write(path: Path, mapping: Mapping, t: Any, values: dict[str, Any], data: st
     plan = mapping.plan.with_test(duration=t.size * mapping.plan.test.interval)
     recording = Recording(path, plan.test.name, plan.storeys, topics, plan.roles)
     recording.metadata("plan", {"toml": plan.toml(), "digest": plan.digest()})
+    recording.describe()
     recording.metadata("import", {"data": data})
     for topic, names in given.items():
         table = zip(*(values[name].tolist() for name in names), strict=True)

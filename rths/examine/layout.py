@@ -10,11 +10,11 @@ from pathlib import Path
 from string import Template
 from typing import TYPE_CHECKING, Any
 
-from common import signals
 from common.errors import InputError
 from common.roles import LATENCY, MASTER, SLAVE, latency_topic, name_of
 from common.terminal import cli, outputs
 from common.terminal.printable import shown
+from laboratories import kinds
 
 if TYPE_CHECKING:
     from common.recording.reader import Run
@@ -104,7 +104,7 @@ def of_default_test() -> Subject:
     from common.plan import plan
 
     test = plan.load(cli.plan_path(None))
-    held = signals.topics(test.roles)
+    held = kinds.topics(test)
     fields = {topic: frozenset(row.name for row in rows) for topic, rows in held.items()}
     return Subject(test.test.name, test.roles, test.test.interval, test.ticks - 1, fields)
 

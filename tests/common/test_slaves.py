@@ -20,7 +20,7 @@ from common.plan import plan, reality
 from common.plan.plan import MOST_SLAVES, Plan, from_tables, parse
 from common.recording.reader import read
 from common.recording.writer import Recording
-from common.signals import topics
+from common.signals import default_topics
 from common.terminal import cli
 from loop.links import seed_of
 
@@ -251,12 +251,12 @@ def test_the_recorder_tells_each_laboratory_how_far_it_is() -> None:
 
 def test_a_recording_has_a_topic_per_slave_and_an_array_per_command(tmp_path: Path) -> None:
     slaves, path = two().roles, tmp_path / "a.mcap"
-    table = topics(slaves)
+    table = default_topics(slaves)
     labs = ["master", "slave.roof", "slave.cellar", "latency.roof", "latency.cellar"]
     assert list(table) == [*labs, "master_ramp", "slave_ramp.roof", "slave_ramp.cellar", "event"]
     recording = Recording(path, "trial", 1, table, slaves)
     kinds = {signals.Kind.INDEX: [1, 2]}
-    values = [kinds.get(row.kind, [1.0, 2.0]) if row.per_slave else 0 for row in signals.MASTER]
+    values = [kinds.get(row.kind, [1.0, 2.0]) if row.slaves else 0 for row in table["master"]]
     recording.add("master", 0, 0, values)
     recording.close({})
     found = read(path)
@@ -272,7 +272,7 @@ def test_a_recording_has_a_topic_per_slave_and_an_array_per_command(tmp_path: Pa
 
 def test_a_recording_without_a_tick_has_empty_parts(tmp_path: Path) -> None:
     slaves, path = two().roles, tmp_path / "a.mcap"
-    recording = Recording(path, "trial", 1, topics(slaves), slaves)
+    recording = Recording(path, "trial", 1, default_topics(slaves), slaves)
     recording.add("event", 0, 0, (0.0, "recorder", "info", "begin", "begun", {}))
     recording.close({})
     found = read(path)
@@ -282,8 +282,8 @@ def test_a_recording_without_a_tick_has_empty_parts(tmp_path: Path) -> None:
 
 def test_the_schema_of_one_slave_has_no_arrays(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
-    recording = Recording(path, "trial", 1, topics(("slave",)))
-    recording.add("master", 0, 0, [0 for _ in signals.MASTER])
+    recording = Recording(path, "trial", 1, default_topics())
+    recording.add("master", 0, 0, [0 for _ in signals.TOPICS["master"]])
     recording.close({})
     found = read(path)
     assert found.of("slave") is found

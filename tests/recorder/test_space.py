@@ -12,7 +12,7 @@ from common.lab.preflight import RefusedError
 from common.plan.plan import Plan
 from common.recording.reader import read
 from common.recording.schema import message_class, message_name, schema_file
-from common.signals import TICK_TOPICS, TOPICS, Kind
+from common.signals import TICK_TOPICS, TOPICS, Kind, default_topics
 from recorder import space
 from rths.perform.run import run
 from tests.helpers import with_table
@@ -36,15 +36,17 @@ def full(monkeypatch: Any, free: int) -> None:
 @pytest.mark.parametrize("slaves", [1, 4])
 @pytest.mark.parametrize("topic", TICK_TOPICS)
 def test_the_bytes_of_a_message_are_those_of_its_fields(topic: str, storeys: int, slaves: int) -> None:
-    rows = TOPICS[topic]
-    kind = message_class(schema_file(topic, rows, storeys, slaves), f"rths.{message_name(topic)}")
+    rows = default_topics([f"slave.{number}" for number in range(slaves)] if slaves > 1 else ["slave"]).get(
+        topic, TOPICS[topic]
+    )
+    kind = message_class(schema_file(topic, rows, storeys), f"rths.{message_name(topic)}")
     values = {}
     for row in rows:
-        count = storeys if row.kind is Kind.STOREYS else slaves if row.per_slave else 1
+        count = row.count(storeys)
         value = VALUES.get(row.kind, 0.1)
         values[row.name] = value if count == 1 else [value] * count
     exact = len(kind(**values).SerializeToString())
-    assert space.payload(rows, storeys, slaves) == pytest.approx(exact, abs=2)
+    assert space.payload(rows, storeys) == pytest.approx(exact, abs=2)
 
 
 def test_twice_the_test_needs_twice_the_room(short_plan: Plan) -> None:

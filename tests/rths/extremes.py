@@ -32,12 +32,12 @@ def value(row: Signal, tick: int) -> Any:
         Kind.STOREYS: [EXTREMES[tick], EXTREMES[-tick]],
         Kind.TEXT: "ramping",
     }[row.kind]
-    return [found, found] if row.per_slave else found
+    return [found, found] if row.slaves else found
 
 
 def write(path: Path) -> Path:
     """Two slaves and two storeys; the cellar's last tick is missing."""
-    topics = signals.topics(SLAVES)
+    topics = signals.default_topics(SLAVES)
     recording = Recording(path, "two", 2, topics, SLAVES)
     recording.metadata("versions", {"a": "ä\n", "": ""})
     recording.attach("ground_motion", bytes(range(256)), "application/octet-stream")

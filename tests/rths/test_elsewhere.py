@@ -229,7 +229,7 @@ def test_the_recordings_have_what_the_comparison_is_about(recordings: dict[str, 
     for kind, path in recordings.items():
         found = by_python(path)
         assert "killed" in kind or found.messages.keys() == {
-            f"rths/{read(path).test}/{topic}" for topic in signals.topics(read(path).roles)
+            f"rths/{read(path).test}/{topic}" for topic in signals.default_topics(read(path).roles)
         }
         assert "plan" in found.metadata or kind == "extremes"
         assert "ground_motion" in found.attachments
@@ -243,7 +243,7 @@ def test_the_recordings_have_what_the_comparison_is_about(recordings: dict[str, 
 def drawn(tmp_path: Path) -> Path:
     """A recording of two slaves with drawn latencies, some beyond the last bin and some missing."""
     path, draw = tmp_path / "drawn.mcap", np.random.default_rng(1)
-    topics = signals.topics(extremes.SLAVES)
+    topics = signals.default_topics(extremes.SLAVES)
     recording = Recording(path, "drawn", 1, topics, extremes.SLAVES)
     zero = {Kind.COUNT: 0, Kind.INDEX: 0, Kind.STAMP: 0, Kind.FLAG: False}
     for tick in range(500):

@@ -150,7 +150,7 @@ def test_without_the_option_there_is_one_file(call: Any, recording: Path, tmp_pa
 
 def test_a_name_too_long_for_matlab_is_said_in_one_sentence(call: Any, capsys: Any, tmp_path: Path) -> None:
     slave = "slave." + "a" * 60
-    topics = signals.topics((slave,))
+    topics = signals.default_topics((slave,))
     written = Recording(tmp_path / "long.mcap", "long", 1, {slave: topics[slave]}, (slave,))
     written.add(slave, 0, 0, [extremes.value(row, 0) for row in topics[slave]])
     written.close({})
