@@ -1,35 +1,41 @@
 """A kind of laboratory of the user's own: a class in a file, from which all else follows.
 
-The class names its channels, its nominal parameters and what moves the device on. A plan chooses it by
-`kind = "file.py:Class"`, and its table `[device]` says where the device stands in the building.
+The class names its channels, its nominal parameters, what may go wrong with it, and what moves it on. A plan chooses it
+by `kind = "file.py:Class"`, and its table `[device]` says where the device stands in the building.
 """
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from functools import partial
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar, cast
 
 import numba
 import numpy as np
-from numba import types
 
 from common.errors import InputError
 from common.plan.plan import Plan
-from common.plan.schema import as_type, nearest
+from common.plan.schema import Rule, as_type, in_range, nearest
 from common.plan.tables import ForceCorrection
 from common.safety.ramp import MotionRamp, Ramp
-from laboratories.kind import Chosen, Coupling, Follows, Kind
+from laboratories import completeness
+from laboratories.kind import Channels, Chosen, Coupling, Follows, Kind, Sensed
 from models.registry import Array
 from models.system import System
 
 if TYPE_CHECKING:
     from laboratories.effects.effect import Effect
 
-VECTOR = types.float64[::1]
-KERNEL = types.void(VECTOR, VECTOR, VECTOR, types.float64, types.float64)
-"""Signature of a device's `step`: parameters, state, truth, command (m), effort (N)."""
+Function = TypeVar("Function", bound=Callable[..., object])
 
 UNCORRECTED = ForceCorrection()
+SITE = "device"  # where the faults of any device are
+
+
+def kernel(function: Function) -> Function:
+    """Compile a function that a device's `step` calls, in each process anew: a file of a user's may import others."""
+    return cast(Function, numba.njit(error_model="numpy", nogil=True)(function))
 
 
 class Nominal(NamedTuple):
@@ -39,6 +45,39 @@ class Nominal(NamedTuple):
     unit: str
     says: str
     tolerance: float = 0.02  # how well it is known, relative
+    least: float = 0.0  # a plan may give no less
+    most: float | None = None  # and no more; None for any
+
+
+class Fault(NamedTuple):
+    """What may go wrong with a device and that no plan describes: an effect of the catalogue with one parameter.
+
+    The fault `leak` is the effect `device.leak`, which a reality can hide and a diagnosis can name.
+    """
+
+    says: str  # what it is, in a few words
+    parameter: str  # what says how strong it is
+    unit: str
+    null: float  # the value at which it is not there
+    least: float
+    most: float
+    sizes: tuple[float, ...]  # from barely visible to strong, where a search starts
+    reference: str = "the user's own kind"
+
+    def effect(self, name: str) -> Effect:
+        """The effect of the catalogue that sets it."""
+        # the catalogue loads the files of the shipped kinds, which need this module's room
+        from laboratories.effects.effect import Effect, Parameter
+
+        parameter = Parameter(self.parameter, self.unit, self.null, self.least, self.most, self.sizes)
+        laid = partial(_laid, name=name, parameter=self.parameter)
+        return Effect(f"{SITE}.{name}", SITE, "physics", self.says, (parameter,), self.reference, laid)
+
+
+def _laid(system: System, *, name: str, parameter: str, **given: float) -> System:
+    """The system whose device has a fault as strong as its one parameter says."""
+    device = system.effects.device | {name: given[parameter]}
+    return dataclasses.replace(system, effects=dataclasses.replace(system.effects, device=device))
 
 
 class DeviceRecord(NamedTuple):
@@ -94,62 +133,65 @@ class HoldRamp:
 
 
 class Device(Kind):
-    """Base of kinds of users' own; a subclass sets what stands here and writes `step`.
+    """Base of kinds of users' own, which set `name`, `says`, `channels` and what else they need, and write `step`.
 
-    `step(parameters, state, truth, command, effort)` moves the device on by one interval and is compiled: `parameters`
-    holds the interval (s), the values of `nominal` and then those of `faults`, each in the order of the class; `state`
-    has `states` numbers, all zero at rest; `command` (m) is reached at the interval's end, `effort` (N) is the motor's;
-    what sensors without error would read then goes into `truth`, in the order of the measured channels.
+    `step(parameters, state, truth, command, effort)` is a static method that moves the device on by one interval and is
+    compiled: `parameters` holds the interval (s), the values of `nominal` and then those of `faults`, each in the order
+    of the class; `state` has `states` numbers, all zero at rest; `command` (m) is reached at the interval's end,
+    `effort` (N) is the motor's; what sensors without error would read then goes into `truth`, in the order of the
+    measured channels.
     """
 
     follows: ClassVar[Follows] = Follows.DRIFT
     nominal: ClassVar[Mapping[str, Nominal]] = {}
-    faults: ClassVar[
-        Mapping[str, float]
-    ] = {}  # what effects set, by name, with the value at which there is none
+    faults: ClassVar[Mapping[str, Fault]] = {}
     states: ClassVar[int] = 0
-    rms: ClassVar[Mapping[str, float]] = {}  # nominal noise by channel
+    rms: ClassVar[Mapping[str, float]] = {}  # nominal noise by measured channel
     most: ClassVar[Mapping[str, float]] = {}  # limits by signal, and of those that `limited` names
-    effects: ClassVar[tuple[Effect, ...]] = ()
     stiffness: ClassVar[str] = ""  # the nominal parameter that is the device's stiffness, N/m; empty for none
     damping: ClassVar[str] = ""  # likewise its dashpot, N·s/m
-    sites = ("device",)
+    sites = (SITE,)
     record = DeviceRecord
     advance = staticmethod(advance_device)
     step: Callable[[Array, Array, Array, float, float], None]
 
+    def __init_subclass__(cls) -> None:
+        """A reading that has noise never stays the same: where it does while the device moves, its sensor is frozen."""
+        if "sensed" not in vars(cls) and isinstance(getattr(cls, "channels", None), Channels):
+            noisy = tuple(name for name in cls.channels.names if cls.rms.get(name, 0.0) > 0.0)
+            cls.sensed = (Sensed(noisy, cls.channels.position),) if noisy else ()
+
     def check(self, where: str) -> None:
-        """Raise InputError where the class is no complete kind; compile its kernel."""
-        lacking = [name for name in ("name", "says", "channels", "step") if not hasattr(self, name)]
-        if lacking:
-            raise InputError(f"{type(self).__name__} named in {where} lacks {', '.join(lacking)}.")
-        try:
-            self._kernel = numba.cfunc(KERNEL)(type(self).step)
-        except numba.core.errors.NumbaError as error:
-            reason = str(error).strip().splitlines()[-1]
-            raise InputError(
-                f"step of {type(self).__name__} named in {where} cannot be compiled: {reason}"
-            ) from None
+        """Compile the kernel; raises InputError with one sentence where the class is no complete kind."""
+        if wrong := completeness.complaint(self):
+            raise InputError(f"{completeness.called(self)} named in {where} {wrong}.")
+        self._kernel = completeness.compiled(self, where)
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """Its faults as effects of the catalogue, in the order of the class."""
+        return tuple(fault.effect(name) for name, fault in self.faults.items())
 
     def values(self, plan: Plan) -> dict[str, float]:
         """The nominal parameters by name: the class's, or the plan's where it gives them.
 
         Raises:
-            InputError: the plan gives one that the class does not have, or no number.
+            InputError: the plan gives one that the class does not have, no number, or one beyond its bounds.
         """
-        given = self._given(
-            plan.device.parameters,
-            self.nominal,
-            "device.parameters",
-            {name: one.unit for name, one in self.nominal.items()},
-        )
+        where = "device.parameters"
+        units = {name: one.unit for name, one in self.nominal.items()}
+        given = self._given(plan.device.parameters, units, where)
+        for name, value in given.items():
+            one = self.nominal[name]
+            rule = Rule(one.says, one.unit, least=one.least, most=one.most)
+            in_range(value, rule, f"{name} in [{where}]")
         return {name: one.value for name, one in self.nominal.items()} | given
 
     def build(self, system: System) -> DeviceRecord:
         """The device of a system at rest."""
-        values = self.values(system.plan)
-        faults = dict(self.faults) | system.effects.device
-        row = [system.plan.test.interval, *values.values(), *(faults[name] for name in self.faults)]
+        values, faults = self.values(system.plan), system.effects.device
+        laid = [faults.get(name, fault.null) for name, fault in self.faults.items()]
+        row = [system.plan.test.interval, *values.values(), *laid]
         return DeviceRecord(self._kernel, np.array(row), np.zeros(self.states))
 
     def coupling(self, plan: Plan) -> Coupling:
@@ -177,25 +219,31 @@ class Device(Kind):
     def noise(self, plan: Plan) -> Array:
         """The class's, or the plan's where it gives it."""
         units = {signal.name: signal.unit for signal in self.channels.measured}
-        rms = dict(self.rms) | self._given(plan.device.noise, units, "device.noise", units)
+        rms = dict(self.rms) | self._given(plan.device.noise, units, "device.noise")
         return np.array([rms.get(name, 0.0) for name in self.channels.names])
 
     def limits(self, plan: Plan) -> Mapping[str, float]:
         """The class's, or the plan's where it gives them."""
-        return dict(self.most) | self._given(plan.device.limits, self.most, "device.limits", {})
+        channels, limited = self.channels, self.limited
+        signals = (channels.target, channels.command, channels.effort, *channels.measured)
+        units = {signal.name: signal.unit for signal in signals if signal}
+        rates = (limited.step, limited.velocity, limited.acceleration, limited.effort_step, limited.error)
+        units |= {
+            name: unit for name, unit in zip(rates, ("m", "m/s", "m/s²", "N", "m"), strict=True) if name
+        }
+        return dict(self.most) | self._given(plan.device.limits, units, "device.limits")
 
     def ramp(self, plan: Plan, last: tuple[float, ...], before: tuple[float, ...]) -> Ramp:
         """The command comes to a hold, then the device is unloaded."""
         force = self.channels.names.index(self.channels.force)
         return HoldRamp(plan, last, before, force, effort=self.channels.effort is not None)
 
-    def _given(
-        self, table: Mapping[str, Any], known: Mapping[str, Any], where: str, units: Mapping[str, str]
-    ) -> dict[str, float]:
+    def _given(self, table: Mapping[str, Any], units: Mapping[str, str], where: str) -> dict[str, float]:
+        """The numbers of a table of the plan, whose names are among `units`; raises InputError where one is none."""
         for name in table:
-            if name not in known:
-                raise InputError(f"Unknown key '{name}' in [{where}]: {nearest(name, known)}")
+            if name not in units:
+                raise InputError(f"Unknown key '{name}' in [{where}]: {nearest(name, units)}")
         return {
-            name: as_type("float", value, f"{name} in [{where}]", units.get(name))
+            name: as_type("float", value, f"{name} in [{where}]", units[name])
             for name, value in table.items()
         }

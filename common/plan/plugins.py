@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import importlib
 import importlib.util
 import inspect
@@ -48,7 +49,8 @@ def _from_file(path: Path) -> ModuleType:
         raise InputError(
             f"There is no file {path}: a plug-in's path starts from the folder of the plan or reality."
         )
-    name = f"rths_plugin_{path.stem}_{abs(hash(path.resolve()))}"
+    digest = hashlib.blake2b(bytes(path.resolve()), digest_size=8).hexdigest()
+    name = f"rths_plugin_{path.stem}_{digest}"  # the same in every process, as what is compiled of it is kept by name
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
         raise InputError(f"{path} is no Python file.")

@@ -1,0 +1,181 @@
+"""Whether a class of a user's is a complete kind of laboratory: what is wrong with it, in one sentence, and its kernel.
+
+The kernel is tried on its nominal parameters before a plan may use it: between numbers that it must not touch, since
+compiled code that writes beside its arrays would otherwise end the process or falsify others without a word.
+"""
+
+from __future__ import annotations
+
+import inspect
+import linecache
+import math
+import re
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Any
+
+import numba
+import numpy as np
+from numba import types
+
+from common import blame
+from common.errors import InputError
+from laboratories.kind import Channels
+from models.compiled import jit_apart
+from models.registry import Array
+
+if TYPE_CHECKING:
+    from laboratories.device import Device
+
+VECTOR = types.float64[::1]
+KERNEL = types.void(VECTOR, VECTOR, VECTOR, types.float64, types.float64)
+"""Signature of a device's `step`: parameters, state, truth, command (m), effort (N)."""
+
+MOST_CHANNELS = 6  # measured: a message to the master has a layout for each count up to this one
+WORD = re.compile(r"[a-z][a-z0-9_]*")
+# other rows of the topics in which a laboratory's channels are recorded
+TAKEN = frozenset(
+    {"seq", "t", "command_seq", "mode", "ground_acceleration", "displacement", "velocity", "acceleration"}
+    | {"absolute_acceleration", "numerical_force"}
+)
+BESIDE = 64  # numbers kept on each side of an array that the kernel is tried on
+# of the trial, in which the command goes once around a sine of 1 mm
+INTERVAL = 2e-3  # s
+TICKS = 250
+REACH = 1e-3  # m
+
+
+def complaint(kind: Device) -> str:
+    """What is wrong with the attributes of a user's kind, as the end of a sentence; empty where nothing is."""
+    lacking = [name for name in ("name", "says", "channels", "step") if not hasattr(kind, name)]
+    if lacking:
+        return f"lacks {', '.join(lacking)}"
+    if not isinstance(kind.channels, Channels):
+        return f"has channels of the class {type(kind.channels).__name__}, but must have laboratories.kind.Channels"
+    if not isinstance(kind.states, int) or kind.states < 0:
+        return f"has states = {kind.states!r}, but must have the number of its states"
+    return of_names(kind) or of_channels(kind) or of_tables(kind)
+
+
+def of_names(kind: Device) -> str:
+    """The names of signals, parameters and faults."""
+    channels = kind.channels
+    signals = [channels.target.name, *channels.drives, *channels.names]
+    for name in (kind.name, *signals, *kind.nominal, *kind.faults):
+        if not isinstance(name, str) or not WORD.fullmatch(name):
+            return f"has the name {name!r}, but a name begins with a letter and has small letters, digits and _ only"
+    for place, name in enumerate(signals):
+        if name in TAKEN or name in signals[:place] or name in channels.rates:
+            return f"has a signal '{name}', which another signal of the recording is called already: name it otherwise"
+    both = sorted(kind.nominal.keys() & kind.faults.keys())
+    return f"has '{both[0]}' in nominal and in faults: name one of them otherwise" if both else ""
+
+
+def of_channels(kind: Device) -> str:
+    """How many are measured, and which are the position and the force."""
+    names = kind.channels.names
+    if not 1 <= len(names) <= MOST_CHANNELS:
+        return f"measures {len(names)} channels, but must measure 1 to {MOST_CHANNELS}"
+    for role in ("position", "force"):
+        given = getattr(kind.channels, role)
+        if given not in names:
+            return f"has '{given}' for its {role}, but must name a measured channel: {', '.join(names)}"
+    return ""
+
+
+def of_tables(kind: Device) -> str:
+    """Nominal parameters, noise, limits and faults, and the names in which one refers to another."""
+    channels = kind.channels
+    limits = (*(name for name in (*kind.limited,) if name), channels.target.name, *channels.drives)
+    for table, known in (("rms", channels.names), ("most", (*channels.names, *limits))):
+        if strange := [name for name in getattr(kind, table) if name not in known]:
+            return f"has '{strange[0]}' in {table}, but may have there only {', '.join(known)}"
+    for attribute in ("stiffness", "damping"):
+        if (given := getattr(kind, attribute)) and given not in kind.nominal:
+            return f"has {attribute} = '{given}', which is no parameter in nominal: {', '.join(kind.nominal)}"
+    for name, fault in kind.faults.items():
+        if not fault.least <= fault.null <= fault.most or not all(
+            fault.least <= size <= fault.most and size != fault.null for size in fault.sizes
+        ):
+            return f"has a fault '{name}' whose null or sizes are beyond its least and most, or sizes that are its null"
+        if not fault.sizes:
+            return f"has a fault '{name}' without sizes, from which a search would start"
+    return ""
+
+
+def compiled(kind: Device, where: str) -> Any:
+    """The kernel of a kind, compiled and tried; raises InputError with one sentence where it cannot be used."""
+    step = type(kind).step
+    try:
+        kernel = numba.cfunc(KERNEL, error_model="numpy")(step)
+    except Exception as error:  # Numba raises what its parts raise
+        raise InputError(
+            f"step of {type(kind).__name__} named in {where} cannot be compiled ({place(step, error)}): "
+            f"{reason(error)}."
+        ) from None
+    if wrong := misbehaviour(kind, kernel):
+        raise InputError(f"step of {called(kind)} named in {where} {wrong}.")
+    return kernel
+
+
+def called(kind: Device) -> str:
+    """A kind's class with its file."""
+    return f"{type(kind).__name__} ({blame.source_of(type(kind)) or 'no file'})"
+
+
+def place(step: Callable[..., Any], error: Exception) -> str:
+    """File, line and text of what cannot be compiled: as Numba says it, or the kernel's beginning."""
+    location = getattr(error, "loc", None)
+    code = inspect.unwrap(step).__code__
+    file, line = (location.filename, location.line) if location else (code.co_filename, code.co_firstlineno)
+    text = linecache.getline(file, line).strip()
+    return f"{file}, line {line}: {text}" if text else f"{file}, line {line}"
+
+
+def reason(error: Exception) -> str:
+    """The first line of Numba's text that says something of the code itself."""
+    words = ("Failed in ", "During: ")
+    lines = [line.strip() for line in str(error).splitlines() if line.strip() and not line.startswith(words)]
+    return lines[0].rstrip(".:") if lines else type(error).__name__
+
+
+def misbehaviour(kind: Device, kernel: Any) -> str:
+    """What a kernel does wrong as it follows a sine from rest, as the end of a sentence; empty where nothing is."""
+    row = (
+        INTERVAL,
+        *(one.value for one in kind.nominal.values()),
+        *(one.null for one in kind.faults.values()),
+    )
+    arrays = [padded(row), padded([0.0] * kind.states), padded([math.nan] * len(kind.channels.names))]
+    inner = [array[BESIDE : array.size - BESIDE] for array in arrays]
+    before = [array.copy() for array in arrays]
+    parameters, state, truth = inner
+    driven(kernel, parameters, state, truth, REACH, TICKS)
+    for name, array, old in zip(("parameters", "state", "truth"), arrays, before, strict=True):
+        changed = np.flatnonzero(array.view(np.int64) != old.view(np.int64)) - BESIDE
+        size = array.size - 2 * BESIDE
+        if np.any((changed < 0) | (changed >= size)):
+            return f"writes beside the {size} numbers of {name}"
+        if name == "parameters" and changed.size:
+            return f"changes parameters[{changed[0]}], which it may only read"
+    return of_truth(kind, truth)
+
+
+@jit_apart
+def driven(step: Any, parameters: Array, state: Array, truth: Array, reach: float, ticks: int) -> None:
+    """Drive a kernel along one period of a sine of `reach` m."""
+    for tick in range(ticks):
+        step(parameters, state, truth, reach * math.sin(2.0 * math.pi * (tick + 1) / ticks), 0.0)
+
+
+def of_truth(kind: Device, truth: Array) -> str:
+    """Which channel a trial has left without a finite number."""
+    for place_, name in enumerate(kind.channels.names):
+        if not math.isfinite(truth[place_]):
+            return f"gives {name} (truth[{place_}]) no finite number under a sine of 1 mm with the nominal parameters"
+    return ""
+
+
+def padded(values: Iterable[float]) -> Array:
+    """The values between numbers that are none, so that a kernel which reads them shows it."""
+    beside = [math.nan] * BESIDE
+    return np.array([*beside, *values, *beside])
