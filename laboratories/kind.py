@@ -10,7 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from enum import Enum
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from common.plan.plan import Plan
 from common.plan.tables import ForceCorrection
@@ -18,6 +18,9 @@ from common.safety.ramp import Ramp
 from common.signals import Channels
 from models.registry import Array
 from models.system import System
+
+if TYPE_CHECKING:
+    from laboratories.effects.effect import Effect
 
 
 class Follows(Enum):
@@ -81,6 +84,11 @@ class Kind(ABC):
     sites: tuple[str, ...] = ()  # where effects can be, sensors apart
     record: type[Any]  # NamedTuple of the laboratory at work
     advance: Callable[..., None]  # (record, truth, command, effort): one interval, see `kinds.advance`
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """Its effects beside those in the folders of the catalogue."""
+        return ()
 
     @abstractmethod
     def build(self, system: System) -> Any:

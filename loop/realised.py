@@ -3,34 +3,66 @@
 from __future__ import annotations
 
 from common.errors import InputError
+from common.plan.plan import Plan
 from common.plan.reality import Reality
-from common.roles import SLAVE
-from laboratories.effects import CATALOGUE, lay
-from laboratories.effects.sites import SITES
+from common.plan.schema import nearest
+from common.roles import MASTER
+from laboratories import effects
+from laboratories.effects import CATALOGUE, lay, sites
+from laboratories.effects.effect import Effect
+from laboratories.kinds import kind_of
 from models.system import System
 
 
 def true_system(reality: Reality) -> System:
-    """The plan's parameters as they really are, with the effects laid over them.
+    """The plan's parameters as they really are for a role, with the effects laid over them that it can have.
+
+    Of a reality that is not of one role it is the master's. An effect holds for every laboratory that has its place,
+    or for the one that it names; those in no laboratory hold for all.
 
     Raises:
-        InputError: an effect that the catalogue does not know, parameters it cannot have, an effect on a
-            laboratory whose rig is a plug-in: it brings its own physics, or one that names a slave and is none of
-            a slave's.
+        InputError: an effect that the plan's test cannot have, parameters it cannot have, an effect on a laboratory
+            whose rig is a plug-in: it brings its own physics, or one that names a role which does not have its place.
     """
-    only = reality.only or ("",) * len(reality.effects)
-    for (name, _), alone in zip(reality.effects, only, strict=True):
-        site = CATALOGUE[name].site if name in CATALOGUE else ""
-        lab = SITES.get(site, "")
-        if lab and getattr(reality, lab).class_:
+    one = reality if reality.whole else reality.of(MASTER)
+    whole = one.whole or one
+    known, own = effects.of_plan(whole.plan), effects.of_role(whole.plan, one.role)
+    for (name, _), only in zip(whole.effects, whole.only, strict=True):
+        check(name, only, whole.plan, known)
+    for part in (one,) if reality.whole else map(whole.of, (MASTER, *whole.plan.roles)):
+        check_rig(part)
+    return lay(System(one.plan), [entry for entry in one.effects if entry[0] in own], own)
+
+
+def check(name: str, only: str, whole: Plan, known: dict[str, Effect]) -> None:
+    """Raise InputError where the test of a plan cannot have an effect, or the one role that it names cannot."""
+    if name not in known:
+        if name in CATALOGUE:
             raise InputError(
-                f"The effect '{name}' cannot be laid over the plug-in in "
-                f"[{reality.role if lab == SLAVE else lab}.rig]: "
+                f"The effect '{name}' is of the {CATALOGUE[name].site}, which the plan's test does not have: leave it "
+                "out, or look at kind in [master] and [slave]."
+            )
+        raise InputError(f"Unknown effect '{name}': {nearest(name, known)}")
+    site = known[name].site
+    if only and not (site == sites.LINK and only != MASTER) and only not in sites.holders(whole, site):
+        named = "one slave: leave out its slave" if only != MASTER else "the master: leave out its laboratory"
+        raise InputError(
+            f"The effect '{name}' does not belong to {named}, or name a laboratory that has the {site}."
+        )
+
+
+def check_rig(one: Reality) -> None:
+    """Raise InputError where an effect is in the laboratory of a role whose rig is a plug-in."""
+    rig = one.master if one.role == MASTER else one.slave
+    if not rig.class_ or one.role not in one.plan.kinds:
+        return
+    places = sites.of_kind(kind_of(one.plan, one.role))
+    for name, _ in one.effects:
+        if name in CATALOGUE and CATALOGUE[name].site in places:
+            raise InputError(
+                f"The effect '{name}' cannot be laid over the plug-in in [{one.role}.rig]: "
                 "put it into that rig, or leave the rig out of the reality and the plan."
             )
-        if alone and site != "link" and lab != SLAVE:
-            raise InputError(f"The effect '{name}' does not belong to one slave: leave out its slave.")
-    return lay(System(reality.plan), reality.effects)
 
 
 def true_slaves(reality: Reality) -> dict[str, System]:

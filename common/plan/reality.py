@@ -14,6 +14,7 @@ from typing import Any
 
 from common.errors import PlanError
 from common.plan.building import OF_FOPDT
+from common.plan.kinds import TABLES_OF_KIND, known_kind
 from common.plan.plan import Plan, from_tables
 from common.plan.schema import fill, nearest
 from common.plan.tables import Rig
@@ -21,8 +22,16 @@ from common.roles import MASTER, SLAVE, slave_role
 
 Entry = tuple[str, Mapping[str, float]]  # name of an effect of the catalogue, and its parameters
 
-TRUE_TABLES = ("ground_motion", "structure", "column", "actuator", "table", "damper", "sensors")
-MERGED = ("experimental", "servo")
+TRUE_TABLES = ("ground_motion", "structure", "column", "actuator", "table", "damper", "device", "sensors")
+OF_LABORATORY = ("actuator", "column", "table", "damper", "device")  # true tables that a named slave may have
+DESIGNED = (
+    "place",
+    "ratio",
+    "scale",
+    "compensator",
+    "limits",
+)  # of [device]: chosen, never otherwise in reality
+MERGED = ("experimental", "servo", "parameters", "noise")
 KNOWN = ("seed", "master", "slave", "link", "effect", *TRUE_TABLES)
 
 
@@ -30,7 +39,8 @@ KNOWN = ("seed", "master", "slave", "link", "effect", *TRUE_TABLES)
 class Reality:
     """What differs from the plan; the plan itself where nothing does.
 
-    `role` and `place` (of all slaves, from 0) say whose reality it is where it is that of one slave alone.
+    `whole` is the reality of the whole test where this is that of one role alone, which `role` and `place` (of all
+    slaves, from 0) then name.
     """
 
     plan: Plan  # with the true parameters in place of the nominal ones
@@ -41,29 +51,27 @@ class Reality:
     base: Path = Path()
     hidden: frozenset[str] = frozenset()  # roles whose rig no recording may name
     effects: tuple[Entry, ...] = ()  # laid over the emulated laboratories, in this order
-    only: tuple[str, ...] = ()  # the role of the slave that each effect is laid over alone, empty for all
+    only: tuple[str, ...] = ()  # the role whose laboratory each effect is laid over alone, empty for all
     slaves: dict[str, Rig] = field(default_factory=dict)  # by role, where the plan names them
     role: str = SLAVE
     place: int = 0
+    whole: Reality | None = None
 
     def of(self, role: str) -> Reality:
-        """The reality of one slave, as of a plan with no other; raises InputError where there is no such slave."""
+        """The reality of the master's or of one slave's laboratory; raises InputError where there is no such slave."""
         plan = self.plan.of(role)
-        if not self.slaves:
-            return self
-        only = self.only or ("",) * len(self.effects)
-        kept = [
-            (entry, alone) for entry, alone in zip(self.effects, only, strict=True) if alone in ("", role)
-        ]
+        pairs = zip(self.effects, self.only, strict=True)
+        kept = [(entry, alone) for entry, alone in pairs if alone in ("", role)]
         return replace(
             self,
             plan=plan,
-            slave=self.slaves[role],
-            slaves={},
+            slave=self.slaves.get(role, self.slave),
+            slaves=self.slaves if role == MASTER else {},
             effects=tuple(entry for entry, _ in kept),
             only=tuple(alone for _, alone in kept),
             role=role,
-            place=list(self.slaves).index(role),
+            place=list(self.slaves).index(role) if role in self.slaves else 0,
+            whole=self.whole or self,
         )
 
 
@@ -133,7 +141,7 @@ def laboratories(tables: dict[str, Any], plan: Plan) -> dict[str, dict[str, Any]
         slaves = {SLAVE: slaves}
     labs = {MASTER: tables.get("master", {})} | slaves
     for role, lab in labs.items():
-        known = ("rig", "table", "damper") if role in slaves and plan.slaves else ("rig",)
+        known = tables_of(plan, role) if role in slaves and plan.slaves else ("rig",)
         if not isinstance(lab, dict):
             raise PlanError(f"[{role}] must be a table, not {lab!r}.")
         for name in lab:
@@ -142,9 +150,28 @@ def laboratories(tables: dict[str, Any], plan: Plan) -> dict[str, dict[str, Any]
     return labs
 
 
+def tables_of(plan: Plan, role: str) -> tuple[str, ...]:
+    """What a reality may say of a named slave: its rig, and the true tables that its kind of laboratory takes."""
+    taken = TABLES_OF_KIND[known_kind(plan.kinds[role])]
+    return ("rig", *(name for name in OF_LABORATORY if name in taken))
+
+
 def alone(entry: Mapping[str, Any], plan: Plan) -> str:
-    """The role of the slave that an effect names, empty where it holds for all; raises PlanError for another."""
-    name = entry.get("slave", "")
+    """The role that an effect names by `slave` or `laboratory`, empty where it holds for all.
+
+    Raises:
+        PlanError: the plan has no such laboratory, or both are given.
+    """
+    name, lab = entry.get("slave", ""), entry.get("laboratory", "")
+    if name and lab:
+        raise PlanError(f"[[effect]] '{entry['name']}' gives both slave and laboratory: leave slave out.")
+    if lab:
+        if lab not in (MASTER, *plan.roles):
+            raise PlanError(
+                f"laboratory of [[effect]] '{entry['name']}' is {lab!r}, which the plan does not have: "
+                f"{nearest(str(lab), (MASTER, *plan.roles))}"
+            )
+        return str(lab)
     if name == "":
         return ""
     if not isinstance(name, str) or name not in plan.slaves:
@@ -164,7 +191,7 @@ def entries(given: object) -> tuple[Entry, ...]:
         name = entry.get("name")
         if not isinstance(name, str):
             raise PlanError(f"an [[effect]] has the name {name!r}: give a name of the catalogue.")
-        values = {key: value for key, value in entry.items() if key not in ("name", "slave")}
+        values = {key: value for key, value in entry.items() if key not in ("name", "slave", "laboratory")}
         for key, value in values.items():
             if not isinstance(value, int | float) or isinstance(value, bool):
                 raise PlanError(f"{key} of [[effect]] '{name}' is {value!r}, but must be a number.")
@@ -179,16 +206,34 @@ def true_plan(tables: dict[str, Any], plan: Plan) -> Plan:
     """
     merged = plan.tables()
     del merged["tolerances"]
+    check_device(tables, "device")
     for name in TRUE_TABLES:
         given = table_of(tables, name, name)
-        planned = replaced(name, merged[name], given)
-        merged[name] = planned | within(planned, given)
+        if given:
+            merged[name] = true_table(name, merged.get(name, {}), given)
     for slave in plan.slaves:
-        own = tables.get("slave", {}).get(slave, {})
-        for name in ("table", "damper"):
-            merged["slave"][slave][name] |= table_of(tables, name, name)
-            merged["slave"][slave][name] |= table_of(own, name, f"slave.{slave}.{name}")
+        lab, own = merged["slave"][slave], tables.get("slave", {}).get(slave, {})
+        check_device(own, f"slave.{slave}.device")
+        for name in OF_LABORATORY:
+            if name in lab:
+                lab[name] = true_table(name, lab[name], table_of(tables, name, name))
+                lab[name] = true_table(name, lab[name], table_of(own, name, f"slave.{slave}.{name}"))
     return replace(from_tables(merged, plan.base), tolerances=plan.tolerances)
+
+
+def true_table(name: str, planned: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    """A planned table with what a reality gives of it."""
+    kept = replaced(name, planned, given)
+    return kept | within(kept, given)
+
+
+def check_device(tables: Mapping[str, Any], where: str) -> None:
+    """Raise PlanError where [device] gives what is chosen and cannot be otherwise in reality."""
+    for key in table_of(tables, "device", where):
+        if key in DESIGNED:
+            raise PlanError(
+                f"{key} in [{where}] is chosen by the plan and cannot be otherwise in reality: leave it out."
+            )
 
 
 def replaced(name: str, planned: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
@@ -198,7 +243,7 @@ def replaced(name: str, planned: Mapping[str, Any], given: Mapping[str, Any]) ->
     each other's place where one of them is given.
     """
     gone: tuple[str, ...] = ()
-    if name == "actuator" and given.get("model", planned["model"]) != planned["model"]:
+    if name == "actuator" and given.get("model", planned.get("model")) != planned.get("model"):
         gone = (*OF_FOPDT, "servo")
     if name == "structure" and "damping" in given and "damping_ratio" not in given:
         gone = ("damping_ratio",)

@@ -1,7 +1,7 @@
 """The catalogue of unmodelled effects: one file each, in the folder of its site.
 
-A file in a site's folder is all that an effect needs: the catalogue finds it. It defines `EFFECT`, or `EFFECTS` where
-one law exists once per signal.
+A file in a site's folder is all that an effect needs: the catalogue finds it. It defines `EFFECT`, or `FAULT` where
+one law exists once per reading of any laboratory. The effects of a kind of a user's stand in its class.
 """
 
 from __future__ import annotations
@@ -10,35 +10,99 @@ import math
 import pkgutil
 from collections.abc import Iterator, Mapping, Sequence
 from importlib import import_module
+from typing import Any
 
 from common.errors import InputError
+from common.plan.plan import Plan
 from common.plan.schema import Rule, nearest
+from common.roles import MASTER
+from laboratories.effects import reading, sites
 from laboratories.effects.effect import Effect, Parameter
-from laboratories.effects.sites import SITES
+from laboratories.effects.reading import SIGNALS, Fault
+from laboratories.effects.sites import OF_TEST, SITES
+from laboratories.kind import Kind
+from laboratories.kinds import kind_of
 from models.system import System
 
 Entry = tuple[str, Mapping[str, float]]  # name of an effect, its parameters
 
 
-def files() -> Iterator[Effect]:
-    """The effects of all files in the folders of sites: of the whole test, then of each kind of laboratory."""
+def modules() -> Iterator[dict[str, Any]]:
+    """The files in the folders of sites: of the whole test, then of each kind of laboratory."""
     for package in (__name__, "laboratories.column.effects", "laboratories.table.effects"):
         for folder in pkgutil.iter_modules(import_module(package).__path__, f"{package}."):
             if not folder.ispkg:
                 continue
             for item in pkgutil.iter_modules(import_module(folder.name).__path__, f"{folder.name}."):
-                module = vars(import_module(item.name))
-                yield from module.get("EFFECTS") or (module["EFFECT"],)
+                yield vars(import_module(item.name))
+
+
+FILES = tuple(modules())
+FAULTS: tuple[Fault, ...] = tuple(file["FAULT"] for file in FILES if "FAULT" in file)
+"""What can be wrong with any reading."""
+
+
+def shipped() -> Iterator[Effect]:
+    """The effects of all files, those on readings for the kinds that ship."""
+    for file in FILES:
+        if "FAULT" in file:
+            yield from (file["FAULT"].on(name, signal) for name, signal in SIGNALS.items())
+        else:
+            yield file["EFFECT"]
 
 
 CATALOGUE: dict[str, Effect] = {
-    item.name: item for item in sorted(files(), key=lambda item: list(SITES).index(item.site))
+    item.name: item for item in sorted(shipped(), key=lambda item: SITES.index(item.site))
 }
-"""Every effect by its name, in the order of sites, within a site by the names of the files."""
+"""Every effect that ships by its name, in the order of sites, within a site by the names of the files."""
 
 
-def lay(system: System, entries: Sequence[Entry]) -> System:
-    """The system with effects of the catalogue laid over it, in the order given.
+def of_test() -> dict[str, Effect]:
+    """The effects that are in no laboratory, by name."""
+    return {name: effect for name, effect in CATALOGUE.items() if effect.site in OF_TEST}
+
+
+def of_kind(kind: Kind, plan: Plan) -> dict[str, Effect]:
+    """The effects that a laboratory of a kind can have, by name; `plan` as the role that hosts it sees it."""
+    places = sites.of_kind(kind)
+    found = {name: effect for name, effect in CATALOGUE.items() if effect.site in places}
+    found |= {effect.name: effect for effect in kind.effects}
+    limits = kind.limits(plan)
+    for signal, noise in zip(kind.channels.measured, kind.noise(plan), strict=True):
+        size = reading.channel(signal.name, signal.unit, limits.get(signal.name, 0.0), float(noise))
+        found |= {
+            effect.name: effect
+            for fault in FAULTS
+            if (effect := fault.on(signal.name, size)).name not in found
+        }
+    return dict(sorted(found.items(), key=lambda item: places.index(item[1].site)))
+
+
+def of_role(plan: Plan, role: str) -> dict[str, Effect]:
+    """The effects that can be laid over what a role of the plan hosts, those of the whole test first, by name.
+
+    Raises:
+        InputError: the kind that the plan names cannot be loaded.
+    """
+    own = plan.kinds.get(role)
+    return of_test() | (of_kind(kind_of(plan, role), plan.of(role)) if own else {})
+
+
+def of_plan(plan: Plan) -> dict[str, Effect]:
+    """The effects that the test of a plan can have, by name, in the order of its sites; raises InputError likewise."""
+    order = sites.of_plan(plan)
+    found: dict[str, Effect] = {}
+    for role in (MASTER, *plan.roles):
+        found = of_role(plan, role) | found
+    kept = {name: effect for name, effect in found.items() if effect.site in order}
+    places = {name: place for place, name in enumerate(CATALOGUE)}
+    return dict(
+        sorted(kept.items(), key=lambda item: (order.index(item[1].site), places.get(item[0], len(places))))
+    )
+
+
+def lay(system: System, entries: Sequence[Entry], known: Mapping[str, Effect] | None = None) -> System:
+    """The system with effects laid over it, in the order given; of those `known`, else those that ship.
 
     Parameters of the plan are multiplied or added to, so that such effects given twice add up; of effects
     with fields of their own the last one given holds.
@@ -47,10 +111,11 @@ def lay(system: System, entries: Sequence[Entry]) -> System:
         InputError: an effect or a parameter is unknown, a parameter is missing or out of its bounds, or the plan's
             actuator is of a model that cannot have the effect.
     """
+    catalogue = CATALOGUE if known is None else known
     for name, given in entries:
-        if name not in CATALOGUE:
-            raise InputError(f"Unknown effect '{name}': {nearest(name, CATALOGUE)}")
-        effect = CATALOGUE[name]
+        if name not in catalogue:
+            raise InputError(f"Unknown effect '{name}': {nearest(name, catalogue)}")
+        effect = catalogue[name]
         if not effect.fits(system.plan):
             raise InputError(
                 f"The effect '{name}' is one of the actuator '{' or '.join(effect.actuators)}', but the plan's is "

@@ -57,7 +57,7 @@ class Effect:
     """
 
     name: str
-    site: str  # one of `laboratories.effects.sites.SITES`
+    site: str  # in the building, the link or a kind of laboratory (laboratories/effects/sites.py)
     kind: Kind
     says: str
     parameters: tuple[Parameter, ...]

@@ -23,7 +23,7 @@ def factor_on(
     """The effect `site.thing` with one parameter, `factor`, which is 1 where the effect is not there.
 
     Args:
-        site: where it is, one of `laboratories.effects.sites.SITES`.
+        site: where it is, as `laboratories/effects/sites.py` lists them.
         thing: what is multiplied, the rest of the effect's name.
         apply: lays it over a system, given the factor; `of_plan` makes it for a parameter of the plan.
         says: what the effect is, in a few words.

@@ -6,6 +6,7 @@ default plan believes.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -31,43 +32,48 @@ SIGNALS = {
     "damper_stroke": Signal("m", 50e-3, 2e-6),
     "damper_force": Signal("N", 80.0, 0.2),
 }
+TYPICAL = {
+    "m": 20e-3,
+    "m/s": 0.1,
+    "m/s²": 1.0,
+    "N": 10e3,
+}  # of a reading by its unit, where nothing more is known
+QUIET = 1e-3  # noise over that, likewise
 
 
-def on_each(
-    fault: str,
-    parameter: Callable[[Signal], Parameter],
-    *,
-    says: str,
-    reference: str,
-    in_samples: bool = False,
-    random: bool = False,
-) -> tuple[Effect, ...]:
-    """The effects `sensor.<signal>.<fault>` with one parameter each.
+@dataclass(frozen=True)
+class Fault:
+    """What can be wrong with any reading: the effects `sensor.<signal>.<name>` with one parameter each."""
 
-    Args:
-        fault: what is wrong with the reading: the field of `SensorEffects` that the parameter sets.
-        parameter: the parameter for a signal, with its unit and sizes.
-        says: what the effect is, in a few words.
-        reference: a source or an equation.
-        in_samples: it is told from single samples, no fit looks for it.
-        random: it is noise.
-    """
-    return tuple(
-        Effect(
-            name=f"sensor.{name}.{fault}",
+    name: str  # the field of `SensorEffects` that the parameter sets
+    parameter: Callable[[Signal], Parameter]  # the parameter for a signal, with its unit and sizes
+    says: str  # what the effect is, in a few words
+    reference: str  # a source or an equation
+    in_samples: bool = False  # it is told from single samples, no fit looks for it
+    random: bool = False  # it is noise
+
+    def on(self, name: str, signal: Signal) -> Effect:
+        """The effect on the reading of that name."""
+        return Effect(
+            name=f"sensor.{name}.{self.name}",
             site=f"sensor.{name}",
             kind="measurement",
-            says=says,
-            parameters=(parameter(signal),),
-            reference=reference,
-            apply=partial(falsified, signal=name, fault=fault),
+            says=self.says,
+            parameters=(self.parameter(signal),),
+            reference=self.reference,
+            apply=partial(falsified, signal=name, fault=self.name),
             signal=name,
-            fault=fault,
-            in_samples=in_samples,
-            random=random,
+            fault=self.name,
+            in_samples=self.in_samples,
+            random=self.random,
         )
-        for name, signal in SIGNALS.items()
-    )
+
+
+def channel(name: str, unit: str, limit: float, noise: float) -> Signal:
+    """A reading of a kind of a user's, sized by its limit or else by its unit; `limit` and `noise` may be 0."""
+    usable = limit if 0.0 < limit < math.inf else 0.0
+    typical = usable or TYPICAL.get(unit, 1.0)
+    return SIGNALS.get(name) or Signal(unit, typical, noise or QUIET * typical)
 
 
 def sized(size: float, *shares: float) -> tuple[float, ...]:

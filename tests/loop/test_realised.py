@@ -14,10 +14,10 @@ from common.plan import reality
 from common.plan.plan import Plan, from_tables
 from common.plan.reality import Reality
 from common.recording.reader import Run, read
-from common.roles import kind_of
+from common.roles import MASTER, SLAVE, kind_of
 from common.signals import TOPICS
 from laboratories.effects import CATALOGUE, lay
-from laboratories.effects.sites import SITES
+from laboratories.effects.sites import holders
 from loop import substructure
 from loop.closed_loop import Exchange, rows, simulate
 from loop.exchange import exchange
@@ -146,7 +146,7 @@ def test_the_loops_with_effects_equal_the_compiled_rollout(lot: str, plan: Plan,
     assert truth.seed == 11
     recording = assert_equals_the_rollout(plan, truth, tmp_path / "real.mcap")
     assert recording.ticks("master") == plan.ticks
-    assert true_system(truth) != System(plan)
+    assert [true_system(truth), *true_slaves(truth).values()] != [System(plan)] * 2
 
 
 def test_effects_and_parameters_of_a_reality_come_together(plan: Plan, tmp_path: Path) -> None:
@@ -226,11 +226,12 @@ def size(name: str) -> dict[str, float]:
 @pytest.mark.parametrize("name", DISTINCT)
 @pytest.mark.parametrize("lab", ["master", "slave"])
 def test_effects_on_a_plug_in_rig_are_refused_with_one_sentence(name: str, lab: str, plan: Plan) -> None:
-    assert SITES[CATALOGUE[name].site] == site_of(name)
+    assert holders(plan, CATALOGUE[name].site) == ((site_of(name),) if site_of(name) else ())
     rig = {"rig": {"class": "somewhere.else:Lab"}}
     truth = real(plan, effect(name, **size(name)), **{lab: rig})
     if site_of(name) != lab:
-        assert true_system(truth) == lay(System(plan), [(name, size(name))])
+        there = {"slave": site_of(name) or MASTER}.get(lab, SLAVE)  # the other laboratory
+        assert true_system(truth.of(there)) == lay(System(plan), [(name, size(name))])
         return
     with pytest.raises(InputError) as caught:
         true_system(truth)

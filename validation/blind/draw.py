@@ -24,12 +24,11 @@ from common.plan.plan import Plan
 from common.plan.schema import nearest
 from common.terminal import cli
 from laboratories.effects.effect import Parameter
-from laboratories.effects.sites import SITES
 from models.ground_motion.motions import MOTIONS
 from models.system import Effects, System
 from validation.blind import library as libraries
 from validation.blind import lots
-from validation.blind.library import LABS, PARTS, Library
+from validation.blind.library import LABS, PARTS, Library, role_at
 
 Lot = tuple[str | int, ...]  # seed, set and number of a case: what all of its draws are named by
 Set = Literal["judge", "tune"]
@@ -82,7 +81,7 @@ class Case:
         if silent:
             tables["sensors"] = dict.fromkeys(self.truths["sensors"], 0.0)
         if self.kind in ("formula", "unknown"):
-            lab = SITES[self.laid[0].site]
+            lab = role_at(self.laid[0].site, Plan())
             tables[lab] = {"rig": {"class": LABS[lab], "options": self._options(lab, tables, laid)}}
         elif laid:
             tables["effect"] = [{"name": item.name, **item.parameters} for item in laid]

@@ -6,7 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from common.plan.plan import Plan
 from laboratories.effects.effect import Effect
+from laboratories.effects.sites import holders
 
 LABS = {
     "master": "validation.blind.labs.column_lab:ColumnLab",
@@ -34,6 +36,11 @@ class Library:
     def names(self) -> tuple[str, ...]:
         """Every effect there is."""
         return (*self.catalogue, *self.strangers)
+
+
+def role_at(site: str, plan: Plan) -> str:
+    """The role whose laboratory has a site, the first of several; empty where it is in no laboratory."""
+    return next(iter(holders(plan, site)), "")
 
 
 def shipped() -> Library:

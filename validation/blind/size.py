@@ -12,12 +12,13 @@ from typing import Any
 
 import numpy as np
 
+from common.plan.plan import Plan
 from common.recording.reader import Run, Values, read
 from common.rig import ColumnCommand, TableCommand
 from common.roles import MASTER, SLAVE
 from common.signals import MEASURED
-from laboratories.effects.sites import SITES
 from validation.blind.draw import Case, Laid
+from validation.blind.library import role_at
 
 FORCE_NOISE = "damper_force"
 # a signal that is computed, not read, is compared with the noise of the reading beside it
@@ -43,7 +44,7 @@ def size(case: Case, item: Laid, run: Run) -> float:
     noise = case.truths["sensors"]
     if item.site == "link":
         return max(_ratios(_messages(run), noise), default=0.0)
-    play = {MASTER: play_a, SLAVE: play_b}.get(SITES[item.site], play_building)
+    play = {MASTER: play_a, SLAVE: play_b}.get(role_at(item.site, Plan()), play_building)
     with_effect, without = play(case, (item,), run), play(case, (), run)
     difference = {name: values - without[name] for name, values in with_effect.items()}
     return max(_ratios(difference, noise), default=0.0)
@@ -75,7 +76,7 @@ def play_b(case: Case, laid: tuple[Laid, ...], run: Run) -> dict[str, Values]:
     columns = run.columns["slave"]
     pairs = zip(columns["table_command"].tolist(), columns["damper_command"].tolist(), strict=True)
     commands = [TableCommand(*pair) for pair in pairs]
-    return _played(build_rig(reality(case, laid, silent=True)), commands, MEASURED["slave"])
+    return _played(build_rig(reality(case, laid, silent=True).of(SLAVE)), commands, MEASURED["slave"])
 
 
 def _played(rig: Any, commands: list[Any], names: tuple[str, ...]) -> dict[str, Values]:

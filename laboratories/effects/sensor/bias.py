@@ -9,7 +9,7 @@ loop moves too.
 from __future__ import annotations
 
 from laboratories.effects.effect import Parameter
-from laboratories.effects.reading import Signal, on_each, sized
+from laboratories.effects.reading import Fault, Signal, sized
 
 
 def parameter(signal: Signal) -> Parameter:
@@ -24,7 +24,7 @@ def parameter(signal: Signal) -> Parameter:
     )
 
 
-EFFECTS = on_each(
+FAULT = Fault(
     "bias",
     parameter,
     says="the reading is off by a constant",

@@ -10,9 +10,9 @@ comparison of displacements shows.
 from __future__ import annotations
 
 from laboratories.effects.effect import Parameter
-from laboratories.effects.reading import on_each
+from laboratories.effects.reading import Fault
 
-EFFECTS = on_each(
+FAULT = Fault(
     "delay",
     lambda _: Parameter(
         "delay",

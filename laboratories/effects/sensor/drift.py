@@ -8,7 +8,7 @@ Not to be confused with `sensor.<signal>.bias`, which is there from the beginnin
 from __future__ import annotations
 
 from laboratories.effects.effect import Parameter
-from laboratories.effects.reading import Signal, on_each, sized
+from laboratories.effects.reading import Fault, Signal, sized
 
 
 def parameter(signal: Signal) -> Parameter:
@@ -24,7 +24,7 @@ def parameter(signal: Signal) -> Parameter:
     )
 
 
-EFFECTS = on_each(
+FAULT = Fault(
     "drift",
     parameter,
     says="the reading goes astray steadily",

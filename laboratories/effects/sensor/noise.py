@@ -8,7 +8,7 @@ Not to be confused with `link.jitter`, which scatters what is used, not what was
 from __future__ import annotations
 
 from laboratories.effects.effect import Parameter
-from laboratories.effects.reading import Signal, on_each, sized
+from laboratories.effects.reading import Fault, Signal, sized
 
 
 def parameter(signal: Signal) -> Parameter:
@@ -24,7 +24,7 @@ def parameter(signal: Signal) -> Parameter:
     )
 
 
-EFFECTS = on_each(
+FAULT = Fault(
     "noise",
     parameter,
     says="the reading is noisier than believed",

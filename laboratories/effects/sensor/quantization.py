@@ -9,7 +9,7 @@ the readings lie on a grid.
 from __future__ import annotations
 
 from laboratories.effects.effect import Parameter
-from laboratories.effects.reading import Signal, on_each, sized
+from laboratories.effects.reading import Fault, Signal, sized
 
 
 def parameter(signal: Signal) -> Parameter:
@@ -25,7 +25,7 @@ def parameter(signal: Signal) -> Parameter:
     )
 
 
-EFFECTS = on_each(
+FAULT = Fault(
     "quantization",
     parameter,
     says="the reading comes in steps",
