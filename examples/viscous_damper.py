@@ -15,9 +15,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from common.signals import Signal
-from laboratories.device import Device, Fault, Nominal, kernel
-from laboratories.kind import Channels, Limited
+from laboratories.device import Channels, Device, Fault, Limited, Nominal, Signal, kernel
 from models.registry import Array
 from models.transfer_systems import delay, first_order
 

@@ -19,7 +19,7 @@ from numba import types
 
 from common import blame
 from common.errors import InputError
-from laboratories.kind import Channels
+from common.signals import BUILDING, MODE, NUMERICAL, Channels
 from models.compiled import jit_apart
 from models.registry import Array
 
@@ -33,10 +33,7 @@ KERNEL = types.void(VECTOR, VECTOR, VECTOR, types.float64, types.float64)
 MOST_CHANNELS = 6  # measured: a message to the master has a layout for each count up to this one
 WORD = re.compile(r"[a-z][a-z0-9_]*")
 # other rows of the topics in which a laboratory's channels are recorded
-TAKEN = frozenset(
-    {"seq", "t", "command_seq", "mode", "ground_acceleration", "displacement", "velocity", "acceleration"}
-    | {"absolute_acceleration", "numerical_force"}
-)
+TAKEN = frozenset(signal.name for signal in (*BUILDING, NUMERICAL, MODE)) | {"command_seq"}
 BESIDE = 64  # numbers kept on each side of an array that the kernel is tried on
 # of the trial, in which the command goes once around a sine of 1 mm
 INTERVAL = 2e-3  # s
@@ -50,7 +47,7 @@ def complaint(kind: Device) -> str:
     if lacking:
         return f"lacks {', '.join(lacking)}"
     if not isinstance(kind.channels, Channels):
-        return f"has channels of the class {type(kind.channels).__name__}, but must have laboratories.kind.Channels"
+        return f"has channels of the class {type(kind.channels).__name__}, but must have laboratories.device.Channels"
     if not isinstance(kind.states, int) or kind.states < 0:
         return f"has states = {kind.states!r}, but must have the number of its states"
     return of_names(kind) or of_channels(kind) or of_tables(kind)

@@ -19,13 +19,16 @@ from common.plan.plan import Plan
 from common.plan.schema import Rule, as_type, in_range, nearest
 from common.plan.tables import ForceCorrection
 from common.safety.ramp import MotionRamp, Ramp
+from common.signals import Channels, Signal
 from laboratories import completeness
-from laboratories.kind import Channels, Chosen, Coupling, Follows, Kind, Sensed
+from laboratories.kind import Chosen, Coupling, Follows, Kind, Limited, Sensed
 from models.registry import Array
 from models.system import System
 
 if TYPE_CHECKING:
     from laboratories.effects.effect import Effect
+
+__all__ = ["Channels", "Device", "Fault", "Follows", "Limited", "Nominal", "Signal", "kernel"]
 
 Function = TypeVar("Function", bound=Callable[..., object])
 

@@ -35,9 +35,7 @@ def written(
     given |= {"nominal": '{"stiffness": Nominal(1e6, "N/m", "of the spring")}'} | (attributes or {})
     body = "".join(f"    {name} = {text}\n" for name, text in given.items() if text)
     (folder / "own.py").write_text(
-        "from common.signals import Signal\n"
-        "from laboratories.device import Device, Fault, Nominal\n"
-        "from laboratories.kind import Channels\n\n\n"
+        "from laboratories.device import Channels, Device, Fault, Nominal, Signal\n\n\n"
         f"class Spring({base}):\n{body}{step}"
     )
     kind = named("own.py:Spring", folder, "[slave] kind")
@@ -68,7 +66,7 @@ def test_a_complete_class_is_a_kind(tmp_path: Path) -> None:
         ({"says": "", "channels": ""}, "lacks says, channels"),
         (
             {"channels": "('place', 'push')"},
-            "has channels of the class tuple, but must have laboratories.kind.Channels",
+            "has channels of the class tuple, but must have laboratories.device.Channels",
         ),
         ({"states": "-1"}, "has states = -1, but must have the number of its states"),
         ({"name": '"My spring"'}, "has the name 'My spring', but a name begins with a letter"),
