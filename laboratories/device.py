@@ -21,7 +21,7 @@ from common.plan.tables import ForceCorrection
 from common.safety.ramp import MotionRamp, Ramp
 from common.signals import Channels, Signal
 from laboratories import completeness
-from laboratories.kind import Chosen, Coupling, Follows, Kind, Limited, Sensed
+from laboratories.kind import Chosen, Coupling, Follows, Kind, Limited, Sensed, usual
 from models.registry import Array
 from models.system import System
 
@@ -159,8 +159,15 @@ class Device(Kind):
     step: Callable[[Array, Array, Array, float, float], None]
 
     def __init_subclass__(cls) -> None:
-        """A reading that has noise never stays the same: where it does while the device moves, its sensor is frozen."""
-        if "sensed" not in vars(cls) and isinstance(getattr(cls, "channels", None), Channels):
+        """A reading that has noise never stays the same: where it does while the device moves, its sensor is frozen.
+
+        Pictures show its force over its position.
+        """
+        if not isinstance(getattr(cls, "channels", None), Channels):
+            return
+        if "pictured" not in vars(cls):
+            cls.pictured = usual(cls.channels)
+        if "sensed" not in vars(cls):
             noisy = tuple(name for name in cls.channels.names if cls.rms.get(name, 0.0) > 0.0)
             cls.sensed = (Sensed(noisy, cls.channels.position),) if noisy else ()
 

@@ -73,6 +73,35 @@ class Sensed(NamedTuple):
     by_effort: bool = False  # whether it is the motor's force that moves them, not the command
 
 
+class Hysteresis(NamedTuple):
+    """A motion and the force that goes with it: what makes a loop."""
+
+    name: str  # what is deformed, in a word: "damper"
+    motion: str  # of the measured channels
+    force: str  # likewise
+    across: str  # what the motion is called on an axis, behind that word: "stroke"
+    unit: str = "N"  # of the force where an axis cannot choose it by what is recorded: N or kN
+
+
+class Pictured(NamedTuple):
+    """What pictures and tables call the parts of a laboratory, and which of its signals they put together."""
+
+    system: str  # the transfer system: "actuator"
+    name: str  # what that moves, in a word: "column"
+    position: str  # what its motion is called, behind that word: "deformation"
+    loops: tuple[Hysteresis, ...]
+    also: tuple[str, ...] = ()  # measured channels in none of these loops whose histories are shown
+
+
+def usual(channels: Channels) -> Pictured:
+    """What pictures call a laboratory of which they know the signals alone."""
+    word = channels.target.name.removesuffix("_target").replace("_", " ")
+    across = channels.position.replace("_", " ").removeprefix(f"{word} ")
+    loop = Hysteresis(word, channels.position, channels.force, across)
+    also = tuple(name for name in channels.names if name not in (loop.motion, loop.force))
+    return Pictured(word, word, across, (loop,), also)
+
+
 class Kind(ABC):
     """One kind of laboratory. A kind of a user's is a subclass of `laboratories.device.Device` in a file of its own."""
 
@@ -82,6 +111,7 @@ class Kind(ABC):
     limited: Limited = Limited()
     sensed: tuple[Sensed, ...] = ()
     sites: tuple[str, ...] = ()  # where effects can be, sensors apart
+    pictured: Pictured
     record: type[Any]  # NamedTuple of the laboratory at work
     advance: Callable[..., None]  # (record, truth, command, effort): one interval, see `kinds.advance`
 

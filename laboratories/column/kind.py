@@ -10,7 +10,7 @@ from common.signals import COLUMN_CHANNELS
 from laboratories.column import model
 from laboratories.column.descent import ColumnRamp
 from laboratories.column.model import ColumnLab
-from laboratories.kind import Chosen, Coupling, Follows, Kind, Limited, Sensed
+from laboratories.kind import Chosen, Coupling, Follows, Hysteresis, Kind, Limited, Pictured, Sensed
 from laboratories.sensors import noise
 from models.registry import Array
 from models.system import System
@@ -25,6 +25,12 @@ class ColumnKind(Kind):
     limited = Limited("actuator_step", "actuator_velocity", "actuator_acceleration", "", "column_error")
     sensed = (Sensed(("column_displacement", "column_force"), "column_displacement"),)
     sites = ("actuator", "column")
+    pictured = Pictured(
+        "actuator",
+        "column",
+        "deformation",
+        (Hysteresis("column", "column_displacement", "column_force", "deformation", "kN"),),
+    )
     record = ColumnLab
 
     def build(self, system: System) -> ColumnLab:

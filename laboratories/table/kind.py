@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from common.plan.plan import Plan
 from common.plan.tables import ForceCorrection
 from common.signals import TABLE_CHANNELS
-from laboratories.kind import Chosen, Coupling, Follows, Kind, Limited, Sensed
+from laboratories.kind import Chosen, Coupling, Follows, Hysteresis, Kind, Limited, Pictured, Sensed
 from laboratories.sensors import noise
 from laboratories.table import model
 from laboratories.table.descent import TableRamp
@@ -31,6 +31,9 @@ class TableKind(Kind):
         Sensed(("damper_stroke", "damper_force"), "damper_force", by_effort=True),
     )
     sites = ("table", "damper")
+    pictured = Pictured(
+        "table", "table", "displacement", (Hysteresis("damper", "damper_stroke", "damper_force", "stroke"),)
+    )
     record = TableLab
 
     def build(self, system: System) -> TableLab:

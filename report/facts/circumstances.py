@@ -12,7 +12,7 @@ import numpy as np
 
 from common.plan.plan import Plan
 from common.recording.reader import CLOCK, Run
-from common.roles import LATENCY, MASTER, SLAVE, kind_of, title
+from common.roles import LATENCY, MASTER, kind_of, title
 
 VIRTUAL, REAL, SIMULATION, IMPORT, UNKNOWN = "virtual", "real", "simulation", "import", ""
 SENTENCES = {
@@ -22,7 +22,6 @@ SENTENCES = {
     IMPORT: "Imported data, which no test of rths recorded",
 }
 NO_LATENCY = "The test ran in virtual time, where no latency is measured"
-BENCH_PARTS = {"column": MASTER, "actuator": MASTER, "table": SLAVE, "damper": SLAVE}
 
 
 def clock_of(run: Run) -> str:
@@ -50,20 +49,30 @@ def sentence(run: Run, plan: Plan | None) -> str:
     clock = clock_of(run)
     part = run.metadata.get("bench", {}).get("part", "")
     if clock == REAL and part:
-        return f"Real time in one process; {rigs(plan, part)}." if plan else "Real time in one process."
+        return (
+            f"Real time in one process; {of_part(run, plan, part)}." if plan else "Real time in one process."
+        )
     if clock == UNKNOWN:
         return ""
     rigged = plan is not None and clock in (VIRTUAL, REAL)
-    return SENTENCES[clock] + (f"; {rigs(plan, part)}." if rigged and plan else ".")
+    if not rigged or plan is None:
+        return SENTENCES[clock] + "."
+    return f"{SENTENCES[clock]}; {of_part(run, plan, part) if part else rigs(plan)}."
 
 
-def rigs(plan: Plan, part: str = "") -> str:
-    """The rigs that the plan names; of a bench test that of the part."""
+def of_part(run: Run, plan: Plan, part: str) -> str:
+    """The rig that the plan names for the part of a bench test, whose topic alone the recording holds."""
     of = dict(classes(plan))
-    if part in BENCH_PARTS:
-        role = next(name for name in of if kind_of(name) == BENCH_PARTS[part])
-        return f"the plan's rig of the {part}: {of[role] or 'emulated'}"
+    role = next((name for name in of if kind_of(name) in run.columns), "")
+    return f"the plan's rig of the {part}: {of.get(role) or 'emulated'}"
+
+
+def rigs(plan: Plan) -> str:
+    """The rigs that the plan names."""
+    of = dict(classes(plan))
     if not any(of.values()):
+        if len(of) == 1:
+            return "by the plan its only laboratory is emulated"
         return "by the plan " + ("both" if len(of) == 2 else f"all {len(of)}") + " laboratories are emulated"
     named = (f"{title(role)} {name or 'emulated'}" for role, name in of.items())
     return f"the plan's rigs: {', '.join(named)}"
@@ -71,6 +80,5 @@ def rigs(plan: Plan, part: str = "") -> str:
 
 def classes(plan: Plan) -> Iterator[tuple[str, str]]:
     """Every laboratory and the class that the plan names for its rig, empty for the emulated one."""
-    yield MASTER, plan.master.rig.class_
-    for role in plan.roles:
-        yield role, plan.of(role).slave.rig.class_
+    for role in plan.kinds:
+        yield role, (plan.master if role == MASTER else plan.of(role).slave).rig.class_

@@ -14,7 +14,7 @@ from laboratories.identification import actuator, column, damper, step_response,
 from laboratories.identification.estimate import Estimate
 from models.excitation import Segment
 from models.registry import Array
-from report.facts.summary import plan_of
+from report.facts.laboratories import plan_of
 
 NEEDED = {
     "column": ("master", ("column_displacement", "column_force")),

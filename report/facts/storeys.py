@@ -10,24 +10,26 @@ import numpy as np
 from common.plan.plan import Plan
 from common.recording.reader import Run, Values
 from common.roles import MASTER
+from laboratories.kind import Follows
 from loop.nominal.partition import matrices
 from models.structures import shear_building
+from report.facts.laboratories import Laboratory
 
 UNITS = {"drift": "m", "displacement": "m", "absolute_acceleration": "m/s²", "shear": "N"}
 
 
-def storeys(run: Run, plan: Plan) -> list[dict[str, Any]]:
+def storeys(run: Run, plan: Plan, labs: list[Laboratory]) -> list[dict[str, Any]]:
     """Peaks of every storey from the lowest up, each with its time; of quantities without signals nothing.
 
     The drift is that between a storey's two floors, displacement and absolute acceleration are of the floor above it.
-    The shear is the restoring force of the storey's columns: of the numerical ones, and in the specimen's storey what
-    was measured times the columns that the specimen stands for.
+    The shear is the restoring force of the storey's columns: of the numerical ones, and in a specimen's storey what was
+    measured times the columns that the specimen stands for; of a slave's specimen what the building had of it.
     """
     columns = run.columns.get(MASTER, {})
     t = columns.get("t", np.array([]))
     if "displacement" not in columns or not t.size:
         return []
-    found = quantities(columns, plan)
+    found = quantities(run, plan, labs)
     return [
         {"storey": place + 1}
         | {name: peak(values[:, place], t, UNITS[name]) for name, values in found.items()}
@@ -35,18 +37,39 @@ def storeys(run: Run, plan: Plan) -> list[dict[str, Any]]:
     ]
 
 
-def quantities(columns: dict[str, Values], plan: Plan) -> dict[str, Values]:
+def quantities(run: Run, plan: Plan, labs: list[Laboratory]) -> dict[str, Values]:
     """Each quantity over time and storeys, (n, storeys)."""
+    columns = run.columns[MASTER]
     shape = (columns["t"].size, plan.storeys)
     displacement = columns["displacement"].reshape(shape)
     found = {"drift": np.diff(displacement, axis=1, prepend=0.0), "displacement": displacement}
     if "absolute_acceleration" in columns:
         found["absolute_acceleration"] = columns["absolute_acceleration"].reshape(shape)
-    if {"numerical_force", "column_force"} <= columns.keys():
+    parts = [resisting(run, lab) for lab in labs if follows_drift(lab)]
+    known = [part for part in parts if part is not None]
+    if "numerical_force" in columns and len(known) == len(parts) and all(lab.coupling for lab in labs):
         shear = columns["numerical_force"].reshape(shape).copy()
-        shear[:, plan.column.storey - 1] += plan.column.represents * columns["column_force"]
+        for place, force in known:
+            shear[:, place - 1] += force
         found["shear"] = shear
     return found
+
+
+def follows_drift(lab: Laboratory) -> bool:
+    """Whether a laboratory's force is part of a storey's shear."""
+    return lab.coupling is not None and lab.coupling.follows is Follows.DRIFT
+
+
+def resisting(run: Run, lab: Laboratory) -> tuple[int, Values] | None:
+    """The storey of a laboratory and the force (n,) N with which it resists there; None where it is not recorded."""
+    columns, coupling = run.columns[MASTER], lab.coupling
+    force = lab.channels.force if lab.topic == MASTER else f"{lab.channels.force}_used"
+    if coupling is None or force not in columns:
+        return None
+    values = columns[force]
+    if values.ndim > 1:
+        values = values[:, run.shared[force].index(lab.role)]
+    return coupling.place, coupling.scale * values
 
 
 def peak(values: Values, t: Values, unit: str) -> dict[str, Any] | None:

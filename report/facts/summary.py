@@ -7,12 +7,11 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from common import signals
 from common.errors import InputError
-from common.plan.plan import Plan, parse
 from common.recording.reader import Run, Values
 from common.roles import LATENCY, MASTER, SLAVE, kind_of, latency_topic, name_of
-from common.signals import Kind
+from laboratories.column.kind import COLUMN
+from laboratories.kind import Follows
 from loop.force_path import force_path as force_path_of
 from loop.nominal.partition import storey_stiffness
 from models import indicators
@@ -20,15 +19,11 @@ from report.facts import circumstances, storeys
 from report.facts import late as lateness
 from report.facts.accounts import accounts
 from report.facts.due import due
+from report.facts.laboratories import Laboratory, laboratories, plan_of
 
 Result = TypeVar("Result")
 PERCENTILES = (50, 90, 99, 99.9)
 LEAST_TICKS = 500  # a second at 2 ms: less holds too few cycles of a building for a delay
-# topic, part, target, measurement, ticks by which the target stands before the measurement that it belongs to
-PATHS = (
-    ("master", "actuator", "column_target", "column_displacement", 0),
-    ("slave", "table", "table_target", "table_displacement", 1),
-)
 SEGMENTS = (
     "wake_lateness",
     "compute_time",
@@ -43,17 +38,11 @@ SEGMENTS = (
 )
 
 
-def plan_of(run: Run) -> Plan | None:
-    """The plan inside a recording, as the slave sees it whose part of a recording it is; None where there is none."""
-    text = run.metadata.get("plan", {}).get("toml")
-    plan = parse(text, run.path.parent, f"the plan in {run.path}") if text else None
-    return plan.of(run.part_of) if plan and run.part_of else plan
-
-
 def summarize(run: Run) -> dict[str, Any]:
     """Everything that `inspect` reports, as plain values."""
     plan, real_time = plan_of(run), lateness.late_ticks(run)
-    expected = due(run, plan)
+    expected, labs = due(run, plan), laboratories(run)
+    paths = force_paths(run, labs)
     return {
         "file": str(run.path),
         "test": run.test,
@@ -68,11 +57,13 @@ def summarize(run: Run) -> dict[str, Any]:
         "topics": {topic: completeness(run, topic, ticks) for topic, ticks in expected.items()},
         "recorder": dict(run.metadata.get("summary", {})),
         "peaks": peaks(run),
-        "storeys": (floors := storeys.storeys(run, plan) if plan else []),
+        "storeys": (floors := storeys.storeys(run, plan, labs) if plan else []),
         "modes": storeys.modes(plan) if plan and floors else [],
-        "tracking": tracking(run),
-        "force_path": force_path(run, plan) if plan else None,
-        "error_energy": error_energy(run, plan) if plan else None,
+        "tracking": tracking(run, labs),
+        "force_path": next(iter(paths.values()), None),
+        "force_paths": paths,
+        "error_energy": error_energy(run, labs),
+        "error_energy_at": next((f"the {lab.name}" for lab in labs if lab.topic == MASTER), ""),
         "latency": latencies(run),
         "late_ticks": late_ticks(run),
         "real_time": real_time,
@@ -105,39 +96,39 @@ def peaks(run: Run) -> dict[str, dict[str, Any]]:
     result = {}
     for topic, columns in run.columns.items():
         t = columns.get("t")
-        for row in signals.TOPICS[kind_of(topic)] if kind_of(topic) in (MASTER, SLAVE) else ():
-            values = columns.get(row.name)
-            if (
-                row.kind not in (Kind.NUMBER, Kind.STOREYS)
-                or values is None
-                or not values.size
-                or row.unit == "s"
-            ):
+        for name, unit in units_of(run, topic).items() if kind_of(topic) in (MASTER, SLAVE) else ():
+            values = columns.get(name)
+            if values is None or not values.size:
                 continue
             magnitude = np.abs(values).reshape(len(values), -1).max(axis=1)
             place = int(np.argmax(magnitude))
             at = float(t[place]) if t is not None else None
-            result[f"{topic}/{row.name}"] = {"peak": float(magnitude[place]), "t": at, "unit": row.unit}
+            result[f"{topic}/{name}"] = {"peak": float(magnitude[place]), "t": at, "unit": unit}
     return result
 
 
-def tracking(run: Run) -> dict[str, dict[str, Any]]:
+def units_of(run: Run, topic: str) -> dict[str, str]:
+    """The units of the quantities of a topic, as the recording says them; numbers of ticks and times are none."""
+    return {name: unit for name, unit in run.units.get(topic, {}).items() if unit not in ("", "s", "ns")}
+
+
+def tracking(run: Run, labs: list[Laboratory]) -> dict[str, dict[str, Any]]:
     """How the transfer systems followed their targets: delay (s) two ways, amplitude, NRMSE, peak error.
 
-    By part; the table of a named slave is `table.NAME`. Where the delay is not determined it is None and `undetermined`
-    says why.
+    By system; that of a named slave is `table.NAME`, that of a slave without a name whose master has a system of the
+    same name `actuator.slave`. Where the delay is not determined it is None and `undetermined` says why.
     """
     result: dict[str, dict[str, Any]] = {}
-    paths = ((path, topic) for path in PATHS for topic in run.columns if kind_of(topic) == path[0])
-    for (_, part, target, measured, late), topic in paths:
-        columns = run.columns[topic]
+    for lab in labs:
+        columns, late = run.columns[lab.topic], lab.late
+        target, measured = lab.channels.target.name, lab.channels.position
         if not {target, measured, "t"} <= columns.keys() or columns["t"].size <= LEAST_TICKS:
             continue
         wanted, got = columns[target][: columns["t"].size - late], columns[measured][late:]
         if not np.all(np.isfinite([wanted, got])) or not np.ptp(wanted) or not np.ptp(got):
             continue
         interval = float(np.median(np.diff(columns["t"])))
-        result[part + topic.removeprefix(kind_of(topic))] = {
+        result[system(lab, labs)] = {
             **following(wanted, got, interval),
             "nrmse": indicators.nrmse(wanted, got),
             "peak_error": indicators.peak_error(wanted, got),
@@ -146,34 +137,51 @@ def tracking(run: Run) -> dict[str, dict[str, Any]]:
     return result
 
 
-def force_path(run: Run, plan: Plan) -> dict[str, Any] | None:
-    """Delay (s) with its interval and gain of the column force, which tracking does not show; None where unknown."""
-    columns = run.columns.get("master", {})
-    if not {"column_displacement", "column_force"} <= columns.keys():
+def system(lab: Laboratory, labs: list[Laboratory]) -> str:
+    """What tables call a laboratory's transfer system: no two have one name."""
+    name = name_of(lab.topic)
+    first = next(other for other in labs if other.pictured.system == lab.pictured.system)
+    return (
+        f"{lab.pictured.system}.{name or SLAVE}" if name or first.topic != lab.topic else lab.pictured.system
+    )
+
+
+def force_paths(run: Run, labs: list[Laboratory]) -> dict[str, dict[str, Any]]:
+    """Delay (s) with its interval and gain of each column's force, which tracking does not show, by its system."""
+    found = ((system(lab, labs), force_path(run, lab)) for lab in labs if lab.channels == COLUMN.channels)
+    return {name: facts for name, facts in found if facts is not None}
+
+
+def force_path(run: Run, lab: Laboratory) -> dict[str, Any] | None:
+    """That of one laboratory; None where it is unknown."""
+    columns, position, force = run.columns[lab.topic], lab.channels.position, lab.channels.force
+    if lab.plan is None or not {position, force} <= columns.keys():
         return None
-    displacement, force = columns["column_displacement"], columns["column_force"]
-    if force.size <= LEAST_TICKS or not np.all(np.isfinite([displacement, force])):
+    moved, felt = columns[position], columns[force]
+    if felt.size <= LEAST_TICKS or not np.all(np.isfinite([moved, felt])):
         return None
-    found = force_path_of(plan, displacement, force)
+    found = force_path_of(lab.plan, moved, felt)
     return None if found is None else {**found._asdict(), "interval": list(found.interval)}
 
 
-def error_energy(run: Run, plan: Plan) -> float | None:
-    """Largest share of energy that tracking errors put in or took out at the column; None without its signals."""
-    columns = run.columns.get("master", {})
-    needed = {"t", "column_target", "column_displacement", "column_force", "ground_acceleration", "velocity"}
+def error_energy(run: Run, labs: list[Laboratory]) -> float | None:
+    """Largest share of energy that tracking errors put in or took out in laboratory A; None without its signals."""
+    lab = next((one for one in labs if one.topic == MASTER), None)
+    coupling = lab.coupling if lab is not None else None
+    if lab is None or lab.plan is None or coupling is None or coupling.follows is not Follows.DRIFT:
+        return None
+    columns, plan = run.columns[MASTER], lab.plan
+    own = (lab.channels.target.name, lab.channels.position, lab.channels.force)
+    needed = {"t", *own, "ground_acceleration", "velocity"}
     if not needed <= columns.keys() or not columns["t"].size:
         return None
-    column, structure = plan.column, plan.structure
-    target, measured = (
-        columns[name] / column.deformation_ratio for name in ("column_target", "column_displacement")
-    )
+    target, measured = (columns[name] / coupling.ratio for name in own[:2])
     strain = 0.5 * storey_stiffness(plan) * float(np.max(np.abs(target))) ** 2
     if strain == 0.0 or not all(np.all(np.isfinite(columns[name])) for name in needed):
         return None
-    momentum = columns["velocity"].reshape(columns["t"].size, -1) @ np.array(structure.mass)
+    momentum = columns["velocity"].reshape(columns["t"].size, -1) @ np.array(plan.structure.mass)
     given = np.cumsum(-columns["ground_acceleration"] * momentum) * plan.test.interval
-    force = column.represents * columns["column_force"]
+    force = coupling.scale * columns[own[2]]
     share = indicators.hybrid_simulation_error_energy(target, measured, force, given, strain)
     return float(share[np.argmax(np.abs(share))])
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import contextlib
 import math
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,22 +16,34 @@ from common.errors import InputError
 from common.host.clock import Clock
 from common.plan.plan import Plan, parse
 from common.recording.outcome import outcome
-from common.recording.reader import Run, Tail, Values
+from common.recording.reader import Run, Values
+from common.recording.tail import Tail
 from common.roles import LATENCY, MASTER, SLAVE, kind_of, latency_topic
 from common.safety.modes import Mode
+from report.facts.laboratories import Laboratory, laboratories
 from report.live.standing import Standing
 from report.live.trace import Trace, extremes, largest
+from report.pictures.curves import labs_of
 
 POINTS = 1000  # of a line: as many as a wide screen has columns for it
 POINTS_WHOLE = 5000  # of a line of a finished recording, which is sent once
 SILENT_NS = 2_000_000_000  # without anything new; the recorder writes twenty times a second
 EVENTS = 100
 EDGES = np.geomspace(50.0, 50_000.0, 61)  # µs, of the histogram's classes
-SIGNALS = {
-    MASTER: ("t", "column_target", "column_displacement", "column_force"),
-    SLAVE: ("t", "table_target", "table_displacement", "damper_stroke", "damper_force"),
-    LATENCY: ("t", "round_trip", "wake_lateness"),
-}
+TIMED = ("t", "round_trip", "wake_lateness")  # of the latency
+DEFAULT = laboratories(Run(Path(), columns={MASTER: {}, SLAVE: {}}))
+
+
+def names_of(labs: Iterable[Laboratory], kind: str) -> tuple[str, ...]:
+    """The signals that the views show of a kind of topic; of slaves those of all of them."""
+    if kind == LATENCY:
+        return TIMED
+    found = ["t"]
+    for lab in labs:
+        if kind_of(lab.topic) == kind:
+            loops = [name for loop in lab.pictured.loops for name in (loop.motion, loop.force)]
+            found += [lab.channels.target.name, lab.channels.position, *loops, *lab.pictured.also]
+    return tuple(dict.fromkeys(found))
 
 
 class Timing:
@@ -75,6 +89,7 @@ class Feed:
         self.plan: Plan | None = None
         self.test = ""
         self.roles: tuple[str, ...] = (SLAVE,)
+        self.laboratories = DEFAULT  # until the recording says others
         self.t = 0.0
         self.interval = 0.0  # s, 0 while it is not known
         self.standing = Standing(clock)
@@ -88,6 +103,7 @@ class Feed:
         self._traces: dict[str, Trace] = {}
         self._timings: dict[str, Timing] = {}
         self._summary: Mapping[str, str] = {}
+        self._metadata: dict[str, dict[str, str]] = {}
 
     # -- reading ----------------------------------------------------------------------------------
 
@@ -130,6 +146,7 @@ class Feed:
         return old
 
     def _plan_of(self, run: Run) -> None:
+        self._metadata = {"plan": run.metadata["plan"]}
         with contextlib.suppress(InputError):
             self.plan = parse(run.metadata["plan"].get("toml", ""), self.path.parent)
             self.interval = self.plan.test.interval
@@ -141,6 +158,8 @@ class Feed:
     def _take(self, run: Run) -> None:
         self.test, self.roles = run.test, run.roles
         self._summary = run.metadata.get("summary", self._summary)
+        if self.changes == 1:
+            self.laboratories = labs_of(replace(run, metadata=self._metadata))
         for role in (MASTER, *run.roles):
             self._move(role, run.columns.get(role, {}))
             self._move(role, run.ramps.get(role, {}))
@@ -160,16 +179,14 @@ class Feed:
         self.t = max(self.t, float(columns["t"][-1]))
         self.standing.row(role, float(columns["t"][-1]))
         nothing = np.full(columns["seq"].size, math.nan)
-        names = SIGNALS[MASTER if role == MASTER else SLAVE]
+        names = names_of(self.laboratories, kind_of(role))
         self._kept(role).add(columns["seq"], {name: columns.get(name, nothing) for name in names})
 
     def _exchange(self, role: str, columns: Mapping[str, Values]) -> None:
         if columns and columns["seq"].size and self.interval:
             values = {"t": columns["seq"] * self.interval, **columns}
             self._timings.setdefault(role, Timing()).add(columns)
-            self._kept(latency_topic(role)).add(
-                columns["seq"], {name: values[name] for name in SIGNALS[LATENCY]}
-            )
+            self._kept(latency_topic(role)).add(columns["seq"], {name: values[name] for name in TIMED})
 
     def _kept(self, topic: str) -> Trace:
         """The trace of a topic of which something has come: of the latency the worst of each group of ticks."""
@@ -177,7 +194,9 @@ class Feed:
             ticks = self.window / (self.interval or Plan().test.interval)
             kind, room = kind_of(topic), POINTS_WHOLE if self.whole else POINTS
             thin = largest if kind == LATENCY else extremes if self.whole else None
-            most = 2 * len(SIGNALS[kind][1:]) if thin is extremes else 1  # points of a group
+            most = (
+                2 * len(names_of(self.laboratories, kind)[1:]) if thin is extremes else 1
+            )  # points of a group
             step = max(math.ceil((ticks + 1 if self.whole else ticks) * most / room), 1)
             self._traces[topic] = Trace(step, room, thin)
         return self._traces[topic]
@@ -191,6 +210,10 @@ class Feed:
     def timing(self, role: str) -> Timing:
         """The exchange with a slave."""
         return self._timings.get(role, NO_TIMING)
+
+    def names(self, kind: str) -> tuple[str, ...]:
+        """The signals of a kind of topic that are shown."""
+        return names_of(self.laboratories, kind)
 
     @property
     def labs(self) -> tuple[str, ...]:

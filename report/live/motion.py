@@ -1,47 +1,96 @@
-"""What the rigs do: displacements beside their targets, the column's hysteresis loop, the damper's stroke and force."""
+"""What the rigs do: each laboratory's motion beside its target, forces over motions or over time."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterable
+from typing import Any, NamedTuple
 
+from common.roles import MASTER
+from laboratories.kind import Hysteresis
+from report.facts.laboratories import Laboratory
 from report.live.chart import Curve, draw, history, plot
-from report.live.stream import Streams
+from report.live.stream import Stream, Streams
 from report.pictures.figure import COLOURS
 
 
-def motions(streams: Streams, window: float | None) -> dict[str, Any]:
-    """The plots of both laboratories by name, of the last `window` s, or of the whole test."""
-    part = "" if window is None else f" of the last {window:g} s"
-    loop = plot(f"column: hysteresis{part}", "displacement, mm", "force, kN", ("linear", "linear"))
-    draw(
-        loop,
-        streams.master,
-        "column_displacement",
-        (Curve("column_force", "measured", COLOURS[0], width=1.0),),
+class Plot(NamedTuple):
+    """A plot of a laboratory."""
+
+    lab: Laboratory
+    figure: Any
+
+
+def motions(streams: Streams, labs: Iterable[Laboratory], window: float | None) -> dict[str, Plot]:
+    """The plots of the laboratories by name, of the last `window` s, or of the whole test.
+
+    Slaves whose laboratories have the same signals share their plots. What deforms by the motion that the laboratory
+    imposes is shown by its loop; a motion of its own, as a damper's stroke, over time.
+    """
+    found: dict[str, Plot] = {}
+    each = apart(labs)
+    for lab in each:
+        add(found, lab.name, lab, beside_target(streams, lab, window))
+    for lab in each:
+        stream = stream_of(streams, lab)
+        for loop in lab.pictured.loops:
+            name, up = loop.name + lab.letter, f"force, {loop.unit}"
+            if loop.motion == lab.channels.position:
+                add(found, f"hysteresis{lab.letter}", lab, hysteresis(stream, name, loop, window))
+                continue
+            stroke = (Curve(loop.motion, "measured", COLOURS[2]),)
+            force = (Curve(loop.force, "measured", COLOURS[3]),)
+            title = f"{name}: {loop.across}"
+            add(found, loop.across, lab, history(title, f"{loop.across}, mm", stream, stroke, window))
+            add(found, "force", lab, history(f"{name}: force", up, stream, force, window))
+        for signal in lab.channels.measured:
+            if signal.name in lab.pictured.also:
+                unit = "mm" if signal.unit == "m" else signal.unit
+                curve = (Curve(signal.name, "measured", COLOURS[4]),)
+                title = signal.name.replace("_", " ") + lab.letter
+                add(found, signal.name, lab, history(title, unit, stream, curve, window))
+    return found
+
+
+def apart(labs: Iterable[Laboratory]) -> list[Laboratory]:
+    """The laboratories without those slaves' whose signals another slave's has as well."""
+    found: dict[Any, Laboratory] = {}
+    for lab in labs:
+        found.setdefault((lab.topic == MASTER, lab.channels, lab.letter), lab)
+    return list(found.values())
+
+
+def looks(labs: Iterable[Laboratory]) -> list[Any]:
+    """What makes the plots of laboratories differ from those of others."""
+    return [(lab.topic == MASTER, lab.channels, lab.letter) for lab in apart(labs)]
+
+
+def add(found: dict[str, Plot], name: str, lab: Laboratory, figure: Any) -> None:
+    """Add a plot under a name that no other has."""
+    while name in found:
+        name = f"{name} of {lab.name}"
+    found[name] = Plot(lab, figure)
+
+
+def stream_of(streams: Streams, lab: Laboratory) -> Stream:
+    """Where a laboratory's signals come from."""
+    return streams.master if lab.topic == MASTER else streams.slave
+
+
+def beside_target(streams: Streams, lab: Laboratory, window: float | None) -> Any:
+    """A measured motion and its target, told apart by more than their colours."""
+    curves = (
+        Curve(lab.channels.target.name, "target", COLOURS[1], "dashed", 2.0),
+        Curve(lab.channels.position, "measured", COLOURS[0]),
     )
-    stroke = (Curve("damper_stroke", "measured", COLOURS[2]),)
-    force = (Curve("damper_force", "measured", COLOURS[3]),)
-    return {
-        "column": history(
-            "column: target and measured",
-            "displacement, mm",
-            streams.master,
-            beside_target("column_target", "column_displacement"),
-            window,
-        ),
-        "table": history(
-            "shaking table: target and measured",
-            "displacement, mm",
-            streams.slave,
-            beside_target("table_target", "table_displacement"),
-            window,
-        ),
-        "hysteresis": loop,
-        "stroke": history("damper: stroke", "stroke, mm", streams.slave, stroke, window),
-        "force": history("damper: force on the table", "force, N", streams.slave, force, window),
-    }
+    title, up = f"{lab.name}: target and measured", f"{lab.pictured.position}, mm"
+    return history(title, up, stream_of(streams, lab), curves, window)
 
 
-def beside_target(target: str, measured: str) -> tuple[Curve, Curve]:
-    """A measured signal and its target, told apart by more than their colours."""
-    return Curve(target, "target", COLOURS[1], "dashed", 2.0), Curve(measured, "measured", COLOURS[0])
+def hysteresis(stream: Stream, name: str, loop: Hysteresis, window: float | None) -> Any:
+    """A force over its motion."""
+    part = "" if window is None else f" of the last {window:g} s"
+    found = plot(
+        f"{name}: hysteresis{part}", f"{loop.across}, mm", f"force, {loop.unit}", ("linear", "linear")
+    )
+    draw(found, stream, loop.motion, (Curve(loop.force, "measured", COLOURS[0], width=1.0),))
+    return found

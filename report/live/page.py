@@ -12,10 +12,10 @@ from bokeh.models.widgets import Div, Select
 from bokeh.themes import Theme
 from jinja2 import Template
 
-from common.roles import name_of
+from common.roles import MASTER, name_of
 from report.live.feed import Feed
 from report.live.latency import Latency
-from report.live.motion import motions
+from report.live.motion import looks, motions
 from report.live.status import ORANGE, Status
 from report.live.stream import Streams
 from report.page import block_of
@@ -59,16 +59,21 @@ class Page:
     def __init__(self, document: Document, feed: Feed) -> None:
         self._document = document
         self._feed = feed
-        self.streams = Streams()
+        self._labs = looks(feed.laboratories)
+        self.streams = Streams(feed)
         self.status = Status()
         window = None if feed.whole else feed.window
         self.latency = Latency(self.streams, window)
-        self.plots = motions(self.streams, window) | self.latency.parts
+        self._motions = motions(self.streams, feed.laboratories, window)
+        self.plots = {name: each.figure for name, each in self._motions.items()}
+        self.plots |= self.latency.parts if feed.roles else {}
         self._heading = Div(sizing_mode="stretch_width", name="heading")
         self._parting = parting(feed)
         self.slave = Select(title="slave", options=[], visible=False, width=200, name="slave")
-        for name, each in self.plots.items():
-            each.name = name
+        for name, figure in self.plots.items():
+            figure.name = name
+            code = "document.getElementById(cell).hidden = !plot.visible"
+            figure.js_on_change("visible", CustomJS(args={"plot": figure, "cell": f"cell {name}"}, code=code))
         texts = (
             self._heading,
             self._parting,
@@ -89,9 +94,10 @@ class Page:
             CustomJS(args={"text": self._parting}, code="text.visible = true; window.heard = 0"),
         )
         self.status.tiles.js_on_change("tags", CustomJS(code="window.heard = Date.now()"))
+        self._heading.js_on_change("tags", CustomJS(code="location.reload()"))
         document.theme = THEME
         document.template = Template(TEMPLATE.read_text(encoding="utf-8"))
-        document.template_variables["plots"] = list(self.plots)
+        document.template_variables["plots"] = self.plots
         for model in document.models:  # the ranges that a reader chooses in the browser stay as they are
             model.syncable = model is self.slave
 
@@ -109,10 +115,23 @@ class Page:
         if len(feed.roles) > 1 and not self.slave.visible:
             options: Any = [(role, name_of(role)) for role in feed.roles]
             self.slave.update(options=options, value=feed.roles[0], visible=True)
-        chosen = str(self.slave.value) if self.slave.visible else feed.roles[0]
+        if self._labs != looks(feed.laboratories):
+            self._heading.tags = [
+                "anew"
+            ]  # the browser loads the page again, with the plots of these laboratories
+        chosen = str(self.slave.value) if self.slave.visible else "".join(feed.roles[:1])
+        self._choose(chosen)
         self.streams.follow(feed, chosen)
         self.latency.update(feed, chosen)
         self.status.update(feed, chosen)
+
+    def _choose(self, role: str) -> None:
+        """Show the plots of laboratory A and of those slaves that have the signals of the chosen one."""
+        channels = next((lab.channels for lab in self._feed.laboratories if lab.topic == role), None)
+        for each in self._motions.values():
+            visible = each.lab.topic == MASTER or channels in (None, each.lab.channels)
+            if each.figure.visible != visible:
+                each.figure.visible = visible
 
     def _head(self, feed: Feed) -> None:
         test = feed.test or feed.path.stem

@@ -79,10 +79,16 @@ def tiles(feed: Feed, role: str) -> str:
     facts = [(title(lab), *standing(feed, lab)) for lab in feed.labs]
     facts += [
         ("test time", f"{feed.t:.1f}{duration} s", "", ""),
-        ("late ticks", f"{timing.late}{share}", ORANGE if timing.late else "", ""),
-        ("round trip", f"{microseconds(timing.newest).strip()} µs", "", ""),
-        ("longest round trip", f"{microseconds(timing.longest).strip()} µs", "", ""),
     ]
+    facts += (
+        []
+        if not role
+        else [
+            ("late ticks", f"{timing.late}{share}", ORANGE if timing.late else "", ""),
+            ("round trip", f"{microseconds(timing.newest).strip()} µs", "", ""),
+            ("longest round trip", f"{microseconds(timing.longest).strip()} µs", "", ""),
+        ]
+    )
     return str(block_of("live.html", "tiles", heading(feed), facts))
 
 

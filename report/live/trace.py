@@ -59,6 +59,11 @@ class Trace:
         if thinned:
             self._keep({name: np.concatenate([points[name] for points in thinned]) for name in columns})
 
+    @property
+    def names(self) -> frozenset[str]:
+        """The signals, none before the first points."""
+        return frozenset(self._points)
+
     def close(self) -> None:
         """The newest group is complete: no more ticks of it will come."""
         group, self._open = self._open, {}

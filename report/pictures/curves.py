@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from common import signals
 from common.errors import InputError
 from common.recording.reader import Run
 from report.text.formats import milliseconds
 
+if TYPE_CHECKING:
+    from report.facts.laboratories import Laboratory
+
 Values = NDArray[np.float64]
 
 STRONGEST = 1.5  # s before and behind the largest target
-COMMANDS = {"actuator": "actuator_command", "table": "table_command"}
 LATE = 1  # ticks by which a command stands before the measurement at which it is to be reached
-LABELS = {"actuator": "column deformation", "table": "table displacement"}
 
 
 class Curve(NamedTuple):
@@ -32,6 +33,7 @@ class Pair(NamedTuple):
 
     label: str
     word: str  # what was asked: the target, or the command where no target is recorded
+    lab: Laboratory
     t: Values  # (n,) s, of the measurement
     wanted: Values  # (n,) m
     got: Values  # (n,) m
@@ -47,44 +49,42 @@ class Pair(NamedTuple):
         return np.asarray(np.abs(self.t - middle) <= STRONGEST)
 
 
-def curve(recording: Run, name: str) -> Curve | None:
-    """A signal from the laboratory that knows it at first hand; None where it has no value over time."""
-    order = ("slave", "master") if name in signals.MEASURED["slave"] else ("master", "slave")
-    for topic in order:
-        columns = recording.columns.get(topic, {})
-        if name in columns and "t" in columns and np.isfinite(columns[name]).any():
-            return Curve(columns["t"], columns[name])
+def curve(recording: Run, topic: str, name: str) -> Curve | None:
+    """A signal of a topic; None where it has no value over time."""
+    columns = recording.columns.get(topic, {})
+    if name in columns and "t" in columns and np.isfinite(columns[name]).any():
+        return Curve(columns["t"], columns[name])
     return None
 
 
-def moving(recording: Run, name: str) -> Curve | None:
+def moving(recording: Run, topic: str, name: str) -> Curve | None:
     """A signal that does not stand still all the time."""
-    found = curve(recording, name)
+    found = curve(recording, topic, name)
     return found if found is not None and np.nanmax(found.values) > np.nanmin(found.values) else None
 
 
 def pairs(recording: Run) -> list[Pair]:
-    """The transfer systems that a recording shows, at most one each of laboratory A and of B."""
-    from report.facts.summary import PATHS
-
+    """The transfer systems that a recording shows, at most one of each laboratory."""
     found = []
-    for topic, part, target, measured, late in PATHS:
-        options = ((target, "target", late), (COMMANDS[part], "command", LATE))
-        made = (matched(recording, topic, LABELS[part], measured, option) for option in options)
+    for lab in labs_of(recording):
+        options = (
+            (lab.channels.target.name, "target", lab.late),
+            (lab.channels.command.name, "command", LATE),
+        )
+        made = (matched(recording, lab, option) for option in options)
         found += [pair for pair in made if pair is not None][:1]
     return found
 
 
-def matched(
-    recording: Run, topic: str, label: str, measured: str, asked: tuple[str, str, int]
-) -> Pair | None:
-    """A measurement beside what was asked of it so many ticks before; None where either is lacking or still."""
+def matched(recording: Run, lab: Laboratory, asked: tuple[str, str, int]) -> Pair | None:
+    """A laboratory's position beside what was asked of it so many ticks before; None where one is lacking or still."""
+    topic, measured = lab.topic, lab.channels.position
     columns, (name, word, late) = recording.columns.get(topic, {}), asked
     if not {"t", name, measured} <= columns.keys():
         return None
     seq = recording.sequences[topic]
     _, before, after = np.intersect1d(seq + late, seq, return_indices=True)
-    pair = Pair(label, word, columns["t"][after], columns[name][before], columns[measured][after])
+    pair = Pair(lab.label, word, lab, columns["t"][after], columns[name][before], columns[measured][after])
     known = np.isfinite(pair.wanted) & np.isfinite(pair.got)
     if not known.any() or not np.ptp(pair.wanted[known]) or not np.ptp(pair.got[known]):
         return None
@@ -112,11 +112,21 @@ def interval(t: Values) -> float:
     return float(np.median(np.diff(t))) if t.size > 1 else float("nan")
 
 
-def plan_of(recording: Run) -> Any:
+def planned(recording: Run) -> Any:
     """The plan inside a recording, None where there is none that can be read."""
-    from report.facts import summary
+    from report.facts.laboratories import plan_of
 
     try:
-        return summary.plan_of(recording)
+        return plan_of(recording)
     except InputError:
         return None
+
+
+def labs_of(recording: Run) -> list[Laboratory]:
+    """The laboratories of a recording; those of the default test where its plan cannot be read."""
+    from report.facts.laboratories import laboratories
+
+    try:
+        return laboratories(recording)
+    except InputError:
+        return laboratories(replace(recording, metadata={}))

@@ -1,51 +1,48 @@
-"""Force against deformation of the column, and against stroke of the damper."""
+"""Force against motion of what stands in the laboratories: deformation of the column, stroke of the damper."""
 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from common.recording.reader import Run
-from report.pictures.curves import Values, moving, plan_of
+from report.pictures.curves import Values, labs_of, moving
 from report.pictures.figure import SMALL
 from report.pictures.layout import panels
 from report.text.formats import axis_scale, fixed, scale
 
-
-class Loop(NamedTuple):
-    """A deformation, the force that resists it, and how both are shown."""
-
-    deformation: str
-    force: str
-    x_label: str
-    y_label: str
+if TYPE_CHECKING:
+    from laboratories.kind import Hysteresis
+    from report.facts.laboratories import Laboratory
 
 
-COLUMN = Loop("column_displacement", "column_force", "column deformation", "column force")
-DAMPER = Loop("damper_stroke", "damper_force", "damper stroke", "damper force")
-LOOPS = (COLUMN, DAMPER)
 LEAST = 10  # ticks
 
 
 def draw(recording: Run, canvas: Any) -> bool:
-    """Loops with the energy that they absorb, the column's beside its planned stiffness; False where there is none."""
-    found = ((loop, moving(recording, loop.deformation), moving(recording, loop.force)) for loop in LOOPS)
+    """Loops with the energy that they absorb, a specimen's beside its planned stiffness; False where there is none."""
+    found = [
+        (lab, loop, moving(recording, lab.topic, loop.motion), moving(recording, lab.topic, loop.force))
+        for lab in labs_of(recording)
+        for loop in lab.pictured.loops
+    ]
     present = [
-        (loop, x.values, y.values)
-        for loop, x, y in found
+        (lab, loop, x.values, y.values)
+        for lab, loop, x, y in found
         if x is not None and y is not None and x.values.shape == y.values.shape
     ]
     if not present:
         return False
-    for axis, (loop, x, y) in zip(panels(canvas, len(present), 2), present, strict=True):
+    for axis, (lab, loop, x, y) in zip(panels(canvas, len(present), 2), present, strict=True):
         (along, length), (up, force) = (
             axis_scale(float(np.nanmax(np.abs(v))), u) for v, u in ((x, "m"), (y, "N"))
         )
         axis.plot(along * x, up * y, linewidth=0.5)
-        axis.set(xlabel=f"{loop.x_label}, {length}", ylabel=f"{loop.y_label}, {force}")
-        planned = planned_stiffness(axis, recording, (along, up), x, y) if loop is COLUMN else ""
+        name = loop.name + lab.letter
+        axis.set(xlabel=f"{name} {loop.across}, {length}", ylabel=f"{name} force, {force}")
+        planned = planned_stiffness(axis, stiffness_of(lab, loop), (along, up), x, y)
         axis.set_title(work(x, y) + planned, loc="left", fontsize=SMALL)
     return True
 
@@ -85,12 +82,17 @@ def noise(values: Values) -> float:
     return float(np.std(np.diff(values, 2))) / math.sqrt(6.0) if values.size > LEAST else 0.0
 
 
-def planned_stiffness(axis: Any, recording: Run, factors: tuple[float, float], x: Values, y: Values) -> str:
-    """The line of the plan's elastic stiffness, as far as forces were recorded, and what the title says of it."""
-    plan = plan_of(recording)
-    if plan is None or not plan.column.stiffness:
+def stiffness_of(lab: Laboratory, loop: Hysteresis) -> float:
+    """The planned elastic stiffness (N/m) of what makes a loop; 0 where it has none or none is known."""
+    felt, whole = lab.coupling, (lab.channels.position, lab.channels.force) == (loop.motion, loop.force)
+    return felt.stiffness / (felt.ratio * felt.scale) if felt is not None and felt.scale and whole else 0.0
+
+
+def planned_stiffness(axis: Any, stiffness: float, factors: tuple[float, float], x: Values, y: Values) -> str:
+    """The line of a planned stiffness (N/m), as far as forces were recorded, and what the title says of it."""
+    if not stiffness:
         return ""
-    stiffness, reach = plan.column.stiffness, float(np.nanmax(np.abs(y)))
+    reach = float(np.nanmax(np.abs(y)))
     ends = np.clip(np.array([np.nanmin(x), np.nanmax(x)]), -reach / stiffness, reach / stiffness)
     axis.plot(
         factors[0] * ends, factors[1] * stiffness * ends, linestyle=(0, (4, 3)), color="black", linewidth=0.8

@@ -7,14 +7,18 @@ square is the mean square over the whole test.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from common.recording.reader import Run
-from report.pictures.curves import Curve, Values, curve, interval, moving, pairs, plan_of
+from common.roles import MASTER
+from report.pictures.curves import Curve, Values, curve, interval, labs_of, moving, pairs, planned
 from report.pictures.figure import COLOURS
 from report.pictures.layout import bound, decades, legend_above, shrink
+
+if TYPE_CHECKING:
+    from report.facts.laboratories import Laboratory
 
 SEGMENT = 10.0  # s: lines 0.1 Hz apart, half the width of a peak at 2 Hz with 5 % of damping
 LEAST = 64  # ticks
@@ -60,12 +64,13 @@ def draw(recording: Run, canvas: Any) -> bool:
 
 
 def accelerations(recording: Run) -> list[Line]:
-    """Spectra of the ground's acceleration and of the floor's as the table imposed it."""
-    names = (
-        ("ground", "ground_acceleration", COLOURS[0], "-"),
-        ("table", "table_acceleration", COLOURS[1], DASHED),
-    )
-    found = [(label, moving(recording, name), colour, style) for label, name, colour, style in names]
+    """Spectra of the ground's acceleration and of those measured in the laboratories."""
+    found = [("ground", moving(recording, MASTER, "ground_acceleration"), COLOURS[0], "-")]
+    for lab in labs_of(recording):
+        measured = [signal.name for signal in lab.channels.measured if signal.unit == "m/s²"]
+        for name in measured:
+            label = lab.name if len(measured) == 1 else name.replace("_", " ") + lab.letter
+            found.append((label, moving(recording, lab.topic, name), *drawn(lab)))
     return [
         Line(label, item, 1.0, colour, style)
         for label, item, colour, style in found
@@ -76,18 +81,20 @@ def accelerations(recording: Run) -> list[Line]:
 def displacements(recording: Run) -> list[Line]:
     """As measured and, dotted in the same colour, by how much they missed what was wanted."""
     lines = []
-    names = (("column", "column_displacement"), ("table", "table_displacement"))
-    for (label, name), colour, style in zip(names, COLOURS[:2], ("-", DASHED), strict=True):
-        item = moving(recording, name)
+    for lab in labs_of(recording):
+        item = moving(recording, lab.topic, lab.channels.position)
         if item is not None and long_enough(item):
-            lines.append(Line(label, item, 1e3, colour, style))
+            lines.append(Line(lab.name, item, 1e3, *drawn(lab)))
     for pair in pairs(recording):
-        label = pair.label.split()[0]
         error = Curve(pair.t, pair.error)
         if long_enough(error) and np.nanmax(np.abs(pair.error)) > 0.0:
-            colour = COLOURS[("column", "table").index(label)]
-            lines.append(Line(f"error of {label}", error, 1e3, colour, DOTTED))
+            lines.append(Line(f"error of {pair.lab.name}", error, 1e3, drawn(pair.lab)[0], DOTTED))
     return lines
+
+
+def drawn(lab: Laboratory) -> tuple[str, Any]:
+    """Colour and style of a laboratory's lines."""
+    return (COLOURS[0], "-") if lab.topic == MASTER else (COLOURS[1], DASHED)
 
 
 def long_enough(item: Curve) -> bool:
@@ -153,8 +160,8 @@ def natural_frequencies(recording: Run) -> list[float]:
     from loop.nominal.partition import matrices
     from models.structures import shear_building
 
-    plan = plan_of(recording)
-    if plan is None or curve(recording, "ground_acceleration") is None:
+    plan = planned(recording)
+    if plan is None or curve(recording, MASTER, "ground_acceleration") is None:
         return []
     periods = shear_building.modes(*matrices(plan)).periods
     return [1.0 / float(period) for period in periods[:MODES] if np.isfinite(period)]

@@ -8,11 +8,10 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from common.plan.limits import UNITS
 from common.recording.outcome import outcome
 from common.recording.reader import CLOCK, GROUND, MACHINES, Run
 from common.roles import MASTER, name_of
-from report.facts.summary import plan_of
+from report.facts.laboratories import plan_of
 from report.page import breakable
 from report.run.verdict import Margin, Summary, amount
 from report.text.formats import MISSING, milliseconds, reading, storey_rows, tracked
@@ -128,8 +127,7 @@ def limits(found: list[Margin]) -> Table:
     """How near recorded signals came to the limits of the plan."""
     rows = []
     for item in found:
-        unit = UNITS[item.signal.partition("/")[2]]
-        peak, limit = reading(item.peak, unit), reading(item.limit, unit)
+        peak, limit = reading(item.peak, item.unit), reading(item.limit, item.unit)
         rows.append([breakable(item.signal), peak, limit, f"{100.0 * item.share:.1f} %"])
     return Table("", ("signal", "peak", "limit", "share"), rows)
 
@@ -142,18 +140,21 @@ def tracking(summary: Summary) -> Table:
 
 
 def force_path(summary: Summary) -> Table:
-    """The column force against the plan's specimen at the measured displacement."""
-    found = summary["force_path"]
-    if found is None:
-        return Table("", (), [])
-    low, high = (milliseconds(end) for end in found["interval"])
-    row = [
-        milliseconds(found["delay"]),
-        f"{low} to {high}",
-        f"{found['gain']:.4f}",
-        f"{found['frequency']:.2f} Hz",
+    """The force of each column against the plan's specimen at the measured displacement."""
+    paths = summary["force_paths"]
+    rows = [
+        [
+            name,
+            milliseconds(found["delay"]),
+            " to ".join(milliseconds(end) for end in found["interval"]),
+            f"{found['gain']:.4f}",
+            f"{found['frequency']:.2f} Hz",
+        ]
+        for name, found in paths.items()
     ]
-    return Table("Force path", ("delay", "95 %", "gain", "at"), [row])
+    head = ("column of", "delay", "95 %", "gain", "at")
+    first = 0 if len(paths) > 1 else 1
+    return Table("Force path", head[first:], [row[first:] for row in rows])
 
 
 def latency(summary: Summary) -> list[Table]:

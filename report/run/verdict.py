@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from common.plan.limits import UNITS
+from common.plan.plan import Plan
 from common.recording.reader import Run
 from common.roles import LATENCY, MASTER, SLAVE, kind_of, name_of, title
-from report.facts.summary import plan_of
+from report.facts.laboratories import Laboratory, laboratories, whole_plan
 from report.text.force_path import sentence as force_sentence
 from report.text.formats import apart, milliseconds, quantity
 
@@ -28,6 +28,7 @@ class Margin(NamedTuple):
     signal: str
     peak: float
     limit: float
+    unit: str
 
     @property
     def share(self) -> float:
@@ -77,7 +78,7 @@ def sentences(run: Run, summary: Summary) -> list[str]:
         lateness(run, summary),
         summary["patience"],
         *tracking(summary),
-        force_path(summary),
+        *force_paths(summary),
         energy(summary),
         nearest(run, summary),
     ]
@@ -139,7 +140,15 @@ def lateness(run: Run, summary: Summary) -> str:
 
 def tracking(summary: Summary) -> list[str]:
     """How the transfer systems followed their targets."""
-    return [followed(name.replace(".", " of slave "), facts) for name, facts in summary["tracking"].items()]
+    return [followed(of_whom(name), facts) for name, facts in summary["tracking"].items()]
+
+
+def of_whom(name: str) -> str:
+    """The name of a transfer system in words: `table of slave roof` for `table.roof`."""
+    system, _, slave = name.partition(".")
+    if slave == SLAVE:
+        return f"{system} of the slave"
+    return f"{system} of slave {slave}" if slave else system
 
 
 def followed(name: str, facts: Mapping[str, Any]) -> str:
@@ -153,12 +162,14 @@ def followed(name: str, facts: Mapping[str, Any]) -> str:
     )
 
 
-def force_path(summary: Summary) -> str:
-    """How late the measured column force was; the tracking of displacements does not show it."""
-    found = summary["force_path"]
-    if found is None:
-        return ""
-    return force_sentence(found["delay"], found["interval"], found["gain"])
+def force_paths(summary: Summary) -> list[str]:
+    """How late the measured force of each column was; the tracking of displacements does not show it."""
+    paths = summary["force_paths"]
+    lead = {name: f"At the {of_whom(name)}: " if len(paths) > 1 else "" for name in paths}
+    return [
+        lead[name] + force_sentence(found["delay"], found["interval"], found["gain"])
+        for name, found in paths.items()
+    ]
 
 
 def energy(summary: Summary) -> str:
@@ -168,25 +179,34 @@ def energy(summary: Summary) -> str:
         return ""
     did = "put in" if share > 0.0 else "took out"
     return (
-        f"Tracking errors at the column {did} up to {abs(share) * 100.0:.2f} % of the energy that the "
-        "ground motion gave."
+        f"Tracking errors at {summary['error_energy_at']} {did} up to {abs(share) * 100.0:.2f} % of the energy that "
+        "the ground motion gave."
     )
 
 
 def margins(run: Run, summary: Summary) -> list[Margin]:
     """Recorded signals with a limit of their own, the nearest to it first."""
-    peaks = summary["peaks"]
-    of_slaves = {name.partition("/")[2] for name in peaks if name.startswith(SLAVE)}
+    peaks, plan = summary["peaks"], whole_plan(run)
+    if plan is None:
+        return []
+    labs = {lab.topic: lab for lab in laboratories(run)}
+    channels = labs[MASTER].channels if MASTER in labs else None
+    own = (channels.target.name, *channels.drives, *channels.names) if channels else ()
+    of_slaves = {name.partition("/")[2] for name in peaks if name.startswith(SLAVE)}.difference(own)
     found = []
     for name, facts in peaks.items():
         topic, _, signal = name.partition("/")
         of_all_slaves = topic == MASTER and signal in of_slaves  # one row for all slaves together
-        if signal not in UNITS or of_all_slaves or not math.isfinite(facts["peak"]):
-            continue
-        plan = plan_of(run.of(topic) if name_of(topic) else run)
-        if plan:
-            found.append(Margin(name, facts["peak"], getattr(plan.limits, signal)))
+        limit = limits(plan, labs.get(topic)).get(signal)
+        if limit is not None and not of_all_slaves and math.isfinite(facts["peak"]):
+            found.append(Margin(name, facts["peak"], limit, facts["unit"]))
     return sorted(found, key=lambda item: -item.share)
+
+
+def limits(plan: Plan, lab: Laboratory | None) -> Mapping[str, float]:
+    """The limits that the plan says by signal; of a kind of the user's those of `[device.limits]`."""
+    own: Mapping[str, Any] = lab.plan.device.limits if lab and lab.plan and lab.coupling is None else {}
+    return vars(plan.limits) | {name: value for name, value in own.items() if isinstance(value, int | float)}
 
 
 def nearest(run: Run, summary: Summary) -> str:
@@ -195,8 +215,10 @@ def nearest(run: Run, summary: Summary) -> str:
     if not found:
         return ""
     first = found[0]
-    unit = UNITS[first.signal.partition("/")[2]]
+    unit, twice = first.unit, [item for item in found if item.words == first.words]
+    of = f" of the {first.signal.partition('/')[0]}" if len(twice) > 1 else ""
     return (
-        f"Nearest to its limit came the {first.words}: {quantity(first.peak, unit)} of {quantity(first.limit, unit)} "
+        f"Nearest to its limit came the {first.words}{of}: {quantity(first.peak, unit)} of "
+        f"{quantity(first.limit, unit)} "
         f"({100.0 * first.share:.0f} %)."
     )

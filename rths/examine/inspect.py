@@ -46,10 +46,11 @@ def write_report(summary: dict[str, Any]) -> None:
     write_peaks(summary["peaks"])
     write_storeys(summary)
     write_tracking(summary["tracking"])
-    write_force_path(summary["force_path"])
+    write_force_paths(summary["force_paths"])
     if summary["error_energy"] is not None:
         say(
-            f"hybrid simulation error energy at the column: {summary['error_energy'] * 100.0:+.2f} % of the energy in\n"
+            f"hybrid simulation error energy at {summary['error_energy_at']}: "
+            f"{summary['error_energy'] * 100.0:+.2f} % of the energy in\n"
         )
     write_latency(summary)
     if summary["patience"]:
@@ -152,15 +153,14 @@ def write_tracking(tracking: dict[str, dict[str, Any]]) -> None:
             sys.stdout.write(f"The delay of the {part} is not determined: {facts['undetermined']}.\n")
 
 
-def write_force_path(found: dict[str, Any] | None) -> None:
-    """How late the column force is, and its gain, beside the plan's specimen at the measured displacement."""
-    if found is None:
-        return
-    low, high = found["interval"]
-    sys.stdout.write(
-        f"force path: delay {fixed(found['delay'] * 1e3, 2)} ± {milliseconds((high - low) * 0.5)}, "
-        f"gain {found['gain']:.4f} at {found['frequency']:.2f} Hz\n"
-    )
+def write_force_paths(paths: dict[str, dict[str, Any]]) -> None:
+    """How late the force of each column is, and its gain, beside the plan's specimen at the measured displacement."""
+    for name, found in paths.items():
+        low, high = found["interval"]
+        sys.stdout.write(
+            f"force path{f' of the {name}' if len(paths) > 1 else ''}: delay {fixed(found['delay'] * 1e3, 2)} ± "
+            f"{milliseconds((high - low) * 0.5)}, gain {found['gain']:.4f} at {found['frequency']:.2f} Hz\n"
+        )
 
 
 def write_latency(summary: dict[str, Any]) -> None:

@@ -113,7 +113,7 @@ def of_recording(path: Path) -> Subject:
     """What a recording holds; raises InputError where it cannot be read."""
     from common.plan.plan import Plan
     from common.recording.reader import read
-    from report.facts.summary import plan_of
+    from report.facts.laboratories import plan_of
 
     found = read(path)
     plan = plan_of(found) or Plan()

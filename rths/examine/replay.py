@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
 def replay_master(recording: Run, tell: Tell = untold) -> dict[str, Match]:
     """The building, the compensator and the damper's control again, from the first tick to the first hole."""
     from master.step import MasterStep
-    from report.facts.summary import plan_of
+    from report.facts.laboratories import plan_of
 
     plan = plan_of(recording)
     if plan is None or not recording.has(MASTER):
@@ -180,7 +180,7 @@ def replay_table(recording: Run, slave: dict[str, Any], match: Match, ramped: se
     """The table's compensator again, from the first tick to the first hole; not where it was `ramped` to rest."""
     from common.protocol.messages import Command
     from common.rig import TableMeasurement
-    from report.facts.summary import plan_of
+    from report.facts.laboratories import plan_of
     from slave.step import SlaveStep
 
     plan = plan_of(recording)

@@ -14,7 +14,8 @@ from common.plan.plan import Plan, from_tables
 from common.plan.tables import Laboratory, Rig
 from common.recording.reader import CLOCK, Run, read
 from report.facts import circumstances, storeys
-from report.facts.summary import plan_of, summarize
+from report.facts.laboratories import laboratories, plan_of
+from report.facts.summary import summarize
 
 
 def without_the_record(path: Path) -> Run:
@@ -76,14 +77,14 @@ def test_three_storeys_have_a_drift_and_a_shear_each() -> None:
     numerical = np.array([[0.0, 0.0, 0.0], [10.0, 20.0, -30.0], [-40.0, 50.0, 60.0]])
     columns = {"t": t, "displacement": floors, "absolute_acceleration": 10.0 * floors}
     columns |= {"numerical_force": numerical, "column_force": np.array([0.0, 5.0, 0.0])}
-    run = Run(Path("x"), columns={"master": columns})
-    found = storeys.storeys(run, plan)
+    run = Run(Path("x"), columns={"master": columns}, metadata={"plan": {"toml": plan.toml()}})
+    found = storeys.storeys(run, plan, laboratories(run))
     assert [item["drift"]["peak"] for item in found] == pytest.approx([2e-3, 2e-3, 4e-3])
     assert [item["displacement"]["peak"] for item in found] == pytest.approx([2e-3, 3e-3, 7e-3])
     assert [item["shear"]["peak"] for item in found] == [40.0, 50.0, 60.0]
     assert found[1]["drift"]["t"] == 0.002
     columns["column_force"] = np.array([0.0, 500.0, 0.0])
-    assert storeys.storeys(run, plan)[0]["shear"]["peak"] == 510.0
+    assert storeys.storeys(run, plan, laboratories(run))[0]["shear"]["peak"] == 510.0
 
 
 def test_the_modes_are_those_of_the_plan(call: Any, capsys: Any, virtual_recording: Path) -> None:

@@ -16,7 +16,7 @@ import pytest
 from common.recording.reader import read
 from common.signals import TICK_TOPICS
 from recorder import space
-from report.facts.summary import plan_of
+from report.facts.laboratories import plan_of
 from tests.faults.rows import Row, passed
 from tests.helpers import PATIENT
 from tests.system.test_real_time import crew, finish, start, wait_for_ticks

@@ -18,14 +18,15 @@ from common.errors import EmergencyStopError
 from common.host.clock import VirtualClock
 from common.plan import reality
 from common.plan.plan import Plan, load
-from common.recording.reader import Run, Tail, length, read
+from common.recording.reader import Run, read
+from common.recording.tail import Tail, length
 from common.recording.writer import Recording
 from common.signals import TOPICS
 from report.live.feed import EDGES, POINTS, POINTS_WHOLE, SILENT_NS, Feed
 from report.live.page import Page
 from report.live.standing import Standing
 from report.live.status import heading, listing
-from report.live.stream import FACTORS
+from report.live.stream import factors
 from simulation import virtual
 from tests.helpers import ROOT
 
@@ -159,7 +160,7 @@ def test_the_whole_of_a_long_recording_is_shown_with_all_that_is_extreme(
         assert source["t"][0] < 0.1
         assert source["t"][-1] > run.ramps[topic]["t"][-1] - 0.1
         for name in names:
-            every = FACTORS.get(name, 1.0) * np.concatenate(
+            every = factors(growing.feed.laboratories).get(name, 1.0) * np.concatenate(
                 [run.columns[topic][name], run.ramps[topic].get(name, [])]
             )
             assert np.nanmax(source[name]) == np.nanmax(every), name
@@ -202,8 +203,10 @@ def test_a_silent_recorder_is_said(growing: Growing) -> None:
     assert "running" in growing.feed.state
     growing.clock.time += SILENT_NS + 1_000_000_000
     growing.to(0.5)
-    assert growing.feed.state.startswith("no news for 3 s; the newest: running, t = 1.9")
-    assert growing.text.count("no news for 3 s, since t = 1.") == 2  # a tile for each laboratory
+    assert growing.feed.state.startswith("no news for 3 s; the newest: running, t = 1.")
+    assert (
+        len(re.findall(r"no news for 3 s, since t = 1\.[89]", growing.text)) == 2
+    )  # a tile for each laboratory
 
 
 def test_a_state_is_said_with_its_age(growing: Growing) -> None:
@@ -284,7 +287,7 @@ def test_damage_is_said_and_what_came_before_stays(virtual_recording: Path, grow
 def test_what_is_no_recording_is_said(grow: Grow) -> None:
     growing = grow(b"no recording at all")
     growing.to(1.0)
-    assert "is not a readable MCAP recording" in growing.feed.state
+    assert "is no MCAP recording" in growing.feed.state
     assert growing.feed.ended
 
 

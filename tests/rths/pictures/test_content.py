@@ -11,6 +11,7 @@ import pytest
 
 from common.recording.reader import Run
 from common.roles import SLAVE
+from report.facts.laboratories import laboratories
 from report.facts.summary import SEGMENTS, tracking
 from report.pictures import PICTURES, curves, hysteresis, spectra
 from report.pictures.figure import COLOURS
@@ -84,7 +85,7 @@ def test_synchronisation_tilts_by_the_amplitude_and_opens_by_the_delay(delay: fl
 
 def test_what_the_synchronisation_says_is_what_inspect_says() -> None:
     run = sinusoid(2.0, 5e-3, 0.018, 0.97)
-    found: dict[str, Any] = tracking(run)
+    found: dict[str, Any] = tracking(run, laboratories(run))
     for axis, part in zip(drawn(run, "synchronisation").axes, ("actuator", "table"), strict=True):
         said = " ".join(text.get_text() for text in axis.texts)
         assert f"delay {1e3 * found[part]['delay']:.2f} ms" in said

@@ -1,0 +1,129 @@
+"""The laboratories of a recording: whose they are, and what their signals are called.
+
+The plan inside a recording says the kinds. Of a kind of the user's the recording itself says the signals. A recording
+is data: nothing here runs a class that its plan names, and it opens where that class is not at hand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import NamedTuple
+
+from common.plan.kinds import COLUMN, TABLE, planned
+from common.plan.plan import Plan, parse
+from common.recording.reader import Run
+from common.roles import MASTER, SLAVE, kind_of
+from common.signals import RATES, Channels, Signal
+from laboratories.column.kind import COLUMN as COLUMN_KIND
+from laboratories.kind import Coupling, Kind, Pictured, usual
+from laboratories.table.kind import TABLE as TABLE_KIND
+
+SHIPPED: Mapping[str, Kind] = {COLUMN: COLUMN_KIND, TABLE: TABLE_KIND}
+LETTERS = {MASTER: " A", SLAVE: " B"}
+BEFORE = {MASTER: "absolute_acceleration", SLAVE: "command_seq"}  # the row before a laboratory's own
+
+
+class Laboratory(NamedTuple):
+    """A laboratory as a recording shows it."""
+
+    role: str
+    topic: str  # in the recording at hand, which may be one of one slave
+    channels: Channels
+    pictured: Pictured
+    plan: Plan | None = None  # as the role sees it
+    coupling: Coupling | None = None  # None for a kind that does not ship
+    letter: str = ""  # " A" or " B" where the other laboratory is of the same kind
+
+    @property
+    def late(self) -> int:
+        """Ticks by which a target stands before the measurement that it belongs to."""
+        return 0 if self.topic == MASTER else 1
+
+    @property
+    def name(self) -> str:
+        """What it moves, in a word."""
+        return self.pictured.name + self.letter
+
+    @property
+    def label(self) -> str:
+        """What its motion is called."""
+        return f"{self.pictured.name} {self.pictured.position}{self.letter}"
+
+
+def whole_plan(run: Run) -> Plan | None:
+    """The whole plan inside a recording; None where there is none.
+
+    Raises:
+        PlanError: it is no plan.
+    """
+    text = run.metadata.get("plan", {}).get("toml")
+    return _parsed(text, run.path) if text else None
+
+
+@lru_cache(maxsize=8)
+def _parsed(text: str, path: Path) -> Plan:
+    return parse(text, path.parent, f"the plan in {path}")
+
+
+def plan_of(run: Run) -> Plan | None:
+    """The plan inside a recording, as the slave sees it whose part of a recording it is; None where there is none."""
+    plan = whole_plan(run)
+    return plan.of(run.part_of) if plan is not None and run.part_of else plan
+
+
+def laboratories(run: Run) -> list[Laboratory]:
+    """The laboratories of a recording, the master's first; raises PlanError as `whole_plan`."""
+    plan = whole_plan(run)
+    found = [
+        laboratory(
+            run.part_of if topic == SLAVE and run.part_of else topic, topic, plan, run.units.get(topic, {})
+        )
+        for topic in (MASTER, *run.roles)
+        if topic in run.columns
+    ]
+    return lettered([lab for lab in found if lab is not None])
+
+
+def lettered(labs: list[Laboratory]) -> list[Laboratory]:
+    """The laboratories with a letter where the master's and a slave's would have one name."""
+    names = {lab.pictured.name for lab in labs if lab.topic == MASTER}
+    alike = names & {lab.pictured.name for lab in labs if lab.topic != MASTER}
+    return [
+        lab._replace(letter=LETTERS[kind_of(lab.topic)]) if lab.pictured.name in alike else lab
+        for lab in labs
+    ]
+
+
+def laboratory(role: str, topic: str, plan: Plan | None, units: Mapping[str, str]) -> Laboratory | None:
+    """The laboratory of a role whose topic holds signals of these units; None where it has none or none is told."""
+    kind = planned(kind_of(role), "") if plan is None else plan.kinds.get(role, "")
+    part = plan.of(role) if plan is not None and kind else None
+    if kind in SHIPPED:
+        known = SHIPPED[kind]
+        coupling = known.coupling(part) if part is not None else None
+        return Laboratory(role, topic, known.channels, known.pictured, part, coupling)
+    channels = told(topic, units) if kind else None
+    return None if channels is None else Laboratory(role, topic, channels, usual(channels), part)
+
+
+def told(topic: str, units: Mapping[str, str]) -> Channels | None:
+    """The channels of a kind that does not ship, by the order in which its topic has them; None where it lacks some.
+
+    These are its target, a motor's force where it has one, the command, and what is measured. The first measured one in
+    the target's unit is its position, the first in newtons its force.
+    """
+    names = [*units]
+    after = names.index(BEFORE[kind_of(topic)]) + 1 if BEFORE[kind_of(topic)] in names else len(names)
+    end = names.index("numerical_force") if "numerical_force" in names[after:] else len(names)
+    rows = [Signal(name, units[name], name.replace("_", " ")) for name in names[after:end]]
+    rates = {f"{rows[0].name}_{rate}" for rate in RATES} if rows else set()
+    own = [row for row in rows if row.name not in rates]
+    effort = own.pop(1) if len(own) > 2 and own[1].unit == "N" else None
+    target, command, measured = own[:1], own[1:2], own[2:]
+    position = [row.name for row in measured if row.unit == target[0].unit]
+    force = [row.name for row in measured if row.unit == "N"]
+    if not (position and force):
+        return None
+    return Channels(target[0], command[0], tuple(measured), position[0], force[0], effort)
