@@ -1,6 +1,7 @@
 """The classes that a plan would run, and where their code lies; none of it is imported here.
 
-A plan that names a class runs that class's code with the rights of whoever starts the test.
+A plan that names a class, for a rig or for a kind of laboratory, runs that class's code with the rights of whoever
+starts the test. That of a kind runs as well where the plan is checked or simulated.
 """
 
 from __future__ import annotations
@@ -21,16 +22,16 @@ class Code(NamedTuple):
 
 
 def named(plan: Plan) -> list[Code]:
-    """The classes of a plan, in its order."""
+    """The classes of a plan: those of kinds of laboratory, then those of rigs, each in the plan's order."""
+    given = {role: kind for role, kind in plan.kinds.items() if ":" in kind}
     rigs = {"master.rig": plan.master.rig}
     rigs |= (
         {f"slave.{name}.rig": lab.rig for name, lab in plan.slaves.items()}
         if plan.slaves
         else {"slave.rig": plan.slave.rig}
     )
-    return [
-        Code(where, rig.class_, file_of(rig.class_, plan.base)) for where, rig in rigs.items() if rig.class_
-    ]
+    given |= {where: rig.class_ for where, rig in rigs.items() if rig.class_}
+    return [Code(where, name, file_of(name, plan.base)) for where, name in given.items()]
 
 
 def file_of(reference: str, base: Path) -> str:

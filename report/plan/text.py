@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from report.text.formats import quantity
@@ -101,16 +101,21 @@ def peak_row(name: str, peak: Mapping[str, Any]) -> list[str]:
     return [name, quantity(peak["peak"], unit), limit, f"{share:.0%}", bar]
 
 
-def concerns(facts: Mapping[str, Any]) -> Iterator[str]:
-    """What to look at before the test: classes, slips, refusals."""
-    for code in facts["classes"]:
-        place = code["file"] or "a file that is not there"
+def code(classes: Sequence[Mapping[str, str]]) -> Iterator[str]:
+    """The classes that a plan names, each in a sentence."""
+    for one in classes:
+        place = one["file"] or "a file that is not there"
         yield (
-            f"[{code['where']}] runs the class '{code['name']}' from {place}, with your rights: only run plans that "
+            f"[{one['where']}] runs the class '{one['name']}' from {place}, with your rights: only run plans that "
             "you trust."
         )
-    if not facts["classes"]:
+    if not classes:
         yield "The plan names no class of its own: all laboratories are emulated."
+
+
+def concerns(facts: Mapping[str, Any]) -> Iterator[str]:
+    """What to look at before the test: classes, slips, refusals."""
+    yield from code(facts["classes"])
     for slip in facts["slips"]:
         yield f"a slip of units? {slip['where']}: {slip['text']}"
     for risk in facts["refused"]:

@@ -1,4 +1,8 @@
-"""`rths check`: what a plan describes, before anything of it is run; it imports no class that the plan names."""
+"""`rths check`: what a plan describes, before anything of it is run.
+
+It imports no class of a rig. What a plan with a kind of the user's own describes depends on that kind's class, which is
+imported, unless only the classes are asked for.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +11,7 @@ import json
 import sys
 from typing import Any
 
+from common.plan.plan import Plan
 from common.terminal import cli
 from report.text.progress import Progress
 
@@ -14,12 +19,19 @@ from report.text.progress import Progress
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `check`."""
     cli.plan_arguments(parser)
+    parser.add_argument(
+        "--classes",
+        action="store_true",
+        help="only list the classes that the plan names, and import none of them",
+    )
     cli.json_argument(parser, "write what the plan describes as JSON on standard output")
 
 
 def run(args: argparse.Namespace) -> int:
     """Describe a plan; 1 where pre-flight would refuse it."""
     plan = cli.load_plan(args)
+    if args.classes:
+        return listed(plan, as_json=args.json)
     with Progress("simulating the test"):
         from report.plan.facts import facts
 
@@ -31,6 +43,16 @@ def run(args: argparse.Namespace) -> int:
 
         show(printable(found))
     return 0 if found["ready"] else 1
+
+
+def listed(plan: Plan, *, as_json: bool) -> int:
+    """List the classes that a plan names, without importing one; exit code 0."""
+    from report.plan.classes import named
+    from report.plan.text import code
+
+    found = printable([one._asdict() for one in named(plan)])
+    sys.stdout.write(json.dumps({"classes": found}) + "\n" if as_json else "\n".join(code(found)) + "\n")
+    return 0
 
 
 def printable(value: Any) -> Any:

@@ -138,6 +138,20 @@ def test_classes_are_named_with_their_files_and_never_imported(
     assert not (tmp_path / "ran").exists()
 
 
+def test_the_class_of_a_kind_is_listed_too_and_with_classes_alone_not_imported(
+    call: Any, capsys: Any, tmp_path: Path
+) -> None:
+    (tmp_path / "own.py").write_text(f"open({str(tmp_path / 'ran')!r}, 'w')\nclass Own: ...\n")
+    (tmp_path / "p.toml").write_text(SHORT + '[slave]\nkind = "own.py:Own"\n')
+    assert call("check", tmp_path / "p.toml", "--classes") == 0
+    said = f"[slave] runs the class 'own.py:Own' from {tmp_path / 'own.py'}, with your rights"
+    assert capsys.readouterr().out.startswith(said)
+    assert call("check", tmp_path / "p.toml", "--classes", "--json") == 0
+    (found,) = json.loads(capsys.readouterr().out)["classes"]
+    assert found == {"where": "slave", "name": "own.py:Own", "file": str(tmp_path / "own.py")}
+    assert not (tmp_path / "ran").exists()
+
+
 def test_the_file_of_a_module_is_found_without_importing_its_package(
     monkeypatch: Any, tmp_path: Path
 ) -> None:
