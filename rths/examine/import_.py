@@ -14,30 +14,35 @@ from common.errors import InputError, PlanError
 from common.plan import plan as plans
 from common.plan.plan import Plan
 from common.plan.schema import fill, key, nearest
-from common.roles import MASTER, kind_of, name_of
+from common.roles import MASTER, name_of
 from common.signals import Kind, Signal
 from common.terminal import cli, outputs
+from laboratories import kinds
 from report.text.progress import Progress
 
+Known = dict[str, tuple[str, Signal]]  # by our name of a signal its topic and its row there
 
-def lab_signals(plan: Plan) -> dict[str, str]:
-    """What can be given: our signals, those of a named slave as `NAME.signal`, and the topic of each."""
-    found: dict[str, str] = {}
-    for topic in (MASTER, *plan.roles):
-        for row in signals.TOPICS[kind_of(topic)]:
+
+def lab_signals(plan: Plan) -> Known:
+    """What can be given: our signals, those of a named slave as `NAME.signal`.
+
+    Where both ends know a signal, the slave's is meant. Of a slave without a name whose laboratory is of the master's
+    kind the signals are `slave.signal`.
+    """
+    found: Known = {}
+    kind = kinds.own(plan)
+    own = (kind.channels.target.name, *kind.channels.drives, *kind.channels.names) if kind else ()
+    for topic, rows in kinds.topics(plan).items():
+        for row in rows if topic in (MASTER, *plan.roles) else ():
             if row.kind in (Kind.NUMBER, Kind.STOREYS) and row is not signals.TIME:
-                found[prefix(topic) + row.name] = topic  # where both ends know a signal, the slave's is meant
+                name = prefix(topic) + row.name
+                found[f"{topic}.{name}" if topic != MASTER and name in own else name] = topic, row
     return found
 
 
 def prefix(topic: str) -> str:
     """What stands before a signal's name in the topic of a named slave."""
     return f"{name_of(topic)}." if name_of(topic) else ""
-
-
-def bare(name: str) -> str:
-    """A signal's name without that of its slave."""
-    return name.rpartition(".")[2]
 
 
 @dataclass(frozen=True)
@@ -124,7 +129,7 @@ def load_map(path: Path) -> Mapping:
     known_signals = lab_signals(plan)
     sources = {name: source(path, name, entry, known_signals) for name, entry in tables["signals"].items()}
     for name in sources:
-        row = signals.signal(known_signals[name], bare(name))
+        _, row = known_signals[name]
         per = "storey" if plan.storeys > 1 and row.kind is Kind.STOREYS else ""
         per = "slave" if len(plan.roles) > 1 and row.slaves else per
         if per:
@@ -134,7 +139,7 @@ def load_map(path: Path) -> Mapping:
     return Mapping(plan, sources, str(tables.get("time", "")), float(tables.get("rate", 0.0)))
 
 
-def source(path: Path, name: str, entry: dict[str, Any], known_signals: dict[str, str]) -> Source:
+def source(path: Path, name: str, entry: dict[str, Any], known_signals: Known) -> Source:
     """One row of [signals]."""
     if name not in known_signals:
         raise InputError(f"Unknown signal '{name}' in {path}: {nearest(name, known_signals)}")
@@ -200,12 +205,10 @@ def write(path: Path, mapping: Mapping, t: Any, values: dict[str, Any], data: st
 
     known = lab_signals(mapping.plan)
     given: dict[str, list[str]] = {}
-    for topic in (MASTER, *mapping.plan.roles):
-        ours = (prefix(topic) + row.name for row in signals.TOPICS[kind_of(topic)])
-        if names := [name for name in ours if name in values and known[name] == topic]:
-            given[topic] = names
+    for name in (name for name in known if name in values):
+        given.setdefault(known[name][0], []).append(name)
     topics: dict[str, tuple[Signal, ...]] = {
-        topic: (signals.SEQ, signals.TIME, *(signals.signal(topic, bare(name)) for name in names))
+        topic: (signals.SEQ, signals.TIME, *(known[name][1] for name in names))
         for topic, names in given.items()
     }
     plan = mapping.plan.with_test(duration=t.size * mapping.plan.test.interval)

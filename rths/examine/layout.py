@@ -18,23 +18,14 @@ from laboratories import kinds
 
 if TYPE_CHECKING:
     from common.recording.reader import Run
+    from laboratories.kind import Hysteresis
+    from report.facts.laboratories import Laboratory
 
 EVENT = "event"
 SCRIPT_TOPICS = "/studio_script/rths_"  # the viewers give scripts topics of this beginning only
 BINS_PER_INTERVAL, BINNED_INTERVALS = 100, 2
 
-PLOTS = {
-    "column": ("Column: displacement (m)", MASTER, ("column_target", "column_displacement")),
-    "table": ("Table: displacement (m)", SLAVE, ("table_target", "table_displacement")),
-    "stroke": ("AMD: stroke (m)", SLAVE, ("damper_stroke",)),
-    "force": ("AMD: force (N)", SLAVE, ("damper_command", "damper_force")),
-    "round_trip": ("Latency: round trip and interval (s)", LATENCY, ("round_trip",)),
-}
-ROWS = (
-    ("Plot!column", "Plot!table"),
-    ("Plot!hysteresis", "Plot!stroke", "Plot!force"),
-    ("Plot!histogram", "Plot!round_trip"),
-)
+TIMES = ("Plot!histogram", "Plot!round_trip")
 BESIDE = ("StateTransitions!states", "RawMessages!events")
 SHARE_OF_ROWS = 70  # % of the width
 
@@ -79,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
 class Subject:
     """What a layout is made for: a test's name, its slaves' roles, its interval in s, its last tick.
 
-    `fields` are the names of what its topics hold.
+    `fields` are the names of what its topics hold, `labs` its laboratories.
     """
 
     test: str
@@ -87,6 +78,7 @@ class Subject:
     interval: float
     last: int
     fields: dict[str, frozenset[str]]
+    labs: Sequence[Laboratory]
 
     def topics(self, kind: str) -> list[str]:
         """Its topics of a kind: one, or one per slave."""
@@ -102,25 +94,28 @@ class Subject:
 def of_default_test() -> Subject:
     """The default test as it ships."""
     from common.plan import plan
+    from common.recording.reader import Run
+    from report.facts.laboratories import laboratories
 
-    test = plan.load(cli.plan_path(None))
-    held = kinds.topics(test)
-    fields = {topic: frozenset(row.name for row in rows) for topic, rows in held.items()}
-    return Subject(test.test.name, test.roles, test.test.interval, test.ticks - 1, fields)
+    path = cli.plan_path(None)
+    test = plan.load(path)
+    fields = {topic: frozenset(row.name for row in rows) for topic, rows in kinds.topics(test).items()}
+    labs = laboratories(Run(path, roles=test.roles, columns={topic: {} for topic in fields}))
+    return Subject(test.test.name, test.roles, test.test.interval, test.ticks - 1, fields, labs)
 
 
 def of_recording(path: Path) -> Subject:
     """What a recording holds; raises InputError where it cannot be read."""
     from common.plan.plan import Plan
     from common.recording.reader import read
-    from report.facts.laboratories import plan_of
+    from report.facts.laboratories import laboratories, plan_of
 
     found = read(path)
-    plan = plan_of(found) or Plan()
+    plan, labs = plan_of(found) or Plan(), laboratories(found)
     fields = {topic: frozenset(columns) for topic, columns in found.columns.items() if found.has(topic)}
     if found.events:
         fields[EVENT] = frozenset(found.events[0])
-    return Subject(found.test, found.roles, plan.test.interval, last_tick(found), fields)
+    return Subject(found.test, found.roles, plan.test.interval, last_tick(found), fields, labs)
 
 
 def last_tick(found: Run) -> int:
@@ -135,9 +130,11 @@ def layout(subject: Subject) -> dict[str, Any]:
     Raises:
         InputError: there is nothing of which it has a panel.
     """
+    above, below = motions(subject), forces(subject)
     panels = {
-        **{f"Plot!{name}": time_plot(subject, *rest) for name, rest in PLOTS.items()},
-        "Plot!hysteresis": hysteresis(subject),
+        **above,
+        **below,
+        "Plot!round_trip": round_trips(subject),
         "Plot!histogram": histogram(subject),
         "StateTransitions!states": states(subject),
         "RawMessages!events": events(subject),
@@ -145,7 +142,7 @@ def layout(subject: Subject) -> dict[str, Any]:
     shown = {name: panel for name, panel in panels.items() if panel}
     if not shown:
         raise InputError(f"The recording of '{subject.test}' holds nothing of which a layout has a panel.")
-    rows = [stacked("row", [name for name in row if name in shown]) for row in ROWS]
+    rows = [stacked("row", [name for name in row if name in shown]) for row in (above, below, TIMES)]
     parts = [
         stacked("column", [row for row in rows if row]),
         stacked("column", [name for name in BESIDE if name in shown]),
@@ -184,13 +181,13 @@ def series(path: str, label: str) -> dict[str, Any]:
     return {"value": path, "label": label, "enabled": True, "timestampMethod": "receiveTime"}
 
 
-def plot(title: str, lines: Sequence[dict[str, Any]], **axis: Any) -> dict[str, Any]:
+def plot(title: str, drawn: Sequence[dict[str, Any]], **axis: Any) -> dict[str, Any]:
     """A plot; none where it has no line."""
-    if not lines:
+    if not drawn:
         return {}
     return {
         **titled(title),
-        "paths": [{**line, "showLine": True, "lineSize": 1} for line in lines],
+        "paths": [{**line, "showLine": True, "lineSize": 1} for line in drawn],
         "showLegend": True,
         "legendDisplay": "floating",
         "showPlotValuesInLegend": False,
@@ -213,27 +210,88 @@ def label(topic: str, field: str) -> str:
     return f"{name_of(topic)} {field}".strip()
 
 
-def time_plot(subject: Subject, title: str, kind: str, names: Iterable[str]) -> dict[str, Any]:
-    """Signals over time, of every slave."""
-    lines = [
+def motions(subject: Subject) -> dict[str, dict[str, Any]]:
+    """The motion that each laboratory imposes beside its target, by panel; of slaves that are alike in one."""
+    return {
+        f"Plot!{labs[0].name}": over_time(
+            subject,
+            f"{labs[0].name.capitalize()}: {labs[0].pictured.position} (m)",
+            labs,
+            (labs[0].channels.target.name, labs[0].channels.position),
+        )
+        for labs in alike(subject.labs)
+    }
+
+
+def forces(subject: Subject) -> dict[str, dict[str, Any]]:
+    """What each laboratory tests: force over the motion that is imposed, or its own motion and force over time."""
+    found: dict[str, dict[str, Any]] = {}
+    for labs in alike(subject.labs):
+        channels = labs[0].channels
+        effort = (channels.effort.name,) if channels.effort else ()
+        for loop in labs[0].pictured.loops:
+            title = (loop.name + labs[0].letter).capitalize()
+            if loop.motion == channels.position:
+                for lab in labs:
+                    slave = f" of {name_of(lab.role)}" if len(labs) > 1 else ""
+                    name = f"Plot!hysteresis{lab.letter}{slave}"
+                    found[unlike(name, found)] = hysteresis(subject, title + slave, lab, loop)
+                continue
+            stroke, force = (
+                (f"{title}: {loop.across} (m)", (loop.motion,)),
+                (f"{title}: force (N)", (*effort, loop.force)),
+            )
+            found[unlike(f"Plot!{loop.across}", found)] = over_time(subject, stroke[0], labs, stroke[1])
+            found[unlike("Plot!force", found)] = over_time(subject, force[0], labs, force[1])
+    return found
+
+
+def unlike(name: str, others: Iterable[str]) -> str:
+    """A panel's name that no other has."""
+    return unlike(f"{name}'", others) if name in others else name
+
+
+def alike(labs: Iterable[Laboratory]) -> list[list[Laboratory]]:
+    """The laboratories, those of slaves with the same signals together."""
+    found: dict[Any, list[Laboratory]] = {}
+    for lab in labs:
+        found.setdefault((lab.topic == MASTER, lab.channels), []).append(lab)
+    return list(found.values())
+
+
+def over_time(
+    subject: Subject, title: str, labs: Iterable[Laboratory], names: Sequence[str]
+) -> dict[str, Any]:
+    """Signals of laboratories over time."""
+    return plot(title, lines(subject, (lab.topic for lab in labs), names))
+
+
+def lines(subject: Subject, topics: Iterable[str], names: Iterable[str]) -> list[dict[str, Any]]:
+    """A line for each signal of each topic that is recorded."""
+    return [
         series(subject.path(topic, f".{name}"), label(topic, name))
-        for topic in subject.topics(kind)
+        for topic in topics
         for name in names
-        if name in subject.fields[topic]
+        if name in subject.fields.get(topic, ())
     ]
-    if lines and kind == LATENCY:
-        lines.append(series(f"{subject.interval!r}", "interval"))  # a number is a line across
-    return plot(title, lines)
 
 
-def hysteresis(subject: Subject) -> dict[str, Any]:
-    """The column's force over its displacement."""
-    force, displacement = "column_force", "column_displacement"
-    if not {force, displacement} <= subject.fields.get(MASTER, frozenset()):
+def round_trips(subject: Subject) -> dict[str, Any]:
+    """The round trip with every slave, and the interval."""
+    found = lines(subject, subject.topics(LATENCY), ("round_trip",))
+    if found:
+        found.append(series(f"{subject.interval!r}", "interval"))  # a number is a line across
+    return plot("Latency: round trip and interval (s)", found)
+
+
+def hysteresis(subject: Subject, title: str, lab: Laboratory, loop: Hysteresis) -> dict[str, Any]:
+    """A laboratory's force over its motion."""
+    if not {loop.force, loop.motion} <= subject.fields.get(lab.topic, frozenset()):
         return {}
-    lines = [series(subject.path(MASTER, f".{force}"), force)]
-    axis = against(subject.path(MASTER, f".{displacement}"))
-    return plot("Column: force (N) over displacement (m)", lines, **axis)
+    axis = against(subject.path(lab.topic, f".{loop.motion}"))
+    return plot(
+        f"{title}: force (N) over {loop.across} (m)", lines(subject, (lab.topic,), (loop.force,)), **axis
+    )
 
 
 def timed(subject: Subject) -> list[str]:
@@ -251,9 +309,9 @@ def histogram(subject: Subject) -> dict[str, Any]:
     topics = [(topic, script_topic(topic)) for topic in timed(subject)]
     if not topics:
         return {}
-    lines = [series(f"{made}.ticks[:]", label(topic, "ticks")) for topic, made in topics]
+    found = [series(f"{made}.ticks[:]", label(topic, "ticks")) for topic, made in topics]
     axis = against(f"{topics[0][1]}.time[:]")  # the bins of all are the same
-    return plot("Latency: ticks over round trip (s)", lines, **axis)
+    return plot("Latency: ticks over round trip (s)", found, **axis)
 
 
 def scripts(subject: Subject) -> Iterable[tuple[str, dict[str, str]]]:
@@ -273,18 +331,18 @@ def scripts(subject: Subject) -> Iterable[tuple[str, dict[str, str]]]:
 
 def states(subject: Subject) -> dict[str, Any]:
     """Safety modes, what went wrong, late ticks."""
-    lines = []
+    found = []
     if EVENT in subject.fields:
         for role in (MASTER, *subject.roles):
-            lines.append(series(subject.path(EVENT, where(lab=role, code="mode"), ".text"), role))
+            found.append(series(subject.path(EVENT, where(lab=role, code="mode"), ".text"), role))
         for level in ("error", "warning"):
-            lines.append(series(subject.path(EVENT, where(level=level), ".text"), f"{level}s"))
-    lines += [
+            found.append(series(subject.path(EVENT, where(level=level), ".text"), f"{level}s"))
+    found += [
         series(subject.path(topic, ".deadline_missed"), label(topic, "deadline_missed"))
         for topic in subject.topics(LATENCY)
         if "deadline_missed" in subject.fields[topic]
     ]
-    return {**titled("States and errors"), "paths": lines, "isSynced": True} if lines else {}
+    return {**titled("States and errors"), "paths": found, "isSynced": True} if found else {}
 
 
 def where(**texts: str) -> str:
