@@ -14,7 +14,7 @@ from common.protocol.messages import Command, Feedback
 COUNT = 20_000
 REPEATS = 7
 COMMAND = Command(2**60, 10_000, 2**60, 1_000, 9_999, 0.01, 50.0, 0.1, 1.0, 10.0)
-FEEDBACK = Feedback(2**60, 10_000, 10_000, 2**60, 10_000, 2**60, 2**60, 2**60, 0.01, 0.2, 0.03, 50.0)
+FEEDBACK = Feedback(2**60, 10_000, 10_000, 2**60, 10_000, 2**60, 2**60, 2**60, (0.01, 0.2, 0.03, 50.0))
 LAYOUT = struct.Struct(f"<B{''.join('q' if type(value) is int else 'd' for value in COMMAND)}")
 
 

@@ -8,6 +8,7 @@ read any number of times while nothing moves, and is, before the first command, 
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple, Protocol
@@ -15,6 +16,7 @@ from typing import Any, NamedTuple, Protocol
 from common import blame
 from common.errors import EmergencyStopError, RigError
 from common.rig_time import RigTime
+from common.signals import Channels
 
 ANYTHING = (Exception, SystemExit)  # a plug-in may raise anything, and ends nothing by `sys.exit`
 
@@ -52,6 +54,30 @@ class TableMeasurement(NamedTuple):
     damper_force: float  # N
 
 
+class NothingCommand(NamedTuple):
+    """What a laboratory without a rig is told."""
+
+
+class NothingMeasurement(NamedTuple):
+    """What a laboratory without a rig reads."""
+
+
+COMMANDS: Mapping[tuple[str, ...], Any] = {one._fields: one for one in (ColumnCommand, TableCommand)}
+MEASUREMENTS: Mapping[tuple[str, ...], Any] = {
+    one._fields: one for one in (ColumnMeasurement, TableMeasurement)
+}
+
+
+def command_of(channels: Channels) -> Any:
+    """The NamedTuple of what a laboratory of these channels is told, in the order of `channels.drives`."""
+    return COMMANDS.get(channels.drives) or namedtuple("Command", channels.drives)
+
+
+def measurement_of(channels: Channels) -> Any:
+    """The NamedTuple of what a laboratory of these channels reads, in the order of `channels.names`."""
+    return MEASUREMENTS.get(channels.names) or namedtuple("Measurement", channels.names)
+
+
 class Rig(Protocol):
     """A laboratory."""
 
@@ -66,6 +92,23 @@ class Rig(Protocol):
 
     def disarm(self) -> None:
         """Come to a safe stop; must not raise."""
+
+
+class NoRig:
+    """The rig of a master without a laboratory: it has nothing to read and nothing that could move."""
+
+    def arm(self) -> None:
+        """Nothing has to be ready."""
+
+    def read(self) -> NothingMeasurement:
+        """No channel."""
+        return NothingMeasurement()
+
+    def write(self, command: NothingCommand) -> None:
+        """No command."""
+
+    def disarm(self) -> None:
+        """At rest in any case."""
 
 
 class AtRest(Protocol):

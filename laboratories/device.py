@@ -22,6 +22,7 @@ from common.safety.ramp import MotionRamp, Ramp
 from common.signals import Channels, Signal
 from laboratories import completeness
 from laboratories.kind import Chosen, Coupling, Follows, Kind, Limited, Sensed, usual
+from models.compiled import jit
 from models.registry import Array
 from models.system import System
 
@@ -94,6 +95,12 @@ class DeviceRecord(NamedTuple):
 def advance_device(lab: DeviceRecord, truth: Array, command: float, effort: float) -> None:
     """One interval of any device, by its own kernel."""
     lab.step(lab.parameters, lab.state, truth, command, effort)
+
+
+@jit
+def enter_device(lab: tuple[Any, ...], truth: Array, command: float, effort: float) -> None:
+    """`advance_device` for a caller outside compiled code, which holds the device as `compiled.plain` gives it."""
+    lab[0](lab[1], lab[2], truth, command, effort)
 
 
 class HoldRamp:
@@ -203,6 +210,12 @@ class Device(Kind):
         laid = [faults.get(name, fault.null) for name, fault in self.faults.items()]
         row = [system.plan.test.interval, *values.values(), *laid]
         return DeviceRecord(self._kernel, np.array(row), np.zeros(self.states))
+
+    def enter(self, lab: tuple[Any, ...], command: float, effort: float = 0.0) -> tuple[float, ...]:
+        """What sensors without error would read one interval later, for a caller outside compiled code."""
+        truth = np.empty(len(self.channels.names))
+        enter_device(lab, truth, command, effort)
+        return tuple(truth.tolist())
 
     def coupling(self, plan: Plan) -> Coupling:
         """The device's storey or floor as `[device]` says it."""

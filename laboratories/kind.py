@@ -115,6 +115,10 @@ class Kind(ABC):
     record: type[Any]  # NamedTuple of the laboratory at work
     advance: Callable[..., None]  # (record, truth, command, effort): one interval, see `kinds.advance`
 
+    enter: Callable[
+        ..., tuple[float, ...]
+    ]  # (record as `compiled.plain` gives it, commands...): truth after `advance`
+
     @property
     def effects(self) -> tuple[Effect, ...]:
         """Its effects beside those in the folders of the catalogue."""

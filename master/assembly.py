@@ -3,29 +3,22 @@
 from __future__ import annotations
 
 import secrets
-from functools import partial
-from typing import Any
 
 from common.host.clock import unix_ns
 from common.lab.laboratory import Setting
-from common.lab.preflight import Check, Gate, SensorsAtRest
-from common.plan import schema
+from common.lab.preflight import Check, Gate
 from common.plan.plan import Plan
-from common.plan.plugins import construct, find
 from common.plan.reality import Reality
-from common.rig import METHODS, AtRest, ColumnMeasurement, GuardedRig
-from laboratories.column import model as column_lab
-from laboratories.column.kind import COLUMN
-from laboratories.sensors import noise, readings
-from loop import substructure
+from common.rig import AtRest, GuardedRig
+from common.roles import MASTER
+from loop import rigs, substructure
 from loop.links import link_model
 from loop.nominal import preflight as nominal
 from loop.realised import true_system
 from master.limits import MasterLimits
 from master.loop import MasterLoop
-from master.rig import ColumnLab
+from master.own import Own
 from master.step import MasterStep
-from models.compiled import plain
 from models.registry import Array
 from models.system import System
 
@@ -36,35 +29,14 @@ def preflight(plan: Plan) -> list[Check]:
 
 
 def build_rig(reality: Reality, at_rest: AtRest | None = None) -> GuardedRig:
-    """Laboratory A as the plan and the reality have it, judged `at_rest` as it is armed.
-
-    Raises:
-        InputError: it cannot be constructed.
-    """
-    plan, rig = reality.plan, reality.master
-    arguments: dict[str, Any] = {
-        "interval": plan.test.interval,
-        "seed": noise.lab_seed(reality.seed, noise.LAB_A),
-    }
-    if not rig.class_:
-        system = true_system(reality)
-        plan = system.plan
-        arguments |= {"effects": system.effects}
-        arguments |= {name: schema.plain(getattr(plan, name)) for name in ("actuator", "column", "sensors")}
-        twin = partial(ColumnLab, **arguments)
-        return GuardedRig(twin(), "laboratory A", ColumnMeasurement, at_rest=at_rest, twin=twin)
-    kind = find(rig.class_, reality.base, "[master.rig]")
-    name = "laboratory A" if "master" in reality.hidden else f"laboratory A ({kind.__name__})"
-    built = construct(kind, arguments | rig.options, "[master.rig]", METHODS)
-    return GuardedRig(built, name, ColumnMeasurement, hidden="master" in reality.hidden, at_rest=at_rest)
+    """The master's own laboratory, judged `at_rest` as it is armed; raises InputError where it cannot be."""
+    return rigs.build(reality, MASTER, at_rest)
 
 
 def check(reality: Reality) -> None:
     """Raise InputError where the laboratory could not be built; nothing of it is constructed or moved."""
     master_step(reality)
-    COLUMN.build(true_system(reality))
-    if reality.master.class_:
-        find(reality.master.class_, reality.base, "[master.rig]")
+    rigs.check(reality, MASTER)
 
 
 def master_step(reality: Reality) -> MasterStep:
@@ -93,7 +65,7 @@ def build_loop(
     warm_up(reality)
     return MasterLoop(
         setting,
-        build_rig(reality, SensorsAtRest(gate, setting) if gate else None),
+        build_rig(reality, rigs.at_rest(gate, setting, MASTER)),
         master_step(reality),
         {role: link_model(reality.of(role)) for role in setting.plan.roles},
         session=session if session is not None else secrets.randbelow(2**62) + 1,
@@ -104,7 +76,9 @@ def build_loop(
 
 def warm_up(reality: Reality) -> None:
     """Compile the kernels on arrays that are thrown away."""
-    outputs = master_step(reality)(0, 0.0, 0.0, [0.0] * len(reality.plan.roles))
-    MasterLimits(reality.plan).violation(ColumnMeasurement(0.0, 0.0), outputs)
-    column_lab.enter(plain(COLUMN.build(true_system(reality))), 0.0)
-    readings.step(readings.build(reality.plan.test.interval, ("any",), {}), 0, 0.0, 0.0, 0.0)
+    plan = reality.plan
+    own = Own(plan)
+    outputs = master_step(reality)(0, 0.0, 0.0, [0.0] * len(plan.roles))
+    measured = (0.0,) * (len(own.channels.names) if own.channels else 0)
+    MasterLimits(plan).violation(measured, own.command(outputs), outputs)
+    rigs.warm_up(reality, MASTER)

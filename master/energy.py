@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from operator import itemgetter
+from typing import Any
 
 import numpy as np
 
 from common.plan.limits import Violation, violated
 from common.plan.plan import Plan
-from common.rig import ColumnMeasurement
+from laboratories import kinds
+from laboratories.kind import Follows, Kind
 from loop.nominal.partition import felt, storey_stiffness
 from master.step import Outputs
 from models import energy_balance
@@ -23,14 +27,10 @@ class EnergyMonitor:
     """The balance of one test, moving on tick by tick, and its limits `error_energy` and `numerical_drift`."""
 
     def __init__(self, plan: Plan) -> None:
-        column = plan.column
-        self._limits, self._plain = plan.limits, plan.storeys == 1
+        self._limits, self._plain = vars(plan.limits), plan.storeys == 1
+        ratio, scale, self._felt = interface(kinds.own(plan), plan)
         self._balance = energy_balance.build(
-            plan.test.interval,
-            column.deformation_ratio,
-            float(column.represents),
-            floor(plan),
-            np.array(plan.structure.mass),
+            plan.test.interval, ratio, scale, floor(plan), np.array(plan.structure.mass)
         )
         self._enter, self._sums = energy_balance.enter, plain(self._balance)
 
@@ -44,7 +44,7 @@ class EnergyMonitor:
         """Energy that the integration has made, over that of the ground."""
         return self._balance.sums.item(DRIFT_SHARE)
 
-    def violation(self, measured: ColumnMeasurement, outputs: Outputs) -> Violation | None:
+    def violation(self, measured: tuple[float, ...], outputs: Outputs) -> Violation | None:
         """Take one tick into the sums; the first of them beyond its limit."""
         balance = self._balance
         motion = balance.motion
@@ -54,11 +54,28 @@ class EnergyMonitor:
             motion[ACCELERATION, 0] = outputs.acceleration
         else:
             motion[: ACCELERATION + 1] = outputs[5:8]
-        self._enter(self._sums, outputs.ground_acceleration, outputs.target, *measured)
+        self._enter(self._sums, outputs.ground_acceleration, outputs.target, *self._felt(measured))
         error, drift = self.error_energy, self.numerical_drift
-        if abs(error) <= self._limits.error_energy and abs(drift) <= self._limits.numerical_drift:
+        limits = self._limits
+        if abs(error) <= limits["error_energy"] and abs(drift) <= limits["numerical_drift"]:
             return None
-        return violated(self._limits, error_energy=error, numerical_drift=drift)
+        return violated(limits, error_energy=error, numerical_drift=drift)
+
+
+def interface(own: Kind | None, plan: Plan) -> tuple[float, float, Callable[[Any], tuple[float, float]]]:
+    """Deformation over motion and force over force of the master's own laboratory, and its position and force.
+
+    A force that pushes counts as one that resists with the other sign. Without a laboratory there is no error.
+    """
+    if own is None:
+        return 1.0, 0.0, lambda _: (0.0, 0.0)
+    coupling, names = own.coupling(plan), own.channels.names
+    scale = coupling.scale if coupling.follows is Follows.DRIFT else -coupling.scale
+    return (
+        coupling.ratio,
+        scale,
+        itemgetter(names.index(own.channels.position), names.index(own.channels.force)),
+    )
 
 
 def floor(plan: Plan) -> float:

@@ -80,24 +80,29 @@ class Handshake:
             self._lab.note("latched", text, level="warning")
 
     def _agree(self, partner: Partner, message: Registered | Armed | Scheduled, received_ns: int) -> None:
-        """Move on where all have given the answer that the present state waits for; repeated ones change nothing."""
-        state, partners = self._lab.exchange.state, self._partners
+        """Take an answer that the present state waits for, and move on where all have given it."""
+        state = self._lab.exchange.state
         match message:
             case Registered() if state is State.IDLE:
                 partner.register(message.instance, received_ns)
-                if all(one.registered for one in partners) and self._recorder_is_here():
-                    self._move(Event.REGISTER)
-                    self._arm()
             case Armed() if state is State.REGISTERED:
                 partner.armed = True
-                if all(one.armed for one in partners):
-                    self._move(Event.ARM)
             case Scheduled() if state is State.ARMED and self._lab.start_ns:  # it was asked
                 partner.scheduled = True
-                if all(one.scheduled for one in partners):
-                    self._move(Event.SCHEDULE)
             case _:
-                pass
+                return
+        self._move_on()
+
+    def _move_on(self) -> None:
+        """Leave the present state where every slave has given the answer that it waits for."""
+        state, partners = self._lab.exchange.state, self._partners
+        if state is State.IDLE and all(one.registered for one in partners) and self._recorder_is_here():
+            self._move(Event.REGISTER)
+            self._arm()
+        elif state is State.REGISTERED and all(one.armed for one in partners):
+            self._move(Event.ARM)
+        elif state is State.ARMED and self._lab.start_ns and all(one.scheduled for one in partners):
+            self._move(Event.SCHEDULE)
 
     def _move(self, event: Event) -> None:
         self._lab.move(event)
@@ -163,6 +168,10 @@ class Handshake:
             for partner in self._partners:
                 if partner.due(now):
                     self._ask(partner, now)
+            if not self._partners:
+                self._schedule(now)
+        if not self._partners:  # nobody's answer moves it on
+            self._move_on()
 
     def _nobody(self) -> None:
         if self._lab.exchange.state is not State.IDLE:

@@ -2,63 +2,51 @@
 
 from __future__ import annotations
 
-from common.plan.limits import Change, Frozen, Guard, Lasting, Standstill, Violation
+from common.plan.limits import Guard, Standstill, Violation
 from common.plan.plan import Plan
-from common.rig import ColumnCommand, ColumnMeasurement
-from common.signals import OF_STOREYS, SENT
+from common.signals import OF_STOREYS
+from laboratories import kinds
+from laboratories.limits import LaboratoryLimits, NoLimits, sent_guard
 from master.energy import EnergyMonitor
-from master.step import Outputs
+from master.step import Outputs, Sent
 
 STOREYS = Outputs._fields.index(OF_STOREYS[0])
 
 
 class MasterLimits:
-    """The plan's limits on laboratory A, on the building, and on what is sent to the slaves.
+    """The plan's limits on the master's own laboratory, on the building, and on what is sent to the slaves.
 
     `violation` is asked once in every tick; `written` is told of every command that went to the rig.
     """
 
     def __init__(self, plan: Plan) -> None:
-        limits = plan.limits
+        own = kinds.own(plan)
         several = OF_STOREYS if plan.storeys > 1 else ()
-        self._measurements = Guard(limits, ColumnMeasurement._fields)
-        self._command = Guard(limits, ("actuator_command",))
-        self._sent = Guard(limits, SENT)
-        self._storeys = Guard(limits, OF_STOREYS, several)
-        self._actuator = Change(
-            limits,
-            plan.test.interval,
-            step="actuator_step",
-            velocity="actuator_velocity",
-            acceleration="actuator_acceleration",
-        )
-        self._error = Lasting(limits, "column_error")
+        self._own = LaboratoryLimits(own, plan) if own else NoLimits()
+        self._sent = [sent_guard(kinds.kind_of(plan, role), plan.of(role)) for role in plan.roles]
+        self._storeys = Guard(vars(plan.limits), OF_STOREYS, several)
         self._energy = EnergyMonitor(plan)
-        self._frozen = Frozen(plan, ColumnMeasurement._fields, "column_displacement")
-        self._present = 0.0  # command in force over the interval just over
+        self.written = self._own.written
+        self.standing = self._own.standing
 
-    def violation(self, measured: ColumnMeasurement, outputs: Outputs) -> Violation | Standstill | None:
-        """The first value beyond its limit, None where there is none."""
-        error = outputs.target - measured.column_displacement
-        lasting = self._error.violation(error)
+    def violation(
+        self, measured: tuple[float, ...], wanted: tuple[float, ...], outputs: Outputs
+    ) -> Violation | Standstill | None:
+        """The first value beyond its limit, None where there is none; `wanted` is the command for its own rig."""
+        motion = self._own.motion(measured, wanted, outputs.target)
         energy = self._energy.violation(measured, outputs)
-        frozen = self._frozen.violation(measured, self._present)
         return (
-            self._measurements.violation(measured)
-            or self._command.violation((outputs.command,))
-            or next(filter(None, map(self._sent.violation, outputs.sent)), None)
+            self._own.readings(measured)
+            or self._own.commands(wanted)
+            or self._beyond(outputs.sent)
             or self._storeys.violation(outputs[STOREYS:])
-            or self._actuator.violation(outputs.command)
-            or lasting
+            or motion
             or energy
-            or frozen
         )
 
-    def written(self, command: ColumnCommand) -> None:
-        """The rig was given this command."""
-        self._present = command.actuator_command
-        self._actuator.written(command.actuator_command)
-
-    def standing(self, measured: ColumnMeasurement) -> str:
-        """Why a rig at rest may not be reset, empty where all it reads is within its limits."""
-        return str(self._measurements.violation(measured) or "")
+    def _beyond(self, sent: list[Sent]) -> Violation | None:
+        """The first value beyond its limit of what goes to the slaves."""
+        for guard, values in zip(self._sent, sent, strict=True):
+            if violation := guard.violation(values):
+                return violation
+        return None

@@ -7,7 +7,6 @@ real and in virtual time.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
 from typing import Any
 
 from common.errors import InterlockError, RigError
@@ -34,13 +33,15 @@ from common.protocol.messages import (
     Trip,
     Waiting,
 )
-from common.rig import ColumnCommand, ColumnMeasurement, GuardedRig
+from common.rig import GuardedRig
 from common.roles import MASTER, RECORDER
 from common.safety.modes import Turn
 from common.safety.watchdog import Finding
-from laboratories.column.descent import ColumnRamp
+from common.signals import alike
+from laboratories import kinds
 from master.handshake import Handshake
 from master.limits import MasterLimits
+from master.own import Own
 from master.partner import Partner
 from master.step import MasterStep, Outputs
 
@@ -61,17 +62,19 @@ class MasterLoop(RigLoop):
     ) -> None:
         plan, lab = setting.plan, Laboratory(MASTER, setting)
         self._limits = MasterLimits(plan)
-        zero, readings = ColumnCommand(0.0), len(ColumnMeasurement._fields)
-        descent = Descent(lab, rig, partial(ColumnRamp, plan), zero, readings)
+        self._own = Own(plan)
+        descent = Descent(lab, rig, self._own.ramp, self._own.zero, self._own.channels)
         super().__init__(lab, rig, descent, self._limits.standing)
-        self.partners = {role: Partner(role, self.lab, links[role]) for role in plan.roles}
+        channels = {role: kinds.kind_of(plan, role).channels for role in plan.roles}
+        self.partners = {role: Partner(role, self.lab, links[role], channels[role]) for role in plan.roles}
+        self._groups = [[self.partners[role] for role in roles] for roles in alike(channels).values()]
+        lab.endpoint.expect({role: len(one.names) for role, one in channels.items()})
         self._partners = tuple(self.partners.values())
         self._handshake = Handshake(self.lab, self._partners, rig, epoch_ns - setting.clock.now(), gate)
-        self._alone = len(self._partners) == 1
         self._step = step
-        self._command = 0.0
+        self._command = self._own.zero
         self._drift = 0.0
-        self._column_force = 0.0
+        self._measured: tuple[float, ...] = ()
         self._sent_ns = 0  # when the newest command went out
         self._digest = plan.digest()
         self._late = lateness.LateTicks()
@@ -145,13 +148,14 @@ class MasterLoop(RigLoop):
             return
         try:
             measured = self._rig.read()
-            outputs = self._step(tick, measured.column_displacement, measured.column_force, forces)
-            violation = self._limits.violation(measured, outputs)
+            outputs = self._step(tick, *self._own.felt(measured), forces)
+            wanted = self._own.command(outputs)
+            violation = self._limits.violation(measured, wanted, outputs)
             if violation:
                 lab.violated(violation, tick)
                 self._descent.step(tick, measured)
             else:
-                self._write(outputs, held=held)
+                self._write(wanted, outputs, held=held)
         except RigError as error:
             self._rig_failed(error, tick)
             return
@@ -159,27 +163,28 @@ class MasterLoop(RigLoop):
         if lab.recorded:
             self._sample(tick, measured, outputs)
         self.ticks = tick + 1
-        self._drift = outputs.target / lab.plan.column.deformation_ratio
-        self._column_force = measured.column_force
+        self._drift = self._own.drift(outputs)
+        self._measured = measured
         self._watch(tick, wake)
 
     def _finding(self, tick: int) -> tuple[Finding, str]:
         """What the slaves' watchdogs say, and of which slave: the first of which it is the worst."""
         findings = [partner.look(tick) for partner in self._partners]
+        if not findings:
+            return Finding.FINE, ""
         held = Finding.HOLD if Finding.HOLD in findings else findings[0]
         worst = Finding.RAMP if Finding.RAMP in findings else held
         return worst, self._partners[findings.index(worst)].title
 
-    def _write(self, outputs: Outputs, *, held: bool) -> None:
+    def _write(self, wanted: Any, outputs: Outputs, *, held: bool) -> None:
         """Move to the tick's command, or stay where it came too late."""
         if not held:
-            self._command = outputs.command
+            self._command = wanted
             for partner, sent in zip(self._partners, outputs.sent, strict=True):
                 partner.sent = sent
-        command = ColumnCommand(self._command)
-        self._descent.wrote(command)
-        self._rig.write(command)
-        self._limits.written(command)
+        self._descent.wrote(self._command)
+        self._rig.write(self._command)
+        self._limits.written(self._command)
 
     def _tell_late(self, tick: int) -> None:
         """Warn where too many ticks up to this one, which has just been judged, came late in any exchange.
@@ -209,7 +214,7 @@ class MasterLoop(RigLoop):
             ready, self._sent_ns = (0, 0) if nothing else partner.send(tick)
             partner.account.open(tick, wake_ns, ready, self._sent_ns, partner.used)
 
-    def _sample(self, tick: int, measured: tuple[float, float], outputs: Outputs) -> None:
+    def _sample(self, tick: int, measured: tuple[float, ...], outputs: Outputs) -> None:
         lab = self.lab
         log_ns = lab.epoch_ns + lab.plan.tick_ns(tick)
         publish_ns = lab.epoch_ns + (self._sent_ns or lab.clock.now()) - lab.start_ns
@@ -221,20 +226,21 @@ class MasterLoop(RigLoop):
             outputs.velocity,
             outputs.acceleration,
             outputs.absolute_acceleration,
-            outputs.target,
-            self._command,
-            *measured,
+            *self._own.row(outputs, self._command, measured),
             outputs.numerical_force,
             *self._exchanged(tick),
         )
         lab.outlet.add("master", log_ns, publish_ns, values)
 
-    def _exchanged(self, tick: int) -> tuple[Any, ...]:
-        """What was used and what was sent: one value each, or one per slave where there are several."""
-        if self._alone:
-            partner = self._partners[0]
-            return *partner.use(tick), *partner.sent
-        return tuple(zip(*((*partner.use(tick), *partner.sent) for partner in self._partners), strict=True))
+    def _exchanged(self, tick: int) -> list[Any]:
+        """What was used and what was sent: one value each, or one per slave where several are of one kind."""
+        found: list[Any] = []
+        for group in self._groups:
+            if len(group) == 1:
+                found += group[0].row(tick)
+            else:
+                found += zip(*(partner.row(tick) for partner in group), strict=True)
+        return found
 
     def _watch(self, tick: int, now: int) -> None:
         """End the test where a slave or the recorder is gone or cannot go on."""
@@ -316,19 +322,27 @@ class MasterLoop(RigLoop):
 
     @property
     def progress(self) -> dict[str, float]:
-        """What a user watches: drift of the specimen's storey (m), forces (N), round trip (s), missed deadlines.
+        """What a user watches: a storey's drift (m), forces by channel (N), round trip (s), missed deadlines.
 
-        Of several slaves the largest damper force without its sign, the longest round trip, the most deadlines missed.
+        Of several slaves of a kind the largest force without its sign, of all the longest round trip and the most
+        deadlines missed.
         """
         accounts = [partner.account for partner in self._partners]
-        forces = [partner.used.damper_force for partner in self._partners]
-        return {
-            "drift": self._drift,
-            "column_force": self._column_force,
-            "damper_force": forces[0] if self._alone else max(map(abs, forces)),
-            "round_trip": max(account.round_trip for account in accounts),
-            "missed": float(max(account.missed for account in accounts)),
-        }
+        forces = self._own.force(self._measured)
+        for group in self._groups:
+            name = group[0].channels.force
+            several = [partner.force for partner in group]
+            found = several[0] if len(several) == 1 else max(map(abs, several))
+            forces[f"{name}_used" if name in forces else name] = found
+        exchange = (
+            {
+                "round_trip": max(account.round_trip for account in accounts),
+                "missed": float(max(account.missed for account in accounts)),
+            }
+            if accounts
+            else {}
+        )
+        return {"drift": self._drift, **forces, **exchange}
 
     # -- pacing -----------------------------------------------------------------------------------
 

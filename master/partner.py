@@ -10,6 +10,7 @@ from common.protocol.messages import Arm, Command, Feedback, Start, Sync, SyncRe
 from common.protocol.tally import Tally
 from common.roles import latency_topic, name_of, title
 from common.safety.watchdog import Finding, Watchdog
+from common.signals import Channels
 from master.latency import Account
 from master.step import Sent
 
@@ -18,15 +19,19 @@ SYNC_EXCHANGES = 200
 OFFSET_BLOCK, OFFSET_BLOCKS = 250, 40  # exchanges: the best of half a second each, twenty seconds of them
 GIVEN_UP_NS = 5 * REPEAT_NS  # silence after which another process may register under the same name
 
-NO_FEEDBACK = Feedback(0, -1, -1, 0, -1, 0, 0, 0, 0.0, 0.0, 0.0, 0.0)
+# stands for what has not come; a partner's own has as many channels as its laboratory
+NO_FEEDBACK = Feedback(0, -1, -1, 0, -1, 0, 0, 0, (0.0, 0.0, 0.0, 0.0))
 
 NOTHING_SENT = (0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Partner:
-    """A slave in a test; `role` is what it is called, `link` the impairment of what comes from it."""
+    """A slave in a test; `role` is what it is called, `link` the impairment of what comes from it.
 
-    def __init__(self, role: str, lab: Laboratory, link: LinkModel) -> None:
+    `channels` are those of its laboratory.
+    """
+
+    def __init__(self, role: str, lab: Laboratory, link: LinkModel, channels: Channels) -> None:
         interval = lab.plan.test.interval
         self.role = role
         self.title = title(role)
@@ -52,7 +57,9 @@ class Partner:
         self.heard_ns = 0
         self.latched = False  # since a test before, so that it refuses this one
         self.commands = 0  # sent
-        self.used = NO_FEEDBACK
+        self.channels = channels
+        self._force = channels.names.index(channels.force)
+        self.used = NO_FEEDBACK._replace(measured=(0.0,) * len(channels.names))
         self.sent: Sent = NOTHING_SENT
 
     # -- handshake --------------------------------------------------------------------------------
@@ -152,12 +159,17 @@ class Partner:
         return self._feedback.newest_seen >= seq
 
     def begin(self, tick: int, now: int) -> float:
-        """The damper force (N) that a tick uses: of the newest feedback that is there by then."""
+        """The force (N) that a tick uses: of the newest feedback that is there by then."""
         if (feedback := self._feedback.take(tick)) is not None:
             self.used = feedback
             self.tally.use(feedback.seq)
         self.account.close(tick - 1, now)
-        return self.used.damper_force
+        return self.used.measured[self._force]
+
+    @property
+    def force(self) -> float:
+        """The force (N) in use."""
+        return self.used.measured[self._force]
 
     def look(self, tick: int) -> Finding:
         """What the watchdog says at a tick that came in time."""
@@ -182,8 +194,11 @@ class Partner:
         text = f"{self.commands} commands sent to the {self.title}, {self.tally.used} of its feedbacks used."
         return text, values
 
-    def use(self, tick: int) -> tuple[float, int, float]:
-        """The damper force (N) in use at a tick, the tick at which it was measured, and its age (s)."""
+    def row(self, tick: int) -> tuple[float | int, ...]:
+        """The force (N) in use at a tick, the tick at which it was measured, its age (s), and what was sent."""
         used = self.used
         age = (tick - used.seq) * self._lab.plan.test.interval if used.seq >= 0 else 0.0
-        return used.damper_force, used.seq, age
+        if self.channels.effort is None:
+            target, _, *rates = self.sent
+            return used.measured[self._force], used.seq, age, target, *rates
+        return used.measured[self._force], used.seq, age, *self.sent

@@ -141,8 +141,8 @@ class ColumnBench:
 
     def __init__(self, plan: Plan, reality: Reality, order: Order, programme: Programme) -> None:
         self.plan, self.rig = plan, master.build_rig(reality)
-        self._measurements = Guard(plan.limits, ColumnMeasurement._fields)
-        self._commands = Guard(plan.limits, ColumnCommand._fields)
+        self._measurements = Guard(vars(plan.limits), ColumnMeasurement._fields)
+        self._commands = Guard(vars(plan.limits), ColumnCommand._fields)
         chosen = plan.compensator if order.compensated else UNCOMPENSATED
         self._follow = Follower(chosen, programme, plan.test.interval)
 
@@ -164,8 +164,8 @@ class TableBench:
 
     def __init__(self, plan: Plan, reality: Reality, order: Order, programme: Programme) -> None:
         self.plan, self.rig = plan, slave.build_rig(reality)
-        self._measurements = Guard(plan.limits, TableMeasurement._fields)
-        self._commands = Guard(plan.limits, ("table_target", *TableCommand._fields))
+        self._measurements = Guard(vars(plan.limits), TableMeasurement._fields)
+        self._commands = Guard(vars(plan.limits), ("table_target", *TableCommand._fields))
         self._force = programme.motion[POSITION] if order.part == "damper" else None
         chosen = plan.table.compensator if order.compensated else UNCOMPENSATED
         self._follow = Follower(chosen, programme, plan.test.interval, plan.follows_in)

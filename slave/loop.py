@@ -30,11 +30,11 @@ from common.protocol.messages import (
     Trip,
 )
 from common.protocol.tally import Tally
-from common.rig import GuardedRig, TableCommand, TableMeasurement
+from common.rig import GuardedRig, command_of
 from common.roles import MASTER, SLAVE
 from common.safety.modes import Turn
 from common.safety.watchdog import Finding, Watchdog
-from laboratories.table.descent import TableRamp
+from laboratories import kinds
 from slave.handshake import Handshake
 from slave.limits import SlaveLimits
 from slave.step import SlaveStep
@@ -49,17 +49,20 @@ class SlaveLoop(RigLoop):
     def __init__(
         self, setting: Setting, rig: GuardedRig, link: LinkModel, *, role: str = SLAVE, instance: int = 1
     ) -> None:
-        lab = Laboratory(role, setting)
-        self._limits = SlaveLimits(setting.plan)
-        zero, readings = TableCommand(0.0, 0.0), len(TableMeasurement._fields)
-        descent = Descent(lab, rig, partial(TableRamp, setting.plan), zero, readings)
+        lab, plan = Laboratory(role, setting), setting.plan.of(role)
+        kind = kinds.kind_of(setting.plan, role)
+        self._limits = SlaveLimits(kind, plan)
+        self._wanted = command_of(kind.channels)
+        self._motor = kind.channels.effort is not None
+        zero = self._wanted(*(0.0 for _ in kind.channels.drives))
+        descent = Descent(lab, rig, partial(kind.ramp, plan), zero, kind.channels)
         super().__init__(lab, rig, descent, self._limits.standing)
         self._instance = instance
         self._handshake = Handshake(self.lab, rig, instance)
         self._commands: Mailbox[Command] = Mailbox(link, "command", setting.plan.test.interval, nominal=0)
         self._received_ns: dict[int, int] = {}
         self._heard = NOTHING_HEARD  # number and arrival of the newest command
-        self._step = SlaveStep(setting.plan.of(role))
+        self._step = SlaveStep(plan, kind)
         self._command = NO_COMMAND
         self._shift_ns = 0
         self._leap_ns = (
@@ -158,7 +161,8 @@ class SlaveLoop(RigLoop):
         command = self._command
         try:
             measured = self._rig.read()
-            wanted = TableCommand(self._step(command, measured), command.damper_command)
+            effort = (command.effort,) if self._motor else ()
+            wanted = self._wanted(self._step(command, measured), *effort)
             violation = self._limits.violation(measured, command, wanted)
             if violation:
                 lab.violated(violation, tick)
@@ -188,7 +192,9 @@ class SlaveLoop(RigLoop):
         judged = self._commands.judged(self._command)
         return self._watchdog.look(tick, judged.seq, judged.heard_seq), MASTER
 
-    def _answer(self, tick: int, started_ns: int, measured: TableMeasurement, wanted: TableCommand) -> None:
+    def _answer(
+        self, tick: int, started_ns: int, measured: tuple[float, ...], wanted: tuple[float, ...]
+    ) -> None:
         lab, command = self.lab, self._command
         received_ns = self._told(command.seq, started_ns)
         sent_ns = lab.clock.now()
@@ -202,7 +208,7 @@ class SlaveLoop(RigLoop):
                 *self._heard,
                 started_ns,
                 sent_ns,
-                *measured,
+                tuple(measured),
             )
         )
         if lab.recorded:
@@ -220,7 +226,9 @@ class SlaveLoop(RigLoop):
         self._received_ns = {later: stamp for later, stamp in self._received_ns.items() if later > seq}
         return received_ns
 
-    def _sample(self, tick: int, measured: TableMeasurement, wanted: TableCommand, sent_ns: int) -> None:
+    def _sample(
+        self, tick: int, measured: tuple[float, ...], wanted: tuple[float, ...], sent_ns: int
+    ) -> None:
         lab, command = self.lab, self._command
         log_ns = lab.epoch_ns + lab.plan.tick_ns(tick)
         publish_ns = log_ns + sent_ns - self.tick_ns(tick)
@@ -228,13 +236,13 @@ class SlaveLoop(RigLoop):
             tick,
             tick * lab.plan.test.interval,
             command.seq,
-            command.table_target,
-            command.damper_command,
-            wanted.table_command,
+            command.target,
+            *([command.effort] if self._motor else []),
+            wanted[0],
             *measured,
-            command.table_target_velocity,
-            command.table_target_acceleration,
-            command.table_target_jerk,
+            command.velocity,
+            command.acceleration,
+            command.jerk,
         )
         lab.outlet.add(lab.name, log_ns, publish_ns, values)
 

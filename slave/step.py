@@ -1,34 +1,35 @@
-"""The slave's computation of one tick: from the target received to the command of the table."""
+"""A slave's computation of one tick: from the target received to the command of its transfer system."""
 
 from __future__ import annotations
 
 from common.plan.plan import Plan
 from common.protocol.messages import Command
-from common.rig import TableMeasurement
+from laboratories.kind import Kind
 from models import compensators
 from models.compiled import plain
 
 
 class SlaveStep:
-    """The table's compensator, moving on tick by tick."""
+    """The compensator of a kind's laboratory, as the slave's own plan chooses it, moving on tick by tick."""
 
-    def __init__(self, plan: Plan) -> None:
-        chosen = plan.table.compensator
+    def __init__(self, plan: Plan, kind: Kind) -> None:
+        chosen = kind.compensator(plan)
         interval = self._interval = plan.test.interval
-        self._built = plain(compensators.build(chosen.kind, chosen.parameters, interval, plan.follows_in))
+        self._built = plain(compensators.build(chosen.kind, chosen.parameters, interval, chosen.where))
+        self._position = kind.channels.names.index(kind.channels.position)
         self._target = 0.0  # of t_k
 
-    def __call__(self, command: Command, measured: TableMeasurement) -> float:
+    def __call__(self, command: Command, measured: tuple[float, ...]) -> float:
         """Command (m) for the interval's end, from the target in force and the measurement at t_k."""
-        present, self._target = self._target, command.table_target
+        present, self._target = self._target, command.target
         result: float = compensators.enter(
             self._built,
-            command.table_target,
-            command.table_target_velocity,
-            command.table_target_acceleration,
-            command.table_target_jerk,
+            command.target,
+            command.velocity,
+            command.acceleration,
+            command.jerk,
             present,
-            measured.table_displacement,
+            measured[self._position],
             self._interval,
         )
         return result

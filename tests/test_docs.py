@@ -17,10 +17,11 @@ from common.plan.plan import Plan
 from common.plan.tables import Limits
 from common.protocol.exchange import Event
 from common.protocol.messages import Command
-from common.rig import ColumnMeasurement, TableCommand, TableMeasurement
+from common.rig import ColumnCommand, ColumnMeasurement, TableCommand, TableMeasurement
 from common.safety.modes import TURNS, Mode, Turn
 from common.signals import SENT
 from docs import generate
+from laboratories.table.kind import TABLE
 from master.limits import MasterLimits
 from master.step import Outputs
 from slave.limits import SlaveLimits
@@ -79,7 +80,7 @@ def master_trips(name: str) -> bool:
         measured = ColumnMeasurement(*(draw.random() * 0.1 for _ in ColumnMeasurement._fields))
         drawn = Outputs(*(draw.random() * 0.1 for _ in Outputs._fields))  # type: ignore[arg-type]
         outputs = drawn._replace(sent=[tuple(draw.random() * 0.1 for _ in SENT)])
-        violation = checks.violation(measured, outputs)
+        violation = checks.violation(measured, ColumnCommand(outputs.command), outputs)
         if violation is not None:
             assert violation.name == name
             return True
@@ -87,7 +88,7 @@ def master_trips(name: str) -> bool:
 
 
 def slave_trips(name: str) -> bool:
-    checks, draw = SlaveLimits(only(name)), random.Random(1)
+    checks, draw = SlaveLimits(TABLE, only(name)), random.Random(1)
     for tick in range(2 * PATIENCE):
         measured = TableMeasurement(*(draw.random() * 0.1 for _ in TableMeasurement._fields))
         values = [draw.random() * 0.1 for _ in Command._fields[5:]]

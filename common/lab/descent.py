@@ -12,6 +12,7 @@ from common.protocol.exchange import Event
 from common.rig import GuardedRig
 from common.roles import ramp_topic
 from common.safety.ramp import Ramp
+from common.signals import Channels
 
 Command = TypeVar("Command", bound=tuple[float, ...])
 
@@ -24,7 +25,10 @@ class Resting(NamedTuple):
 
 
 class Descent(Generic[Command]):
-    """Knows the last two commands written, from which `begin` makes a ramp when the rig is to come to rest."""
+    """Knows the last two commands written, from which `begin` makes a ramp when the rig is to come to rest.
+
+    `channels` are those of the rig's laboratory, None where there is none.
+    """
 
     def __init__(
         self,
@@ -32,14 +36,15 @@ class Descent(Generic[Command]):
         rig: GuardedRig,
         begin: Callable[[tuple[float, ...], tuple[float, ...]], Ramp],
         zero: Command,
-        readings: int,
+        channels: Channels | None,
     ) -> None:
         self._lab = lab
         self._rig = rig
         self._make = begin
         self._last = self._before = zero
         self._command: Callable[..., Command] = type(zero)
-        self._blank = (math.nan,) * readings
+        self._recorded = channels is not None  # a laboratory without a rig has no topic for it
+        self._blank = (math.nan,) * (len(channels.names) if channels else 0)
         self._ramp: Ramp | None = None
         self._begun = 0
         self._settling = 0  # intervals at rest
@@ -91,7 +96,8 @@ class Descent(Generic[Command]):
             duration = (tick + 1 - self._begun - max(self._settling - 1, 0)) * self._lab.plan.test.interval
             values = {"duration": duration, "travel": ramp.travel}
             self._lab.at_rest(tick, values | command._asdict())  # type: ignore[attr-defined]
-        self._lab.sample_ramp(ramp_topic(self._lab.name), tick, *command, *(measured or self._blank))
+        if self._recorded:
+            self._lab.sample_ramp(ramp_topic(self._lab.name), tick, *command, *(measured or self._blank))
 
     def _written(self, command: Command, tick: int) -> bool:
         """Write a command; whether the rig takes no more, and rests where it is."""

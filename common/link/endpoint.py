@@ -104,6 +104,9 @@ class Endpoint(Protocol):
     def enter(self, session: int) -> None:
         """Take part in a session: what is sent from now on belongs to it."""
 
+    def expect(self, measured: Mapping[str, int]) -> None:
+        """A feedback must have as many measured channels as its sender's laboratory, which `measured` gives by role."""
+
     def send(self, message: Message, to: str = "") -> int:
         """Hand a message to the link, `to` one role alone where it is named; never blocks.
 
@@ -133,6 +136,7 @@ class FrameEndpoint:
         self._digest = plan_digest
         self._open_key = codec.session_key(0, plan_digest)
         self._place = (0, self._open_key)  # session and its key; replaced as one, read by the link's threads
+        self._measured: Mapping[str, int] = {}  # number of channels by role
         self._inbox: Inbox[Received] = Inbox()
         self.rejections = Rejections()
         self.rejected = self.rejections.counts
@@ -141,6 +145,10 @@ class FrameEndpoint:
     def enter(self, session: int) -> None:
         """Use the key of a session from now on; what must be understood before it still is."""
         self._place = (session, codec.session_key(session, self._digest))
+
+    def expect(self, measured: Mapping[str, int]) -> None:
+        """Reject every feedback that has not as many measured channels as its role."""
+        self._measured = measured
 
     def send(self, message: Message, to: str = "") -> int:
         """Hand a message to the link; when it was encoded, ns."""
@@ -191,7 +199,12 @@ class FrameEndpoint:
         else:
             if not session:
                 check_open(message)
-        if channel != TICK and type(message) in SIGNED and message.lab != role:  # type: ignore[union-attr]
+        if channel == TICK:
+            if type(message) is Feedback and self._measured.get(role, len(message.measured)) != len(
+                message.measured
+            ):
+                raise RejectedFrame(Reject.FIELDS)
+        elif type(message) in SIGNED and message.lab != role:  # type: ignore[union-attr]
             raise RejectedFrame(Reject.SENDER)
         return message
 

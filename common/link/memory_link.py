@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from common.host.clock import Waiter
@@ -45,6 +45,9 @@ class MemoryEndpoint:
 
     def enter(self, session: int) -> None:
         """Memory needs no key."""
+
+    def expect(self, measured: Mapping[str, int]) -> None:
+        """Memory brings what was sent."""
 
     def send(self, message: Message, to: str = "") -> int:
         """Put a message into the queue of every role that hears it; the present time, ns."""

@@ -41,18 +41,12 @@ ACCEPT_PENDING = 512
 # ours is larger than MOST_FRAME (a piece of the stream to the recorder has some 2 kB, 50 kB with 100 storeys), and the
 # codec rejects any that is; the rest is for zenoh's header with the key. Its default is 1 GiB.
 MOST_MESSAGE = MOST_FRAME + (1 << 12)
-# zenoh drops such a connection in its acceptor's thread, where the close waits for the other end (some 40 ms, a delayed
-# acknowledgement). With zenoh's single thread 100 connections dropped at a time kept the feedback out for over 50 ms;
-# with two none was late (tests/system/faults/test_recording.py, F51).
-RUNTIME = "(acc: (worker_threads: 2))"
 PREFIX = "rths"
 REFUSED = "zenoh_link_tls=warn"  # log of zenoh's that names every dial it refuses
 YIELD = getattr(os, "sched_yield", lambda: None)  # not every system has it
 
 if TYPE_CHECKING:
     from common.link.security import Identity
-
-os.environ.setdefault("ZENOH_RUNTIME", RUNTIME)  # read as the first session of a process opens
 
 
 def configuration(role: str, listen: str, connect: str) -> zenoh.Config:

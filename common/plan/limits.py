@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from operator import itemgetter, le, ne
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from common.plan.plan import Plan
 from common.plan.tables import Limits
 
 UNITS: dict[str, str] = {field.name: field.metadata["rule"].unit for field in dataclasses.fields(Limits)}
@@ -22,12 +22,16 @@ PATIENCE = 3
 TRAVEL = 10.0
 
 
+NO_UNITS: Mapping[str, str] = MappingProxyType({})
+
+
 class Violation(NamedTuple):
     """A value beyond the limit of that name."""
 
     name: str
     value: float
     limit: float
+    unit: str = ""  # of a limit that is none of the plan's own
 
     @property
     def values(self) -> dict[str, float]:
@@ -37,7 +41,7 @@ class Violation(NamedTuple):
     @property
     def sentence(self) -> str:
         """What was violated, by how much, in a sentence."""
-        limit = f"{self.limit:g} {UNITS.get(self.name, '')}".rstrip()
+        limit = f"{self.limit:g} {UNITS.get(self.name, self.unit)}".rstrip()
         return f"{self.name} is {self.value:.6g}, beyond its limit of {limit}."
 
     def __str__(self) -> str:
@@ -64,10 +68,10 @@ class Standstill(NamedTuple):
         )
 
 
-def violated(limits: Limits, **values: float) -> Violation | None:
+def violated(limits: Mapping[str, float], **values: float) -> Violation | None:
     """The first of some values, by the names of their limits, that is beyond its own."""
     for name, value in values.items():
-        most = getattr(limits, name)
+        most = limits.get(name, math.inf)
         if not abs(value) <= most:
             return Violation(name, value, most)
     return None
@@ -76,19 +80,24 @@ def violated(limits: Limits, **values: float) -> Violation | None:
 class Guard:
     """Checks the values of one kind of record, by the names they have in it.
 
-    `several` are the names that hold one value per storey or laboratory.
+    `several` are the names that hold one value per storey, `units` those of limits that are none of the plan's own.
     """
 
-    def __init__(self, limits: Limits, names: tuple[str, ...], several: tuple[str, ...] = ()) -> None:
-        known = {field.name: getattr(limits, field.name) for field in dataclasses.fields(limits)}
-        limited = [place for place, name in enumerate(names) if name in known]
+    def __init__(
+        self,
+        limits: Mapping[str, float],
+        names: tuple[str, ...],
+        several: tuple[str, ...] = (),
+        units: Mapping[str, str] = NO_UNITS,
+    ) -> None:
+        limited = [place for place, name in enumerate(names) if name in limits]
         self._single = [place for place in limited if names[place] not in several]
         self._several = [place for place in limited if names[place] in several]
-        self._all = {place: known[names[place]] for place in limited}
+        self._all = {place: limits[names[place]] for place in limited}
         twice = (*self._single, *self._single[:1])  # the first again: the getter of one place gives no tuple
         self._values: Callable[[Any], Any] = itemgetter(*twice) if twice else lambda _: ()
         self._most = [self._all[place] for place in twice]
-        self._names = names
+        self._names, self._units = names, units
 
     def violation(self, values: tuple[Any, ...]) -> Violation | None:
         """The first value beyond its limit."""
@@ -96,12 +105,16 @@ class Guard:
             return None
         for place in self._single:
             if not abs(values[place]) <= self._all[place]:
-                return Violation(self._names[place], values[place], self._all[place])
+                return self._beyond(place, values[place])
         for place in self._several:
             for value in values[place]:
                 if not abs(value) <= self._all[place]:
-                    return Violation(self._names[place], value, self._all[place])
+                    return self._beyond(place, value)
         return None
+
+    def _beyond(self, place: int, value: float) -> Violation:
+        name = self._names[place]
+        return Violation(name, value, self._all[place], self._units.get(name, ""))
 
 
 class Change:
@@ -113,11 +126,17 @@ class Change:
     """
 
     def __init__(
-        self, limits: Limits, interval: float, *, step: str, velocity: str = "", acceleration: str = ""
+        self,
+        limits: Mapping[str, float],
+        interval: float,
+        *,
+        step: str,
+        velocity: str = "",
+        acceleration: str = "",
     ) -> None:
         self._limits, self._interval = limits, interval
         self._names = {"step": step, "velocity": velocity, "acceleration": acceleration}
-        most = {kind: getattr(limits, name, math.inf) for kind, name in self._names.items()}
+        most = {kind: limits.get(name, math.inf) for kind, name in self._names.items()}
         self._reach = min(most["step"], most["velocity"] * interval)
         self._bend = most["acceleration"] * interval**2
         self._last = 0.0
@@ -146,8 +165,8 @@ class Change:
 class Lasting:
     """Checks an error that may be beyond the limit of its `name` for a moment, but not for `PATIENCE` intervals."""
 
-    def __init__(self, limits: Limits, name: str) -> None:
-        self._name, self._most = name, getattr(limits, name)
+    def __init__(self, limits: Mapping[str, float], name: str) -> None:
+        self._name, self._most = name, limits.get(name, math.inf)
         self._beyond = 0
 
     def violation(self, error: float) -> Violation | None:
@@ -193,13 +212,14 @@ class Frozen:
     White noise makes each reading another one, wherever the sensor's steps are finer: equal neighbours then have a
     chance below 0.3. A channel without nominal noise, or one that has shown no such step, is not judged, as it may
     repeat itself honestly; nor is any while the command stays within `TRAVEL` times the noise of the channel `moved`,
-    which reads what the command is about.
+    which reads what the command is about. `noise` are the nominal rms by channel, `count` is how many equal readings in
+    a row are too many.
     """
 
-    def __init__(self, plan: Plan, names: tuple[str, ...], moved: str) -> None:
-        self._channels = [_Channel(name, getattr(plan.sensors, name)) for name in names]
-        self._count = plan.safety.frozen_readings
-        self._travel = TRAVEL * getattr(plan.sensors, moved)
+    def __init__(self, noise: Mapping[str, float], names: tuple[str, ...], moved: str, count: int) -> None:
+        self._channels = [_Channel(name, noise[name]) for name in names]
+        self._count = count
+        self._travel = TRAVEL * noise[moved]
         self._last: Sequence[float] = ()
         self._plain = False  # every channel is known, and none repeats itself
 

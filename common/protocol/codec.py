@@ -15,11 +15,11 @@ from collections.abc import Callable, Container, Sequence
 from enum import Enum
 from math import isfinite
 from operator import itemgetter
-from typing import Any, Protocol, get_args, get_type_hints
+from typing import Any, Protocol, cast, get_args, get_origin, get_type_hints
 
 import msgpack
 
-from common.protocol.messages import Message
+from common.protocol.messages import MOST_CHANNELS, Message
 
 CHECK_SIZE = 8  # bytes: of damaged frames one in 2^64 passes
 MOST = 2**62  # of a whole number; in ns a century and a half
@@ -64,14 +64,13 @@ NUMBERS = {
 ARRAY = 0x90  # msgpack's mark of an array of up to 15 items, plus their count
 
 
-def checker(message: type[Any]) -> Callable[..., bool]:
+def checker(names: Sequence[str], types: Sequence[type]) -> Callable[..., bool]:
     """A function that tells whether the items of a message of numbers, its kind first, are in their ranges.
 
     It is written out as one expression: after a wake-up the caches hold other things, and each further call costs
     more than the comparisons do.
     """
-    hints = get_type_hints(message)
-    names = message._fields
+    hints = dict(zip(names, types, strict=True))
     whole = [f"{LEAST.get(name, 0)} <= {name} <= {MOST}" for name in names if hints[name] is int]
     floats = [name for name in names if hints[name] is float]
     finite = [f"isfinite({' + '.join(floats)})"] if floats else []
@@ -86,21 +85,21 @@ class _Layout:
     It is msgpack like any other, read and written by `struct`, which takes a third of the time.
     """
 
-    def __init__(self, message: type[Any], types: Sequence[type]) -> None:
+    def __init__(self, names: Sequence[str], types: Sequence[type]) -> None:
         fields = [NUMBERS[kind] for kind in types[1:]]
         self.marks = bytes(mark for mark, _ in fields)
         self.size = 2 + 9 * len(fields)
-        self.admits = checker(message)
+        self.admits = checker(names, types[1:])
         self._write = struct.Struct(">BB" + "".join(f"B{letter}" for _, letter in fields)).pack
         self.read = struct.Struct(">xB" + "".join(f"x{letter}" for _, letter in fields)).unpack
         # the loop's thread alone encodes; the numbers of a message take their places among the marks
         self._slots: list[Any] = [ARRAY + len(types), 0, *(item for mark in self.marks for item in (mark, 0))]
 
-    def pack(self, kind: int, message: Message) -> bytes:
-        """The payload of a message of this kind."""
+    def pack(self, kind: int, numbers: Sequence[int | float]) -> bytes:
+        """The payload of a message of this kind that holds these numbers."""
         slots = self._slots
         slots[1] = kind
-        slots[3::2] = message
+        slots[3::2] = numbers
         return self._write(*slots)
 
 
@@ -108,28 +107,30 @@ class _Shape:
     """What the items of one frame must be: exact types, whole numbers and texts in range, floats finite.
 
     The first item is the kind of the message. Checks are calls into C wherever they can be: they run twice a tick.
+    `channels` are how many numbers stand in place of the message's last field, which is a tuple of them; 0 for none.
     """
 
-    def __init__(self, message: type[Any]) -> None:
+    def __init__(self, message: type[Any], channels: int = 0) -> None:
         hints = get_type_hints(message)
-        self.message = message
-        self.types = (int, *(hints[name] for name in message._fields))
-        self._numbers = self._items(message, int)
-        self._counts = self._items(message, int, but=LEAST)
-        self._floats = self._items(message, float)
+        self.message, self.channels = message, channels
+        fields: tuple[str, ...] = message._fields[:-1] if channels else message._fields
+        numbers = [f"{message._fields[-1]}_{place}" for place in range(channels)]
+        self.names = (*fields, *numbers)
+        self.types = (int, *(hints[name] for name in fields), *[float] * channels)
+        self._numbers = self._items(int)
+        self._counts = self._items(int, but=LEAST)
+        self._floats = self._items(float)
         self._signed = [
-            (place, LEAST[name]) for place, name in enumerate(message._fields, start=1) if name in LEAST
+            (place, LEAST[name]) for place, name in enumerate(self.names, start=1) if name in LEAST
         ]
         self.texts = [place for place, kind in enumerate(self.types) if kind is str]
-        self.layout = _Layout(message, self.types) if set(self.types) <= NUMBERS.keys() else None
+        self.layout = _Layout(self.names, self.types) if set(self.types) <= NUMBERS.keys() else None
 
-    def _items(
-        self, message: type[Any], kind: type, *, but: Container[str] = ()
-    ) -> Callable[[Sequence[Any]], tuple[Any, ...]]:
+    def _items(self, kind: type, *, but: Container[str] = ()) -> Callable[[Sequence[Any]], tuple[Any, ...]]:
         """What takes the items of a type out of a frame's, but for those of these names."""
         places = [
             place
-            for place, name in enumerate(message._fields, start=1)
+            for place, name in enumerate(self.names, start=1)
             if self.types[place] is kind and name not in but
         ]
         first, *_ = places or [0]
@@ -163,10 +164,18 @@ def as_text(text: str) -> str:
 PACKER = msgpack.Packer()
 REPACKER = msgpack.Packer()  # the link's threads', which hold the interpreter's lock while they pack
 
-SHAPES = tuple(_Shape(message) for message in MESSAGES)
+
+def shapes(message: type[Any]) -> list[_Shape]:
+    """The shapes that a message can have: one, or one per count of channels where its last field holds them."""
+    several = get_origin(get_type_hints(message)[message._fields[-1]]) is tuple
+    return [_Shape(message, count) for count in range(1, MOST_CHANNELS + 1)] if several else [_Shape(message)]
+
+
+SHAPES = tuple(map(shapes, MESSAGES))
 LAYOUTS = {
     bytes((ARRAY + len(shape.types), kind)): (shape, shape.layout)
-    for kind, shape in enumerate(SHAPES)
+    for kind, several in enumerate(SHAPES)
+    for shape in several
     if shape.layout is not None
 }  # by the first two bytes
 
@@ -200,14 +209,19 @@ def _check(key: Key, payload: bytes) -> bytes:
 def encode(message: Message, key: Key) -> bytes:
     """The frame of a message."""
     kind = KINDS[type(message)]
-    layout = SHAPES[kind].layout
-    payload: bytes = layout.pack(kind, message) if layout else PACKER.pack((kind, *message))
+    several, numbers = SHAPES[kind], cast(tuple[Any, ...], message)
+    if len(several) > 1:
+        shape, numbers = several[len(numbers[-1]) - 1], (*numbers[:-1], *numbers[-1])
+    else:
+        shape = several[0]
+    layout = shape.layout
+    payload: bytes = layout.pack(kind, numbers) if layout else PACKER.pack((kind, *numbers))
     return payload + _check(key, payload)
 
 
 def fit(message: Message) -> Message:
     """A message with its texts as a frame may hold them: a rig's own words may be long, or of several lines."""
-    texts = SHAPES[KINDS[type(message)]].texts
+    texts = SHAPES[KINDS[type(message)]][0].texts
     fields: list[Any] = list(message)
     if all(is_text(fields[place - 1]) for place in texts):
         return message
@@ -242,6 +256,8 @@ def decode(frame: bytes, key: Key, *, allowed: Container[type] = KINDS, largest:
             raise RejectedFrame(Reject.VALUE)
     else:
         shape, items = _unpacked(payload, allowed)
+    if shape.channels:
+        items = (*items[: -shape.channels], items[-shape.channels :])
     message: Message = tuple.__new__(shape.message, items[1:])
     return message
 
@@ -268,10 +284,10 @@ def _shape(items: list[Any], allowed: Container[type]) -> _Shape:
     kind = items[0]
     if type(kind) is not int or not 0 <= kind < len(MESSAGES):
         raise RejectedFrame(Reject.KIND)
-    shape = SHAPES[kind]
-    if shape.message not in allowed:
+    if MESSAGES[kind] not in allowed:
         raise RejectedFrame(Reject.KIND_NOT_ALLOWED)
-    if len(items) != len(shape.types):
+    shape = next((one for one in SHAPES[kind] if len(items) == len(one.types)), None)
+    if shape is None:
         raise RejectedFrame(Reject.FIELDS)
     if tuple(map(type, items)) != shape.types:
         raise RejectedFrame(Reject.TYPE)

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+MOST_CHANNELS = 6  # of a feedback: its frame then has fifteen items, as many as the shortest head counts
+
 
 class Register(NamedTuple):
     """Master to slave: take part in this test."""
@@ -90,11 +92,11 @@ class Command(NamedTuple):
     sent_ns: int
     shift_ns: int  # how far the slave's clock has drifted from the master's since the start, estimated
     heard_seq: int  # newest feedback that came over the wire, in use or not yet; -1 for none
-    table_target: float
-    damper_command: float
-    table_target_velocity: float
-    table_target_acceleration: float
-    table_target_jerk: float
+    target: float  # of the laboratory's transfer system, m
+    effort: float  # of its motor, N; 0 where it has none
+    velocity: float  # of the target, m/s
+    acceleration: float  # of the target, m/s²
+    jerk: float  # of the target, m/s³
 
 
 class Feedback(NamedTuple):
@@ -108,10 +110,7 @@ class Feedback(NamedTuple):
     heard_ns: int  # when that one came
     started_ns: int  # start of the tick: the measurements are of this moment
     sent_ns: int
-    table_displacement: float
-    table_acceleration: float
-    damper_stroke: float
-    damper_force: float
+    measured: tuple[float, ...]  # the channels of the laboratory's kind, in its order, 1 to `MOST_CHANNELS`
 
 
 class Stop(NamedTuple):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
+from typing import Any
 
 from common.plan.plan import Plan
 from common.signals import COLUMN_CHANNELS
@@ -42,6 +43,11 @@ class ColumnKind(Kind):
     def advance(lab: ColumnLab, truth: Array, command: float, effort: float) -> None:
         """Displacement (m) and force (N); the actuator's command alone moves it."""
         truth[0], truth[1] = model.advance(lab, command)
+
+    @staticmethod
+    def enter(lab: tuple[Any, ...], command: float) -> tuple[float, ...]:
+        """Displacement (m) and force (N) for a caller outside compiled code."""
+        return model.enter(lab, command)
 
     def coupling(self, plan: Plan) -> Coupling:
         """The specimen's storey; its force resists the drift, `represents` times."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
+from typing import Any
 
 from common.plan.plan import Plan
 from common.plan.tables import ForceCorrection
@@ -45,6 +46,11 @@ class TableKind(Kind):
     def advance(lab: TableLab, truth: Array, command: float, effort: float) -> None:
         """Displacement, acceleration, stroke, force; `effort` is the motor's command (N)."""
         truth[0], truth[1], truth[2], truth[3] = model.advance(lab, command, effort)
+
+    @staticmethod
+    def enter(lab: tuple[Any, ...], command: float, effort: float) -> tuple[float, ...]:
+        """Displacement, acceleration, stroke and force for a caller outside compiled code."""
+        return model.enter(lab, command, effort)
 
     def coupling(self, plan: Plan) -> Coupling:
         """The damper's floor; neither force nor motor where the building does without the damper."""

@@ -180,13 +180,14 @@ def replay_table(recording: Run, slave: dict[str, Any], match: Match, ramped: se
     """The table's compensator again, from the first tick to the first hole; not where it was `ramped` to rest."""
     from common.protocol.messages import Command
     from common.rig import TableMeasurement
+    from laboratories.table.kind import TABLE
     from report.facts.laboratories import plan_of
     from slave.step import SlaveStep
 
     plan = plan_of(recording)
     if plan is None:
         return
-    step = SlaveStep(plan)
+    step = SlaveStep(plan, TABLE)
     for place, (t, seq) in enumerate(zip(slave["t"], slave["seq"], strict=True)):
         if seq != place:
             break

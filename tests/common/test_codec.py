@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from common.protocol import codec
 from common.protocol.codec import MESSAGES, RejectedFrame, decode, encode, session_key
-from common.protocol.messages import Command, Feedback, Message, Register
+from common.protocol.messages import MOST_CHANNELS, Command, Feedback, Message, Register
 
 KEY = session_key(7, "plan")
 
@@ -19,6 +19,7 @@ FIELDS = {
     float: st.floats(-1e300, 1e300),
     str: st.text(st.characters(exclude_categories=("C", "Z")) | st.just(" "), max_size=50),
     bytes: st.binary(max_size=200),
+    tuple[float, ...]: st.lists(st.floats(-1e300, 1e300), min_size=1, max_size=MOST_CHANNELS).map(tuple),
 }
 
 
@@ -74,6 +75,21 @@ def test_what_is_no_message_is_rejected_with_its_reason(content: object, reason:
     assert rejection.value.reason.value == reason
 
 
+@pytest.mark.parametrize("channels", range(1, MOST_CHANNELS + 1))
+def test_a_feedback_has_a_layout_of_its_own_per_count_of_channels(channels: int) -> None:
+    feedback = Feedback(7, 3, 2, 11, 2, 11, 12, 13, tuple(float(place) for place in range(channels)))
+    frame = encode(feedback, KEY)
+    assert len(frame) == 2 + 9 * (8 + channels) + codec.CHECK_SIZE
+    assert decode(frame, KEY) == feedback
+
+
+@pytest.mark.parametrize("channels", [0, MOST_CHANNELS + 1])
+def test_a_feedback_of_too_few_or_too_many_channels_is_rejected(channels: int) -> None:
+    with pytest.raises(RejectedFrame) as rejection:
+        decode(framed([codec.KINDS[Feedback], 7, 3, 2, 11, 2, 11, 12, 13, *[0.0] * channels]), KEY)
+    assert rejection.value.reason.value == "fields"
+
+
 def test_two_messages_in_one_frame_are_rejected() -> None:
     payload = msgpack.packb((codec.KINDS[Command], *COMMAND)) * 2
     with pytest.raises(RejectedFrame) as rejection:
@@ -120,6 +136,6 @@ def test_before_a_session_all_understand_each_other() -> None:
 
 
 def test_a_frame_each_way_stays_small() -> None:
-    feedback = Feedback(2**62, 10**6, 10**6, 2**60, 10**6, 2**60, 2**60, 2**60, 0.1, 0.2, 0.3, 0.4)
+    feedback = Feedback(2**62, 10**6, 10**6, 2**60, 10**6, 2**60, 2**60, 2**60, (0.1, 0.2, 0.3, 0.4))
     assert len(encode(feedback, KEY)) < 128
     assert len(encode(COMMAND._replace(session=2**62), KEY)) < 128

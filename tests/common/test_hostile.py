@@ -21,6 +21,7 @@ from common.link.transport import CONTROL, SAMPLES, TICK, Packet
 from common.protocol import codec
 from common.protocol.codec import MESSAGES, MOST_TEXT, Reject, RejectedFrame, decode, encode, session_key
 from common.protocol.messages import (
+    MOST_CHANNELS,
     Arm,
     Command,
     Feedback,
@@ -40,7 +41,7 @@ from tests.common.test_codec import COMMAND, KEY, framed, messages_of
 from tests.helpers import ROOT
 
 SESSION = 7
-FEEDBACK = Feedback(SESSION, 3, 2, 11, 2, 11, 12, 13, 0.001, 0.1, 0.002, 12.5)
+FEEDBACK = Feedback(SESSION, 3, 2, 11, 2, 11, 12, 13, (0.001, 0.1, 0.002, 12.5))
 REST = (0.0, 0.0, 0.0)
 
 
@@ -93,6 +94,15 @@ def signed(payload: bytes) -> bytes:
 def bare(content: object) -> bytes:
     packed: bytes = msgpack.packb(content)
     return packed
+
+
+@pytest.mark.parametrize(("channels", "heard"), [(4, True), (2, False)])
+def test_a_feedback_has_as_many_channels_as_its_slave(channels: int, heard: bool) -> None:
+    master = end()
+    master.endpoint.expect({SLAVE: 4})
+    frame = encode(FEEDBACK._replace(measured=FEEDBACK.measured[:channels]), KEY)
+    assert (master.hears(SLAVE, TICK, frame) is not None) == heard
+    assert master.endpoint.rejected == ({} if heard else {"fields": 1})
 
 
 GOOD = encode(COMMAND, KEY)
@@ -231,6 +241,7 @@ def test_what_a_role_does_not_say_on_a_channel_is_not_heard(role: str, channel: 
         session = 0 if kind is Recorder else SESSION
         hints = get_type_hints(kind)
         fields = {name: hints[name]() for name in kind._fields} | {"session": session}
+        fields |= {"measured": (0.0,)} if "measured" in fields else {}
         if "lab" in fields:
             fields["lab"] = role
         frame = encode(kind(**fields), KEY)
@@ -383,7 +394,8 @@ def test_an_oversize_frame_is_not_even_hashed() -> None:
 
 @pytest.mark.parametrize("kind", MESSAGES, ids=lambda kind: kind.__name__)
 def test_the_largest_message_of_numbers_fits_its_channel(kind: type[Any]) -> None:
-    largest = {int: codec.MOST, float: 0.1, str: "slave." + "x" * 100, bytes: b"x" * 10_000}
+    largest: dict[Any, Any] = {int: codec.MOST, float: 0.1, str: "slave." + "x" * 100, bytes: b"x" * 10_000}
+    largest[tuple[float, ...]] = (0.1,) * MOST_CHANNELS
     fields = [largest[hint] for name, hint in get_type_hints(kind).items() if name in kind._fields]
     assert len(encode(kind(*fields), KEY)) <= LARGEST[CHANNELS.get(kind, CONTROL)]
 

@@ -28,7 +28,7 @@ NAMES = {"step": "actuator_step", "velocity": "actuator_velocity", "acceleration
 
 def actuator(**most: float) -> Change:
     limits = dict.fromkeys(NAMES.values(), math.inf) | most
-    return Change(Limits(**limits), INTERVAL, **NAMES)
+    return Change(vars(Limits(**limits)), INTERVAL, **NAMES)
 
 
 @pytest.mark.parametrize(
@@ -51,7 +51,7 @@ def test_a_violation_is_a_sentence_with_the_unit_of_the_plan(violation: Violatio
 
 def test_the_first_command_is_a_change_from_rest_in_zero() -> None:
     assert actuator(actuator_step=1e-3).violation(1e-3) is None
-    assert actuator(actuator_step=1e-3).violation(-1.01e-3) == ("actuator_step", -1.01e-3, 1e-3)
+    assert actuator(actuator_step=1e-3).violation(-1.01e-3) == Violation("actuator_step", -1.01e-3, 1e-3)
     for name, most, value in (
         ("actuator_velocity", 0.5, 0.55),
         ("actuator_acceleration", 250.0, 275.0),
@@ -87,28 +87,28 @@ def test_an_acceleration_is_the_second_difference() -> None:
 
 
 def test_a_quantity_without_a_limit_of_that_kind_has_none() -> None:
-    motor = Change(Limits(damper_step=10.0), INTERVAL, step="damper_step")
+    motor = Change(vars(Limits(damper_step=10.0)), INTERVAL, step="damper_step")
     assert motor.violation(10.0) is None
-    assert motor.violation(10.1) == ("damper_step", 10.1, 10.0)
+    assert motor.violation(10.1) == Violation("damper_step", 10.1, 10.0)
 
 
 def test_an_error_trips_when_it_lasts() -> None:
-    lasting = Lasting(Limits(column_error=0.01), "column_error")
+    lasting = Lasting(vars(Limits(column_error=0.01)), "column_error")
     errors = [0.011, -0.02, 0.01, 0.011, -0.011, 0.012, 0.013]
     found = [lasting.violation(error) for error in errors]
     assert [violation is not None for violation in found] == [False] * 5 + [True] * 2
-    assert found[5] == ("column_error", 0.012, 0.01)
+    assert found[5] == Violation("column_error", 0.012, 0.01)
 
 
 def test_nan_is_beyond_any_limit_and_nothing_else_beyond_an_infinite_one() -> None:
     limits = Limits(velocity=math.inf, column_error=math.inf)
-    guard = Guard(limits, ("velocity",))
+    guard = Guard(vars(limits), ("velocity",))
     assert guard.violation((math.inf,)) is guard.violation((-1e300,)) is None
     assert guard.violation((math.nan,)) is not None
-    assert violated(limits, velocity=1e9, column_error=math.nan) is not None
+    assert violated(vars(limits), velocity=1e9, column_error=math.nan) is not None
     assert actuator().violation(1e300) is None
     assert actuator().violation(math.nan) is not None
-    lasting = Lasting(limits, "column_error")
+    lasting = Lasting(vars(limits), "column_error")
     assert all(lasting.violation(1e9) is None for _ in range(2 * PATIENCE))
     assert [lasting.violation(math.nan) is not None for _ in range(PATIENCE)] == [False, False, True]
 
@@ -125,7 +125,7 @@ def watched(
 ) -> tuple[int, Standstill | None]:
     """How many ticks it took, and what was found, with a command that moves by `speed` in every tick."""
     chosen = plan or Plan()
-    guard = Frozen(chosen, CHANNELS, "column_displacement")
+    guard = Frozen(vars(chosen.sensors), CHANNELS, "column_displacement", chosen.safety.frozen_readings)
     forces = np.random.default_rng(2).normal(0.0, 100.0, 10_000)
     for tick, value in enumerate(np.asarray(displacements).tolist()):
         if found := guard.violation((value, float(forces[tick])), tick * speed):

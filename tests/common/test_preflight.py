@@ -15,6 +15,7 @@ from common.lab import preflight
 from common.lab.laboratory import Laboratory, Setting
 from common.lab.preflight import Check, Gate, RefusedError, SensorsAtRest, link_risk, sensor_risk
 from common.link.memory_link import MemoryHub
+from common.plan.patience import strict
 from common.plan.plan import Plan
 from common.rig import ColumnMeasurement, GuardedRig
 from common.safety.risks import Risk
@@ -171,7 +172,8 @@ def armed(rig: Counting, gate: Gate, **options: Any) -> None:
     setting = Setting(
         with_table(Plan(), "preflight", readings=5), MemoryHub().join("master", rig.clock), rig.clock
     )
-    GuardedRig(rig, "lab A", ColumnMeasurement, at_rest=SensorsAtRest(gate, setting), **options).arm()
+    at_rest = SensorsAtRest(gate, setting, vars(strict(setting.plan).limits), vars(setting.plan.sensors))
+    GuardedRig(rig, "lab A", ColumnMeasurement, at_rest=at_rest, **options).arm()
 
 
 def test_a_rig_that_says_so_is_read_at_rest_an_interval_apart() -> None:

@@ -202,13 +202,13 @@ def test_options_that_do_not_fit_are_a_sentence() -> None:
 
 
 def test_limits_apply_by_name_and_take_no_nan() -> None:
-    guard = Guard(tables.Limits(column_force=10.0), ColumnMeasurement._fields)
+    guard = Guard(vars(tables.Limits(column_force=10.0)), ColumnMeasurement._fields)
     assert guard.violation((0.0, 10.0)) is None
     assert str(guard.violation((0.0, -10.1))) == "column_force is -10.1, beyond its limit of 10 N."
     assert "column_displacement is nan" in str(guard.violation((math.nan, 0.0)))
 
 
 def test_limits_apply_to_every_storey() -> None:
-    guard = Guard(tables.Limits(displacement=1.0), ("displacement", "other"), several=("displacement",))
+    guard = Guard(vars(tables.Limits(displacement=1.0)), ("displacement", "other"), several=("displacement",))
     assert guard.violation(([0.5, 1.0], 99.0)) is None
     assert str(guard.violation(([0.5, -1.5], 0.0))) == "displacement is -1.5, beyond its limit of 1 m."

@@ -212,10 +212,10 @@ def test_f30_values_that_are_no_numbers(tmp_path: Path) -> None:
 
     def changed(message: Command) -> Command | None:
         if message.seq in odd:
-            return message._replace(table_target=odd[message.seq])
+            return message._replace(target=odd[message.seq])
         if message.seq in tiny:
             return message._replace(table_target_jerk=tiny[message.seq])
-        return message._replace(damper_command=math.nan) if message.seq >= AT else None
+        return message._replace(effort=math.nan) if message.seq >= AT else None
 
     scene.change(SLAVE, changed)
     course = scene.play()
@@ -244,7 +244,7 @@ def test_f30_values_that_are_no_numbers(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("fault", "fields", "title"),
     [
-        ("F31", {"table_target": 0.41}, "a table target beyond its limit"),
+        ("F31", {"target": 0.41}, "a table target beyond its limit"),
         ("F32", {}, "a table target 10 mm off for one sample"),
     ],
 )
@@ -253,7 +253,7 @@ def test_f31_f32_a_command_beyond_a_limit(
 ) -> None:
     target = undisturbed.run.columns["slave"]["table_target"]
     step = 0.010 * float(np.sign(target[AT] - target[AT - 1]))
-    wrong = fields or {"table_target": float(target[AT]) + step}
+    wrong = fields or {"target": float(target[AT]) + step}
     scene = Scene(tmp_path)
     scene.change(SLAVE, only(AT, **wrong))
     course = scene.play()
@@ -316,7 +316,7 @@ def test_f53_a_wrong_check_under_a_right_content(tmp_path: Path, undisturbed: Co
     forged: dict[str, list[Letter]] = {SLAVE: [], MASTER: []}
     for seq in range(AT, AT + 50):
         there = hostile.command(SESSION, seq, 0.05)
-        back: Feedback = hostile.feedback(SESSION, seq, damper_force=500.0)
+        back: Feedback = hostile.feedback(SESSION, seq, 0.0, 0.0, 0.0, 500.0)
         for role, message in ((SLAVE, there), (MASTER, back)):
             forged[role] += [hostile.letter(message, key, "injected") for key in keys]
             payload = codec.encode(message, keys[0])[: -codec.CHECK_SIZE]

@@ -17,7 +17,6 @@ from scipy.integrate import quad, solve_ivp, trapezoid
 
 from common.errors import InputError
 from common.plan.plan import Plan
-from common.plan.schema import plain
 from common.plan.tables import Actuator, Column, Damper, Table
 from common.rig import ColumnCommand, TableCommand
 from laboratories.column import model as column_lab
@@ -25,13 +24,12 @@ from laboratories.column import specimen
 from laboratories.column.kind import COLUMN
 from laboratories.effects import CATALOGUE, lay, null_parameters
 from laboratories.effects.effect import Effect, Parameter
+from laboratories.emulated import EmulatedLab
 from laboratories.table import model as table_lab
 from laboratories.table.kind import TABLE
 from loop import substructure
 from loop.closed_loop import Rollout, signals, simulate, stacked
-from master.rig import ColumnLab
 from models.system import ActuatorEffects, ColumnEffects, DamperEffects, System, TableEffects
-from slave.rig import TableLab
 from tests.laboratories.effects.distinct import DISTINCT
 
 Array = NDArray[np.floating[Any]]
@@ -92,14 +90,8 @@ def test_all_null_effects_together_change_no_bit(plan: Plan, nominal: Rollout) -
 
 def rigs(system: System) -> list[tuple[float, ...]]:
     """Readings of both emulated laboratories under commands that do not depend on them."""
-    plan = system.plan
     result: list[tuple[float, ...]] = []
-    tables = {
-        name: plain(getattr(plan, name)) for name in ("actuator", "column", "table", "damper", "sensors")
-    }
-    of_a, of_b = ({name: tables[name] for name in names} for names in (PART_A, PART_B))
-    lab_a = ColumnLab(DT, 5, effects=system.effects, **of_a)
-    lab_b = TableLab(DT, 6, effects=system.effects, **of_b)
+    lab_a, lab_b = EmulatedLab(COLUMN, system, 5), EmulatedLab(TABLE, system, 6)
     for tick in range(150):
         wave = math.sin(0.05 * tick) + 0.3 * math.sin(0.31 * tick)
         result.append((*lab_a.read(), *lab_b.read()))

@@ -17,13 +17,12 @@ from common.plan.tables import Sensors
 from common.rig import ColumnCommand, TableCommand
 from laboratories.column.kind import COLUMN
 from laboratories.effects import CATALOGUE, lay
+from laboratories.emulated import EmulatedLab
 from laboratories.sensors import noise, readings
 from laboratories.table.kind import TABLE
 from loop import substructure
 from loop.closed_loop import Rollout, simulate
-from master.rig import ColumnLab
 from models.system import Effects, SensorEffects, System
-from slave.rig import TableLab
 
 Array = NDArray[np.floating[Any]]
 
@@ -164,12 +163,13 @@ def test_levels_add_as_independent_noises_do(name: str) -> None:
 
 def test_the_noise_of_a_reading_has_the_level_of_both() -> None:
     force = SensorEffects(noise=300.0)
-    lab = ColumnLab(DT, 3, sensors={"column_force": 400.0}, effects=Effects(sensors={"column_force": force}))
+    loud = Plan(sensors=Sensors(column_force=400.0))
+    lab = EmulatedLab(COLUMN, System(loud, Effects(sensors={"column_force": force})), 3)
     got = np.array([lab.read() for _ in range(8000)])
     assert got[:, 1].std() == pytest.approx(500.0, rel=0.03)
     assert got[:, 0].std() == pytest.approx(5e-6, rel=0.03)
     table = SensorEffects(noise=3e-5)
-    other = TableLab(DT, 3, effects=Effects(sensors={"table_displacement": table}))
+    other = EmulatedLab(TABLE, System(Plan(), Effects(sensors={"table_displacement": table})), 3)
     rows = np.array([other.read() for _ in range(8000)])
     assert rows[:, 0].std() == pytest.approx(math.hypot(10e-6, 3e-5), rel=0.03)
     assert rows[:, 3].std() == pytest.approx(0.2, rel=0.03)
@@ -185,11 +185,10 @@ def test_the_rigs_falsify_the_reading_named_and_the_truth_stays(name: str, kind:
     effect = CATALOGUE[f"sensor.{name}.{kind}"]
     size = SIZES[kind] * (1.0 if kind in ("gain", "lag", "delay") else min(effect.parameters[0].most, 1.0))
     system = lay(System(Plan()), [(effect.name, {effect.parameters[0].name: size})])
-    quiet = dict.fromkeys((*COLUMN.channels.names, *TABLE.channels.names), 0.0)
+    quiet = Plan(sensors=Sensors(**dict.fromkeys((*COLUMN.channels.names, *TABLE.channels.names), 0.0)))
     rows: list[list[tuple[float, ...]]] = []
     for effects in (Effects(), system.effects):
-        lab_a = ColumnLab(DT, 1, sensors=quiet, effects=effects)
-        lab_b = TableLab(DT, 1, sensors=quiet, effects=effects)
+        lab_a, lab_b = (EmulatedLab(kind, System(quiet, effects), 1) for kind in (COLUMN, TABLE))
         rows.append([])
         for tick in range(300):
             rows[-1].append((*lab_a.read(), *lab_b.read()))

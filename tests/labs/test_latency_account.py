@@ -61,7 +61,7 @@ class Trial:
             self.account.close(tick - 1, wake)
             t1, t2, t3, t4 = self._exchange(true + 60_000)
             self.account.open(tick, wake, t1 - 9_000, t1, feedback)
-            feedback = Feedback(1, tick, tick, t2, tick, t2, t2 + 25_000, t3, 0.0, 0.0, 0.0, 0.0)
+            feedback = Feedback(1, tick, tick, t2, tick, t2, t2 + 25_000, t3, (0.0, 0.0, 0.0, 0.0))
             self.account.answer(feedback, t4, t4 + 7_000, self.extra)
             self.truth.append(self.delays(true + 60_000))
         self.account.finish(ticks - 1, self.master(SECOND + ticks * INTERVAL))

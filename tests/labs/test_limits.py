@@ -19,6 +19,7 @@ from common.plan.reality import Reality, from_reality
 from common.plan.tables import Limits
 from common.recording.reader import Run, read
 from common.terminal import cli
+from laboratories.limits import LaboratoryLimits
 from loop import substructure
 from loop.closed_loop import signals, simulate
 from models import integrators
@@ -159,8 +160,9 @@ def test_a_held_tick_does_not_move_what_rates_are_measured_from(short_plan: Plan
     bench.world.time = bench.master.lab.tick_ns(101)  # a whole interval late
     bench.master.tick(100)
     assert bench.master._command == before
-    change = bench.master._limits._actuator
-    assert (change._last, change._change) == (before, 0.0)
+    own = bench.master._limits._own
+    assert isinstance(own, LaboratoryLimits)
+    assert [(change._last, change._change) for change in own._changes] == [(*before, 0.0)]
 
 
 # -- dangers ------------------------------------------------------------------------------------------
@@ -185,9 +187,9 @@ def test_an_unstable_delay_is_stopped_before_the_building_moves_more_than_it_sho
     )
     check = bench.master._limits.violation
 
-    def watched(measured: Any, outputs: Any) -> Any:
+    def watched(measured: Any, wanted: Any, outputs: Any) -> Any:
         peaks.append(abs(outputs.displacement))
-        return check(measured, outputs)
+        return check(measured, wanted, outputs)
 
     bench.master._limits.violation = watched  # type: ignore[method-assign]
     error = virtual.run(bench, str)

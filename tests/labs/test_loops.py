@@ -191,7 +191,7 @@ def broken(plan: Plan, how: str) -> Reality:
 def test_a_rig_that_fails_stops_the_test_with_a_sentence(
     short_plan: Plan, tmp_path: Path, how: str, kind: type[Exception], sentence: str, monkeypatch: Any
 ) -> None:
-    monkeypatch.setattr("master.assembly.find", lambda *_: BrokenLab)
+    monkeypatch.setattr("loop.rigs.find", lambda *_: BrokenLab)
     found, error, bench = run(short_plan, tmp_path / "broken.mcap", broken(short_plan, how))
     assert isinstance(error, kind)
     assert isinstance(error, RthsError)
@@ -209,7 +209,7 @@ def test_a_rig_that_fails_stops_the_test_with_a_sentence(
 def test_a_slaves_rig_that_fails_stops_the_master_too(
     short_plan: Plan, tmp_path: Path, monkeypatch: Any
 ) -> None:
-    monkeypatch.setattr("slave.assembly.find", lambda *_: BrokenLab)
+    monkeypatch.setattr("loop.rigs.find", lambda *_: BrokenLab)
     real = dataclasses.replace(
         reality.as_planned(short_plan), slave=Rig("x:BrokenLab", {"how": "raise", "at": 0})
     )
@@ -371,18 +371,18 @@ def test_repeated_and_outdated_feedback_is_not_used(bench: Bench) -> None:
     used = bench.master.partners["slave"].used
     for seq in (used.seq, used.seq - 5):
         bench.master.take(
-            Received(Feedback(session, seq, seq, 0, -1, 0, 0, 0, 0.0, 0.0, 0.0, 999.0), "slave")
+            Received(Feedback(session, seq, seq, 0, -1, 0, 0, 0, (0.0, 0.0, 0.0, 999.0)), "slave")
         )
     bench.world.time = bench.master.lab.tick_ns(100)
     bench.master.tick(100)
-    assert bench.master.partners["slave"].used.damper_force != 999.0
+    assert bench.master.partners["slave"].force != 999.0
 
 
 def test_feedback_of_another_session_is_not_used(bench: Bench) -> None:
-    bench.master.take(Received(Feedback(12345, 99, 99, 0, -1, 0, 0, 0, 0.0, 0.0, 0.0, 999.0), "slave"))
+    bench.master.take(Received(Feedback(12345, 99, 99, 0, -1, 0, 0, 0, (0.0, 0.0, 0.0, 999.0)), "slave"))
     bench.world.time = bench.master.lab.tick_ns(100)
     bench.master.tick(100)
-    assert bench.master.partners["slave"].used.damper_force != 999.0
+    assert bench.master.partners["slave"].force != 999.0
 
 
 class SlowLink:

@@ -203,7 +203,7 @@ class BrokenTable:
 def test_a_slave_that_trips_ends_the_test_for_all_and_the_sentence_names_it(
     hidden: bool, tmp_path: Path, monkeypatch: Any
 ) -> None:
-    monkeypatch.setattr("slave.assembly.find", lambda *_: BrokenTable)
+    monkeypatch.setattr("loop.rigs.find", lambda *_: BrokenTable)
     real = reality.as_planned(TWO)
     real = dataclasses.replace(
         real,
@@ -267,14 +267,14 @@ def test_what_another_role_says_counts_for_that_role_alone() -> None:
     bench = running(without_recorder(TWO), 100)
     session = bench.master.lab.exchange.session
     roof, middle = bench.master.partners.values()
-    forged = Feedback(session, 99, 99, 0, -1, 0, 0, 0, 0.0, 0.0, 0.0, 999.0)
+    forged = Feedback(session, 99, 99, 0, -1, 0, 0, 0, (0.0, 0.0, 0.0, 999.0))
     now = bench.world.time
     bench.master.take(Received(forged._replace(seq=100), "slave.roof", now))
     bench.master.take(Received(forged._replace(seq=100), "slave.nobody", now))
     bench.world.time = bench.master.lab.tick_ns(101)
     bench.master.tick(101)
-    assert roof.used.damper_force == 999.0
-    assert middle.used.damper_force != 999.0
+    assert roof.force == 999.0
+    assert middle.force != 999.0
 
 
 # -- one name, two processes ------------------------------------------------------------------------

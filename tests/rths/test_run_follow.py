@@ -339,7 +339,7 @@ class BrokenTable:
 def test_virtual_time_gives_the_cause_and_not_what_followed(
     short_plan: Plan, tmp_path: Path, monkeypatch: Any
 ) -> None:
-    monkeypatch.setattr("slave.assembly.find", lambda *_: BrokenTable)
+    monkeypatch.setattr("loop.rigs.find", lambda *_: BrokenTable)
     real = reality.as_planned(short_plan)
     real = dataclasses.replace(real, slaves={"slave": Rig("x:BrokenTable")})
     bench = virtual.assemble(short_plan, real, tmp_path / "a.mcap")

@@ -25,7 +25,7 @@ SESSION, DIGEST = 1, "plan"
 EXCHANGES = 60
 DELAYED_ACK_S = 0.02  # half of what a delayed acknowledgement costs, a hundred times what an exchange does
 COMMAND = Command(SESSION, 0, 0, 0, -1, 0.0, 0.0, 0.0, 0.0, 0.0)
-FEEDBACK = Feedback(SESSION, 0, 0, 0, 0, 0, 0, 0, 0.0, 0.0, 0.0, 0.0)
+FEEDBACK = Feedback(SESSION, 0, 0, 0, 0, 0, 0, 0, (0.0, 0.0, 0.0, 0.0))
 
 
 class Relay:

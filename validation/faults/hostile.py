@@ -48,19 +48,23 @@ def tick_message(direction: Direction, session: int, seq: int, value: float = 0.
     """A message of a tick for the direction, its first quantity of a given value."""
     if direction.route.role == MASTER:
         return command(session, seq, value)
-    return feedback(session, seq, table_displacement=value)
+    return feedback(session, seq, value)
 
 
 def command(session: int, seq: int, target: float, force: float = 0.0) -> Command:
     """A command of a target (m) and a motor's force (N), all else zero."""
-    given = {"session": session, "seq": seq, "table_target": target, "damper_command": force}
+    given = {"session": session, "seq": seq, "target": target, "effort": force}
     return Command(**blank(Command) | given)
 
 
-def feedback(session: int, seq: int, **measured: float) -> Feedback:
-    """A feedback that answers the command of its tick, all else zero."""
+def feedback(session: int, seq: int, *measured: float, channels: int = 4) -> Feedback:
+    """A feedback that answers the command of its tick, with so many channels, of which the first are given.
+
+    All else is zero.
+    """
     numbers = {"session": session, "seq": seq, "command_seq": seq, "heard_seq": seq}
-    return Feedback(**blank(Feedback) | numbers | measured)
+    values = (*measured, *[0.0] * (channels - len(measured)))
+    return Feedback(**blank(Feedback) | numbers | {"measured": values})
 
 
 def blank(kind: type[Any]) -> dict[str, Any]:

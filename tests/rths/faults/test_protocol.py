@@ -48,7 +48,13 @@ VALUES = st.floats(-1e6, 1e6) | st.floats(-0.01, 0.01)
 TEXTS = st.sampled_from(["", "a text", SLAVE, MASTER, RECORDER, "ready", "failed", PLAN.digest()])
 BYTES = st.sampled_from([b"", b"\x80", b"\x81\xa5slave\x01", b"garbage"])
 FIELDS: dict[str, st.SearchStrategy[Any]] = {"session": SESSIONS, "instance": st.sampled_from([1, INSTANCE])}
-TYPES: dict[type, st.SearchStrategy[Any]] = {float: VALUES, str: TEXTS, bytes: BYTES, int: NUMBERS}
+TYPES: dict[Any, st.SearchStrategy[Any]] = {
+    tuple[float, ...]: st.tuples(*[VALUES] * 4),
+    float: VALUES,
+    str: TEXTS,
+    bytes: BYTES,
+    int: NUMBERS,
+}
 
 
 def any_of(kind: Any) -> st.SearchStrategy[Message]:
@@ -71,6 +77,9 @@ class Sent:
 
     def enter(self, session: int) -> None:
         """No key."""
+
+    def expect(self, measured: Any) -> None:
+        """No frame is decoded."""
 
     def send(self, message: Message, to: str = "") -> int:
         self.messages.append(message)
@@ -263,7 +272,7 @@ class MasterMachine(Laboratory):
         for _ in range(count):
             self.step(late)
             seq = self.tick - 1
-            self.give(feedback(SESSION, seq, damper_force=force), SLAVE)
+            self.give(feedback(SESSION, seq, 0.0, 0.0, 0.0, force), SLAVE)
 
     @rule(count=st.integers(1, 12))
     def ticks_without(self, count: int) -> None:

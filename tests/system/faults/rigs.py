@@ -11,15 +11,18 @@ import struct
 import time
 from enum import IntEnum
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import EmergencyStopError
-from common.rig import ColumnCommand, ColumnMeasurement, TableCommand, TableMeasurement
-from master.rig import ColumnLab
-from slave.rig import TableLab
+from common.plan.plan import Plan
+from common.rig import ColumnMeasurement, TableMeasurement
+from laboratories.column.kind import COLUMN
+from laboratories.emulated import EmulatedLab
+from laboratories.table.kind import TABLE
+from models.system import System
 
 HEAD = struct.Struct("<qq")  # what the rig shall do, commands written
 ENTRY = struct.Struct("<qdd")  # monotonic time, ns; displacement, m; force, N
@@ -76,45 +79,45 @@ class Log:
         return Written(table["ns"], table["displacement"], table["force"])
 
 
-class Column(ColumnLab):
+class Column(EmulatedLab):
     """Laboratory A with a log."""
 
-    def __init__(self, interval: float, seed: int, log: str, **options: Any) -> None:
-        super().__init__(interval, seed, **options)
+    def __init__(self, interval: float, seed: int, log: str) -> None:
+        super().__init__(COLUMN, System(Plan()), seed)
         self._log = Log(Path(log))
 
     def read(self) -> ColumnMeasurement:
         """Readings, or what is wished."""
-        found = super().read()
+        found: ColumnMeasurement = super().read()
         if self._log.wish == Wish.EMERGENCY:
             raise EmergencyStopError("the red button of laboratory A.")
         if self._log.wish == Wish.READ_FAR:
             return found._replace(column_displacement=FAR)
         return found
 
-    def write(self, command: ColumnCommand) -> None:
+    def write(self, command: tuple[float, ...]) -> None:
         """Move, and keep the command."""
-        self._log.add(command.actuator_command, 0.0)
+        self._log.add(command[0], 0.0)
         super().write(command)
 
 
-class Table(TableLab):
+class Table(EmulatedLab):
     """Laboratory B with a log."""
 
-    def __init__(self, interval: float, seed: int, log: str, **options: Any) -> None:
-        super().__init__(interval, seed, **options)
+    def __init__(self, interval: float, seed: int, log: str) -> None:
+        super().__init__(TABLE, System(Plan()), seed)
         self._log = Log(Path(log))
 
     def read(self) -> TableMeasurement:
         """Readings, or what is wished."""
-        found = super().read()
+        found: TableMeasurement = super().read()
         if self._log.wish == Wish.EMERGENCY:
             raise EmergencyStopError("the red button of laboratory B.")
         if self._log.wish == Wish.READ_FAR:
             return found._replace(table_displacement=FAR)
         return found
 
-    def write(self, command: TableCommand) -> None:
+    def write(self, command: tuple[float, ...]) -> None:
         """Move, and keep the command."""
         self._log.add(*command)
         super().write(command)

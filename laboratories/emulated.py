@@ -1,0 +1,53 @@
+"""A laboratory of any kind, emulated: its device and its sensors behind the interface of a rig."""
+
+from __future__ import annotations
+
+from operator import add
+from typing import Any
+
+from common.rig import measurement_of
+from laboratories.kind import Kind
+from laboratories.sensors import noise, readings
+from models.compiled import plain
+from models.system import System
+
+
+class EmulatedLab:
+    """The device of a kind as a system has it, at rest; `seed` is that of its sensors' noise.
+
+    Raises:
+        InputError: the device cannot be as the system has it.
+    """
+
+    def __init__(self, kind: Kind, system: System, seed: int) -> None:
+        names, sensors = kind.channels.names, system.effects.sensors
+        interval = system.plan.test.interval
+        self._lab = plain(kind.build(system))
+        self._enter = kind.enter
+        self._measurement = measurement_of(kind.channels)
+        self._readings = readings.build(interval, names, sensors)
+        self._noise = noise.Noise(seed, readings.levels(names, kind.noise(system.plan), sensors))
+        self._plain = not any(name in sensors for name in names)  # a reading is value plus noise
+        self._interval, self._tick = interval, 0
+        self._true: tuple[float, ...] = (0.0,) * len(names)
+
+    def arm(self) -> None:
+        """An emulated laboratory is always ready."""
+
+    def read(self) -> Any:
+        """Readings at the present tick, with the sensors' noise."""
+        error, true, sensors = self._noise.row(), self._true, self._readings
+        if self._plain:
+            return self._measurement(*map(add, true, error))
+        t = self._tick * self._interval
+        self._tick += 1
+        return self._measurement(
+            *(readings.step(sensors, place, true[place], error[place], t) for place in range(len(true)))
+        )
+
+    def write(self, command: tuple[float, ...]) -> None:
+        """Move on by one interval: the transfer system follows its command, a motor holds its own."""
+        self._true = self._enter(self._lab, *command)
+
+    def disarm(self) -> None:
+        """An emulated device stays where it is."""

@@ -1,0 +1,85 @@
+"""The rig of a role as the plan and the reality have it: emulated, of a class of the user's, or none at all."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+from common.lab.laboratory import Setting
+from common.lab.preflight import Gate, SensorsAtRest
+from common.plan.patience import strict
+from common.plan.plugins import construct, find
+from common.plan.reality import Reality
+from common.rig import METHODS, AtRest, GuardedRig, NoRig, NothingMeasurement, measurement_of
+from common.roles import MASTER, name_of, title
+from laboratories import kinds
+from laboratories.emulated import EmulatedLab
+from laboratories.kind import Kind
+from laboratories.sensors import noise, readings
+from loop.realised import true_system
+from models.compiled import plain
+
+
+def hosted(reality: Reality, role: str) -> Kind | None:
+    """The kind of laboratory of a role, None for a master without one; raises InputError as `kinds.kind_of`."""
+    plan = (reality.whole or reality).plan
+    return kinds.own(plan) if role == MASTER else kinds.kind_of(plan, role)
+
+
+def build(reality: Reality, role: str, at_rest: AtRest | None = None) -> GuardedRig:
+    """A role's laboratory, of a slave from that slave's reality, judged `at_rest` as it is armed.
+
+    Raises:
+        InputError: it cannot be constructed.
+    """
+    kind, hidden = hosted(reality, role), role in reality.hidden
+    name, where = called(role), f"[{role}.rig]"
+    if kind is None:
+        return GuardedRig(NoRig(), name, NothingMeasurement)
+    measurement = measurement_of(kind.channels)
+    rig = reality.master if role == MASTER else reality.slave
+    place = noise.LAB_A if role == MASTER else noise.LAB_B + reality.place
+    seed = noise.lab_seed(reality.seed, place)
+    if not rig.class_:
+        twin = partial(EmulatedLab, kind, true_system(reality), seed)
+        return GuardedRig(twin(), name, measurement, at_rest=at_rest, twin=twin)
+    found = find(rig.class_, reality.base, where)
+    arguments: dict[str, Any] = {"interval": reality.plan.test.interval, "seed": seed}
+    built = construct(found, arguments | rig.options, where, METHODS)
+    shown = name if hidden else f"{name} ({found.__name__})"
+    return GuardedRig(built, shown, measurement, hidden=hidden, at_rest=at_rest)
+
+
+def called(role: str) -> str:
+    """What errors call the laboratory of a role."""
+    if role == MASTER:
+        return "laboratory A"
+    return f"laboratory B of the {title(role)}" if name_of(role) else "laboratory B"
+
+
+def check(reality: Reality, role: str) -> None:
+    """Raise InputError where a role's laboratory could not be built; nothing of it is constructed or moved."""
+    kind = hosted(reality, role)
+    if kind is not None:
+        kind.build(true_system(reality))
+    rig = reality.master if role == MASTER else reality.slave
+    if rig.class_:
+        find(rig.class_, reality.base, f"[{role}.rig]")
+
+
+def at_rest(gate: Gate | None, setting: Setting, role: str) -> AtRest | None:
+    """What judges the sensors of a role's rig as it arms: the gate, where there is one and the role has a rig."""
+    if gate is None or role not in setting.plan.kinds:
+        return None
+    kind = kinds.kind_of(setting.plan, role)
+    plan = strict(setting.plan.of(role))  # what is off zero is so beside an emulation too
+    levels = dict(zip(kind.channels.names, kind.noise(plan).tolist(), strict=True))
+    return SensorsAtRest(gate, setting, kind.limits(plan), levels)
+
+
+def warm_up(reality: Reality, role: str) -> None:
+    """Compile the kernels of a role's emulated laboratory on arrays that are thrown away."""
+    kind = hosted(reality, role)
+    if kind is not None:
+        kind.enter(plain(kind.build(true_system(reality))), *(0.0 for _ in kind.channels.drives))
+    readings.step(readings.build(reality.plan.test.interval, ("any",), {}), 0, 0.0, 0.0, 0.0)

@@ -1,0 +1,93 @@
+"""The master's own laboratory as its loop sees it, of any kind or none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from operator import itemgetter
+from typing import Any
+
+from common.plan.plan import Plan
+from common.rig import NothingCommand, command_of
+from common.roles import MASTER
+from common.safety.ramp import Ramp
+from common.signals import Channels
+from laboratories import kinds
+from laboratories.kind import Follows
+from master.step import Outputs
+
+NOWHERE = (0.0, 0.0)  # position and force of a laboratory that is not there
+
+
+class AtRest:
+    """The way to rest of a laboratory without a rig: it is there."""
+
+    done, travel, left = True, 0.0, 0.0
+
+    def step(self, _measured: tuple[float, ...] | None) -> tuple[float, ...]:
+        """No command."""
+        return ()
+
+    def doing(self, _measured: tuple[float, ...] | None) -> str:
+        """Nothing moves."""
+        return "nothing to bring to rest"
+
+
+class Own:
+    """What a tick hands to the master's own laboratory, and what it takes from it and records of it."""
+
+    def __init__(self, plan: Plan) -> None:
+        self._plan, self._kind = plan, kinds.own(plan)
+        self.channels: Channels | None = self._kind.channels if self._kind else None
+        self.felt: Callable[[Any], tuple[float, float]] = lambda _: NOWHERE
+        self.command: Callable[[Outputs], Any] = lambda _: self.zero
+        self.zero: Any = NothingCommand()
+        if self.channels is not None:
+            names, make = self.channels.names, command_of(self.channels)
+            self.felt = itemgetter(names.index(self.channels.position), names.index(self.channels.force))
+            self.command = (
+                (lambda outputs: make(outputs.command, outputs.effort))
+                if self.channels.effort
+                else (lambda outputs: make(outputs.command))
+            )
+            self.zero = make(*(0.0 for _ in self.channels.drives))
+        self._storey, self._ratio = watched(plan)
+
+    def ramp(self, last: tuple[float, ...], before: tuple[float, ...]) -> Ramp:
+        """The way to rest from the last two commands."""
+        return self._kind.ramp(self._plan, last, before) if self._kind else AtRest()
+
+    def row(self, outputs: Outputs, command: Any, measured: tuple[float, ...]) -> tuple[float, ...]:
+        """What is recorded of it: target, motor's force, command, readings; nothing where it is not there."""
+        if self.channels is None:
+            return ()
+        transfer, *motor = command
+        return (outputs.target, *motor, transfer, *measured)
+
+    def force(self, measured: tuple[float, ...]) -> dict[str, float]:
+        """Its force (N) by the channel's name; empty where it is not there."""
+        return (
+            {}
+            if self.channels is None
+            else {self.channels.force: self.felt(measured)[1] if measured else 0.0}
+        )
+
+    def drift(self, outputs: Outputs) -> float:
+        """Drift (m) of the storey that a user watches."""
+        if self._ratio:
+            return outputs.target / self._ratio
+        moved = outputs.displacement
+        if isinstance(moved, float):
+            return moved
+        return moved[self._storey - 1] - (moved[self._storey - 2] if self._storey > 1 else 0.0)
+
+
+def watched(plan: Plan) -> tuple[int, float]:
+    """The storey whose drift a user watches, and target over drift where the master's own laboratory follows it.
+
+    It is the first that a laboratory follows, the master's before the slaves'; the lowest where none does.
+    """
+    for role, kind in kinds.kinds_of(plan).items():
+        coupling = kind.coupling(plan.of(role))
+        if coupling.follows is Follows.DRIFT:
+            return coupling.place, coupling.ratio if role == MASTER else 0.0
+    return 1, 0.0
