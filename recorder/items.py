@@ -27,6 +27,7 @@ class Items:
     def __init__(self, plan: Plan, lab: str) -> None:
         topics = kinds.topics(plan)
         own = {"event", lab, ramp_topic(lab), *(map(latency_topic, plan.roles) if lab == MASTER else ())}
+        own &= topics.keys()  # a master without a laboratory has no ramp
         self._ticks = range(plan.ticks)
         self._unbounded = ("event", ramp_topic(lab))  # the ramp to rest goes on after the last tick
         self._rows = {topic: checks(topics[topic], plan) for topic in own}
