@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from numba.core import types
 from numba.extending import overload
@@ -31,8 +31,20 @@ from models.registry import Array
 KINDS: dict[str, Kind] = {kind.name: kind for kind in (COLUMN, TABLE)}
 """The kinds that ship, by the names that a plan gives them."""
 
+
+class NoLaboratory(NamedTuple):
+    """At the place of a master that has no laboratory."""
+
+    nothing: float
+
+
+def rest(lab: NoLaboratory, truth: Array, command: float, effort: float) -> None:
+    """Nothing moves where there is no laboratory."""
+
+
 KERNELS: dict[type[Any], Callable[..., None]] = {kind.record: kind.advance for kind in KINDS.values()} | {
-    DeviceRecord: advance_device
+    DeviceRecord: advance_device,
+    NoLaboratory: rest,
 }
 
 

@@ -5,7 +5,7 @@ It is the simulation that a recording is compared with, and the reference for th
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,22 +16,24 @@ from numpy.typing import NDArray
 from common import signals as table
 from common.errors import InputError
 from common.plan.plan import Plan
-from common.roles import MASTER, name_of
+from common.roles import MASTER, SLAVE, name_of, title
 from laboratories import kinds
-from laboratories.column.kind import COLUMN
 from laboratories.kind import Kind
+from laboratories.kinds import kinds_of
 from laboratories.sensors import noise
-from laboratories.table.kind import TABLE
 from loop import site, substructure
+from loop.names import sent_names
 from loop.site import Site
 from loop.substructure import (
-    ACTUATOR_COMMAND,
-    DAMPER_COMMAND,
+    COMMAND,
+    EFFORT,
     OF_SLAVES,
-    TABLE_ACCELERATION,
-    TABLE_JERK,
-    TABLE_TARGET,
-    TABLE_VELOCITY,
+    SENT_ACCELERATION,
+    SENT_EFFORT,
+    SENT_JERK,
+    SENT_TARGET,
+    SENT_VALUES,
+    SENT_VELOCITY,
     Substructure,
 )
 from models import compensators
@@ -44,9 +46,6 @@ from models.system import Effects, System
 Index = NDArray[np.int64]
 
 LARGEST = float(np.finfo(np.float64).max)  # m: every command that is a finite number is below
-DISPLACEMENT, FORCE = map(
-    COLUMN.channels.names.index, (COLUMN.channels.position, COLUMN.channels.force)
-)  # of the master's laboratory
 
 
 class Exchange(NamedTuple):
@@ -62,10 +61,18 @@ class Rollout(NamedTuple):
     master: dict[
         str, Array
     ]  # (ticks,), of several storeys (ticks, storeys), of several slaves (ticks, slaves)
-    slaves: dict[str, dict[str, Array]]  # by role, (ticks,) each: the table's command and what is measured
+    slaves: dict[str, dict[str, Array]]  # by role, (ticks,) each: command of the transfer system, measured
     exchange: dict[str, Exchange]  # by role of the slave
     finite: bool  # False where the loop diverged
     ticks: int  # rows of every signal
+
+
+class Own(NamedTuple):
+    """The master's laboratory."""
+
+    site: Site
+    position: int  # channel that its compensator compares with the target
+    force: int  # channel of the force that enters the building
 
 
 class Slave(NamedTuple):
@@ -73,7 +80,7 @@ class Slave(NamedTuple):
 
     site: Site
     compensator: Compensator
-    follows: int  # channel that its compensator compares with the target
+    position: int  # channel that its compensator compares with the target
     force: int  # channel of the force that goes back to the building
     written: Array  # (ticks,) commands of its transfer system, m
     present: Array  # (1,) target of the present tick, m
@@ -94,7 +101,7 @@ class Loop(NamedTuple):
     """Everything that moves in a closed loop, at rest."""
 
     building: Substructure
-    own: Site  # the master's laboratory
+    own: Own
     slaves: tuple[Slave, ...]  # of any kinds
     traffic: Traffic
 
@@ -119,32 +126,46 @@ def simulate(
 
     `ground` as `substructure.ground_rows` gives it. Every slave is what `plan` and `effects` say, or its entry in
     `slaves`, systems by role; with no entry at all, `{}`, building and master's laboratory move alone, which takes a
-    building without dampers. With a `seed` the sensors read what the emulated laboratories read under that seed of the
-    plan; `noise` are rows (ticks, channels) that err in the readings of single roles; else they are free of noise. Of
-    the link's effects only the `exchange` of each role counts, in time where it is not given. A command of the
-    actuator that is not finite or beyond `farthest` (m) ends the loop.
+    building on which no slave's force acts. With a `seed` the sensors read what the emulated laboratories read under
+    that seed of the plan; `noise` are rows (ticks, channels) that err in the readings of single roles; else they are
+    free of noise. Of the link's effects only the `exchange` of each role counts, in time where it is not given. A
+    command of the master's laboratory, or without one a floor's displacement, that is not finite or beyond `farthest`
+    (m) ends the loop.
 
     Raises:
-        InputError: a building with dampers is to move alone, noise is given twice or has another shape, or a model,
-            method or parameter is unknown to the registries.
+        InputError: a building on which slaves' forces act is to move alone, noise is given twice or has another
+            shape, or a model, method or parameter is unknown to the registries.
     """
     of_master = System(plan, effects or Effects())
     systems = {role: System(plan.of(role), of_master.effects) for role in plan.roles}
     systems = systems if slaves is None else dict(slaves)
-    if not systems and (plan.control.amd or plan.slaves):
-        raise InputError("The loop of laboratory A alone knows no damper: set amd in [control] to false.")
+    if not systems:
+        check_alone(plan)
     ticks, given = plan.ticks, exchange or {}
     used = {role: given.get(role) or on_time(ticks) for role in systems}
     drawn = errors({MASTER: of_master} | systems, seed, noise or {})
     loop = at_rest(of_master, systems, ground, used, drawn)
-    filled = roll(loop, farthest)
+    filled, hosted = roll(loop, farthest), kinds_of(plan)
     return Rollout(
-        master_signals(plan, loop, filled),
-        {role: slave_signals(slave, filled) for role, slave in zip(systems, loop.slaves, strict=True)},
+        master_signals(plan, loop, list(systems), filled),
+        {
+            role: slave_signals(hosted[role], slave, filled)
+            for role, slave in zip(systems, loop.slaves, strict=True)
+        },
         used,
         filled == ticks,
         filled,
     )
+
+
+def check_alone(plan: Plan) -> None:
+    """Raise InputError where the force of a slave acts on the building, which then cannot move without it."""
+    acting = [role for role in plan.roles if kinds.kind_of(plan, role).coupling(plan.of(role)).scale != 0.0]
+    if acting:
+        raise InputError(
+            f"The force of the {title(acting[0])} acts on the building, which is to move without its slaves: leave "
+            "them in, or set amd in [control] to false where they carry dampers only."
+        )
 
 
 def at_rest(
@@ -166,33 +187,49 @@ def at_rest(
         np.array([exchange[role].command for role in slaves], dtype=np.int64).reshape(count, ticks),
         np.array([exchange[role].feedback for role in slaves], dtype=np.int64).reshape(count, ticks),
     )
-    followers = tuple(follower(TABLE, system, errors[role]) for role, system in slaves.items())
-    return Loop(building, site.build(COLUMN, master, errors[MASTER]), followers, traffic)
+    hosted = kinds_of(plan)
+    followers = tuple(follower(hosted[role], system, errors[role]) for role, system in slaves.items())
+    return Loop(building, own(hosted.get(MASTER), master, errors.get(MASTER)), followers, traffic)
+
+
+def own(kind: Kind | None, system: System, errors: Array | None) -> Own:
+    """The master's laboratory at rest, or none."""
+    if kind is None or errors is None:
+        return Own(site.none(system.plan.ticks), 0, 0)
+    return Own(site.build(kind, system, errors), *channels(kind))
+
+
+def channels(kind: Kind) -> tuple[int, int]:
+    """The channels of position and force among those that a kind measures."""
+    names = kind.channels.names
+    return names.index(kind.channels.position), names.index(kind.channels.force)
 
 
 def follower(kind: Kind, system: System, errors: Array) -> Slave:
     """A slave's laboratory at rest."""
     plan, ticks = system.plan, errors.shape[0]
-    chosen = plan.table.compensator
+    chosen = kind.compensator(plan)
     return Slave(
         site.build(kind, system, errors),
-        compensators.build(chosen.kind, chosen.parameters, plan.test.interval, plan.follows_in),
-        kind.channels.names.index(kind.channels.position),
-        kind.channels.names.index(kind.channels.force),
+        compensators.build(chosen.kind, chosen.parameters, plan.test.interval, chosen.where),
+        *channels(kind),
         np.zeros(ticks),
         np.zeros(1),
     )
 
 
 def errors(systems: Mapping[str, System], seed: int | None, given: Mapping[str, Array]) -> dict[str, Array]:
-    """What errs in the readings of master and slaves, (ticks, channels) by role, the slaves in their order.
+    """What errs in the readings of every laboratory, (ticks, channels) by role; `systems` begin with the master's.
 
     Raises:
         InputError: the noise is given twice, or has another shape.
     """
+    hosted = kinds_of(systems[MASTER].plan)
     result = {}
     for place, (role, system) in enumerate(systems.items(), noise.LAB_A):
-        kind, ticks = COLUMN if role == MASTER else TABLE, system.plan.ticks
+        if role not in hosted:
+            continue
+        kind, ticks = hosted[role], system.plan.ticks
         result[role] = site.errors(kind, system, ticks, None if seed is None else noise.lab_seed(seed, place))
         if role not in given:
             continue
@@ -209,47 +246,60 @@ def errors(systems: Mapping[str, System], seed: int | None, given: Mapping[str, 
 
 @jit
 def roll(loop: Loop, farthest: float) -> int:
-    """Fill the rows tick by tick; return how many ticks had a command of the actuator within `farthest` (m)."""
+    """Fill the rows tick by tick; return how many ticks had commands and displacements within `farthest` (m)."""
     building, own, traffic = loop.building, loop.own, loop.traffic
     interval = building.scalars[substructure.INTERVAL]
+    read = own.site.measured
     for tick in range(traffic.outputs.shape[0]):
-        site.read(own, tick, tick * interval)
+        site.read(own.site, tick, tick * interval)
         for place in range(traffic.used.shape[1]):
             answered = traffic.feedback[place, tick]
             traffic.used[tick, place] = traffic.forces[answered, place] if answered >= 0 else 0.0
-            building.dampers[substructure.FORCE_USED, place] = traffic.used[tick, place]
-        substructure.advance(building, tick, own.measured[tick, DISPLACEMENT], own.measured[tick, FORCE])
-        command = building.output[ACTUATOR_COMMAND]
-        if not abs(command) <= farthest:
+            substructure.receive(building, place, traffic.used[tick, place])
+        substructure.advance(building, tick, read[tick, own.position], read[tick, own.force])
+        if not within(building, farthest):
             return tick
         for place in range(building.output.size):
             traffic.outputs[tick, place] = building.output[place]
-        kinds.advance(own.lab, own.truth, command, 0.0)
+        kinds.advance(own.site.lab, own.site.truth, building.output[COMMAND], building.output[EFFORT])
         follow_all(loop.slaves, 0, traffic, tick, interval)
     return traffic.outputs.shape[0]
 
 
 @jit
+def within(building: Substructure, farthest: float) -> bool:
+    """Whether the command of the master's laboratory, or without one every floor, is within `farthest` (m)."""
+    output, n = building.output, building.mass.size
+    if building.codes[substructure.OWN]:
+        return abs(output[COMMAND]) <= farthest
+    first = output.size - substructure.STOREY_VALUES * n
+    inside = True
+    for floor in range(n):
+        inside = inside and abs(output[first + floor]) <= farthest
+    return inside
+
+
+@jit
 def follow(slave: Slave, place: int, traffic: Traffic, tick: int, interval: float) -> None:
-    """One tick of a slave: its readings, its table's command, and its laboratory one interval on."""
-    read, count = slave.site.measured, traffic.used.shape[1]
+    """One tick of a slave: its readings, its command, and its laboratory one interval on."""
+    read = slave.site.measured
     site.read(slave.site, tick, tick * interval)
     traffic.forces[tick, place] = read[tick, slave.force]
     sent = traffic.command[place, tick]
     row = traffic.outputs[sent] if sent >= 0 else traffic.nothing
-    first = OF_SLAVES + place
-    target = row[first + TABLE_TARGET * count]
+    first = OF_SLAVES + SENT_VALUES * place
+    target = row[first + SENT_TARGET]
     wanted = Wanted(
         target,
-        row[first + TABLE_VELOCITY * count],
-        row[first + TABLE_ACCELERATION * count],
-        row[first + TABLE_JERK * count],
+        row[first + SENT_VELOCITY],
+        row[first + SENT_ACCELERATION],
+        row[first + SENT_JERK],
         slave.present[0],
-        read[tick, slave.follows],
+        read[tick, slave.position],
     )
     slave.written[tick] = compensators.step(slave.compensator, wanted, interval)
     slave.present[0] = target
-    kinds.advance(slave.site.lab, slave.site.truth, slave.written[tick], row[first + DAMPER_COMMAND * count])
+    kinds.advance(slave.site.lab, slave.site.truth, slave.written[tick], row[first + SENT_EFFORT])
 
 
 def follow_all(slaves: tuple[Slave, ...], place: int, traffic: Traffic, tick: int, interval: float) -> None:
@@ -278,63 +328,101 @@ def _follow_all(slaves: types.BaseTuple, place: Any, traffic: Any, tick: Any, in
     return different
 
 
-def master_signals(plan: Plan, loop: Loop, ticks: int) -> dict[str, Array]:
+def master_signals(plan: Plan, loop: Loop, slaves: Sequence[str], ticks: int) -> dict[str, Array]:
     """What the master computed, measured and used."""
-    slaves = len(loop.slaves)
-    computed = substructure.named(loop.traffic.outputs[:ticks], slaves, plan.storeys)
-    measured = dict(zip(COLUMN.channels.names, loop.own.measured[:ticks].T, strict=True))
-    used = loop.traffic.used[:ticks]
-    return computed | measured | {"damper_force_used": used[:, 0] if slaves == 1 else used}
+    result = substructure.named(loop.traffic.outputs[:ticks], plan, slaves)
+    if own_kind := kinds.own(plan):
+        read = loop.own.site.measured[:ticks]
+        result |= {name: read[:, channel] for channel, name in enumerate(own_kind.channels.names)}
+    used = {role: loop.traffic.used[:ticks, place] for place, role in enumerate(slaves)}
+    return result | per_kind(plan, used, "used")
 
 
-def slave_signals(slave: Slave, ticks: int) -> dict[str, Array]:
+def per_kind(plan: Plan, values: Mapping[str, Any], what: str) -> dict[str, Any]:
+    """Values (ticks,) of each slave's force by the master's signals, those of slaves of one kind together."""
+    hosted = kinds_of(plan)
+    groups = table.alike({role: hosted[role].channels for role in values})
+    return {
+        f"{channels.force}_{what}": together([values[role] for role in roles])
+        for channels, roles in groups.items()
+    }
+
+
+def together(values: Sequence[Any]) -> Any:
+    """One signal of several slaves, (ticks, slaves); of one slave (ticks,)."""
+    return values[0] if len(values) == 1 else np.stack(values, axis=1)
+
+
+def slave_signals(kind: Kind, slave: Slave, ticks: int) -> dict[str, Array]:
     """What a slave wrote and measured."""
-    measured = dict(zip(TABLE.channels.names, slave.site.measured[:ticks].T, strict=True))
-    return {TABLE.channels.drives[0]: slave.written[:ticks]} | measured
+    measured = dict(zip(kind.channels.names, slave.site.measured[:ticks].T, strict=True))
+    return {kind.channels.command.name: slave.written[:ticks]} | measured
 
 
 def signals(plan: Plan, rollout: Rollout) -> dict[str, Array]:
     """The rollout's signals by name, as a recording names them; (ticks,), (ticks, storeys) or (ticks, slaves) each.
 
-    Those of a named slave are called `NAME.signal`.
+    Those of a named slave are called `NAME.signal`, those of a slave without a name that the master's own laboratory
+    has too `slave.signal`.
     """
     result: dict[str, Array] = {}
     order = kinds.topics(plan)
+    own = {row.name for row in order[MASTER] if not row.slaves} - {table.TIME.name}
     for topic, columns in topics(plan, rollout).items():
         name = name_of(topic)
-        for key in (row.name for row in order[topic] if row.kind in (table.Kind.NUMBER, table.Kind.STOREYS)):
-            if not name:
-                result.setdefault(key, columns[key])
-            elif key != table.TIME.name:
+        for row in order[topic]:
+            key = row.name
+            if row.kind not in (table.Kind.NUMBER, table.Kind.STOREYS) or key not in columns:
+                continue
+            if name and key != table.TIME.name:
                 result[f"{name}.{key}"] = columns[key]
-    del result["damper_force_age"]
+            elif topic != MASTER and key in own:
+                result[f"{SLAVE}.{key}"] = columns[key]
+            elif not name:
+                result.setdefault(key, columns[key])
+    for name in [name for name in result if name in ages(plan, rollout.slaves)]:
+        del result[name]
     return result
 
 
-def stacked(rollout: Rollout) -> dict[str, Array]:
-    """The rollout's signals by name, those of several slaves together: (ticks, slaves)."""
-    slaves = list(rollout.slaves.values())
-    if len(slaves) < 2:
-        return rollout.master | (slaves[0] if slaves else {})
-    return rollout.master | {name: np.stack([one[name] for one in slaves], axis=1) for name in slaves[0]}
+def ages(plan: Plan, slaves: Iterable[str]) -> set[str]:
+    """The names of the ages of the forces that the master used."""
+    hosted = kinds_of(plan)
+    return {f"{hosted[role].channels.force}_age" for role in slaves}
+
+
+def received(plan: Plan, rollout: Rollout) -> dict[str, dict[str, Array]]:
+    """What each slave was sent, (ticks,) each, by role and the names of its own topic, at the ticks of its sending."""
+    hosted, names = kinds_of(plan), sent_names(plan)
+    groups = table.alike({role: hosted[role].channels for role in rollout.slaves})
+    result: dict[str, dict[str, Array]] = {}
+    for channels, roles in groups.items():
+        for place, role in enumerate(roles):
+            sent = (rollout.master[name] for name in names[role])
+            values = (every if len(roles) == 1 else every[:, place] for every in sent)
+            result[role] = dict(zip(channels.sent, values, strict=True))
+    return result
+
+
+def by_role(plan: Plan, rollout: Rollout) -> dict[str, dict[str, Array]]:
+    """The building's and the master's signals, and by role what each slave was sent, wrote and measured."""
+    sent = received(plan, rollout)
+    return {MASTER: rollout.master} | {role: sent[role] | own for role, own in rollout.slaves.items()}
 
 
 def topics(plan: Plan, rollout: Rollout) -> dict[str, dict[str, Any]]:
     """Everything that a recording of the rollout holds, by topic and signal."""
     seq = np.arange(rollout.ticks)
     own: dict[str, Any] = {"seq": seq, "t": seq.astype(np.float64) * plan.test.interval}
-    used = [item.feedback[: rollout.ticks] for item in rollout.exchange.values()]
-    feedback = np.array(used, dtype=np.int64).reshape(len(used), rollout.ticks).T
-    age = np.where(feedback < 0, 0.0, (seq[:, None] - feedback) * plan.test.interval)
-    one = len(rollout.slaves) == 1
-    about = {"damper_force_seq": feedback, "damper_force_age": age}
-    about = {name: values[:, 0] if one else values for name, values in about.items()}
+    used = {role: item.feedback[: rollout.ticks] for role, item in rollout.exchange.items()}
+    age = {role: np.where(of < 0, 0.0, (seq - of) * plan.test.interval) for role, of in used.items()}
+    about = per_kind(plan, used, "seq") | per_kind(plan, age, "age")
     result = {MASTER: own | rollout.master | about}
-    for place, (role, columns) in enumerate(rollout.slaves.items()):
+    sent = received(plan, rollout)
+    for role, columns in rollout.slaves.items():
         command = rollout.exchange[role].command[: rollout.ticks]
-        sent = {name: rollout.master[name] if one else rollout.master[name][:, place] for name in table.SENT}
-        received = {name: np.where(command < 0, 0.0, values[command]) for name, values in sent.items()}
-        result[role] = own | {"command_seq": command} | received | columns
+        came = {name: np.where(command < 0, 0.0, values[command]) for name, values in sent[role].items()}
+        result[role] = own | {"command_seq": command} | came | columns
     return result
 
 

@@ -88,9 +88,9 @@ def building(
     """
     arrays = substructure.build(system.plan, ground, system.effects.p_delta)
     result = np.zeros((force.size, arrays.output.size))
-    slaves = arrays.dampers.shape[1]
-    play_building(arrays, displacement, force, dampers.reshape(force.size, slaves), result)
-    return substructure.named(result, slaves, system.plan.storeys)
+    roles = system.plan.roles
+    play_building(arrays, displacement, force, dampers.reshape(force.size, len(roles)), result)
+    return substructure.named(result, system.plan, roles)
 
 
 @jit
@@ -121,7 +121,7 @@ def play_building(
     """Fill the output rows `result` (ticks, width) from the measurements."""
     for tick in range(force.size):
         for slave in range(dampers.shape[1]):
-            building.dampers[substructure.FORCE_USED, slave] = dampers[tick, slave]
+            substructure.receive(building, slave, dampers[tick, slave])
         substructure.advance(building, tick, displacement[tick], force[tick])
         for place in range(building.output.size):
             result[tick, place] = building.output[place]

@@ -11,6 +11,7 @@ import numpy as np
 
 from laboratories import kinds
 from laboratories.kind import Kind
+from laboratories.kinds import NoLaboratory
 from laboratories.sensors import noise, readings
 from laboratories.sensors.readings import Readings
 from models.compiled import jit
@@ -36,12 +37,17 @@ def build(kind: Kind, system: System, errors: Array) -> Site:
     )
 
 
+def none(ticks: int) -> Site:
+    """In place of a laboratory where there is none: one channel that reads zero."""
+    sensors = readings.build(1.0, ("none",), {})
+    return Site(NoLaboratory(0.0), sensors, np.zeros((ticks, 1)), np.zeros(1), np.zeros((ticks, 1)))
+
+
 def errors(kind: Kind, system: System, ticks: int, seed: int | None = None) -> Array:
     """Noise of a laboratory's readings, (ticks, channels), under the seed of that laboratory; zero without one."""
     if seed is None:
         return np.zeros((ticks, len(kind.channels.names)))
-    nominal = noise.levels(system.plan.sensors, kind.channels.names)
-    levels = readings.levels(kind.channels.names, nominal, system.effects.sensors)
+    levels = readings.levels(kind.channels.names, kind.noise(system.plan), system.effects.sensors)
     return noise.Noise(seed, levels).rows(ticks)
 
 

@@ -1,25 +1,29 @@
-"""The master's computation of one control interval: building, compensator, damper control.
+"""The master's computation of one control interval: the building, and what its laboratories are told.
 
-    M_N·ẍ + C_N·ẋ + f_numerical(x) + specimen = −M·1·z̈ + Σ λ·damper_force
+    M_N·ẍ + C_N·ẋ + f_numerical(x) + Σ λ·f_drift = −M·1·z̈ + Σ λ·f_floor
 
-with the whole building's mass M under the ground, the numerical part's M_N and C_N, and one damper for each slave's
-laboratory. At tick k the forces measured at the displacement x_k, the specimen's corrected and with `unit_delay` that
-of the tick before, complete the equation of motion; the integrator then gives x_{k+1}, from which the targets of the
-interval's end follow (contract, sections 2 and 3).
+with the whole building's mass M under the ground, the numerical part's M_N and C_N, and one force f of each laboratory
+at its scale λ: one that follows the drift of a storey resists it, one that follows a floor pushes it. At tick k the
+forces measured at the displacement x_k, corrected and with `unit_delay` those of the tick before, complete the equation
+of motion; the integrator then gives x_{k+1}, from which the targets of the interval's end follow (contract, sections 2
+and 3). The compensator of the master's own laboratory, where it has one, is part of the computation.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from common.errors import InputError
 from common.plan.building import is_matrix
 from common.plan.plan import Plan, resolve
-from common.signals import OF_BUILDING, OF_STOREYS, SENT
-from laboratories.column.kind import COLUMN
-from laboratories.table.kind import TABLE
+from common.roles import MASTER, title
+from laboratories.kind import Coupling, Follows
+from laboratories.kinds import kinds_of
+from loop.names import sent_names
 from loop.nominal import partition
 from models import compensators, force_correction, integrators, specimens, trend
 from models.compensators import Built as Compensator
@@ -32,69 +36,74 @@ from models.structures import shear_building
 
 Codes = NDArray[np.int64]
 
-# places in `codes`, with one floor per damper from FLOORS on, in `scalars`, and of the rows of `dampers`
-INTEGRATOR, SPECIMEN, STOREY, FLOORS = range(4)
-INTERVAL, RATIO, REPRESENTS, HIGH_PASS, HIGH_PASS_GAIN, P_DELTA, UNIT_DELAY = range(7)
-FORCE_SCALE, MOTOR_GAIN, FORCE_USED = range(3)
+# places in `codes` and in `scalars`; rows of `places` and of `labs`, which have a column for each laboratory
+INTEGRATOR, SPECIMEN, OWN = range(3)  # OWN is 1 where the master has a laboratory, whose column is the first
+INTERVAL, P_DELTA = range(2)
+FOLLOWED, PLACE = range(2)
+RATIO, FORCE_SCALE, MOTOR_GAIN, HIGH_PASS, HIGH_PASS_GAIN, UNIT_DELAY, FORCE_USED, EXERTED = range(8)
+DRIFT, FLOOR = range(2)  # what a laboratory follows
 MATRIX = -1  # in place of a specimen's code: the numerical part is linear and coupled by a stiffness matrix
-DELAYED = force_correction.CORRECTED + 1  # place in `filtered`
+DELAYED = force_correction.CORRECTED + 1  # place in a row of `filtered`
 
-# places in the output row: what is the building's; what is sent to each slave; what each storey has. A signal of slaves
-# or storeys takes as many places as there are of them, and its number here is its place among the signals of its group
-GROUND_ACCELERATION, COLUMN_TARGET, ACTUATOR_COMMAND = (
-    OF_BUILDING.index(name) for name in ("ground_acceleration", "column_target", "actuator_command")
-)
-OF_SLAVES = len(OF_BUILDING)  # first place of what is sent
-TABLE_TARGET, DAMPER_COMMAND, TABLE_VELOCITY, TABLE_ACCELERATION, TABLE_JERK = (
-    SENT.index(name)
-    for name in (
-        "table_target",
-        "damper_command",
-        "table_target_velocity",
-        "table_target_acceleration",
-        "table_target_jerk",
-    )
-)
-SENT_VALUES = len(SENT)
-STOREY_DISPLACEMENT, STOREY_VELOCITY, STOREY_ACCELERATION, STOREY_ABSOLUTE, STOREY_FORCE = (
-    OF_STOREYS.index(name)
-    for name in ("displacement", "velocity", "acceleration", "absolute_acceleration", "numerical_force")
-)
-STOREY_VALUES = len(OF_STOREYS)
+# places in the output row: what is the ground's and the master's own laboratory's; then what each slave is sent, one
+# slave after the other; then what each storey has, one signal after the other
+GROUND_ACCELERATION, TARGET, COMMAND, EFFORT = range(4)
+OF_SLAVES = 4  # first place of what is sent
+SENT_TARGET, SENT_EFFORT, SENT_VELOCITY, SENT_ACCELERATION, SENT_JERK = range(5)  # to one slave
+SENT_VALUES = 5
+OF_STOREYS = ("displacement", "velocity", "acceleration", "absolute_acceleration", "numerical_force")
+STOREY_DISPLACEMENT, STOREY_VELOCITY, STOREY_ACCELERATION, STOREY_ABSOLUTE, STOREY_FORCE = range(5)
+STOREY_VALUES = 5
 
 
-def layout(slaves: int, storeys: int) -> dict[str, slice]:
-    """Places of every signal in the output row by name, in their order; `slaves` of them, and `storeys`."""
-    widths = dict.fromkeys(OF_BUILDING, 1) | dict.fromkeys(SENT, slaves) | dict.fromkeys(OF_STOREYS, storeys)
-    result, end = {}, 0
-    for name, width in widths.items():
-        result[name] = slice(end, end + width)
-        end += width
-    return result
+def layout(plan: Plan, slaves: Sequence[str]) -> dict[str, list[int]]:
+    """Places in the output row by signal of the master's topic; `slaves` are the roles that take part.
+
+    A signal of several slaves of one kind, or of storeys, has a place for each of them.
+    """
+    hosted, n = kinds_of(plan), plan.storeys
+    result = {"ground_acceleration": [GROUND_ACCELERATION]}
+    if MASTER in hosted:
+        own = hosted[MASTER].channels
+        result |= {own.target.name: [TARGET], own.command.name: [COMMAND]}
+        result |= {own.effort.name: [EFFORT]} if own.effort else {}
+    names = sent_names(plan)
+    for place, role in enumerate(slaves):
+        motor = hosted[role].channels.effort is not None
+        values = [value for value in range(SENT_VALUES) if motor or value != SENT_EFFORT]
+        for name, value in zip(names[role], values, strict=True):
+            result.setdefault(name, []).append(OF_SLAVES + SENT_VALUES * place + value)
+    first = OF_SLAVES + SENT_VALUES * len(slaves)
+    return result | {
+        name: [first + i * n + storey for storey in range(n)] for i, name in enumerate(OF_STOREYS)
+    }
 
 
-def named(rows: Array, slaves: int, storeys: int) -> dict[str, Array]:
+def named(rows: Array, plan: Plan, slaves: Sequence[str]) -> dict[str, Array]:
     """Output rows (ticks, width) by signal: (ticks,) each, or with an axis for several slaves or several storeys."""
-    found = {name: rows[:, place] for name, place in layout(slaves, storeys).items()}
-    return {name: values[:, 0] if values.shape[1] == 1 else values for name, values in found.items()}
+    return {
+        name: rows[:, places[0]] if len(places) == 1 else rows[:, places]
+        for name, places in layout(plan, slaves).items()
+    }
 
 
 class Substructure(NamedTuple):
     """The numerical side with its memories, which `advance` moves on."""
 
-    compensator: Compensator
+    compensator: Compensator  # of the master's own laboratory
     codes: Codes
     scalars: Array
-    dampers: Array  # (3, slaves): λ, motor force over floor velocity N·s/m, and the force that a tick uses, N
+    places: Codes  # (2, laboratories): what each follows, and the storey or floor, from 0
+    labs: Array  # (8, laboratories): target over motion, λ, motor force over velocity N·s/m, correction, forces N
     mass: Array  # (n,) kg
     coefficients: Array  # of the integrator
     column_params: Array  # (n, parameters) of the numerical columns, or (n, n) their stiffness matrix N/m
     ground: Array  # (2, ticks + 1): acceleration m/s², displacement m
     state: Array  # (rows, n) of the integrator
     column_memory: Array  # (n, memory)
-    recent: Array  # (1 + slaves, RECENT): accelerations of specimen and floors, newest first, m/s²
-    filtered: Array  # (3,): the column force of the tick before, measured, corrected and to be used next, N
-    target: Array  # (1,): the specimen's target of the present tick, m
+    recent: Array  # (laboratories, RECENT): accelerations of the motion that each follows, newest first, m/s²
+    filtered: Array  # (laboratories, 3): force of the tick before, measured, corrected and to be used next, N
+    asked: Array  # (5,): what the master's own laboratory was told last, its target that of the present tick
     balance: Array  # (n,): external minus restoring force, N
     output: Array
 
@@ -103,44 +112,71 @@ def build(plan: Plan, rows: Array, p_delta: float = 0.0, *, slaves: bool = True)
     """The numerical side of a plan at rest; `rows` of the ground as `ground_rows` gives them.
 
     `p_delta` is the stiffness (N/m, negative) that gravity adds to every storey. Without `slaves` nothing is computed
-    for them: a building without dampers.
+    for them.
 
     Raises:
-        InputError: a model, method or parameter that the registries do not know.
+        InputError: a kind of laboratory, model, method or parameter that is not known, or a laboratory that has no
+            place in the building.
     """
-    column, chosen = plan.column, plan.compensator
-    mass = np.array(plan.structure.mass)
-    columns = numerical_columns(plan)
-    method = integration(plan)
-    compensator = compensators.build(chosen.kind, chosen.parameters, plan.test.interval)
-    labs = [plan.of(role) for role in plan.roles] if slaves else []
-    scalars = [
-        plan.test.interval,
-        column.deformation_ratio,
-        COLUMN.coupling(plan).scale,
-        *force_correction.coefficients(chosen.force, plan.test.interval),
-        p_delta,
-        float(chosen.force.unit_delay),
-    ]
-    n = plan.storeys
-    floors = [lab.damper.floor - 1 for lab in labs]
+    mass, n, interval = np.array(plan.structure.mass), plan.storeys, plan.test.interval
+    columns, method = numerical_columns(plan), integration(plan)
+    hosted = {role: kind for role, kind in kinds_of(plan).items() if slaves or role == MASTER}
+    couplings = {role: kind.coupling(plan.of(role)) for role, kind in hosted.items()}
+    for role, coupling in couplings.items():
+        check_place(plan, role, coupling)
+    labs = [laboratory(coupling, interval) for coupling in couplings.values()]
+    sent = SENT_VALUES * sum(role != MASTER for role in hosted)
     return Substructure(
-        compensator,
-        np.array([method.code, columns.code, column.storey - 1, *floors]),
-        np.array(scalars),
-        np.array([damper(lab) for lab in labs]).reshape(-1, FORCE_USED + 1).T.copy(),
+        own_compensator(plan),
+        np.array([method.code, columns.code, int(MASTER in hosted)]),
+        np.array([interval, p_delta]),
+        np.array([placed(coupling) for coupling in couplings.values()], dtype=np.int64)
+        .reshape(-1, 2)
+        .T.copy(),
+        np.array(labs).reshape(-1, EXERTED + 1).T.copy(),
         mass,
         method.coefficients,
         columns.params,
         rows,
         method.start(np.zeros(n), np.zeros(n), -mass * rows[0, 0]),
         columns.memory,
-        np.zeros((1 + len(labs), trend.RECENT)),
-        np.zeros(DELAYED + 1),
-        np.zeros(1),
+        np.zeros((len(labs), trend.RECENT)),
+        np.zeros((len(labs), DELAYED + 1)),
+        np.zeros(SENT_VALUES),
         np.zeros(n),
-        np.zeros(OF_SLAVES + SENT_VALUES * len(labs) + STOREY_VALUES * n),
+        np.zeros(OF_SLAVES + sent + STOREY_VALUES * n),
     )
+
+
+def check_place(plan: Plan, role: str, coupling: Coupling) -> None:
+    """Raise InputError where a laboratory's storey or floor is not in the building."""
+    if coupling.place > plan.storeys:
+        what = "storey" if coupling.follows is Follows.DRIFT else "floor"
+        raise InputError(
+            f"The laboratory of the {title(role)} stands at {what} {coupling.place}, but the structure has "
+            f"{plan.storeys}: look at its place in the plan."
+        )
+
+
+def own_compensator(plan: Plan) -> Compensator:
+    """The compensator of the master's laboratory; one that does nothing where it has none."""
+    interval, kind = plan.test.interval, kinds_of(plan).get(MASTER)
+    if kind is None:
+        return compensators.build("none", {}, interval)
+    chosen = kind.compensator(plan)
+    return compensators.build(chosen.kind, chosen.parameters, interval, chosen.where)
+
+
+def placed(coupling: Coupling) -> tuple[int, int]:
+    """A laboratory's column of `places`."""
+    return (DRIFT if coupling.follows is Follows.DRIFT else FLOOR, coupling.place - 1)
+
+
+def laboratory(coupling: Coupling, interval: float) -> list[float]:
+    """A laboratory's column of `labs` at an interval (s), no force used yet."""
+    memory, gain = force_correction.coefficients(coupling.correction, interval)
+    delayed = float(coupling.correction.unit_delay)
+    return [coupling.ratio, coupling.scale, coupling.effort, memory, gain, delayed, 0.0, 0.0]
 
 
 class NumericalColumns(NamedTuple):
@@ -170,12 +206,6 @@ def integration(plan: Plan) -> integrators.Method:
     return integrators.build(
         structure.integrator, numerical.M, numerical.C, K, plan.test.interval, structure.rho_infinity
     )
-
-
-def damper(plan: Plan) -> tuple[float, float, float]:
-    """A slave's column of `dampers`; zero where the building does without the damper."""
-    force_scale = TABLE.coupling(plan).scale
-    return force_scale, plan.control.gain / plan.damper.force_scale if force_scale else 0.0, 0.0
 
 
 def motion(plan: Plan) -> GroundMotion:
@@ -214,54 +244,72 @@ def couple(K: Array, state: Array, first: int, output: Array) -> None:
         output[first + i] = shear
 
 
+def forces(building: Substructure) -> Array:
+    """The slaves' forces (slaves,) N that the next tick uses, as measured: a view to be filled."""
+    return building.labs[FORCE_USED, building.codes[OWN] :]
+
+
 @jit
-def control(building: Substructure, tick: int) -> None:
-    """Targets of the tables and forces of the dampers' motors for the interval's end, into its `output`."""
-    codes, dampers, ground = building.codes, building.dampers, building.ground
-    state, recent, output = building.state, building.recent, building.output
-    interval = building.scalars[INTERVAL]
-    here, ahead = ground[1, tick], ground[1, tick + 1]
-    slaves = dampers.shape[1]
-    for slave in range(slaves):
-        floor, past, first = codes[FLOORS + slave], recent[1 + slave], OF_SLAVES + slave
-        trend.remember(past, state[ACCELERATION, floor])
-        output[first + TABLE_TARGET * slaves] = state[NEXT_DISPLACEMENT, floor] + ahead
-        output[first + TABLE_VELOCITY * slaves] = (
-            state[NEXT_VELOCITY, floor] + (ahead - here) / interval + 0.5 * interval * ground[0, tick + 1]
+def receive(building: Substructure, slave: int, force: float) -> None:
+    """The force (N) of a slave, as measured in its laboratory, that the next tick uses."""
+    building.labs[FORCE_USED, building.codes[OWN] + slave] = force
+
+
+@jit
+def tell(building: Substructure, lab: int, tick: int, told: Array, first: int) -> None:
+    """What a laboratory is told for the interval's end, into `told` from place `first` on."""
+    place, followed = building.places[PLACE, lab], building.places[FOLLOWED, lab]
+    labs, state, past = building.labs, building.state, building.recent[lab]
+    interval, ratio, ground = building.scalars[INTERVAL], labs[RATIO, lab], building.ground
+    if followed == DRIFT:
+        rate = shear_building.storey_drift(state[NEXT_VELOCITY], place)
+        trend.remember(past, ratio * shear_building.storey_drift(state[ACCELERATION], place))
+        told[first + SENT_TARGET] = ratio * shear_building.storey_drift(state[NEXT_DISPLACEMENT], place)
+        told[first + SENT_VELOCITY] = ratio * rate
+        told[first + SENT_ACCELERATION] = trend.ahead(past)
+        told[first + SENT_JERK] = trend.slope(past, interval)
+    else:
+        rate = state[NEXT_VELOCITY, place]
+        here, ahead = ground[1, tick], ground[1, tick + 1]
+        trend.remember(past, state[ACCELERATION, place])
+        told[first + SENT_TARGET] = ratio * (state[NEXT_DISPLACEMENT, place] + ahead)
+        told[first + SENT_VELOCITY] = ratio * (
+            rate + (ahead - here) / interval + 0.5 * interval * ground[0, tick + 1]
         )
-        output[first + TABLE_ACCELERATION * slaves] = trend.ahead(past) + ground[0, tick + 1]
-        output[first + TABLE_JERK * slaves] = (
+        told[first + SENT_ACCELERATION] = ratio * (trend.ahead(past) + ground[0, tick + 1])
+        told[first + SENT_JERK] = ratio * (
             trend.slope(past, interval) + (ground[0, tick + 1] - ground[0, tick]) / interval
         )
-        output[first + DAMPER_COMMAND * slaves] = dampers[MOTOR_GAIN, slave] * state[NEXT_VELOCITY, floor]
+    told[first + SENT_EFFORT] = labs[MOTOR_GAIN, lab] * rate
 
 
 @jit
-def enter(building: tuple[Any, ...], tick: int, column_displacement: float, column_force: float) -> None:
+def enter(building: tuple[Any, ...], tick: int, position: float, force: float) -> None:
     """`advance` for a caller outside compiled code, which holds the building as `compiled.plain` gives it."""
     whole = Substructure(Compensator(*building[0]), *building[1:])
-    advance(whole, tick, column_displacement, column_force)
+    advance(whole, tick, position, force)
 
 
 @jit
-def advance(building: Substructure, tick: int, column_displacement: float, column_force: float) -> None:
+def advance(building: Substructure, tick: int, position: float, force: float) -> None:
     """One tick: from the measurements at t_k to the commands for the interval's end, into the `output`.
 
-    `column_displacement` m and `column_force` N as measured at t_k; the dampers' forces, each at its own scale, stand
-    in their row of `dampers`. The memories move on by one interval.
+    `position` m and `force` N are those of the master's own laboratory as measured at t_k; the slaves' forces, each at
+    its own scale, have been given to `receive`. The memories move on by one interval.
     """
     codes, scalars, state, output = building.codes, building.scalars, building.state, building.output
-    ground, filtered = building.ground, building.filtered
-    corrected = force_correction.step(scalars[HIGH_PASS], scalars[HIGH_PASS_GAIN], filtered, column_force)
-    if scalars[UNIT_DELAY] != 0.0:
-        corrected, filtered[DELAYED] = filtered[DELAYED], corrected
-    equilibrate(building, tick, scalars[REPRESENTS] * corrected)
+    ground, own = building.ground, codes[OWN]
+    if own:
+        building.labs[FORCE_USED, 0] = force
+    exert(building)
+    equilibrate(building, tick)
     interval = scalars[INTERVAL]
     integrators.step(codes[INTEGRATOR], building.coefficients, state, building.balance, interval)
     output[GROUND_ACCELERATION] = ground[0, tick]
-    output[COLUMN_TARGET] = building.target[0]
-    output[ACTUATOR_COMMAND] = actuate(building, column_displacement)
-    control(building, tick)
+    if own:
+        actuate(building, tick, position)
+    for lab in range(own, building.labs.shape[1]):
+        tell(building, lab, tick, output, OF_SLAVES + SENT_VALUES * (lab - own))
     n = building.mass.size
     storeys = output.size - STOREY_VALUES * n
     for i in range(n):
@@ -273,18 +321,30 @@ def advance(building: Substructure, tick: int, column_displacement: float, colum
 
 
 @jit
-def equilibrate(building: Substructure, tick: int, specimen_force: float) -> None:
-    """External minus restoring force (N) of every floor at t_k into `balance`; numerical forces into `output`.
+def exert(building: Substructure) -> None:
+    """The force (N) of every laboratory on the building at t_k: the one used, corrected and scaled."""
+    labs = building.labs
+    for lab in range(labs.shape[1]):
+        filtered = building.filtered[lab]
+        corrected = force_correction.step(
+            labs[HIGH_PASS, lab], labs[HIGH_PASS_GAIN, lab], filtered, labs[FORCE_USED, lab]
+        )
+        if labs[UNIT_DELAY, lab] != 0.0:
+            corrected, filtered[DELAYED] = filtered[DELAYED], corrected
+        labs[EXERTED, lab] = labs[FORCE_SCALE, lab] * corrected
 
-    `specimen_force` N is what the specimen's storey feels of it.
-    """
-    codes, mass, dampers, state = building.codes, building.mass, building.dampers, building.state
-    balance, output = building.balance, building.output
+
+@jit
+def equilibrate(building: Substructure, tick: int) -> None:
+    """External minus restoring force (N) of every floor at t_k into `balance`; numerical forces into `output`."""
+    codes, mass, places, labs = building.codes, building.mass, building.places, building.labs
+    state, balance, output = building.state, building.balance, building.output
     n = mass.size
     for i in range(n):
         balance[i] = -mass[i] * building.ground[0, tick]
-    for slave in range(dampers.shape[1]):
-        balance[codes[FLOORS + slave]] += dampers[FORCE_SCALE, slave] * dampers[FORCE_USED, slave]
+    for lab in range(labs.shape[1]):
+        if places[FOLLOWED, lab] == FLOOR:
+            balance[places[PLACE, lab]] += labs[EXERTED, lab]
     forces = output.size - (STOREY_VALUES - STOREY_FORCE) * n
     if codes[SPECIMEN] == MATRIX:
         couple(building.column_params, state, forces, output)
@@ -298,21 +358,26 @@ def equilibrate(building: Substructure, tick: int, specimen_force: float) -> Non
         if building.scalars[P_DELTA] != 0.0:
             force += building.scalars[P_DELTA] * drift
         output[forces + i] = force
-        if i == codes[STOREY]:
-            force += specimen_force
+        for lab in range(labs.shape[1]):
+            if places[FOLLOWED, lab] == DRIFT and places[PLACE, lab] == i:
+                force += labs[EXERTED, lab]
         shear_building.add_nodal(-force, i, balance)
 
 
 @jit
-def actuate(building: Substructure, measured: float) -> float:
-    """Command (m) of the actuator for the interval's end, from the displacement `measured` (m) at t_k."""
-    scalars, state, recent = building.scalars, building.state, building.recent[0]
-    storey, interval, ratio = building.codes[STOREY], scalars[INTERVAL], scalars[RATIO]
-    present = building.target[0]
-    building.target[0] = ratio * shear_building.storey_drift(state[NEXT_DISPLACEMENT], storey)
-    rate = ratio * shear_building.storey_drift(state[NEXT_VELOCITY], storey)
-    trend.remember(recent, ratio * shear_building.storey_drift(state[ACCELERATION], storey))
+def actuate(building: Substructure, tick: int, measured: float) -> None:
+    """What the master's own laboratory does in the interval, into its `output`; `measured` m is its position at t_k."""
+    asked, output = building.asked, building.output
+    present = asked[SENT_TARGET]
+    tell(building, 0, tick, asked, 0)
     wanted = Wanted(
-        building.target[0], rate, trend.ahead(recent), trend.slope(recent, interval), present, measured
+        asked[SENT_TARGET],
+        asked[SENT_VELOCITY],
+        asked[SENT_ACCELERATION],
+        asked[SENT_JERK],
+        present,
+        measured,
     )
-    return compensators.step(building.compensator, wanted, interval)
+    output[TARGET] = present
+    output[COMMAND] = compensators.step(building.compensator, wanted, building.scalars[INTERVAL])
+    output[EFFORT] = asked[SENT_EFFORT]

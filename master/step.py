@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from common.plan.plan import Plan
-from common.signals import OF_STOREYS, SENT
 from loop import substructure
 from models.compiled import plain
 from models.registry import Array
@@ -40,11 +39,14 @@ class MasterStep:
     def __init__(self, plan: Plan, ground: Array, p_delta: float = 0.0) -> None:
         building = substructure.build(plan, ground, p_delta)
         self._building, self._output = plain(building), building.output
-        self._forces = building.dampers[substructure.FORCE_USED]
-        self._plain = plan.storeys == len(plan.roles) == 1
-        places = substructure.layout(len(plan.roles), plan.storeys)
-        self._sent = [places[name] for name in SENT]
-        self._storeys = [places[name] for name in OF_STOREYS]
+        self._forces = substructure.forces(building)
+        width, first = substructure.SENT_VALUES, substructure.OF_SLAVES
+        end = first + width * len(plan.roles)
+        self._sent = [slice(place, place + width) for place in range(first, end, width)]
+        n = plan.storeys
+        self._end = end
+        self._storeys = [slice(place, place + n) for place in range(end, building.output.size, n)]
+        self._one_storey = n == 1
         self._advance = substructure.enter
 
     def __call__(self, tick: int, position: float, force: float, forces: Sequence[float]) -> Outputs:
@@ -53,10 +55,7 @@ class MasterStep:
             self._forces[place] = used
         self._advance(self._building, tick, position, force)
         row = self._output.tolist()
-        ground, target, command = row[: substructure.OF_SLAVES]
-        if self._plain:
-            return Outputs(ground, target, command, 0.0, [tuple(row[3:8])], *row[8:])
-        sent = list(zip(*(row[place] for place in self._sent), strict=True))
-        storeys = (row[place] for place in self._storeys)
-        values = (of if len(of) > 1 else of[0] for of in storeys)
-        return Outputs(ground, target, command, 0.0, sent, *values)
+        sent = [tuple(row[place]) for place in self._sent]
+        ground, target, command, effort = row[: substructure.OF_SLAVES]
+        storeys = row[self._end :] if self._one_storey else [row[place] for place in self._storeys]
+        return Outputs(ground, target, command, effort, sent, *storeys)

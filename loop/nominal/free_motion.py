@@ -13,7 +13,8 @@ import numpy as np
 
 from common.plan.plan import Plan
 from common.plan.tables import Sensors
-from loop.closed_loop import simulate, stacked
+from laboratories.kinds import kinds_of
+from loop.closed_loop import by_role, simulate
 from loop.nominal.partition import matrices
 from models.indicators.growth import grows
 from models.registry import Array
@@ -25,7 +26,7 @@ PERIODS = (
 PULSE = 0.1  # of the first period
 PUSH = 1e-3  # m/s², of the pulse: so small that a specimen keeps its first stiffness
 MOST_TICKS = 200_000  # of the watched motion: 400 s at 2 ms, computed in some hundredths of a second
-WATCHED = ("displacement", "column_target", "actuator_command", "table_command", "damper_stroke")
+METRES = "m"
 SILENT = Sensors(*[0.0] * len(Sensors.__dataclass_fields__))
 
 
@@ -43,5 +44,15 @@ def unstable(plan: Plan) -> bool:
 def moved(plan: Plan, ground: Array) -> list[Array]:
     """What moves in the loop, by tick; a single row that is not finite where the loop diverges."""
     rollout = simulate(plan, ground)
-    columns = stacked(rollout)
-    return [columns[name] for name in WATCHED] if rollout.finite else [np.full((plan.ticks, 1), math.nan)]
+    if not rollout.finite:
+        return [np.full((plan.ticks, 1), math.nan)]
+    found = [rollout.master["displacement"]]
+    columns = by_role(plan, rollout)
+    for role, kind in kinds_of(plan).items():
+        channels = kind.channels
+        moving = [
+            row.name for row in channels.measured if row.unit == METRES and row.name != channels.position
+        ]
+        names = (channels.target.name, channels.command.name, *moving)
+        found += [columns[role][name] for name in names]
+    return found

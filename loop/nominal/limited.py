@@ -7,37 +7,85 @@ from collections.abc import Mapping
 import numpy as np
 
 from common.plan.plan import Plan
+from common.plan.tables import Limits
+from common.roles import MASTER
+from common.signals import UNITS_OF_RATES
+from laboratories.kind import Kind
+from laboratories.kinds import kinds_of
+from loop.substructure import OF_STOREYS
 from models.registry import Array
 
 PATIENCE = 3  # intervals for which an error must be beyond its limit
 ENERGIES = ("numerical_drift", "error_energy")  # sums over a whole test, which a running test watches
+RULES = {name: field.metadata["rule"] for name, field in Limits.__dataclass_fields__.items()}
 
 
-def magnitudes(plan: Plan, columns: Mapping[str, Array]) -> dict[str, Array]:
-    """Magnitude of every limited quantity, its tables' and dampers' the largest of all slaves, (ticks,) each.
+def most(plan: Plan) -> dict[str, float]:
+    """The limits by the names of the quantities that the plan's test has, the least where laboratories differ."""
+    given = vars(plan.limits)
+    found = {name: given[name] for name in OF_STOREYS if name in given}
+    for role, kind in kinds_of(plan).items():
+        limits = kind.limits(plan.of(role))
+        for name in quantities(kind):
+            if name in limits:
+                found[name] = min(limits[name], found.get(name, limits[name]))
+    order = {name: place for place, name in enumerate(given)}
+    return dict(sorted(found.items(), key=lambda one: order.get(one[0], len(order))))
 
-    `columns` by name as `closed_loop.signals` gives them, further axes for storeys and slaves. The two energies of
-    [limits] are not among them.
+
+def quantities(kind: Kind) -> dict[str, str]:
+    """The units of what a kind of laboratory may limit, by name."""
+    channels, limited = kind.channels, kind.limited
+    found = {signal.name: signal.unit for signal in (*channels.driving, channels.command, *channels.measured)}
+    found |= dict(zip(channels.rates, UNITS_OF_RATES, strict=True))
+    found |= {limited.step: "m", limited.velocity: "m/s", limited.acceleration: "m/s²"}
+    found |= {limited.effort_step: "N", limited.error: "m"}
+    return {name: unit for name, unit in found.items() if name}
+
+
+def unit_of(plan: Plan, name: str) -> str:
+    """The unit of a limited quantity."""
+    if name in RULES:
+        return str(RULES[name].unit)
+    return next(units[name] for units in map(quantities, kinds_of(plan).values()) if name in units)
+
+
+def magnitudes(plan: Plan, columns: Mapping[str, Mapping[str, Array]]) -> dict[str, Array]:
+    """Magnitude of every limited quantity, the largest of all laboratories and storeys, (ticks,) each.
+
+    `columns` by role and name as `closed_loop.by_role` gives them. The two energies of [limits] are not among them.
     """
+    found: dict[str, Array] = {}
     with np.errstate(over="ignore", invalid="ignore"):  # a loop that diverged
-        every = {name: largest(values) for name, values in columns.items()} | derived(plan, columns)
-    return {name: every[name] for name in vars(plan.limits) if name not in ENERGIES}
+        of_building = {name: columns[MASTER][name] for name in OF_STOREYS if name in RULES}
+        every = [of_building] + [
+            {name: columns[role][name] for name in quantities(kind) if name in columns[role]}
+            | derived(plan, kind, columns[role], own=role == MASTER)
+            for role, kind in kinds_of(plan).items()
+        ]
+        for of_role in every:
+            for name, values in of_role.items():
+                top = largest(values)
+                found[name] = np.maximum(found[name], top) if name in found else top
+    return {name: found[name] for name in most(plan) if name in found}
 
 
-def derived(plan: Plan, columns: Mapping[str, Array]) -> dict[str, Array]:
-    """The limited quantities that are no signals: rates, steps and lasting errors."""
-    interval = plan.test.interval
-    actuator, table = (steps(columns[f"{part}_command"]) for part in ("actuator", "table"))
-    return {
-        "actuator_step": largest(actuator),
-        "actuator_velocity": largest(actuator) / interval,
-        "actuator_acceleration": largest(steps(actuator)) / interval**2,
-        "column_error": lasting(columns["column_displacement"] - columns["column_target"]),
-        "table_step": largest(table),
-        "table_velocity": largest(table) / interval,
-        "table_error": lasting(columns["table_displacement"] - before(columns["table_target"])),
-        "damper_step": largest(steps(columns["damper_command"])),
+def derived(plan: Plan, kind: Kind, columns: Mapping[str, Array], *, own: bool) -> dict[str, Array]:
+    """The limited quantities of a laboratory that are no signals: rates, steps and lasting errors.
+
+    The target of the master's `own` is that of the tick, a slave's that of the interval's end.
+    """
+    interval, limited, channels = plan.test.interval, kind.limited, kind.channels
+    command, target = steps(columns[channels.command.name]), columns[channels.target.name]
+    found = {
+        limited.step: command,
+        limited.velocity: command / interval,
+        limited.acceleration: steps(command) / interval**2,
+        limited.error: lasting(columns[channels.position] - (target if own else before(target))),
     }
+    if channels.effort:
+        found[limited.effort_step] = steps(columns[channels.effort.name])
+    return {name: values for name, values in found.items() if name}
 
 
 def largest(values: Array) -> Array:

@@ -1,15 +1,16 @@
-"""A plan's building cut in two: the numerical part, what the specimen takes over, and what its path can bear.
+"""A plan's building cut in two: the numerical part, what its specimens take over, and what their paths can bear.
 
-    M = M_N + m_e·1_s·1_sᵀ,    C = C_N + c_e·e·eᵀ,    K = K_N + k_e·e·eᵀ
+    M = M_N + Σ m_e·1_s·1_sᵀ,    C = C_N + Σ c_e·e·eᵀ,    K = K_N + Σ k_e·e·eᵀ
 
-with the whole building's matrices on the left, e the drift of the specimen's storey as a row over the floors and 1_s
-the floor above it. What the specimen really is stands in `[column]`: as the building feels it, its stiffness, dashpot
-and mass count `represents` times the deformation ratio.
+with the whole building's matrices on the left and one term for every laboratory that follows a drift: e the drift of
+its storey as a row over the floors and 1_s the floor above it. What a specimen really is, as the building feels it,
+says its kind; of a column stiffness, dashpot and mass count `represents` times the deformation ratio.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +18,11 @@ import numpy as np
 from common.errors import InputError
 from common.plan.plan import Plan
 from common.plan.tables import Experimental
-from loop.nominal.path import Path, path_at
+from common.roles import MASTER
+from laboratories.kind import Coupling, Follows
+from laboratories.kinds import kind_of, kinds_of
+from loop.nominal import critical
+from loop.nominal.path import NO_PATH, Path, path_at
 from models import indicators
 from models.registry import Array
 from models.structures import shear_building
@@ -56,78 +61,105 @@ def matrices(plan: Plan) -> Matrices:
     return Matrices(M, C, K)
 
 
+def drifts(plan: Plan) -> dict[str, Coupling]:
+    """The laboratories that follow the drift of a storey, by role; raises InputError where a kind cannot be loaded."""
+    couplings = {role: kind.coupling(plan.of(role)) for role, kind in kinds_of(plan).items()}
+    return {role: one for role, one in couplings.items() if one.follows is Follows.DRIFT}
+
+
 def numerical(plan: Plan) -> Matrices:
-    """The numerical part: the whole building without what the specimen takes over.
+    """The numerical part: the whole building without what the specimens take over.
 
     Raises:
-        InputError: a mass, stiffness or dashpot cannot be, or the specimen takes over all of the modal damping.
+        InputError: a mass, stiffness or dashpot cannot be, a specimen takes over all of the modal damping, or
+            `[structure.experimental]` does not belong to exactly one specimen.
     """
-    whole, left_out = matrices(plan), taken_over(plan)
-    if plan.structure.damping_ratio > 0.0 and left_out.damping > 0.0:
-        check_damping(plan, whole, left_out.damping)
-    M = whole.M.copy()
-    M[plan.column.storey - 1, plan.column.storey - 1] -= left_out.mass
-    direction = drift_direction(plan)
-    outer = np.outer(direction, direction)
-    return Matrices(M, whole.C - left_out.damping * outer, whole.K - left_out.stiffness * outer)
+    found = drifts(plan)
+    check_experimental(plan, len(found))
+    whole = matrices(plan)
+    M, C, K = whole.M.copy(), whole.C, whole.K
+    for role, coupling in found.items():
+        left_out = taken_over(plan, role)
+        if plan.structure.damping_ratio > 0.0 and left_out.damping > 0.0:
+            check_damping(plan, whole, left_out.damping, role)
+        M[coupling.place - 1, coupling.place - 1] -= left_out.mass
+        direction = drift_direction(plan, role)
+        outer = np.outer(direction, direction)
+        C, K = C - left_out.damping * outer, K - left_out.stiffness * outer
+    return Matrices(M, C, K)
 
 
-def check_damping(plan: Plan, whole: Matrices, damping: float) -> None:
+def check_experimental(plan: Plan, specimens: int) -> None:
+    """Raise InputError where `[structure.experimental]` does not belong to exactly one specimen."""
+    if plan.structure.experimental is not None and specimens != 1:
+        raise InputError(
+            f"[structure.experimental] says what one specimen takes over, but {specimens} laboratories follow a "
+            "storey's drift: leave it out, or leave one such laboratory."
+        )
+
+
+def check_damping(plan: Plan, whole: Matrices, damping: float, role: str) -> None:
     """Raise InputError where a dashpot (N·s/m) is not below what the modal damping has against the storey's drift.
 
     That is `1/(eᵀ·C⁻¹·e)`, with `C⁻¹ = Φ·diag(1/(2ζω))·Φᵀ` and Φ of modal mass 1; at or beyond it C_N would not be
     positive definite.
     """
     modes = shear_building.modes(*whole)
-    parts = (drift_direction(plan) @ modes.shapes) ** 2
+    parts = (drift_direction(plan, role) @ modes.shapes) ** 2
     takes_part = parts > np.finfo(np.float64).eps * parts.sum()  # rigid modes without this drift have no say
     rate = float(parts[takes_part] @ modes.periods[takes_part]) / (
         4.0 * math.pi * plan.structure.damping_ratio
     )
     if damping * rate >= 1.0:
+        storey = coupling_of(plan, role).place
         raise InputError(
             f"damping in [structure.experimental] is {damping:g}, but with damping_ratio "
-            f"{plan.structure.damping_ratio:g} the drift of storey {plan.column.storey} of the whole building has "
+            f"{plan.structure.damping_ratio:g} the drift of storey {storey} of the whole building has "
             f"{1.0 / rate:g}: give less than that."
         )
 
 
-def taken_over(plan: Plan) -> Experimental:
-    """What the specimen takes over: as the plan says, else its share of the storey's columns."""
+def coupling_of(plan: Plan, role: str) -> Coupling:
+    """The place of a role's laboratory in the building; raises InputError where it has none."""
+    return kind_of(plan, role).coupling(plan.of(role))
+
+
+def taken_over(plan: Plan, role: str = MASTER) -> Experimental:
+    """What a role's specimen takes over: as the plan says, else its share of the storey's columns."""
     if plan.structure.experimental is not None:
         return plan.structure.experimental
-    share = storey_stiffness(plan)
-    share *= plan.column.represents / plan.column.columns_per_storey
-    return Experimental(stiffness=share)
+    share = coupling_of(plan, role).share
+    return Experimental(stiffness=storey_stiffness(plan, role) * share if share else 0.0)
 
 
 def storey_stiffnesses(plan: Plan) -> Array:
     """Stiffness (N/m) of the numerical columns of every storey, (n,); of a plan that has no matrix."""
-    own = np.array(plan.structure.stiffness)
-    place, column = plan.column.storey - 1, plan.column
-    if plan.structure.experimental is None:
-        own[place] *= 1.0 - column.represents / column.columns_per_storey
-    else:
-        own[place] -= plan.structure.experimental.stiffness
+    own, shares = np.array(plan.structure.stiffness), np.zeros(plan.storeys)
+    for coupling in drifts(plan).values():
+        if plan.structure.experimental is None:
+            shares[coupling.place - 1] += coupling.share
+        else:
+            own[coupling.place - 1] -= plan.structure.experimental.stiffness
+    own[shares > 0.0] *= 1.0 - shares[shares > 0.0]
     return own
 
 
-def storey_stiffness(plan: Plan) -> float:
-    """Stiffness (N/m) of the whole building's storey in which the specimen stands.
+def storey_stiffness(plan: Plan, role: str = MASTER) -> float:
+    """Stiffness (N/m) of the whole building's storey in which a role's specimen stands.
 
     Of a matrix, what a pair of forces on the storey's two floors finds against its drift, `1/(eᵀ·K⁻¹·e)`: in a shear
     building the storey's own stiffness.
     """
-    value = plan.structure.stiffness[plan.column.storey - 1]
+    value = plan.structure.stiffness[coupling_of(plan, role).place - 1]
     if not isinstance(value, tuple):
         return value
-    direction = drift_direction(plan)
+    direction = drift_direction(plan, role)
     return 1.0 / float(direction @ np.linalg.solve(np.array(plan.structure.stiffness), direction))
 
 
-def drift_direction(plan: Plan) -> Array:
-    """The specimen's storey drift as a row over the floors' displacements, (n,)."""
-    storey = plan.column.storey - 1
+def drift_direction(plan: Plan, role: str = MASTER) -> Array:
+    """The drift of a role's storey as a row over the floors' displacements, (n,)."""
+    storey = coupling_of(plan, role).place - 1
     direction = np.zeros(plan.storeys)
     direction[storey] = 1.0
     if storey > 0:
@@ -135,35 +167,39 @@ def drift_direction(plan: Plan) -> Array:
     return direction
 
 
-def felt(plan: Plan) -> Felt:
-    """The nominal specimen as its storey feels it."""
-    column = plan.column
-    scale = column.deformation_ratio * column.represents
-    return Felt(scale * column.stiffness, scale * column.damping, scale * column.mass)
+def felt(plan: Plan, role: str = MASTER) -> Felt:
+    """A role's nominal specimen as its storey feels it."""
+    coupling = coupling_of(plan, role)
+    return Felt(coupling.stiffness, coupling.damping, coupling.mass)
 
 
 def critical_delay_of(plan: Plan) -> float:
-    """Smallest delay (s) of the column's force that makes the linear loop unstable.
+    """Smallest delay (s) of all specimens' forces alike that makes the linear loop unstable; inf without a specimen.
 
     Raises:
         InputError: no specimen could stabilise the numerical part.
     """
-    part, specimen = numerical(plan), felt(plan)
-    return indicators.critical_delay(
-        *part, drift_direction(plan), specimen.stiffness, specimen.damping, specimen.mass
-    )
+    found = drifts(plan)
+    if not found:
+        return math.inf
+    directions = np.stack([drift_direction(plan, role) for role in found])
+    specimens = np.array([felt(plan, role) for role in found])
+    if np.all(directions == directions[0]):  # one storey: the specimens act as one
+        stiffness, damping, mass = specimens.sum(axis=0).tolist()
+        return indicators.critical_delay(*numerical(plan), directions[0], stiffness, damping, mass)
+    return critical.critical_delay(*numerical(plan), directions, specimens)
 
 
-def damping_lost(plan: Plan, path: indicators.FrequencyEvaluation | Path) -> float:
-    """Damping ratio of the building's first mode that an amplitude and a delay of the column's path cost.
+def damping_lost(plan: Plan, path: indicators.FrequencyEvaluation | Path, role: str = MASTER) -> float:
+    """Damping ratio of the building's first mode that an amplitude and a delay of a specimen's path cost.
 
     Of a specimen `k + jω·c − ω²·m` behind a path `A·e^(−jωd)`: what the spring and the mass lose, as damping
     equivalent, and the share `1 − A·cos(ωd)` of its dashpot.
     """
     modes = shear_building.modes(*matrices(plan))
     omega = 2.0 * math.pi / float(modes.periods[0])
-    specimen = felt(plan)
-    drift = float(drift_direction(plan) @ modes.shapes[:, 0]) ** 2
+    specimen = felt(plan, role)
+    drift = float(drift_direction(plan, role) @ modes.shapes[:, 0]) ** 2
     share = (specimen.stiffness - omega**2 * specimen.mass) * drift
     lost, _ = indicators.damping_equivalent(share, path.amplitude, path.delay, omega)
     lost += specimen.damping * drift * (1.0 - path.amplitude * math.cos(omega * path.delay))
@@ -171,19 +207,21 @@ def damping_lost(plan: Plan, path: indicators.FrequencyEvaluation | Path) -> flo
 
 
 class Partition(NamedTuple):
-    """Margins of the column's path, from nominal models."""
+    """Margins of the specimens' paths, from nominal models; amplitude and delay are those of the latest path."""
 
     frequency: float  # Hz, of the building's first mode
     critical_delay: float  # s, inf where no delay makes the loop unstable
     sensitivity: float  # predictive stability indicator, log10 of it in ms
-    amplitude: float  # of the compensated actuator at that frequency
-    delay: float  # s, there, with the interval that a unit delay of the force adds; inf where the path is unstable
-    damping_points: float  # damping ratio that the path costs the first mode, inf where the loop is unstable
-    stable: bool = True  # whether the compensated actuator comes to rest by itself
+    amplitude: float  # of that compensated transfer system at that frequency
+    delay: float  # s, there, with the intervals that the force waits; inf where a path is unstable
+    damping_points: float  # damping ratio that the paths cost the first mode, inf where the loop is unstable
+    stable: bool = True  # whether every compensated transfer system comes to rest by itself
+    role: str = MASTER  # whose path is the latest, the first that is unstable where one is
+    paths: Mapping[str, Path] = {}  # of every laboratory that follows a drift, by role
 
     @property
     def unstable(self) -> bool:
-        """Whether the loop of building and specimen is unstable: its path by itself, or by its delay."""
+        """Whether the loop of building and specimens is unstable: a path by itself, or by its delay."""
         return not self.stable or self.delay >= self.critical_delay
 
 
@@ -191,14 +229,20 @@ def assess(plan: Plan) -> Partition:
     """The partition of a plan; raises InputError where a model or parameter is unknown."""
     modes = shear_building.modes(*matrices(plan))
     frequency = 1.0 / float(modes.periods[0])
-    critical = critical_delay_of(plan)
-    path = path_at(plan, frequency)
+    bearable = critical_delay_of(plan)
+    paths = {role: path_at(plan, frequency, role) for role in drifts(plan)}
+    role = max(paths, key=lambda one: paths[one].delay, default=MASTER)
+    path = paths.get(role, NO_PATH)
+    borne = all(one.stable for one in paths.values()) and path.delay < bearable
+    lost = sum(damping_lost(plan, one, of) for of, one in paths.items()) if borne else math.inf
     return Partition(
         frequency,
-        critical,
-        indicators.predictive_stability_indicator(critical),
+        bearable,
+        indicators.predictive_stability_indicator(bearable),
         path.amplitude,
         path.delay,
-        damping_lost(plan, path) if path.stable and path.delay < critical else math.inf,
+        lost,
         path.stable,
+        role,
+        paths,
     )

@@ -1,14 +1,21 @@
-"""The column's path: from the building's target to what the compensated nominal actuator achieves of it."""
+"""A specimen's path: from the building's target to what the compensated nominal transfer system achieves of it."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from common.plan.plan import Plan
+from common.plan.tables import TableCompensator
+from common.roles import MASTER
 from laboratories.column import model as column_lab
+from laboratories.column.kind import COLUMN
+from laboratories.kind import Kind
+from laboratories.kinds import kind_of
+from loop import site
 from models import excitation, indicators
 from models.compensators.follower import Follower
 from models.compiled import plain
@@ -16,6 +23,7 @@ from models.excitation import Programme, join
 from models.excitation.pieces import Piece, sine
 from models.indicators.growth import grows
 from models.registry import Array
+from models.system import System
 
 CYCLES = 12  # of the sine at which amplitude and delay are found
 LEAST_CYCLES = 2.0  # s, as many cycles of it as that where they are more
@@ -35,31 +43,34 @@ class Path(NamedTuple):
 
     amplitude: float  # achieved over target, –
     delay: float  # s, negative where it leads; inf where the path is unstable
-    stable: bool  # whether the actuator comes to rest under its compensator, without the building
+    stable: bool  # whether the transfer system comes to rest under its compensator, without the building
 
 
+NO_PATH = Path(1.0, 0.0, stable=True)
 UNSTABLE = Path(math.inf, math.inf, stable=False)
 
 
-def path_at(plan: Plan, frequency: float) -> Path:
-    """Amplitude and delay of the column's path for a sine of that frequency (Hz).
+def path_at(plan: Plan, frequency: float, role: str = MASTER) -> Path:
+    """Amplitude and delay of the path of a role's laboratory for a sine of that frequency (Hz).
 
-    The path is the compensated nominal actuator, and the interval by which `unit_delay` holds back the force. The
-    delay follows the phase continuously from frequency zero, so that it may be longer than half a period.
+    The path is the compensated nominal transfer system, the interval that the force of a slave takes to the master, and
+    the one by which `unit_delay` holds back the force. The delay follows the phase continuously from frequency zero, so
+    that it may be longer than half a period.
     """
     interval, frequency = plan.test.interval, max(frequency, LOWEST)
-    programme = join([pulse(interval, frequency)], interval, still=watched(plan, frequency))
-    target, achieved = follow(plan, programme)
+    waits = (role != MASTER) + kind_of(plan, role).coupling(plan.of(role)).correction.unit_delay
+    programme = join([pulse(interval, frequency)], interval, still=watched(plan.of(role), frequency))
+    target, achieved = follow(plan, programme, role)
     begin = programme.segments[0].end
     if achieved.size != target.size or grows(achieved[begin:]):
         return UNSTABLE
     whole = phase_delay(target, achieved, interval, frequency)
     cycles = max(CYCLES, round(LEAST_CYCLES * frequency))
     piece = sine(interval, frequency, amplitude=AMPLITUDE, cycles=cycles)
-    found = indicators.frequency_evaluation_index(*follow(plan, join([piece], interval)), interval)
+    found = indicators.frequency_evaluation_index(*follow(plan, join([piece], interval), role), interval)
     turns = round((whole - found.delay) * found.frequency)
     delay = found.delay + turns / found.frequency
-    return Path(found.amplitude, delay + interval * plan.compensator.force.unit_delay, stable=True)
+    return Path(found.amplitude, delay + interval * waits, stable=True)
 
 
 def watched(plan: Plan, frequency: float) -> float:
@@ -90,15 +101,36 @@ def phase_delay(target: Array, achieved: Array, interval: float, frequency: floa
     return -phase / (2.0 * math.pi * frequency)
 
 
-def follow(plan: Plan, programme: Programme) -> tuple[Array, Array]:
-    """Target and achieved displacement of the compensated nominal actuator, m; the latter ends where it diverges."""
-    follower = Follower(plan.compensator, programme, plan.test.interval)
-    lab = plain(column_lab.build(plan.test.interval, plan.actuator, plan.column))
+def follow(plan: Plan, programme: Programme, role: str = MASTER) -> tuple[Array, Array]:
+    """Target and achieved position of the compensated nominal transfer system, m; the latter ends where it diverges."""
+    kind, seen = kind_of(plan, role), plan.of(role)
+    chosen = kind.compensator(seen)
+    follower = Follower(
+        TableCompensator(chosen.kind, dict(chosen.parameters)), programme, plan.test.interval, chosen.where
+    )
+    step = stepped(kind, System(seen))
     target = programme.motion[excitation.POSITION]
     achieved = np.zeros(target.size)
     for tick in range(target.size - 1):
         _, command = follower(tick, float(achieved[tick]))
         if not abs(command) <= FARTHEST:
             return target, achieved[: tick + 1]
-        achieved[tick + 1] = column_lab.enter(lab, command)[0]
+        achieved[tick + 1] = step(command)
     return target, achieved
+
+
+def stepped(kind: Kind, system: System) -> Callable[[float], float]:
+    """The nominal laboratory of a kind, from command (m) to position (m) at the interval's end."""
+    if kind is COLUMN:
+        plan = system.plan
+        lab = plain(column_lab.build(plan.test.interval, plan.actuator, plan.column))
+        return lambda command: column_lab.enter(lab, command)[0]
+    played = site.build(kind, system, np.zeros((1, len(kind.channels.names))))
+    drive, position = np.zeros((1, 2)), kind.channels.names.index(kind.channels.position)
+
+    def step(command: float) -> float:
+        drive[0, 0] = command
+        site.play(played, drive, system.plan.test.interval, 0, 1)
+        return float(played.truth[position])
+
+    return step

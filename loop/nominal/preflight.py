@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -10,13 +11,18 @@ import numpy as np
 
 from common.lab.preflight import Check
 from common.plan import patience
+from common.plan.kinds import TABLE
 from common.plan.plan import Plan
-from common.plan.tables import Limits
+from common.plan.tables import Control
+from common.roles import MASTER, name_of, title
 from common.safety.risks import Risk
+from laboratories.column.kind import COLUMN
+from laboratories.kind import Chosen, Kind
+from laboratories.kinds import kind_of
 from loop import substructure
-from loop.closed_loop import simulate, stacked
+from loop.closed_loop import by_role, simulate
 from loop.nominal import free_motion, limited
-from loop.nominal.partition import Partition, assess
+from loop.nominal.partition import Partition, assess, drifts
 from models.compensators import COMPENSATORS
 from models.registry import Array
 
@@ -24,7 +30,7 @@ MOST_TICKS = 1_000_000  # of the simulation, which is kept in memory
 AMPLITUDE_ERROR = (
     0.2  # of the compensated actuator's amplitude: a stiffness wrong by a fifth is another specimen
 )
-LIMITS: dict[str, Any] = {name: field.metadata["rule"] for name, field in Limits.__dataclass_fields__.items()}
+LIMITS: dict[str, Any] = limited.RULES
 
 
 class Findings(NamedTuple):
@@ -56,8 +62,11 @@ def checks(plan: Plan) -> list[Check]:
 
 
 def expected_delay(plan: Plan, found: Partition) -> float:
-    """Delay (s) to expect in the column's path: the compensated actuator's, and one interval for a late tick."""
-    return found.delay + plan.test.interval
+    """Delay (s) to expect in the latest path: the compensated transfer system's, and one interval for a late tick.
+
+    None without a path.
+    """
+    return found.delay + plan.test.interval if found.paths else 0.0
 
 
 def partition_check(plan: Plan, found: Partition) -> Check:
@@ -68,16 +77,16 @@ def partition_check(plan: Plan, found: Partition) -> Check:
 def partition_risk(plan: Plan, found: Partition) -> Risk | None:
     """The risk of a delay too near to what the partition bears; None where the plan's margin is kept."""
     if not found.stable:
-        return Risk("partition", unstable_path(plan))
+        return Risk("partition", unstable_path(plan, found.role))
     if keeps_margin(plan, found):
         return None
     expected, margin = expected_delay(plan, found), plan.preflight.delay_margin
     return Risk(
         "partition",
-        f"the column's path is unstable beyond {found.critical_delay * 1e3:.1f} ms of delay, and "
+        f"{path_of(plan, found.role)} is unstable beyond {found.critical_delay * 1e3:.1f} ms of delay, and "
         f"{expected * 1e3:.1f} ms are expected with a required margin of {margin:g}, so "
-        f"{compensation(plan, found.delay)}, give the structure more mass or damping, or let the specimen stand for "
-        "less of its stiffness",
+        f"{compensation(plan, found.delay, found.role)}, give the structure more mass or damping, or let the specimen "
+        "stand for less of its stiffness",
     )
 
 
@@ -87,52 +96,99 @@ def keeps_margin(plan: Plan, found: Partition) -> bool:
     return expected <= 0.0 or found.critical_delay >= plan.preflight.delay_margin * expected
 
 
-def unstable_path(plan: Plan) -> str:
-    """What is wrong with an actuator that is unstable under its compensator, and what to change."""
-    chosen, actuator = plan.compensator, plan.actuator
-    late = actuator.servo.delay if actuator.model == "servo_hydraulic" else actuator.delay
+def path_of(plan: Plan, role: str) -> str:
+    """A specimen's path as a sentence names it, with its laboratory where there are several."""
+    kind = kind_of(plan, role)
+    if len(drifts(plan)) == 1 and kind is COLUMN:
+        return "the column's path"
+    return f"the path of the {kind.says} of the {title(role)}"
+
+
+def chosen_of(plan: Plan, role: str) -> tuple[Chosen, str]:
+    """The compensator of a role's laboratory, and the table of the plan in which it is to be changed."""
+    chosen = kind_of(plan, role).compensator(plan.of(role))
+    return chosen, f"{role}.{chosen.where}" if name_of(role) and not name_of(chosen.where) else chosen.where
+
+
+def unstable_path(plan: Plan, role: str) -> str:
+    """What is wrong with a transfer system that is unstable under its compensator, and what to change."""
+    (chosen, where), kind = chosen_of(plan, role), kind_of(plan, role)
     gains = ", ".join(f"{name} = {value:g}" for name, value in chosen.parameters.items()) or "its defaults"
+    system, late, remedy = transfer_system(plan.of(role), kind)
     return (
-        f"the column's path is unstable by itself: the actuator, with {late * 1e3:.1f} ms of dead time, does not come "
-        f"to rest under compensator '{chosen.kind}' ({gains}), so lower the feedback's gains in [compensator] or take "
-        "one that only feeds forward, lower the delay in [actuator], or shorten interval in [test]"
+        f"{path_of(plan, role)} is unstable by itself: the {system}{late}, does not come "
+        f"to rest under compensator '{chosen.kind}' ({gains}), so lower the feedback's gains in [{where}] or take "
+        f"one that only feeds forward, {remedy}or shorten interval in [test]"
     )
 
 
-def compensation(plan: Plan, left: float) -> str:
-    """What to change in [compensator] to take away the delay (s) that it leaves; a lead only where it then serves."""
-    chosen = plan.compensator
+def transfer_system(plan: Plan, kind: Kind) -> tuple[str, str, str]:
+    """What a kind's transfer system is called, its dead time and what to do about it, in words."""
+    if kind is not COLUMN:
+        return kind.says, "", ""
+    actuator = plan.actuator
+    late = actuator.servo.delay if actuator.model == "servo_hydraulic" else actuator.delay
+    return "actuator", f", with {late * 1e3:.1f} ms of dead time", "lower the delay in [actuator], "
+
+
+def compensation(plan: Plan, left: float, role: str = MASTER) -> str:
+    """What to change in a role's compensator to take away the delay (s) that it leaves; a lead only where it serves."""
+    chosen, where = chosen_of(plan, role)
+    system = transfer_system(plan, kind_of(plan, role))[0]
     lead = chosen.parameters.get("lead", 0.0)
     if chosen.kind == "none":
-        return "compensate the actuator in [compensator]"
+        return f"compensate the {system} in [{where}]"
     if "lead" not in chosen.parameters or left <= 0.0:
-        return "compensate the actuator better in [compensator]"
+        return f"compensate the {system} better in [{where}]"
     longer = round(lead + left * (1.0 + chosen.parameters.get("proportional", 0.0)), 4)
-    if not serves(plan, longer):
+    if not serves(plan, longer, role):
         return (
-            "lower the delay in [actuator] (no lead in [compensator] makes up for the "
-            f"{left * 1e3:.1f} ms that are left)"
+            f"lower the delay {'in [actuator]' if system == 'actuator' else f'of the {system}'} (no lead in [{where}] "
+            f"makes up for the {left * 1e3:.1f} ms that are left)"
         )
     return (
-        f"raise lead in [compensator] from {lead * 1e3:.1f} ms to {longer * 1e3:.1f} ms, which takes away the "
+        f"raise lead in [{where}] from {lead * 1e3:.1f} ms to {longer * 1e3:.1f} ms, which takes away the "
         f"{left * 1e3:.1f} ms that are left"
     )
 
 
-def serves(plan: Plan, lead: float) -> bool:
-    """Whether the plan's compensator with that lead (s) keeps margin and amplitude."""
-    chosen = plan.compensator
+def serves(plan: Plan, lead: float, role: str = MASTER) -> bool:
+    """Whether the compensator of a role's laboratory with that lead (s) keeps margin and amplitude."""
+    chosen, _ = chosen_of(plan, role)
     if not COMPENSATORS[chosen.kind].rules["lead"].admits(lead):
         return False
-    led = replace(plan, compensator=replace(chosen, parameters=chosen.parameters | {"lead": lead}))
+    led = led_by(plan, lead, role)
     found = assess(led)
-    return found.stable and keeps_margin(led, found) and abs(found.amplitude - 1.0) <= AMPLITUDE_ERROR
+    return (
+        found.stable
+        and keeps_margin(led, found)
+        and abs(found.paths[role].amplitude - 1.0) <= AMPLITUDE_ERROR
+    )
+
+
+def led_by(plan: Plan, lead: float, role: str) -> Plan:
+    """The plan with another lead (s) in the compensator of a role's laboratory, wherever its kind has that."""
+    name = name_of(role)
+    lab: Any = plan.slaves[name] if name else plan
+    kind = plan.kinds[role]
+    if kind == "column":
+        parameters = lab.compensator.parameters | {"lead": lead}
+        led = replace(lab, compensator=replace(lab.compensator, parameters=parameters))
+    else:
+        part = "table" if kind == "table" else "device"
+        within = getattr(lab, part)
+        parameters = within.compensator.parameters | {"lead": lead}
+        chosen = replace(within.compensator, parameters=parameters)
+        led = replace(lab, **{part: replace(within, compensator=chosen)})
+    return replace(plan, slaves=plan.slaves | {name: led}) if name else led
 
 
 def partition_text(plan: Plan, found: Partition) -> str:
     """What the partition bears and what is to be expected, in words."""
     if not found.stable:
-        return "The actuator is unstable under its compensator"
+        return f"The {transfer_system(plan, kind_of(plan, found.role))[0]} is unstable under its compensator"
+    if not found.paths:
+        return "Stable at any delay, because no laboratory follows a storey's drift"
     expected, points = expected_delay(plan, found), found.damping_points * 100.0
     cost = f"{'costing' if points >= 0.0 else 'adding'} {abs(points):.2f} points of damping at {found.frequency:.2f} Hz"
     if math.isinf(found.critical_delay):
@@ -140,6 +196,8 @@ def partition_text(plan: Plan, found: Partition) -> str:
     figures = f"{found.critical_delay * 1e3:.1f} ms of delay; {expected * 1e3:.1f} ms expected"
     if found.unstable:
         return f"Unstable beyond {figures}"
+    if len(found.paths) > 1:
+        figures = f"{figures} at the {title(found.role)}"
     ratio = f" (margin {times(found.critical_delay / expected)})" if expected > 0.0 else ""
     return f"Stable up to {figures}{ratio}, {cost}"
 
@@ -161,6 +219,8 @@ class Peaks(NamedTuple):
     tick: int  # at which it does
     peak: float  # of that quantity, in its unit
     every: dict[str, float]  # peak of each limited quantity, in its unit
+    most: dict[str, float]  # limit of each
+    units: dict[str, str]  # of each
 
 
 def peaks_check(plan: Plan) -> Check:
@@ -173,9 +233,9 @@ def simulated_peaks(plan: Plan, *, known_unstable: bool = False) -> tuple[Peaks 
 
     Of a loop that is `known_unstable`, which another check refuses, only peaks beyond their share are refused.
     """
-    short = plan.with_ticks(min(plan.ticks, MOST_TICKS // len(plan.roles)))
+    short = plan.with_ticks(min(plan.ticks, MOST_TICKS // max(len(plan.roles), 1)))
     columns, finite = simulated(short)
-    if not columns["actuator_command"].size:
+    if not columns[MASTER]["displacement"].size:
         risk = Risk("peaks", "the simulated test has no finite command at all, so look at [structure]")
         return None, True, Check("", risk)
     found = peaks(short, columns)
@@ -191,16 +251,16 @@ def simulated_peaks(plan: Plan, *, known_unstable: bool = False) -> tuple[Peaks 
     return found, grows, Check(peaks_text(plan, found, short.ticks), peaks_risk(plan, found))
 
 
-def simulated(plan: Plan) -> tuple[dict[str, Array], bool]:
-    """Signals of the nominal test with its sensors' noise, and whether they are finite to its end."""
+def simulated(plan: Plan) -> tuple[dict[str, dict[str, Array]], bool]:
+    """Signals by role of the nominal test with its sensors' noise, and whether they are finite to its end."""
     ground = substructure.ground_rows(plan, substructure.motion(plan))
     rollout = simulate(plan, ground, seed=plan.test.seed)
-    return stacked(rollout), rollout.finite
+    return by_role(plan, rollout), rollout.finite
 
 
-def peaks(plan: Plan, columns: dict[str, Array]) -> Peaks:
-    """Peaks of simulated signals over the plan's limits."""
-    most = vars(plan.limits)
+def peaks(plan: Plan, columns: Mapping[str, Mapping[str, Array]]) -> Peaks:
+    """Peaks of simulated signals, by role and name, over the plan's limits."""
+    most = limited.most(plan)
     magnitudes = limited.magnitudes(plan, columns)
     shares = {name: values / most[name] for name, values in magnitudes.items()}
     tops = {name: float(np.max(share)) for name, share in shares.items()}
@@ -212,7 +272,8 @@ def peaks(plan: Plan, columns: dict[str, Array]) -> Peaks:
     name = max(tops, key=lambda one: tops[one])
     first = min(over, key=lambda one: over[one], default="")
     every = {name: float(np.max(values)) for name, values in magnitudes.items()}
-    return Peaks(tops[name], name, first, over.get(first, 0), every.get(first, 0.0), every)
+    units = {name: limited.unit_of(plan, name) for name in every}
+    return Peaks(tops[name], name, first, over.get(first, 0), every.get(first, 0.0), every, most, units)
 
 
 def unstable_risk(plan: Plan, found: Peaks) -> Risk:
@@ -220,7 +281,7 @@ def unstable_risk(plan: Plan, found: Peaks) -> Risk:
     share = plan.preflight.peak_share
     seen = ""
     if found.first:
-        limit, unit = getattr(plan.limits, found.first), LIMITS[found.first].unit
+        limit, unit = found.most[found.first], found.units[found.first]
         seen = (
             f": {found.first} exceeds {share:.0%} of its limit of {limit:g} {unit} at "
             f"t = {found.tick * plan.test.interval:.3f} s and grows on"
@@ -233,32 +294,42 @@ def unstable_risk(plan: Plan, found: Peaks) -> Risk:
 
 def remedy(plan: Plan) -> str:
     """What to change in a plan whose loop is unstable."""
-    calm = plan.everywhere(control=replace(plan.control, amd=False))
-    if any(one.control.amd for one in map(plan.of, plan.roles)) and not free_motion.unstable(calm):
+    carried = any(plan.kinds[role] == TABLE and plan.of(role).control.amd for role in plan.kinds)
+    calm = plan.everywhere(control=Control(amd=False, gain=plan.control.gain))
+    if carried and not free_motion.unstable(calm):
         return (
             f"lower gain in [control], {plan.control.gain:g} N·s/m, or quicken the shaking table (delay and frequency "
             "in [table], its compensator), as the loop is stable without the damper"
         )
     found = assess(plan)
     if not found.stable:
-        return "lower the feedback's gains in [compensator], or the delay in [actuator]"
+        _, where = chosen_of(plan, found.role)
+        late = ", or the delay in [actuator]" if kind_of(plan, found.role) is COLUMN else ""
+        return f"lower the feedback's gains in [{where}]{late}"
     if found.unstable:
-        return compensation(plan, found.delay)
-    return "look at [compensator] and [table.compensator], or shorten interval in [test]"
+        return compensation(plan, found.delay, found.role)
+    tables = dict.fromkeys(chosen_of(plan, role)[1] for role in plan.kinds)
+    return f"look at {' and '.join(f'[{name}]' for name in tables)}, or shorten interval in [test]"
 
 
 def peaks_risk(plan: Plan, found: Peaks) -> Risk | None:
     """The risk of a peak of a stable loop too near to its limit; None where all keep their distance."""
     if not found.first:
         return None
-    unit = LIMITS[found.first].unit
-    limit, share = getattr(plan.limits, found.first), plan.preflight.peak_share
+    unit, limit, share = found.units[found.first], found.most[found.first], plan.preflight.peak_share
+    limits = "limits" if found.first in LIMITS else "device.limits"
     return Risk(
         "peaks",
         f"the simulated {found.first} exceeds {share:.0%} of its limit of {limit:g} {unit} at "
         f"t = {found.tick * plan.test.interval:.3f} s and peaks at {found.peak:.4g} {unit}, so lower scale in "
-        f"[ground_motion], look at [compensator], or raise {found.first} in [limits] where the laboratory allows it",
+        f"[ground_motion], look at {compensated(plan)}, or raise {found.first} in [{limits}] where the laboratory "
+        "allows it",
     )
+
+
+def compensated(plan: Plan) -> str:
+    """The table of the compensator that acts first: the master's laboratory's, or the first slave's without one."""
+    return f"[{chosen_of(plan, next(iter(plan.kinds)))[1]}]"
 
 
 def peaks_text(plan: Plan, found: Peaks, ticks: int) -> str:

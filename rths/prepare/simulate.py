@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
 def rolled_out(plan: Plan, motion: Any, args: argparse.Namespace) -> tuple[dict[str, Any], str]:
     """Signals of the compiled rollout, written where a file is wanted; the first value beyond the plan's limits."""
     from loop import substructure
-    from loop.closed_loop import signals, simulate, stacked
+    from loop.closed_loop import by_role, signals, simulate
 
     ground = substructure.ground_rows(plan, motion)
     if args.reality:
@@ -73,7 +73,7 @@ def rolled_out(plan: Plan, motion: Any, args: argparse.Namespace) -> tuple[dict[
     if args.output:
         with outputs.writing(args.output, args.force) as path:
             write(path, plan, rollout, motion, ground)
-    return signals(plan, rollout), beyond(plan, stacked(rollout), rollout.ticks)
+    return signals(plan, rollout), beyond(plan, by_role(plan, rollout), rollout.ticks)
 
 
 def really(truth: Reality, *, noise: bool) -> Rollout:
@@ -120,42 +120,56 @@ def adapted(plan: Plan, args: argparse.Namespace) -> Plan:
 
 
 def summarize(plan: Plan, columns: dict[str, Any], beyond_limit: str) -> dict[str, Any]:
-    """Peaks, drift of the specimen's storey, and a sentence on the first value beyond a limit."""
+    """Peaks, drifts of the storeys that laboratories follow, and a sentence on the first value beyond a limit."""
     import numpy as np
 
-    from common import signals
+    from laboratories import kinds
 
+    drifts = peak_drifts(plan, columns)
+    rows = {row.name: row for topic in reversed(kinds.topics(plan).values()) for row in topic}
     peaks = {}
     for name, values in columns.items():
-        base = name.rpartition(".")[2]
-        row = signals.signal(signals.topic_of(base), base)
-        if row.unit not in ("", "s") and values.size:
-            peaks[name] = {"peak": float(np.max(np.abs(values))), "unit": row.unit}
-    drift = columns["column_target"] / plan.column.deformation_ratio
+        unit = rows[name.rpartition(".")[2]].unit
+        if unit not in ("", "s") and values.size:
+            peaks[name] = {"peak": float(np.max(np.abs(values))), "unit": unit}
     return {
         "test": plan.test.name,
         "ticks": len(columns["t"]),
-        "peak_drift": float(np.max(np.abs(drift), initial=0.0)),
+        "peak_drift": max(drifts.values(), default=None),
+        "peak_drifts": drifts,
         "peaks": peaks,
         "beyond_limit": beyond_limit,
     }
 
 
-def beyond(plan: Plan, columns: dict[str, Any], ticks: int) -> str:
+def peak_drifts(plan: Plan, columns: dict[str, Any]) -> dict[int, float]:
+    """Peak drift (m) of every storey whose drift a laboratory follows, by storey."""
+    import numpy as np
+
+    from loop.nominal import partition
+
+    floors = columns["displacement"].reshape(len(columns["t"]), plan.storeys)
+    return {
+        coupling.place: float(np.max(np.abs(floors @ partition.drift_direction(plan, role)), initial=0.0))
+        for role, coupling in partition.drifts(plan).items()
+    }
+
+
+def beyond(plan: Plan, columns: dict[str, dict[str, Any]], ticks: int) -> str:
     """A sentence on the first value beyond a limit of the plan, empty where there is none."""
     import numpy as np
 
     from loop.nominal import limited
 
+    most = limited.most(plan)
     first = (ticks, "")
     for name, values in limited.magnitudes(plan, columns).items() if ticks else ():
-        most = getattr(plan.limits, name)
-        over = np.flatnonzero(~(values <= most))
+        over = np.flatnonzero(~(values <= most[name]))
         if over.size and over[0] < first[0]:
             t = over[0] * plan.test.interval
             first = (
                 int(over[0]),
-                f"{name} is beyond its limit of {most:g} from t = {t:.3f} s on: the loop is unstable.",
+                f"{name} is beyond its limit of {most[name]:g} from t = {t:.3f} s on: the loop is unstable.",
             )
     if not first[1] and ticks < plan.ticks:
         return f"the loop diverges: no finite number after t = {ticks * plan.test.interval:.3f} s."
@@ -172,7 +186,9 @@ def show(plan: Plan, summary: dict[str, Any], stream: TextIO) -> None:
     rows = [["signal", "peak"]]
     rows += [[name, reading(facts["peak"], facts["unit"])] for name, facts in summary["peaks"].items()]
     table(rows, stream)
-    stream.write(f"peak drift of the specimen's storey: {reading(summary['peak_drift'], 'm')}\n")
+    for storey, peak in summary["peak_drifts"].items():
+        where = "the specimen's storey" if len(summary["peak_drifts"]) == 1 else f"storey {storey}"
+        stream.write(f"peak drift of {where}: {reading(peak, 'm')}\n")
     if summary["beyond_limit"]:
         stream.write(summary["beyond_limit"][0].upper() + summary["beyond_limit"][1:] + "\n")
     if "file" in summary:

@@ -19,6 +19,7 @@ from common.errors import InputError
 from common.plan.plan import Plan
 from common.plan.tables import Actuator, Column, Damper, Table
 from common.rig import ColumnCommand, TableCommand
+from common.roles import SLAVE
 from laboratories.column import model as column_lab
 from laboratories.column import specimen
 from laboratories.column.kind import COLUMN
@@ -28,7 +29,7 @@ from laboratories.emulated import EmulatedLab
 from laboratories.table import model as table_lab
 from laboratories.table.kind import TABLE
 from loop import substructure
-from loop.closed_loop import Rollout, signals, simulate, stacked
+from loop.closed_loop import Rollout, signals, simulate
 from models.system import ActuatorEffects, ColumnEffects, DamperEffects, System, TableEffects
 from tests.laboratories.effects.distinct import DISTINCT
 
@@ -57,7 +58,7 @@ def rollout(system: System, seed: int | None = 3) -> Rollout:
 
 
 def everything(found: Rollout) -> Array:
-    return np.column_stack(list(stacked(found).values()))
+    return np.column_stack([*found.master.values(), *found.slaves[SLAVE].values()])
 
 
 @pytest.fixture(scope="module")

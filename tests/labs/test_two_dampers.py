@@ -11,7 +11,7 @@ from scipy.signal import StateSpace, lsim
 
 from common.plan.plan import Plan, from_tables, ideal
 from loop import substructure
-from loop.closed_loop import simulate, stacked
+from loop.closed_loop import simulate
 
 Array = NDArray[np.float64]
 
@@ -77,9 +77,10 @@ def errors(interval: float) -> tuple[float, float]:
     """NRMSE of the floors' displacements and of the strokes."""
     plan = tall(interval)
     ground = substructure.ground_rows(plan, substructure.motion(plan))
-    found = stacked(simulate(plan, ground))
+    found = simulate(plan, ground)
+    strokes_found = np.stack([of["damper_stroke"] for of in found.slaves.values()], axis=1)
     floors, strokes = exact(ground[:, :-1], interval)
-    pairs = ((found["displacement"], floors), (found["damper_stroke"], strokes))
+    pairs = ((found.master["displacement"], floors), (strokes_found, strokes))
     return tuple(  # type: ignore[return-value]
         float(np.sqrt(np.mean((x - y) ** 2)) / np.sqrt(np.mean(y**2))) for x, y in pairs
     )

@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 from common.plan import plan as plans
 from common.plan.plan import Plan
 from common.plan.tables import Compensator, Control
+from common.roles import MASTER, SLAVE
 from common.terminal import cli
 from loop import substructure
 from loop.closed_loop import signals, simulate
@@ -136,11 +137,12 @@ def test_limited_quantities_that_are_no_signals(short_plan: Plan) -> None:
     n = 100
     t = np.linspace(0.0, (n - 1) * short_plan.test.interval, n)
     names = vars(short_plan.limits)
-    columns: dict[str, Array] = {name: np.zeros(n) for name in (*names, "column_target")}
+    still: dict[str, Array] = {name: np.zeros(n) for name in (*names, "column_target")}
+    columns, slave = dict(still), dict(still)
     columns["actuator_command"] = np.square(t)
-    columns["table_command"] = np.stack([0.1 * t, -0.3 * t], axis=1)
+    slave["table_command"] = -0.3 * t
     columns["column_target"][[10, 11, 20, 21, 22]] = [1.0, 1.0, -1.0, 3.0, 2.0]
-    found = limited.magnitudes(short_plan, columns)
+    found = limited.magnitudes(short_plan, {MASTER: columns, SLAVE: slave})
     assert set(found) == set(names) - set(limited.ENERGIES)
     assert np.allclose(found["actuator_acceleration"][2:], 2.0)
     assert found["actuator_velocity"][-1] == pytest.approx(2.0 * t[-1], rel=0.01)
@@ -148,7 +150,7 @@ def test_limited_quantities_that_are_no_signals(short_plan: Plan) -> None:
     assert np.allclose(found["table_step"][1:], 0.0006)
     assert np.flatnonzero(found["column_error"]).tolist() == [22]
     assert found["column_error"][22] == 1.0
-    assert peaks(short_plan, columns).name == "column_error"
+    assert peaks(short_plan, {MASTER: columns, SLAVE: slave}).name == "column_error"
 
 
 def test_several_slaves_have_peaks_too() -> None:
