@@ -41,13 +41,23 @@ class Row(NamedTuple):
     style: str
 
 
-ROWS = (
-    Row("drift", "drift", 1e3, "mm", "+9.3f"),
-    Row("column_force", "column force", 1e-3, "kN", "+9.3f"),
-    Row("damper_force", "damper force", 1.0, "N", "+9.1f"),
-    Row("round_trip", "round trip", 1e6, "µs", "9.0f"),
-)
-LABEL = max(len(row.label) for row in ROWS)
+KNOWN = {
+    row.signal: row
+    for row in (
+        Row("drift", "drift", 1e3, "mm", "+9.3f"),
+        Row("column_force", "column force", 1e-3, "kN", "+9.3f"),
+        Row("column_force_used", "slave's column", 1e-3, "kN", "+9.3f"),
+        Row("damper_force", "damper force", 1.0, "N", "+9.1f"),
+        Row("round_trip", "round trip", 1e6, "µs", "9.0f"),
+    )
+}
+BESIDE = ("tick", "t", "missed")  # of a report: no row of its own
+LABEL = len("column force")  # columns at least
+
+
+def row_of(name: str) -> Row:
+    """The row of a signal: what is not known is the force of a laboratory of a user's."""
+    return KNOWN.get(name, Row(name, name.replace("_", " "), 1.0, "N", "+9.1f"))
 
 
 class Board:
@@ -57,18 +67,20 @@ class Board:
         self.modes: dict[str, str] = {}
         self._duration = duration
         self._t = self._late = 0.0
-        self._values: dict[str, deque[float]] = {row.signal: deque(maxlen=KEPT) for row in ROWS}
+        self._values: dict[str, deque[float]] = {}  # in the order of the reports
 
     def take(self, data: Mapping[str, Any]) -> None:
         """Take in a report of progress."""
         self._t, self._late = float(data["t"]), float(data.get("missed", self._late))
-        for name, values in self._values.items():
-            if name in data:
-                values.append(float(data[name]))
+        for name, value in data.items():
+            if name not in BESIDE and isinstance(value, float | int):
+                self._values.setdefault(name, deque(maxlen=KEPT)).append(float(value))
 
     def lines(self, width: int) -> list[list[Span]]:
         """The board in lines of at most `width` columns."""
-        rows = [self._row(row, width) for row in ROWS if self._values[row.signal]]
+        found = [row_of(name) for name in self._values]
+        label = max((len(row.label) for row in found), default=LABEL)
+        rows = [self._row(row, max(label, LABEL), width) for row in found]
         return [cut(line, width) for line in (self._head(), *rows, self._foot()) if line]
 
     def _head(self) -> list[Span]:
@@ -80,10 +92,10 @@ class Board:
             Span("·" * (BAR - filled)),
         ]
 
-    def _row(self, row: Row, width: int) -> list[Span]:
+    def _row(self, row: Row, label: int, width: int) -> list[Span]:
         values = [row.factor * value for value in self._values[row.signal]]
         newest = "–".rjust(9) if math.isnan(values[-1]) else format(values[-1], row.style)
-        beside = Span(f"{row.label:<{LABEL}} {newest} {row.unit:<2}  ")
+        beside = Span(f"{row.label:<{label}} {newest} {row.unit:<2}  ")
         return [beside, Span(sparkline(values[-max(width - len(beside.text), 0) :]), BLUE)]
 
     def _foot(self) -> list[Span]:

@@ -162,9 +162,7 @@ def in_real_time(
             warm_up(progress)
             for line in before_the_start(plan, output, gate):
                 progress.say(line)
-            progress.say(
-                f"{plan.test.name}: {plan.test.duration:g} s, starting master, {crew(plan)} and recorder"
-            )
+            progress.say(f"{plan.test.name}: {plan.test.duration:g} s, starting {crew(plan)}")
             start_all(processes, args, plan.roles, endpoint, output)
             view = shown(output, args.live_port) if args.live else None
             follow(processes, ending, progress, stopping, view)
@@ -187,8 +185,11 @@ def shown(output: Path, port: int) -> View:
 
 
 def crew(plan: Plan) -> str:
-    """The slaves of a test in words."""
-    return "slave" if not plan.slaves else f"slaves {', '.join(plan.slaves)}"
+    """The processes of a test in words."""
+    if not plan.roles:
+        return "master and recorder"
+    slaves = "slave" if not plan.slaves else f"slaves {', '.join(plan.slaves)}"
+    return f"master, {slaves} and recorder"
 
 
 def check(reality: Reality) -> None:
