@@ -13,11 +13,13 @@ from common.plan.plan import Plan
 from common.roles import MASTER, latency_topic, ramp_topic
 from common.signals import Kind, Signal
 from laboratories import kinds
+from recorder.encoding import is_plain, layout
 
 Item = list[Any]
 Check = Callable[[Any], bool]
 
-STAMPS = range(2**63)  # log and publish time, ns
+STAMPED = 3  # places of an item before its values: topic, log and publish time
+STAMPS = range(2**63)  # those times, ns
 INTEGERS = {Kind.COUNT: range(2**32), Kind.INDEX: range(-(2**31), 2**31), Kind.STAMP: range(-(2**63), 2**63)}
 
 
@@ -31,7 +33,7 @@ class Items:
         self._ticks = range(plan.ticks)
         self._unbounded = ("event", ramp_topic(lab))  # the ramp to rest goes on after the last tick
         self._rows = {topic: checks(topics[topic], plan) for topic in own}
-        self._plain = {topic: Plain(topics[topic]) for topic in own if is_plain(topics[topic], plan)}
+        self._plain = {topic: Plain(topics[topic]) for topic in own if is_plain(topics[topic], plan.storeys)}
 
     def unpack(self, packed: bytes) -> list[Item] | None:
         """The items of a piece; None where it holds anything that cannot be recorded."""
@@ -46,40 +48,35 @@ class Items:
     def _admits(self, item: Any) -> bool:
         if type(item) is not list or len(item) < 4 or type(item[0]) is not str or item[0] not in self._rows:
             return False
-        topic, log_ns, publish_ns, *values = item
+        topic, log_ns, publish_ns, tick = item[:4]
+        if topic in self._plain and self._plain[topic].fits(item):
+            return tick in self._ticks
         rows = self._rows[topic]
-        if type(log_ns) is not int or type(publish_ns) is not int or len(values) != len(rows):
+        if type(log_ns) is not int or type(publish_ns) is not int or len(item) - STAMPED != len(rows):
             return False
         if log_ns not in STAMPS or publish_ns not in STAMPS:
             return False
-        if topic not in self._unbounded and values[0] not in self._ticks:
+        if topic not in self._unbounded and tick not in self._ticks:
             return False
-        if topic in self._plain and self._plain[topic].fits(values):
-            return True
-        return all(check(value) for check, value in zip(rows, values, strict=True))
+        return all(check(value) for check, value in zip(rows, item[STAMPED:], strict=True))
 
 
 class Plain:
-    """The values of a topic that has one number per signal, checked by calls into C: most of a test's items."""
+    """Items of a topic that has one number per signal, checked by calls into C: most of a test's items."""
 
     def __init__(self, rows: tuple[Signal, ...]) -> None:
-        self._types = tuple(PLAIN[row.kind][0] for row in rows)
-        self._layout = struct.Struct("<" + "".join(PLAIN[row.kind][1] for row in rows))
+        self._types = (str, int, int, *(TYPES[row.kind] for row in rows))
+        self._pack = layout(rows).pack
 
-    def fits(self, values: Item) -> bool:
-        """Whether the values are of exactly the types of their signals, and in their ranges."""
-        if tuple(map(type, values)) != self._types:
+    def fits(self, item: Item) -> bool:
+        """Whether times and values are of exactly the types of their signals, and in their ranges."""
+        if tuple(map(type, item)) != self._types:
             return False
         try:
-            self._layout.pack(*values)
+            self._pack(*item[1:])
         except struct.error:
             return False
-        return True
-
-
-def is_plain(rows: tuple[Signal, ...], plan: Plan) -> bool:
-    """Whether a topic has one number per signal."""
-    return all(row.kind in PLAIN and row.count(plan.storeys) == 1 for row in rows)
+        return item[1] | item[2] in STAMPS
 
 
 def checks(rows: tuple[Signal, ...], plan: Plan) -> list[Check]:
@@ -125,11 +122,11 @@ CHECKS: dict[Kind, Check] = {
     Kind.VALUES: is_values,
 }
 
-PLAIN: dict[Kind, tuple[type, str]] = {
-    Kind.NUMBER: (float, "d"),
-    Kind.STOREYS: (float, "d"),
-    Kind.COUNT: (int, "I"),
-    Kind.INDEX: (int, "i"),
-    Kind.STAMP: (int, "q"),
-    Kind.FLAG: (bool, "?"),
+TYPES: dict[Kind, type] = {
+    Kind.NUMBER: float,
+    Kind.STOREYS: float,
+    Kind.COUNT: int,
+    Kind.INDEX: int,
+    Kind.STAMP: int,
+    Kind.FLAG: bool,
 }

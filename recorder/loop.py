@@ -17,7 +17,7 @@ from common.plan.plan import PROTOCOL_VERSION, Plan
 from common.plan.plan_difference import differences, digest_of, said
 from common.protocol.messages import Finished, Message, Recorder, Register, Resend, Samples
 from common.reporting import Report
-from common.roles import LATENCY, MASTER, RECORDER, kind_of, title
+from common.roles import MASTER, RECORDER, kind_of, latency_topic, title
 from laboratories import kinds
 from recorder.items import Items
 from recorder.sink import Item, Sink
@@ -69,6 +69,7 @@ class RecorderLoop:
             for topic in kinds.topics(setting.plan)
             if kind_of(topic) in signals.TICK_TOPICS
         }
+        self._latencies = frozenset(map(latency_topic, setting.plan.roles))
         self._missed = 0
         self._machines: dict[str, str] = {}  # metadata of the recording
         self._outcome = ("", "")
@@ -130,19 +131,14 @@ class RecorderLoop:
         topic = item[0]
         if topic == "event":
             self._take_event(item[3:])
-            return
-        if topic in self._seen:
-            if item[3] > self._newest[3]:
+        elif topic in self._seen:
+            tick, seen = item[3], self._seen[topic]
+            if tick > self._newest[3]:
                 self._newest = item
-            self._note(self._seen[topic], item[3])
-        if kind_of(topic) == LATENCY:
-            self._missed += bool(item[3 + MISSED_AT])
-
-    @staticmethod
-    def _note(seen: bytearray, tick: int) -> None:
-        """A tick is recorded; one byte each, so that memory does not grow with the test."""
-        if 0 <= tick < len(seen):
-            seen[tick] = 1
+            if 0 <= tick < len(seen):
+                seen[tick] = 1  # one byte each, so that memory does not grow with the test
+            if topic in self._latencies:
+                self._missed += bool(item[3 + MISSED_AT])
 
     def _take_event(self, values: Item) -> None:
         """Take note of the machines, and of why the test ended: the first cause, or what led to it if that is late."""

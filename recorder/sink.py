@@ -10,8 +10,11 @@ from common.host.clock import Clock
 from common.lab.outlet import AT_ONCE
 from common.recording.reader import MACHINES
 from common.recording.writer import Recording
+from recorder.encoding import RowEncoder
 
 FLUSH_NS = 50_000_000  # with a piece of a laboratory's stream on its way, less than 0.1 s is not in the file
+# of a recording in virtual time, where a second passes in some hundredths of one: full chunks cost half as much
+SELDOM_NS = 1_000_000_000
 SYNC_NS = 1_000_000_000  # a power cut costs a second at most; a sync takes tens of ms on a slow disk
 QUEUE_ITEMS = 60_000  # forty seconds of a default test
 CLOSE_S = 25.0  # less than `rths run` allows the recorder to write what it holds
@@ -44,13 +47,15 @@ class Sink(Protocol):
 class FileSink:
     """Writes straight away; flushes twenty times a second and after every event, syncs once a second.
 
-    In virtual time, where a second passes in some hundredths of one, it need not be `synced` before its end.
+    Where it is not `timely`, as in virtual time, it flushes once a second and syncs at its end.
     """
 
-    def __init__(self, recording: Recording, clock: Clock, *, synced: bool = True) -> None:
+    def __init__(self, recording: Recording, clock: Clock, *, timely: bool = True) -> None:
         self._recording = recording
         self._clock = clock
-        self._synced = synced
+        self._encoder = RowEncoder(recording.topics, recording.channels, recording.storeys)
+        self._timely = timely
+        self._flush_ns = FLUSH_NS if timely else SELDOM_NS
         self._flushed_ns = self._synced_ns = clock.now()
         self.failure = ""
         self.dropped = 0
@@ -61,18 +66,37 @@ class FileSink:
         if self.failure:
             self.dropped += len(items)
             return
-        for topic, log_ns, publish_ns, *values in items:
+        at_once, layouts = False, self._encoder.layouts
+        topics: list[str] = []
+        rows: list[bytes] = []
+        for item in items:
+            topic = item[0]
+            if (layout := layouts.get(topic)) is not None:
+                topics.append(topic)
+                rows.append(layout.pack(*item[1:]))
+                continue
+            at_once = at_once or topic == AT_ONCE
+            self._write(topics, rows)
+            _, log_ns, publish_ns, *values = item
             self._recording.add(topic, log_ns, publish_ns, values)
-        self.keep_up(at_once=any(item[0] == AT_ONCE for item in items))
+        self._write(topics, rows)
+        self.keep_up(at_once=at_once)
+
+    def _write(self, topics: list[str], rows: list[bytes]) -> None:
+        """Write rows of numbers and forget them."""
+        if rows:
+            self._recording.add_block(self._encoder.encode(topics, rows))
+            topics.clear()
+            rows.clear()
 
     def keep_up(self, *, at_once: bool = False) -> None:
         """Flush and sync where it is time; flush `at_once` in any case."""
         now = self._clock.now()
         try:
-            if at_once or now - self._flushed_ns >= FLUSH_NS:
+            if at_once or now - self._flushed_ns >= self._flush_ns:
                 self._flushed_ns = now
                 self._recording.flush()
-            if self._synced and now - self._synced_ns >= SYNC_NS:
+            if self._timely and now - self._synced_ns >= SYNC_NS:
                 self._synced_ns = now
                 self._recording.sync()
         except OSError as error:

@@ -88,7 +88,7 @@ def begin_recording(setting: Setting, world: World, output: Path) -> RecorderLoo
     """The recorder of a new file; its process begins when time does."""
     motion = substructure.motion(setting.plan)
     file = files.begin(output, setting.plan, motion, substructure.ground_rows(setting.plan, motion))
-    recorder = RecorderLoop(setting, FileSink(file, setting.clock, synced=False))
+    recorder = RecorderLoop(setting, FileSink(file, setting.clock, timely=False))
     process = world.process(RECORDER)
     process.start(recording(recorder, setting.endpoint, process, file))
     return recorder

@@ -1,32 +1,34 @@
-"""Reading a recording back, finished or cut off."""
+"""Reading a recording back, finished, cut off, or still being written.
+
+The recorder hands whole records to the operating system some twenty times a second, so the file itself is the stream
+of a test that runs: the writer neither knows its readers nor waits for them.
+"""
 
 from __future__ import annotations
 
 import io
 import json
-import os
-import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from math import inf
 from pathlib import Path
-from typing import Any
+from types import TracebackType
+from typing import Any, Self
 
 import numpy as np
-import zstandard
 from google.protobuf import descriptor_pb2
 from google.protobuf.message import DecodeError
-from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Chunk, Footer, McapRecord, Message, Metadata, Schema
-from mcap.stream_reader import StreamReader
+from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Metadata, Schema, Statistics
+from mcap.writer import MCAP0_MAGIC
 from numpy.typing import NDArray
 
 from common import signals
 from common.errors import InputError
 from common.recording.bounds import Bounds
 from common.recording.checksums import CHECKSUMS, fits, opened
-from common.recording.salvage import DAMAGE, HEAD, KINDS, MESSAGE, RECORD_LIMIT, inner
+from common.recording.records import DAMAGE, HEAD, MESSAGE, Source, content, framed, inner, parsed, summary
 from common.recording.schema import message_class
 from common.recording.writer import SHARED, SIGNALS
 from common.roles import LATENCY, MASTER, SLAVE, kind_of, latency_topic, ramps_of, title
@@ -38,6 +40,8 @@ CLOCK = "clock"  # metadata: `kind`, virtual or real
 MACHINES = (
     "real_time"  # metadata: real-time shape and time of the laboratories' machines, and the bare timing loop
 )
+LOOK_BYTES = 1 << 20  # of the file per look: some seconds of a test, decoded in a few tens of milliseconds
+WANTED = frozenset({Opcode.CHUNK, Opcode.METADATA, Opcode.ATTACHMENT})  # of the rest the place alone matters
 MISFIT = (DecodeError, TypeError, ValueError, KeyError, AttributeError)
 
 
@@ -136,14 +140,160 @@ def read(path: Path) -> Run:
     Raises:
         InputError: the file cannot be read, is no MCAP file, or holds nothing of a hybrid test.
     """
-    run = Run(path)
-    contents = Contents()
-    for record in _records(path, run):
-        contents.take(record, run)
-    contents.decode(run)
+    with Tail(path) as tail:
+        tail.open()
+        run = tail.look(inf)
+    if tail.place <= len(MCAP0_MAGIC) and (tail.damage or not tail.place):
+        raise _unreadable(path, tail.cause or "it is too short")
+    if tail.misfit:
+        raise tail.misfit
     if not run.columns and not run.events:
         raise InputError(f"{path} is an MCAP file, but holds no topic rths/<test>/<name>.")
     return run
+
+
+def length(path: Path) -> float:
+    """Seconds from the first to the last message of a finished recording, by its summary; 0 where it has none."""
+    try:
+        with path.open("rb") as stream:
+            found = summary(Source(stream))
+    except (OSError, *DAMAGE):
+        return 0.0
+    times = [
+        (record.message_end_time - record.message_start_time) * 1e-9
+        for record in (found.records if found else ())
+        if isinstance(record, Statistics)
+    ]
+    return max(times, default=0.0)
+
+
+def _unreadable(path: Path, cause: str) -> InputError:
+    return InputError(
+        f"{path} is not a readable MCAP recording: {cause}; if it was one, rths recover saves what is whole."
+    )
+
+
+class Tail:
+    """A recording that may still grow, read on from look to look; a context that closes the file.
+
+    `place` is the byte behind the newest whole record. `damage` says why reading has ended before the file's end, empty
+    while it has not, and `cause` what is wrong there; `behind` says whether there is more to be had at once, and
+    `finished` whether the recorder has closed the file.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.place = 0
+        self.finished = self.behind = False
+        self.damage = self.cause = ""
+        self.misfit: InputError | None = None  # messages that do not fit what describes them
+        self._stream: io.BufferedReader | None = None
+        self._contents = Contents()
+        self._bounds = Bounds(path, 0)
+        self._metadata: dict[str, dict[str, str]] = {}
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._stream is not None:
+            self._stream.close()
+
+    def open(self) -> None:
+        """Open the file; raises InputError where that cannot be done."""
+        try:
+            self._stream = self.path.open("rb")
+        except OSError as error:
+            raise InputError(f"Cannot read the recording {self.path}: {error.strerror}.") from None
+
+    def look(self, most: float = LOOK_BYTES) -> Run:
+        """What is new, of at most `most` bytes of the file and one record more; its metadata are all so far.
+
+        A record that is not whole yet is left for the next look, and so is a file that does not exist yet.
+
+        Raises:
+            InputError: the file cannot be read, is no MCAP file, or holds more than any recording of its size does.
+        """
+        run = Run(self.path, metadata=dict(self._metadata))
+        if self._stream is None and self.path.exists():
+            self.open()
+        try:
+            if self._stream is not None:
+                self._read(Source(self._stream), most, run)
+        except OSError as error:
+            raise InputError(f"Cannot read the recording {self.path}: {error.strerror}.") from None
+        try:
+            self._contents.decode(run)
+        except InputError as error:
+            self.misfit = error
+            self._end(str(error))
+        if run.damage and not self.damage:
+            self._end(run.damage)
+        run.finished, run.damage = self.finished, self.damage
+        self._metadata = dict(run.metadata)
+        return run
+
+    def _end(self, damage: str) -> None:
+        self.damage, self.behind = damage, False
+
+    def _read(self, source: Source, most: float, run: Run) -> None:
+        self._bounds.size = source.size
+        if source.size < self.place:
+            self._end("it was cut off or begun anew while it was read")
+        if not self._begun(source):
+            return
+        try:
+            for found in self._wanted(source, self.place + most):
+                for record in list(unpacked(parsed(found), self._bounds)):
+                    self._contents.take(record, run)
+        except DAMAGE as error:
+            self._end(f"at byte {self.place}")
+            self.cause = str(error) or type(error).__name__
+
+    def _begun(self, source: Source) -> bool:
+        """Whether the file is written beyond the bytes with which every MCAP file begins."""
+        if not self.place:
+            begin = source.at(0, len(MCAP0_MAGIC))
+            if begin != MCAP0_MAGIC[: len(begin)]:
+                raise _unreadable(self.path, "it does not begin as one")
+            self.place = len(begin) if begin == MCAP0_MAGIC else 0
+        return self.place > 0
+
+    def _wanted(self, source: Source, limit: float) -> Iterator[bytes]:
+        """Whole records that count, up to a place; each counts as read when the next one is asked for."""
+        self.behind = False
+        while not (self.finished or self.damage) and (frame := framed(source, self.place, source.size)):
+            opcode, after = frame
+            if self.place >= limit:
+                self.behind = True
+                return
+            if opcode in WANTED:
+                yield source.at(self.place, after - self.place)
+            self.place = after
+            self.finished = opcode == Opcode.FOOTER
+
+
+def unpacked(record: McapRecord, bounds: Bounds) -> Iterator[McapRecord]:
+    """What counts of a record: definitions and messages are those of chunks, which have a checksum.
+
+    Raises:
+        ValueError: a chunk is damaged.
+        InputError: the file holds more than any of its size does.
+    """
+    if not isinstance(record, Chunk):
+        yield record
+        return
+    data = content(record)
+    bounds.unpack(len(data))
+    for opcode, found in inner(data):
+        bounds.record()
+        if opcode == Opcode.MESSAGE:
+            channel, sequence, log_ns, publish_ns = MESSAGE.unpack_from(found, HEAD.size)
+            yield Message(channel, log_ns, found[HEAD.size + MESSAGE.size :], publish_ns, sequence)
+        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+            yield parsed(found)
 
 
 class Contents:
@@ -189,96 +339,6 @@ def _check(run: Run) -> None:
     wrong = [name for name, values in run.metadata.items() if not fits(name, values, checksums)]
     if wrong and not run.damage:
         run.damage = f"in its metadata '{wrong[0]}'"
-
-
-def _records(path: Path, run: Run) -> Iterator[Any]:
-    try:
-        with path.open("rb") as stream:
-            bounds = Bounds(path, os.fstat(stream.fileno()).st_size)
-            yield from _up_to_damage(stream, run, bounds)
-    except OSError as error:
-        raise InputError(f"Cannot read the recording {path}: {error.strerror}.") from None
-    except DAMAGE as error:
-        raise InputError(
-            f"{path} is not a readable MCAP recording: {str(error) or type(error).__name__}; "
-            "if it was one, rths recover saves what is whole."
-        ) from None
-
-
-def _up_to_damage(stream: io.BufferedReader, run: Run, bounds: Bounds) -> Iterator[Any]:
-    records = StreamReader(stream, emit_chunks=True, record_size_limit=RECORD_LIMIT).records
-    place = 0  # behind the newest whole record
-    while True:
-        try:
-            record = next(records)
-            contents = list(unpacked(record, bounds))
-        except StopIteration:
-            return
-        except DAMAGE:
-            if not place:
-                raise
-            run.damage = "" if _torn(stream, place) else f"at byte {place}"
-            return
-        place = stream.tell()
-        run.finished = isinstance(record, Footer)
-        yield from contents
-
-
-def _torn(stream: io.BufferedReader, place: int) -> bool:
-    """Whether a file ends within the record at a place, as one does whose writer was cut off."""
-    size = stream.seek(0, io.SEEK_END)
-    stream.seek(place)
-    head = stream.read(HEAD.size)
-    return len(head) < HEAD.size or size - place - HEAD.size < HEAD.unpack(head)[1] <= RECORD_LIMIT
-
-
-def unpacked(record: McapRecord, bounds: Bounds) -> Iterator[McapRecord]:
-    """What counts of a record: definitions and messages are those of chunks, which have a checksum.
-
-    Raises:
-        ValueError: a chunk would unpack to more than any of a recording holds.
-        InputError: the file holds more than any of its size does.
-    """
-    if isinstance(record, Chunk):
-        for opcode, body in inner(_content(record, bounds)):
-            bounds.record()
-            if opcode == Opcode.MESSAGE:
-                channel, sequence, log_ns, publish_ns = MESSAGE.unpack_from(body)
-                yield Message(channel, log_ns, body[MESSAGE.size :], publish_ns, sequence)
-            elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-                yield KINDS[opcode].read(ReadDataStream(io.BytesIO(body)))
-    elif not isinstance(record, Schema | Channel | Message):
-        yield record
-
-
-def _content(chunk: Chunk, bounds: Bounds) -> bytes:
-    """The records of a chunk, as any program may have packed them."""
-    size = zstandard.frame_content_size(chunk.data) if chunk.compression == "zstd" else 0
-    if max(size, chunk.uncompressed_size) > RECORD_LIMIT:
-        raise ValueError("a chunk is larger than any of a recording")
-    bounds.unpack(max(size, chunk.uncompressed_size))
-    match chunk.compression:
-        case "":
-            data = chunk.data
-        case "zstd":
-            data = zstandard.decompress(chunk.data, chunk.uncompressed_size)
-        case "lz4":  # which other programs write
-            data = _lz4(chunk)
-        case _:
-            raise ValueError(f"a chunk is packed by '{chunk.compression}', which is not known here")
-    if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
-        raise ValueError("a chunk does not have its checksum")
-    return data
-
-
-def _lz4(chunk: Chunk) -> bytes:
-    """A chunk unpacked by LZ4, at most as large as it says itself."""
-    from lz4.frame import LZ4FrameDecompressor
-
-    try:
-        return bytes(LZ4FrameDecompressor().decompress(chunk.data, max_length=chunk.uncompressed_size))
-    except RuntimeError as error:  # which is how the library says it
-        raise ValueError(str(error)) from None
 
 
 def _take(run: Run, channel: Channel, schemas: dict[int, Schema], messages: list[Message]) -> None:

@@ -18,7 +18,7 @@ from mcap.writer import CompressionType, Writer
 
 from common.errors import InputError
 from common.recording.checksums import CHECKSUMS, checksum, sealed
-from common.recording.chunks import pack_messages
+from common.recording.chunks import Block, pack_messages
 from common.recording.index import pack_index
 from common.recording.schema import message_class, message_name, schema_file
 from common.roles import SLAVE
@@ -88,6 +88,7 @@ class Recording:
         slaves: Sequence[str] = (SLAVE,),
     ) -> None:
         self._path = path
+        self.topics, self.storeys = topics, storeys
         try:
             self._stream = path.open("wb", buffering=0)
         except OSError as error:
@@ -99,11 +100,11 @@ class Recording:
             cast(io.BufferedWriter, self._spool), chunk_size=CHUNK_SIZE, compression=CompressionType.ZSTD
         )
         pack_index(self._writer)
-        pack_messages(self._writer)
+        self._add_block = pack_messages(self._writer, CHUNK_SIZE)
         self._writer.start(profile="", library="rths")
         self._names = {topic: [row.name for row in rows] for topic, rows in topics.items()}
         self._classes: dict[str, type[Any]] = {}
-        self._channels: dict[str, int] = {}
+        self.channels: dict[str, int] = {}  # numbers under which the file knows its topics
         self._numbers = dict.fromkeys(topics, 0)
         self._checksums: dict[str, str] = {}
         self._sealed = True
@@ -115,7 +116,7 @@ class Recording:
             named = {"slaves": " ".join(slaves)} if list(slaves) != [SLAVE] else {}
             each = shared(rows) if len(slaves) > 1 else {}
             about = units | named | ({SHARED: packed(each)} if each else {})
-            self._channels[topic] = self._channel(
+            self.channels[topic] = self._channel(
                 f"rths/{test}/{topic}", self._described(topic, rows, storeys), about
             )
         self._define()
@@ -164,12 +165,16 @@ class Recording:
         sequence = values[0] if names[0] == "seq" else self._numbers[topic]
         self._numbers[topic] += 1
         self._writer.add_message(
-            self._channels[topic],
+            self.channels[topic],
             log_time=log_ns,
             publish_time=publish_ns,
             sequence=int(sequence) & 0xFFFFFFFF,
-            data=message.SerializeToString(),
+            data=message.SerializeToString(deterministic=True),  # tables of an event's values in one order
         )
+
+    def add_block(self, block: Block) -> None:
+        """Write messages that are encoded already; the sequence of each is its seq."""
+        self._add_block(block)
 
     def describe(self) -> None:
         """Write the unit and the meaning of every signal."""

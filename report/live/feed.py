@@ -16,8 +16,7 @@ from common.errors import InputError
 from common.host.clock import Clock
 from common.plan.plan import Plan, parse
 from common.recording.outcome import outcome
-from common.recording.reader import Run, Values
-from common.recording.tail import Tail
+from common.recording.reader import Run, Tail, Values
 from common.roles import LATENCY, MASTER, SLAVE, kind_of, latency_topic
 from common.safety.modes import Mode
 from report.facts.laboratories import Laboratory, laboratories

@@ -67,7 +67,7 @@ def serve(args: argparse.Namespace, since_ns: int) -> None:
     """Read the recording and serve its page."""
     from common.host.clock import MonotonicClock
     from common.host.stopping import Stopper
-    from common.recording.tail import Tail, length
+    from common.recording.reader import Tail, length
     from report.live.feed import Feed
     from report.live.server import Server
 

@@ -15,10 +15,9 @@ import zstandard
 from common.errors import InputError
 from common.recording import bounds
 from common.recording.bounds import FREE_RECORDS, RECORD_BYTES, UNPACKED
-from common.recording.reader import read
+from common.recording.reader import Tail, read
+from common.recording.records import HEAD, MESSAGE
 from common.recording.recovery import recover
-from common.recording.salvage import HEAD, MESSAGE
-from common.recording.tail import Tail
 from common.recording.writer import Recording
 from common.signals import TOPICS, Kind
 
@@ -118,7 +117,7 @@ def test_a_short_file_may_hold_what_it_likes(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("packing", ["", "lz4"])
-def test_what_other_programs_pack_is_read(packing: str, tmp_path: Path) -> None:
+def test_what_other_programs_pack_is_read_and_recovered(packing: str, tmp_path: Path) -> None:
     from mcap.reader import make_reader
     from mcap.writer import CompressionType, Writer
 
@@ -136,3 +135,5 @@ def test_what_other_programs_pack_is_read(packing: str, tmp_path: Path) -> None:
             writer.add_message(place, message.log_time, message.data, message.publish_time, message.sequence)
         writer.finish()  # type: ignore[no-untyped-call]
     assert read(other).events == read(path).events
+    assert recover(other, tmp_path / "out.mcap").complete
+    assert read(tmp_path / "out.mcap").events == read(path).events

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from common.errors import InputError, PlanError, RthsError
 from common.plan.plan import Plan, parse
 from common.recording.reader import read
-from common.recording.salvage import RECORD_LIMIT
+from common.recording.records import RECORD_LIMIT
 from common.recording.writer import Recording
 from common.signals import TOPICS
 from report.facts.summary import rejected

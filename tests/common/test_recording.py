@@ -227,6 +227,15 @@ def test_messages_packed_in_one_call_are_the_librarys_to_the_byte(
 ) -> None:
     packed = write(tmp_path / "packed.mcap", 500)
     assert isinstance(vars(packed._writer)[chunks.BUILDER], chunks.PackedChunks)
-    monkeypatch.setattr("common.recording.writer.pack_messages", lambda _writer: None)
+    monkeypatch.setattr(chunks, "BUILDER", "none")
     write(tmp_path / "plain.mcap", 500)
     assert (tmp_path / "packed.mcap").read_bytes() == (tmp_path / "plain.mcap").read_bytes()
+
+
+def test_the_same_event_gives_the_same_bytes_in_whatever_order_its_values_come(tmp_path: Path) -> None:
+    values = dict.fromkeys(("b", "a", "slave.feedbacks.used", "ab"), 1.0)
+    for name, table in (("a", values), ("b", dict(reversed(values.items())))):
+        recording = Recording(tmp_path / name, "trial", 1, TOPICS)
+        recording.add("event", 0, 0, (0.0, "master", "info", "exchange", "a sentence", table))
+        recording.close({})
+    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()

@@ -11,8 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.errors import InputError
-from common.recording.reader import Run, read
-from common.recording.tail import Tail
+from common.recording.reader import Run, Tail, read
 from common.recording.writer import Recording
 from common.signals import TOPICS
 from tests.common.test_recording import example, write
@@ -168,7 +167,7 @@ def test_what_is_no_recording_is_said_in_one_sentence(content: bytes, tmp_path: 
         if len(content) < 8:
             assert not tail.look().columns  # it may become one
             return
-        with pytest.raises(InputError, match="is no MCAP recording"):
+        with pytest.raises(InputError, match="is not a readable MCAP recording"):
             tail.look()
 
 

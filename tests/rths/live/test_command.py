@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from common.recording.tail import length
+from common.recording.reader import length
 from report.live.feed import Feed
 from rths.__main__ import main
 from tests.helpers import ROOT
@@ -46,7 +46,7 @@ def test_what_is_no_recording_is_said_before_anything_is_served(
     monkeypatch.setattr("os.nice", lambda _more: 0)
     monkeypatch.setattr(signal, "signal", lambda *_: None)
     assert rths(monkeypatch, "live", path, "--no-browser") == 2
-    assert "is no MCAP recording" in capsys.readouterr().err
+    assert "is not a readable MCAP recording" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -18,8 +18,7 @@ from common.errors import EmergencyStopError
 from common.host.clock import VirtualClock
 from common.plan import reality
 from common.plan.plan import Plan, load
-from common.recording.reader import Run, read
-from common.recording.tail import Tail, length
+from common.recording.reader import Run, Tail, length, read
 from common.recording.writer import Recording
 from common.signals import TOPICS
 from report.live.feed import EDGES, POINTS, POINTS_WHOLE, SILENT_NS, Feed
@@ -287,7 +286,7 @@ def test_damage_is_said_and_what_came_before_stays(virtual_recording: Path, grow
 def test_what_is_no_recording_is_said(grow: Grow) -> None:
     growing = grow(b"no recording at all")
     growing.to(1.0)
-    assert "is no MCAP recording" in growing.feed.state
+    assert "is not a readable MCAP recording" in growing.feed.state
     assert growing.feed.ended
 
 

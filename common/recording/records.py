@@ -1,0 +1,144 @@
+"""The records of a recording's file one by one: where each ends, what it holds, and what a chunk unpacks to.
+
+Everything that opens a recording takes its records from here: `reader` reads on from the file's beginning up to damage,
+`salvage` looks for what is whole behind damage as well.
+"""
+
+from __future__ import annotations
+
+import io
+import struct
+import zlib
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import zstandard
+from mcap.data_stream import RecordBuilder
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import Chunk, McapRecord
+from mcap.stream_reader import StreamReader
+from mcap.writer import MCAP0_MAGIC
+
+# bytes of a record that is looked at: a thousand times the chunk that this software writes
+RECORD_LIMIT = 64 << 20
+DAMAGE = (McapError, ValueError, struct.error, zstandard.ZstdError, MemoryError)  # what libraries raise on it
+HEAD = struct.Struct("<BQ")  # opcode and length of a record
+MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
+FOOTER_SIZE = HEAD.size + 20 + len(MCAP0_MAGIC)
+
+
+class Source:
+    """A file read in pieces, as long as it is at this moment."""
+
+    def __init__(self, stream: io.BufferedReader) -> None:
+        self._stream = stream
+        self.size = stream.seek(0, io.SEEK_END)
+
+    def at(self, offset: int, length: int) -> bytes:
+        """Bytes from a place on, fewer at the end."""
+        self._stream.seek(offset)
+        return self._stream.read(length)
+
+
+def framed(source: Source, offset: int, end: int) -> tuple[int, int] | None:
+    """Opcode and end of the record at a place; None where it does not end before `end`.
+
+    Raises:
+        ValueError: its length is none of a recording's.
+    """
+    head = source.at(offset, HEAD.size)
+    if len(head) < HEAD.size:
+        return None
+    opcode, length = HEAD.unpack(head)
+    if length > RECORD_LIMIT:
+        raise ValueError("a record is larger than any of a recording")
+    after = offset + HEAD.size + length
+    return (opcode, after) if after <= end else None
+
+
+def parsed(record: bytes) -> Any:
+    """A record, with its opcode and length, as the MCAP library reads it; a chunk stays packed."""
+    stream = io.BytesIO(record + MCAP0_MAGIC)  # which follows a footer
+    return next(StreamReader(stream, skip_magic=True, emit_chunks=True).records)
+
+
+def written(record: McapRecord) -> bytes:
+    """A record as it stands in a file."""
+    builder = RecordBuilder()
+    record.write(builder)
+    return bytes(builder.end())  # type: ignore[no-untyped-call]
+
+
+def as_written(record: bytes) -> Any:
+    """A record that gives the same bytes when it is written again; raises ValueError where it does not."""
+    found = parsed(record)
+    if written(found) != record:
+        raise ValueError("not as written")
+    return found
+
+
+def content(chunk: Chunk) -> bytes:
+    """The records of a chunk, packed in any way that the format knows.
+
+    Raises:
+        ValueError: they are not those that were written, or more than any chunk of a recording holds.
+    """
+    size = zstandard.frame_content_size(chunk.data) if chunk.compression == "zstd" else 0
+    if max(size, chunk.uncompressed_size) > RECORD_LIMIT:
+        raise ValueError("a chunk is larger than any of a recording")
+    match chunk.compression:
+        case "":
+            data = chunk.data
+        case "zstd":
+            data = zstandard.decompress(chunk.data, chunk.uncompressed_size)
+        case "lz4":  # which other programs write
+            data = _lz4(chunk)
+        case _:
+            raise ValueError(f"a chunk is packed by '{chunk.compression}', which is not known here")
+    if len(data) != chunk.uncompressed_size:
+        raise ValueError("a chunk does not have its size")
+    if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
+        raise ValueError("a chunk does not have its checksum")
+    return data
+
+
+def _lz4(chunk: Chunk) -> bytes:
+    """A chunk unpacked by LZ4, at most as large as it says itself."""
+    from lz4.frame import LZ4FrameDecompressor
+
+    try:
+        return bytes(LZ4FrameDecompressor().decompress(chunk.data, max_length=chunk.uncompressed_size))
+    except RuntimeError as error:  # which is how the library says it
+        raise ValueError(str(error)) from None
+
+
+def inner(data: bytes) -> Iterator[tuple[int, bytes]]:
+    """Opcode and whole bytes of every record in the content of a chunk."""
+    place = 0
+    while place < len(data):
+        opcode, length = HEAD.unpack_from(data, place)
+        begin, place = place, place + HEAD.size + length
+        yield opcode, data[begin:place]
+
+
+class Summary(NamedTuple):
+    """The end of a finished recording, where its checksum is right."""
+
+    start: int
+    records: list[Any]
+
+
+def summary(source: Source) -> Summary | None:
+    """The summary of a finished recording; None where there is none, or a damaged one."""
+    tail = source.at(max(source.size - FOOTER_SIZE, 0), FOOTER_SIZE)
+    if len(tail) < FOOTER_SIZE or not tail.endswith(MCAP0_MAGIC) or tail[0] != Opcode.FOOTER:
+        return None
+    start, _, crc = struct.unpack_from("<QQI", tail, HEAD.size)
+    limit = source.size - FOOTER_SIZE
+    if not len(MCAP0_MAGIC) <= start <= limit or limit - start > RECORD_LIMIT:
+        return None
+    data = source.at(start, limit - start)
+    if zlib.crc32(tail[: HEAD.size + 16], zlib.crc32(data)) != crc:
+        return None
+    return Summary(start, [as_written(record) for _, record in inner(data)])
