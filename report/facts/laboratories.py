@@ -73,6 +73,11 @@ def plan_of(run: Run) -> Plan | None:
     return plan.of(run.part_of) if plan is not None and run.part_of else plan
 
 
+def views(run: Run) -> dict[str, Run]:
+    """The recording as pictures show it: of each slave with the master, by its role; the master's of a test without."""
+    return {role: run.of(role) for role in run.roles} or {MASTER: run}
+
+
 def laboratories(run: Run) -> list[Laboratory]:
     """The laboratories of a recording, the master's first; raises PlanError as `whole_plan`."""
     plan = whole_plan(run)

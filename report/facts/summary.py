@@ -63,7 +63,7 @@ def summarize(run: Run) -> dict[str, Any]:
         "force_path": next(iter(paths.values()), None),
         "force_paths": paths,
         "error_energy": error_energy(run, labs),
-        "error_energy_at": next((f"the {lab.name}" for lab in labs if lab.topic == MASTER), ""),
+        "error_energy_at": next((whereabouts(lab) for lab in labs if lab.topic == MASTER), ""),
         "latency": latencies(run),
         "late_ticks": late_ticks(run),
         "real_time": real_time,
@@ -144,6 +144,11 @@ def system(lab: Laboratory, labs: list[Laboratory]) -> str:
     return (
         f"{lab.pictured.system}.{name or SLAVE}" if name or first.topic != lab.topic else lab.pictured.system
     )
+
+
+def whereabouts(lab: Laboratory) -> str:
+    """A laboratory by what stands in it, in a sentence: `the column`, or `column A` of two."""
+    return lab.name if lab.letter else f"the {lab.name}"
 
 
 def force_paths(run: Run, labs: list[Laboratory]) -> dict[str, dict[str, Any]]:

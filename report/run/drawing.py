@@ -8,6 +8,7 @@ from typing import NamedTuple
 from common.recording.reader import Run
 from common.roles import name_of, title
 from common.terminal.telling import Tell
+from report.facts.laboratories import views
 from report.page import data_uri
 from report.pictures import PICTURES, Picture, figure, needs
 
@@ -31,22 +32,23 @@ Pictures = dict[str, list[Drawn]]  # by the role of the slave that they concern
 
 def draw_all(run: Run, tell: Tell) -> tuple[Pictures, dict[str, str]]:
     """Every picture that a recording has signals for, by slave; and those left out, with the signals they need."""
-    asked = [(role, picture) for role in run.roles for picture in PICTURES.values()]
-    found: Pictures = {role: [] for role in run.roles}
+    parts = views(run)
+    asked = [(role, picture) for role in parts for picture in PICTURES.values()]
+    found: Pictures = {role: [] for role in parts}
     for place, (role, picture) in enumerate(asked):
         tell(picture.name, place, len(asked))
-        if drawn := draw(run, role, picture):
+        if drawn := draw(parts[role], role, picture):
             found[role].append(drawn)
     names = {drawn.name for several in found.values() for drawn in several}
     return found, {name: needs(run, picture) for name, picture in PICTURES.items() if name not in names}
 
 
-def draw(run: Run, role: str, picture: Picture) -> Drawn | None:
-    """One picture of what concerns a slave; None where the recording lacks its signals."""
-    narrow = png(run, role, picture, picture.size)
+def draw(part: Run, role: str, picture: Picture) -> Drawn | None:
+    """One picture of the part of a recording that concerns a slave; None where it lacks the picture's signals."""
+    narrow = png(part, picture, picture.size)
     if narrow is None:
         return None
-    wide = png(run, role, picture, picture.double) if picture.name in WIDE else None
+    wide = png(part, picture, picture.double) if picture.name in WIDE else None
     of = f" of the {title(role)}" if name_of(role) else ""
     return Drawn(
         picture.name,
@@ -58,12 +60,10 @@ def draw(run: Run, role: str, picture: Picture) -> Drawn | None:
     )
 
 
-def png(
-    run: Run, role: str, picture: Picture, size: tuple[float, float]
-) -> tuple[bytes, tuple[int, int]] | None:
+def png(part: Run, picture: Picture, size: tuple[float, float]) -> tuple[bytes, tuple[int, int]] | None:
     """A picture's file and its CSS pixels; a grid of dots, because it stays small however long the test was."""
     canvas = figure.figure(*size)
-    if not picture.on(run.of(role), canvas):
+    if not picture.on(part, canvas):
         return None
     stream = io.BytesIO()
     canvas.savefig(stream, format="png", dpi=figure.DOTS, metadata=figure.STAMPS[".png"])

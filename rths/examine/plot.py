@@ -69,13 +69,14 @@ def described(name: str, text: str) -> str:
 def run(args: argparse.Namespace) -> int:
     """Draw what was asked for, or whatever the recording has signals for."""
     from common.recording.reader import read
+    from report.facts.laboratories import views
 
     chosen = choose(args.names)
     recording = read(args.file)
     place = place_of(args)
     with outputs.folder(place.folder, force=True):
         for picture in chosen:
-            for role in recording.roles:
+            for role in views(recording):
                 outputs.checked(place.path(picture.name, role), args.force, [args.file])
         made, left_out = draw_all(recording, chosen, place, args.width)
         complain(args, made, left_out)
@@ -89,6 +90,7 @@ def draw_all(
     recording: Run, chosen: list[Picture], place: Place, width: str
 ) -> tuple[list[str], dict[str, str]]:
     """Files of the pictures that were drawn, and what the others lack."""
+    from report.facts.laboratories import views
     from report.pictures import needs
     from report.text.progress import Progress
 
@@ -99,7 +101,7 @@ def draw_all(
             progress.tell(picture.name, number, len(chosen))
             drawn = {
                 str(path)
-                for role in recording.roles
+                for role in views(recording)
                 if save(
                     recording, role, picture, path := place.path(picture.name, role), width, force=place.force
                 )
@@ -169,10 +171,11 @@ def labelled(name: str, role: str) -> str:
 
 def draw(recording: Run, role: str, picture: Picture, width: str = "single") -> Any | None:
     """The figure of what concerns a slave, with its caption; None where the recording lacks its signals."""
+    from report.facts.laboratories import views
     from report.pictures import figure, layout
 
     canvas = figure.figure(*(picture.double if width == "double" else picture.size))
-    if not picture.on(recording.of(role), canvas):
+    if not picture.on(views(recording)[role], canvas):
         return None
     layout.caption(canvas, caption(recording, role))
     return canvas
