@@ -7,6 +7,7 @@ by `kind = "file.py:Class"`, and its table `[device]` says where the device stan
 from __future__ import annotations
 
 import dataclasses
+import warnings
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar, cast
@@ -28,6 +29,9 @@ from models.system import System
 
 if TYPE_CHECKING:
     from laboratories.effects.effect import Effect
+
+# a kernel is passed by its address, which Numba calls experimental; tests hold that it works in every loop
+warnings.filterwarnings("ignore", category=numba.NumbaExperimentalFeatureWarning)
 
 __all__ = ["Channels", "Device", "Fault", "Follows", "Limited", "Nominal", "Signal", "kernel"]
 

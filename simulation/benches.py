@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 from collections.abc import Callable, Iterator
 from importlib import metadata
 from pathlib import Path
@@ -12,46 +13,49 @@ from typing import NamedTuple
 from common import signals
 from common.errors import InputError, InterlockError, RigError, RthsError
 from common.host.clock import Clock, MonotonicClock, VirtualClock, unix_ns
+from common.plan.kinds import COLUMN, TABLE
 from common.plan.limits import Guard, Violation
 from common.plan.plan import Plan
 from common.plan.reality import Reality
-from common.plan.tables import TableCompensator
 from common.recording.reader import CLOCK
 from common.recording.writer import Recording
-from common.rig import ColumnCommand, ColumnMeasurement, GuardedRig, TableCommand, TableMeasurement
+from common.rig import GuardedRig, command_of
+from common.roles import MASTER, name_of
+from common.roles import kind_of as role_kind
+from common.signals import SEQ, TIME, Signal
 from common.terminal.telling import Tell, untold
-from master import assembly as master
+from laboratories.kind import Chosen, Kind
+from laboratories.kinds import kind_of
+from loop import rigs
 from models import excitation
 from models.compensators.follower import Follower
-from models.excitation import POSITION, Programme, Segment
+from models.excitation import POSITION, Programme, Reach, Segment
 from recorder import files
 from recorder.sink import FileSink, Item, Sink, ThreadedSink
-from slave import assembly as slave
 
 LEAD_NS = 100_000_000  # before the first tick: what is left to prepare takes a few ms
-UNCOMPENSATED = TableCompensator()
+UNCOMPENSATED = Chosen("none", {}, "compensator")
 
-MASTER_FIELDS = ("seq", "t", "column_target", "actuator_command", "column_displacement", "column_force")
-SLAVE_FIELDS = (
-    "seq",
-    "t",
-    "table_target",
-    "damper_command",
-    "table_command",
-    "table_displacement",
-    "table_acceleration",
-    "damper_stroke",
-    "damper_force",
-)
+TARGET = "target"
+"""The bench test of any laboratory: its target, within a share of its limits."""
+
+KIND_OF_PART = {"column": COLUMN, "actuator": COLUMN, "table": TABLE, "damper": TABLE}
+OF_EFFORT = ("damper",)  # parts that a motor's force moves, while the target stands still
+
+# of the limits on displacement and on rates: a bench test stays clear of every limit
+SHARE, HALF = 0.2, 0.5
+# where a kind has no such limit: what actuators and tables of the shipped plans bear
+REACH = Reach(5e-3, 0.25, 3.0)
 
 
 class Order(NamedTuple):
-    """Which bench test is wanted."""
+    """Which bench test is wanted, and in which role's laboratory."""
 
     part: str
     compensated: bool = False
     only: tuple[str, ...] = ()
     real_time: bool = False
+    name: str = ""  # whose laboratory it is: a slave's name, master or slave; empty for the only one that has the part
 
 
 class Result(NamedTuple):
@@ -79,15 +83,12 @@ def play(
     Raises:
         InputError: a piece that the part does not have, a rig that cannot be built, or a file not writable.
     """
-    programme = chosen(plan, order)
-    ticks = programme.motion.shape[1] - 1
-    plan = plan.with_test(duration=ticks * plan.test.interval)
-    bench = (ColumnBench if order.part in ("column", "actuator") else TableBench)(
-        plan, reality, order, programme
-    )
+    role = role_of(plan, order.part, order.name)
+    bench = Bench(plan.of(role), role, kind_of(plan, role), reality.of(role), order)
+    plan = bench.plan
     clock: Clock = MonotonicClock() if order.real_time else VirtualClock()
     epoch_ns = unix_ns() if order.real_time else 0
-    recording = begin(path, plan, bench, order, programme, epoch_ns)
+    recording = begin(path, bench, order, epoch_ns)
     file_sink = FileSink(recording, clock)
     sink: Sink = ThreadedSink(file_sink) if order.real_time else file_sink
     done, late, error = 0, 0, None
@@ -103,16 +104,58 @@ def play(
         sink.close({"outcome": "stopped" if error else "completed", "cause": cause, "ticks": str(done)}, {})
     if sink.failure and error is None:
         error = InterlockError(f"The recording is lost: {sink.failure}")
-    return Result(path, order.part, plan.test.interval, done, late, programme.segments, error)
+    return Result(path, order.part, plan.test.interval, done, late, bench.segments, error)
 
 
-def chosen(plan: Plan, order: Order) -> Programme:
+def role_of(plan: Plan, part: str, name: str = "") -> str:
+    """The role whose laboratory has a part: of that name, or the only one.
+
+    `name` is a slave's, or `master` or `slave` for those without one.
+
+    Raises:
+        InputError: no such laboratory has the part, or several have it and none is named.
+    """
+    wanted = KIND_OF_PART.get(part, "")
+    having = [role for role, kind in plan.kinds.items() if not wanted or kind == wanted]
+    names = [name_of(role) or role for role in having]
+    if name in names:
+        return having[names.index(name)]
+    what = part if wanted else "laboratory"
+    if name or not having:
+        whose = f"The plan's {name}" if name else "No laboratory of the plan"
+        lacks = "has no" if name else "has a"
+        known = f": it is in that of the {', '.join(names)}" if having else ""
+        raise InputError(f"{whose} {lacks} {what}{known}; look at kind in [master] and [slave].")
+    if len(having) > 1:
+        raise InputError(f"Several laboratories have a {what}: say which with --name ({', '.join(names)}).")
+    return having[0]
+
+
+def chosen(plan: Plan, kind: Kind, order: Order) -> Programme:
     """The programme asked for; raises InputError where the part has no such piece."""
-    names = [piece.name for piece in excitation.PARTS[order.part](plan.test.interval, plan.test.seed)]
+    interval, seed = plan.test.interval, plan.test.seed
+    if order.part == TARGET:
+        pieces = excitation.target(interval, reach(plan, kind))
+    else:
+        pieces = excitation.PARTS[order.part](interval, seed)
+    names = [piece.name for piece in pieces]
     for word in order.only:
         if not any(name.startswith(word) for name in names):
             raise InputError(f"The bench test of the {order.part} has no piece '{word}': {', '.join(names)}.")
-    return excitation.programme(order.part, plan.test.interval, plan.test.seed, order.only)
+    return excitation.programme(pieces, interval, order.only)
+
+
+def reach(plan: Plan, kind: Kind) -> Reach:
+    """How far and how fast the target of a kind may go in a bench test, by its limits."""
+    limits, channels, limited = kind.limits(plan), kind.channels, kind.limited
+    ways = (channels.target.name, channels.command.name, channels.position)
+    way = min(limits.get(name, math.inf) for name in ways)
+    shares = (
+        SHARE * way,
+        HALF * limits.get(limited.velocity, math.inf),
+        HALF * limits.get(limited.acceleration, math.inf),
+    )
+    return Reach(*(most if math.isfinite(most) else usual for most, usual in zip(shares, REACH, strict=True)))
 
 
 class StoppedError(Exception):
@@ -134,70 +177,63 @@ def armed(rig: GuardedRig, sink: Sink, at_ns: int) -> Iterator[None]:
             sink.put([["event", at_ns, at_ns, 0.0, "bench", "warning", "disarm", str(complaint), {}]])
 
 
-class ColumnBench:
-    """Laboratory A alone: the actuator follows the programme."""
+class Bench:
+    """One laboratory alone: it follows the programme, or stands still under its motor's force.
 
-    topic, fields = "master", MASTER_FIELDS
+    The target recorded is that of the tick at the master, that of the interval's end at a slave, as in a whole test.
+    """
 
-    def __init__(self, plan: Plan, reality: Reality, order: Order, programme: Programme) -> None:
-        self.plan, self.rig = plan, master.build_rig(reality)
-        self._measurements = Guard(vars(plan.limits), ColumnMeasurement._fields)
-        self._commands = Guard(vars(plan.limits), ColumnCommand._fields)
-        chosen = plan.compensator if order.compensated else UNCOMPENSATED
-        self._follow = Follower(chosen, programme, plan.test.interval)
+    def __init__(self, plan: Plan, role: str, kind: Kind, reality: Reality, order: Order) -> None:
+        self.kind, self.topic = kind, role_kind(role)
+        programme = chosen(plan, kind, order)
+        self.segments = programme.segments
+        self.plan = plan.with_ticks(programme.motion.shape[1] - 1)
+        self.rig = rigs.build(reality, role)
+        channels, limits = kind.channels, kind.limits(plan)
+        self._position = channels.names.index(channels.position)
+        units = {row.name: row.unit for row in self.rows}
+        self._measurements = Guard(limits, channels.names, units=units)
+        self._commands = Guard(limits, (channels.target.name, *channels.drives), units=units)
+        self._command = command_of(channels)
+        self._ahead = int(role != MASTER)
+        self._force = programme.motion[POSITION] if order.part in OF_EFFORT else None
+        compensator = kind.compensator(plan) if order.compensated else UNCOMPENSATED
+        self._follow = Follower(compensator, programme, plan.test.interval, compensator.where)
 
-    def tick(self, tick: int) -> tuple[tuple[float, ...], Violation | None]:
-        """Read, compute, write; the recorded values behind seq and t, and the violation of a limit."""
-        measured = self.rig.read()
-        target, command = self._follow(tick, measured.column_displacement)
-        wanted = ColumnCommand(command)
-        violation = self._measurements.violation(measured) or self._commands.violation(wanted)
-        if not violation:
-            self.rig.write(wanted)
-        return (target, command, *measured), violation
-
-
-class TableBench:
-    """Laboratory B alone: the table follows the programme, or stands still under the motor's force."""
-
-    topic, fields = "slave", SLAVE_FIELDS
-
-    def __init__(self, plan: Plan, reality: Reality, order: Order, programme: Programme) -> None:
-        self.plan, self.rig = plan, slave.build_rig(reality)
-        self._measurements = Guard(vars(plan.limits), TableMeasurement._fields)
-        self._commands = Guard(vars(plan.limits), ("table_target", *TableCommand._fields))
-        self._force = programme.motion[POSITION] if order.part == "damper" else None
-        chosen = plan.table.compensator if order.compensated else UNCOMPENSATED
-        self._follow = Follower(chosen, programme, plan.test.interval, plan.follows_in)
+    @property
+    def rows(self) -> tuple[Signal, ...]:
+        """What is recorded at a tick."""
+        channels = self.kind.channels
+        return (SEQ, TIME, *channels.driving, channels.command, *channels.measured)
 
     def tick(self, tick: int) -> tuple[tuple[float, ...], Violation | None]:
         """Read, compute, write; the recorded values behind seq and t, and the violation of a limit."""
         measured = self.rig.read()
-        if self._force is not None:
-            target, command, force = 0.0, 0.0, float(self._force[tick + 1])
+        if self._force is None:
+            _, command = self._follow(tick, measured[self._position])
+            target, force = self._follow.wanted(tick + self._ahead), 0.0
         else:
-            _, command = self._follow(tick, measured.table_displacement)
-            target, force = self._follow.wanted(tick + 1), 0.0
-        wanted = TableCommand(command, force)
+            target, command, force = 0.0, 0.0, float(self._force[tick + 1])
+        effort = (force,) if self.kind.channels.effort else ()
+        wanted = self._command(command, *effort)
         violation = self._measurements.violation(measured) or self._commands.violation((target, *wanted))
         if not violation:
             self.rig.write(wanted)
-        return (target, force, command, *measured), violation
+        return (target, *effort, command, *measured), violation
 
 
-def begin(
-    path: Path, plan: Plan, bench: ColumnBench | TableBench, order: Order, programme: Programme, at_ns: int
-) -> Recording:
+def begin(path: Path, bench: Bench, order: Order, at_ns: int) -> Recording:
     """A recording of one part's in- and outputs, with what was asked of it in the metadata `bench`."""
-    rows = tuple(signals.signal(bench.topic, name) for name in bench.fields)
-    topics = {bench.topic: rows, "event": signals.EVENT}
-    recording = Recording(path, plan.test.name, plan.storeys, topics)
+    plan = bench.plan
+    recording = Recording(
+        path, plan.test.name, plan.storeys, {bench.topic: bench.rows, "event": signals.EVENT}
+    )
     recording.metadata("plan", {"toml": plan.toml(), "digest": plan.digest()})
     recording.describe()
     recording.metadata("versions", {name: metadata.version(name) for name in files.PACKAGES})
     recording.metadata("host", files.host())
     recording.metadata(CLOCK, {"kind": "real" if order.real_time else "virtual"})
-    segments = json.dumps([segment._asdict() for segment in programme.segments])
+    segments = json.dumps([segment._asdict() for segment in bench.segments])
     asked = {"part": order.part, "compensated": json.dumps(order.compensated), "segments": segments}
     recording.metadata("bench", asked)
     recording.add("event", at_ns, at_ns, (0.0, "recorder", "info", "begin", "recording begun", {}))
@@ -206,7 +242,7 @@ def begin(
 
 
 def loop(
-    bench: ColumnBench | TableBench,
+    bench: Bench,
     clock: Clock,
     sink: Sink,
     epoch_ns: int,

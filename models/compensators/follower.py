@@ -2,10 +2,24 @@
 
 from __future__ import annotations
 
-from common.plan.tables import Compensator, TableCompensator
+from collections.abc import Mapping
+from typing import Protocol
+
 from models import compensators
 from models.compiled import plain
 from models.excitation import ACCELERATION, JERK, POSITION, RATE, Programme
+
+
+class Choice(Protocol):
+    """A compensator that a plan chooses."""
+
+    @property
+    def kind(self) -> str:
+        """Its name."""
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """Its parameters by name."""
 
 
 class Follower:
@@ -13,7 +27,7 @@ class Follower:
 
     def __init__(
         self,
-        chosen: Compensator | TableCompensator,
+        chosen: Choice,
         programme: Programme,
         interval: float,
         table: str = "compensator",

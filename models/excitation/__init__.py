@@ -17,9 +17,11 @@ __all__ = [
     "PARTS",
     "Piece",
     "Programme",
+    "Reach",
     "Segment",
     "join",
     "programme",
+    "target",
 ]
 
 STILL = 0.5  # s, between pieces
@@ -89,11 +91,35 @@ def damper(interval: float, _seed: int) -> list[Piece]:
     return [sweep(interval, (0.8, 20.0), duration=40.0, amplitude=20.0, curvature=np.inf)]
 
 
+class Reach(NamedTuple):
+    """How far and how fast a target may go in a bench test of any laboratory."""
+
+    amplitude: float  # m
+    velocity: float  # m/s
+    acceleration: float  # m/s²
+
+
+def target(interval: float, reach: Reach) -> list[Piece]:
+    """Steps of a quarter of the reach, sines of 0.5 to 4 Hz and a sweep of 0.2 to 20 Hz within it."""
+    # the amplitude at which sweep and sines leave the reach's own for the bounded acceleration: there they are fastest
+    most = min(reach.acceleration, reach.velocity**2 / reach.amplitude)
+    sines = [
+        sine(
+            interval,
+            frequency,
+            amplitude=min(reach.amplitude, most / (2.0 * np.pi * frequency) ** 2),
+            cycles=max(6, round(6 * frequency)),
+        )
+        for frequency in (0.5, 1.0, 2.0, 4.0)
+    ]
+    wave = sweep(interval, (0.2, 20.0), duration=40.0, amplitude=reach.amplitude, curvature=most)
+    return [steps(interval, height=0.25 * reach.amplitude, hold=0.5, count=8), *sines, wave]
+
+
 PARTS = {"column": column, "actuator": actuator, "table": table, "damper": damper}
 
 
-def programme(part: str, interval: float, seed: int, only: Sequence[str] = ()) -> Programme:
-    """The bench test of a part, or those of its pieces whose names begin with one of `only`."""
-    pieces = PARTS[part](interval, seed)
+def programme(pieces: Sequence[Piece], interval: float, only: Sequence[str] = ()) -> Programme:
+    """Pieces of a bench test in a row: all, or those whose names begin with one of `only`."""
     chosen = [piece for piece in pieces if not only or any(piece.name.startswith(word) for word in only)]
     return join(chosen, interval)

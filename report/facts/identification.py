@@ -9,8 +9,11 @@ from typing import Any
 import numpy as np
 
 from common.errors import InputError
+from common.plan.plan import Plan
 from common.recording.reader import Run
-from laboratories.identification import actuator, column, damper, step_response, table
+from common.roles import kind_of, name_of
+from laboratories.device import Device
+from laboratories.identification import actuator, column, damper, device, step_response, table
 from laboratories.identification.estimate import Estimate
 from models.excitation import Segment
 from models.registry import Array
@@ -22,6 +25,7 @@ NEEDED = {
     "table": ("slave", ("table_command", "table_displacement")),
     "damper": ("slave", ("damper_command", "damper_stroke")),
 }
+NEEDED_TOPICS = ("master", "slave")
 EQUIVALENT_LAG = "equivalent first-order lag of a servo-hydraulic actuator"
 TAIL = 0.4  # s behind a step that the tangent looks at
 
@@ -39,9 +43,14 @@ def segments(run: Run) -> list[Segment]:
 
 def possible(run: Run) -> list[str]:
     """Parts whose in- and outputs a recording holds."""
-    return [
-        part for part, (topic, names) in NEEDED.items() if set(names) <= run.columns.get(topic, {}).keys()
-    ]
+    return [part for part in NEEDED if topic_of(run, part)]
+
+
+def topic_of(run: Run, part: str) -> str:
+    """The topic that holds a part's in- and outputs, that of the default plan first; empty where none does."""
+    usual, names = NEEDED[part]
+    topics = (usual, *(topic for topic in NEEDED_TOPICS if topic != usual))
+    return next((topic for topic in topics if set(names) <= run.columns.get(topic, {}).keys()), "")
 
 
 def identify(run: Run, part: str = "") -> dict[str, Any]:
@@ -78,7 +87,7 @@ def plain(found: dict[str, Estimate]) -> dict[str, dict[str, Any]]:
 
 def of_column(run: Run, _interval: float) -> dict[str, Any]:
     """Elastic stiffness; with a static cyclic test also every cycle."""
-    columns = run.columns["master"]
+    columns = run.columns[topic_of(run, "column")]
     deformation, force = columns["column_displacement"], columns["column_force"]
     static = [segment for segment in segments(run) if segment.name == "static"]
     if not static:
@@ -97,7 +106,7 @@ def of_actuator(run: Run, interval: float) -> dict[str, Any]:
 
     Where the plan's actuator is servo-hydraulic they are those of the lag that comes nearest to it, as `model` says.
     """
-    columns = run.columns["master"]
+    columns = run.columns[topic_of(run, "actuator")]
     command, measured = columns["actuator_command"], columns["column_displacement"]
     plan = plan_of(run)
     held = plan is not None and plan.actuator.command == "held"
@@ -124,7 +133,7 @@ def step_ticks(command: Array, segment: Segment) -> list[int]:
 
 def of_table(run: Run, interval: float) -> dict[str, Any]:
     """Frequency, damping ratio and dead time; bandwidth where the motion covers it."""
-    columns = run.columns["slave"]
+    columns = run.columns[topic_of(run, "table")]
     command, measured = columns["table_command"], columns["table_displacement"]
     fit = table.least_squares(command, measured, interval)
     result: dict[str, Any] = {"parameters": plain(fit.parameters), "nrmse": fit.nrmse}
@@ -138,7 +147,7 @@ def of_table(run: Run, interval: float) -> dict[str, Any]:
 
 def of_damper(run: Run, interval: float) -> dict[str, Any]:
     """Mass, spring, dashpot, friction, lag and gain of the motor."""
-    columns = run.columns["slave"]
+    columns = run.columns[topic_of(run, "damper")]
     plan = plan_of(run)
     still = part_of(run) == "damper"
     fit = damper.least_squares(
@@ -153,6 +162,31 @@ def of_damper(run: Run, interval: float) -> dict[str, Any]:
         "parameters": plain(fit.parameters),
         "nrmse": {"damper_stroke": fit.stroke_nrmse, "damper_force": fit.force_nrmse},
     }
+
+
+def of_device(run: Run, plan: Plan, role: str, kind: Device) -> dict[str, Any] | None:
+    """The nominal parameters of a user's kind that a role hosts; None where the recording lacks its signals.
+
+    `plan` is the role's. A bench recording has one topic for the slave, whatever its name.
+    """
+    channels = kind.channels
+    needed = {*channels.drives, *channels.names}
+    columns = next(
+        (
+            run.columns[topic]
+            for topic in (role, kind_of(role))
+            if needed <= run.columns.get(topic, {}).keys()
+        ),
+        None,
+    )
+    if columns is None:
+        return None
+    commands = np.ascontiguousarray(columns[channels.command.name])
+    efforts = columns[channels.effort.name] if channels.effort else np.zeros(commands.size)
+    measured = np.column_stack([columns[name] for name in channels.names])
+    fit = device.least_squares(kind, plan, commands, np.ascontiguousarray(efforts), measured)
+    name = f"{kind.name}.{name_of(role)}" if name_of(role) else kind.name
+    return {"part": name, "parameters": plain(fit.parameters), "nrmse": fit.nrmse}
 
 
 IDENTIFIERS: dict[str, Callable[[Run, float], dict[str, Any]]] = {

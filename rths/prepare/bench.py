@@ -9,7 +9,6 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from common.errors import InputError
 from common.terminal import cli
 from common.terminal.telling import untold
 from report.text.progress import Progress
@@ -17,13 +16,17 @@ from report.text.progress import Progress
 if TYPE_CHECKING:
     from simulation.benches import Result
 
-PARTS = ("column", "actuator", "table", "damper")
-OF_SLAVE = ("table", "damper")
+PARTS = ("column", "actuator", "table", "damper", "target")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `bench`."""
-    parser.add_argument("part", choices=PARTS, metavar="PART", help=", ".join(PARTS))
+    parser.add_argument(
+        "part",
+        choices=PARTS,
+        metavar="PART",
+        help=f"{', '.join(PARTS[:-1])}, or target: any laboratory follows steps, sines and a sweep within its limits",
+    )
     parser.add_argument(
         "plan", metavar="PLAN", help=f"TOML file of the test; {', '.join(cli.SHIPPED)} for those that ship"
     )
@@ -40,7 +43,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="only the pieces that begin so (step, sine, random, sweep, static); may be repeated",
     )
     parser.add_argument(
-        "--name", metavar="NAME", help="whose table or damper it is, where the plan names several slaves"
+        "--name",
+        metavar="NAME",
+        help="whose laboratory it is where several have the part: a slave's name, master, or slave for one without",
     )
     clock = parser.add_mutually_exclusive_group()
     clock.add_argument("--virtual", action="store_true", help="virtual clock, as fast as it goes (default)")
@@ -67,20 +72,16 @@ def run(args: argparse.Namespace) -> int:
         from recorder import files
         from simulation import benches
 
-        order = benches.Order(args.part, args.compensated, tuple(args.only), args.real_time)
+        order = benches.Order(args.part, args.compensated, tuple(args.only), args.real_time, args.name or "")
         reality = cli.load_reality(args.reality, plan)
-        if args.part not in OF_SLAVE and args.name:
-            raise InputError(f"The {args.part} is the master's: leave out --name {args.name}.")
-        if args.part in OF_SLAVE:
-            role = plan.slave_role(args.name or "")
-            plan, reality = plan.of(role), reality.of(role)
         tell = progress.tell if progress else untold
         with files.reserved(args.output, plan, f"bench-{args.part}", force=args.force) as path:
             result = benches.play(plan, reality, order, path, Stopper(), tell)
     if args.json:
         sys.stdout.write(json.dumps(summary(result)) + "\n")
     else:
-        show(result)
+        role = benches.role_of(plan, args.part, args.name or "")
+        show(result, f" --plan {args.plan}" if ":" in plan.kinds[role] else "")
     if result.error is not None:
         raise result.error
     return 0
@@ -97,8 +98,8 @@ def summary(result: Result) -> dict[str, Any]:
     }
 
 
-def show(result: Result) -> None:
-    """What was done, as text."""
+def show(result: Result, more: str) -> None:
+    """What was done, as text; `more` options of the next command."""
     from report.text.terminal import table
 
     rows = [["piece", "from", "to"]]
@@ -109,4 +110,4 @@ def show(result: Result) -> None:
     ]
     table(rows)
     sys.stdout.write(f"{result.ticks} ticks, {result.late} late, recorded in {result.path}\n")
-    sys.stdout.write(f"next: rths identify {result.path}\n")
+    sys.stdout.write(f"next: rths identify {result.path}{more}\n")

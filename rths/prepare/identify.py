@@ -14,9 +14,9 @@ from common.terminal import cli
 from common.terminal.printable import all_shown
 from common.terminal.telling import Tell
 from report.text.progress import Progress
-from rths.prepare.bench import OF_SLAVE
 
 PARTS = ("column", "actuator", "table", "damper")
+OF_SLAVE = ("table", "damper")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -29,6 +29,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--fit", metavar="MODEL", help="fit this hysteretic model to the column too (clough, bwbn, …)"
+    )
+    parser.add_argument(
+        "--plan",
+        metavar="PLAN",
+        help="the plan of the test: the parameters of its own kind of laboratory are fitted, whose class is run",
     )
     cli.json_argument(parser, "write the report as JSON on standard output")
 
@@ -51,21 +56,48 @@ def identified(args: argparse.Namespace, tell: Tell) -> list[dict[str, Any]]:
     from report.facts.identification import identify, part_of, possible
 
     recording = read(args.file)
+    if args.plan:
+        return devices(recording, args.plan, tell)
     tell(f"column, model {args.fit}" if args.fit else "", 0, 0)
     models = [fitted(recording, args.fit)] if args.fit else []
     reports = []
     for role in recording.roles:
         view = recording.of(role)
-        parts = [args.part or part_of(view)]
-        if not parts[0]:
-            parts = possible(view)
+        tested = args.part or part_of(view)
+        parts = possible(view) if tested in ("", "target") else [tested]
         own = [part for part in parts if role == recording.roles[0] or part in OF_SLAVE]
         for part in own:
             tell(part, 0, 0)
             reports.append(identify(view, part) | named(part, role))
     if not reports:
-        raise InputError(f"{args.file} holds no part's in- and outputs: see rths inspect {args.file}.")
+        raise InputError(
+            f"{args.file} holds no part's in- and outputs: see rths inspect {args.file}, and give --plan PLAN for a "
+            "kind of laboratory of your own."
+        )
     return reports + models
+
+
+def devices(recording: Any, plan_name: str, tell: Tell) -> list[dict[str, Any]]:
+    """The reports on the laboratories of the user's own kinds; raises InputError where the plan has none."""
+    from common.plan import plan as plans
+    from laboratories.device import Device
+    from laboratories.kinds import kinds_of
+    from report.facts.identification import of_device
+
+    plan = plans.load(cli.plan_path(plan_name))
+    own = {role: kind for role, kind in kinds_of(plan).items() if isinstance(kind, Device)}
+    if not own:
+        raise InputError(f"The plan {plan_name} has no kind of laboratory of your own: leave out --plan.")
+    reports = []
+    for role, kind in own.items():
+        tell(kind.says, 0, 0)
+        if report := of_device(recording, plan.of(role), role, kind):
+            reports.append(report)
+    if not reports:
+        raise InputError(
+            f"{recording.path} lacks the in- and outputs of the {', the '.join(k.says for k in own.values())}."
+        )
+    return reports
 
 
 def named(part: str, role: str) -> dict[str, str]:

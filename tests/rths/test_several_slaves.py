@@ -191,7 +191,9 @@ def test_bench_refuses_a_slaves_name_for_what_is_the_masters(
     part: str, call: Any, capsys: Any, plan_file: Path, tmp_path: Path
 ) -> None:
     assert call("bench", part, plan_file, "--name", "cellar", "-o", tmp_path / "a.mcap") == 2
-    assert capsys.readouterr().err == f"rths: The {part} is the master's: leave out --name cellar.\n"
+    assert capsys.readouterr().err == (
+        f"rths: The plan's cellar has no {part}: it is in that of the master; look at kind in [master] and [slave].\n"
+    )
     assert not (tmp_path / "a.mcap").exists()
 
 

@@ -14,7 +14,7 @@ DT = 0.002
 
 @pytest.mark.parametrize("part", PARTS)
 def test_a_programme_is_at_rest_at_both_ends_and_between_its_pieces(part: str) -> None:
-    found = excitation.programme(part, DT, 1)
+    found = excitation.programme(PARTS[part](DT, 1), DT)
     still = round(excitation.STILL / DT)
     assert np.all(found.motion[:, :still] == 0.0)
     assert np.all(found.motion[:, -still:] == 0.0)
@@ -45,7 +45,7 @@ def test_derivatives_are_those_of_the_sine() -> None:
 
 
 def test_a_step_has_no_derivatives() -> None:
-    found = excitation.programme("actuator", DT, 1, ("step",))
+    found = excitation.programme(PARTS["actuator"](DT, 1), DT, ("step",))
     assert np.max(found.motion[POSITION]) == 5e-3
     assert np.all(found.motion[RATE:] == 0.0)
 
@@ -66,3 +66,19 @@ def test_the_sweep_keeps_its_curvature() -> None:
     values = sweep(DT, (0.5, 25.0), duration=40.0, amplitude=10e-3, curvature=3.0).values
     assert np.max(np.abs(values)) == pytest.approx(10e-3, rel=0.05)
     assert np.max(np.abs(np.diff(values, 2) / DT**2)) < 3.3
+
+
+@pytest.mark.parametrize("reach", [excitation.Reach(20e-3, 0.5, 5.0), excitation.Reach(5e-3, 0.02, 3.0)])
+def test_the_programme_of_any_laboratory_stays_within_its_reach(reach: excitation.Reach) -> None:
+    pieces = excitation.target(DT, reach)
+    assert [piece.name.split()[0] for piece in pieces] == ["step", "sine", "sine", "sine", "sine", "sweep"]
+    found = excitation.programme(pieces, DT, ("sine", "sweep")).motion
+    for order, most in (
+        (POSITION, reach.amplitude),
+        (RATE, reach.velocity),
+        (ACCELERATION, reach.acceleration),
+    ):
+        assert (
+            np.max(np.abs(found[order])) <= 1.1 * most
+        )  # the growing frequency of a sweep and its fade add to it
+    assert np.max(np.abs(found[POSITION])) > 0.5 * min(reach.amplitude, reach.velocity**2 / reach.amplitude)
