@@ -1,1 +1,1 @@
-"""Laboratory B: drives the shaking table that carries the active mass damper."""
+"""Laboratory B: drives a laboratory of any kind by what the master sends."""

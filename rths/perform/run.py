@@ -188,7 +188,7 @@ def crew(plan: Plan) -> str:
     """The processes of a test in words."""
     if not plan.roles:
         return "master and recorder"
-    slaves = "slave" if not plan.slaves else f"slaves {', '.join(plan.slaves)}"
+    slaves = f"slave{'s' * (len(plan.slaves) > 1)} {', '.join(plan.slaves)}".rstrip()
     return f"master, {slaves} and recorder"
 
 
