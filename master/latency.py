@@ -22,7 +22,7 @@ from common.protocol.messages import Feedback
 NAN = math.nan
 
 
-@dataclass
+@dataclass(slots=True)
 class Row:
     """What the master knows of a tick; `sent_ns` 0 where no command went out, `used_ns` 0 while it lasts."""
 
@@ -142,7 +142,7 @@ class Account:
             *answered.stamps,
             row.used_ns,
         )
-        log_ns = lab.epoch_ns + lab.plan.tick_ns(row.tick)
+        log_ns = lab.unix_ns(row.tick)
         lab.outlet.add(self._topic, log_ns, lab.epoch_ns + now - lab.start_ns, values)
 
 
@@ -172,12 +172,12 @@ def segments(row: Row, offset: int) -> Segments:
     assert feedback is not None  # noqa: S101 - the caller has looked
     stamps = (feedback.command_received_ns, feedback.started_ns, feedback.sent_ns, row.received_ns)
     received, started, sent, back = stamps
-    return Segments(
-        command_one_way=(received - offset - row.sent_ns) * 1e-9,
-        slave_time=(sent - received) * 1e-9,
-        slave_compute_time=(sent - started) * 1e-9,
-        feedback_one_way=(back - sent + offset) * 1e-9,
-        round_trip=(back - row.sent_ns) * 1e-9,
-        decode_time=(row.decoded_ns - back) * 1e-9,
-        stamps=stamps,
+    return Segments(  # in the order of the fields: by their names it takes twice the time
+        (received - offset - row.sent_ns) * 1e-9,
+        (sent - received) * 1e-9,
+        (sent - started) * 1e-9,
+        (back - sent + offset) * 1e-9,
+        (back - row.sent_ns) * 1e-9,
+        (row.decoded_ns - back) * 1e-9,
+        stamps,
     )

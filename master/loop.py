@@ -216,7 +216,7 @@ class MasterLoop(RigLoop):
 
     def _sample(self, tick: int, measured: tuple[float, ...], outputs: Outputs) -> None:
         lab = self.lab
-        log_ns = lab.epoch_ns + lab.plan.tick_ns(tick)
+        log_ns = lab.unix_ns(tick)
         publish_ns = lab.epoch_ns + (self._sent_ns or lab.clock.now()) - lab.start_ns
         values = (
             tick,

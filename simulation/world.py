@@ -51,7 +51,8 @@ class World:
 
     def at(self, time: int, action: Callable[..., None], *arguments: Any) -> None:
         """Let something happen at a time, or now where that has passed."""
-        heappush(self.heap, (max(time, self.time), next(self._orders), action, arguments))
+        time = time if time > self.time else self.time  # max() takes seven times as long
+        heappush(self.heap, (time, next(self._orders), action, arguments))
 
     def process(self, name: str, drift: Drift = NO_DRIFT) -> Process:
         """A process of this world that does not run yet."""
@@ -171,7 +172,7 @@ class Process:
     def listen(self, timeout: int) -> None:
         """Wait for a message for at most `timeout` ns of its own clock."""
         self._listening = True
-        time = self.time
+        time = self.world.time + self.ahead
         self._wait(self.reached(self.local(time) + timeout) if self._ppb else time + timeout)
         self._listening = False
 
@@ -181,9 +182,9 @@ class Process:
             self._wait(self.time)
 
     def _wait(self, until: int) -> None:
-        world = self.world
-        until, self.ahead = max(until, world.time + self.ahead), 0
-        heap = world.heap
+        world, heap = self.world, self.world.heap
+        if self.ahead:
+            until, self.ahead = max(until, world.time + self.ahead), 0
         if until <= world.limit and (not heap or heap[0][0] > until):
             world.time = until  # nothing happens before: to switch would change nothing
             return

@@ -230,7 +230,7 @@ class SlaveLoop(RigLoop):
         self, tick: int, measured: tuple[float, ...], wanted: tuple[float, ...], sent_ns: int
     ) -> None:
         lab, command = self.lab, self._command
-        log_ns = lab.epoch_ns + lab.plan.tick_ns(tick)
+        log_ns = lab.unix_ns(tick)
         publish_ns = log_ns + sent_ns - self.tick_ns(tick)
         values = (
             tick,

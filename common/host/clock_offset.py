@@ -57,6 +57,8 @@ class ClockOffset:
         self._origin: tuple[int, int] | None = None  # own time, offset
         self._centre, self._level, self._slope = 0.0, 0.0, 0.0  # the line: level at centre
         self._seen, self._low, self._high = 0.0, -math.inf, math.inf  # the interval at the time `seen`
+        self._asked: int | None = None  # what `at` was asked for last, since the newest exchange
+        self._value = 0  # and its answer
 
     @property
     def offset(self) -> int:
@@ -77,7 +79,11 @@ class ClockOffset:
         """Other clock minus own clock at a time of the own clock, ns."""
         if self._origin is None:
             return 0
-        start, first = self._origin
+        if now_ns != self._asked:  # a loop asks several times for the same moment
+            self._asked, self._value = now_ns, self._at(now_ns, *self._origin)
+        return self._value
+
+    def _at(self, now_ns: int, start: int, first: int) -> int:
         now = now_ns - start
         value = self._level + self._slope * (now - self._centre)
         wander = MAX_DRIFT * abs(now - self._seen)
@@ -101,7 +107,7 @@ class ClockOffset:
         trip = (t4 - t1) - (t3 - t2)
         if trip < -IMPOSSIBLE * (t4 - t1) - RESOLUTION:
             return
-        self._newest = t4
+        self._newest, self._asked = t4, None
         if trip <= self._shortest:  # of equal ones the newest
             self._shortest = trip
             self._keep(t1, t2, t3, t4)

@@ -189,12 +189,13 @@ def wait(loop: Loop, tick: int) -> None:
 
     A laboratory that was held up itself reports that first, before it reads how the others have reacted.
     """
-    lab = loop.lab
-    lab.clock.sleep_until(loop.earliest(tick))
-    if lab.running and tick < lab.plan.ticks and lab.overrun(lab.clock.now() - loop.nominal(tick), tick):
+    lab, clock = loop.lab, loop.lab.clock
+    clock.sleep_until(loop.earliest(tick))
+    late = clock.now() - loop.nominal(tick)
+    if late > 0 and lab.running and tick < lab.plan.ticks and lab.overrun(late, tick):
         return
     take_all(loop)
-    while not loop.heard(tick) and lab.running and (left := loop.latest(tick) - lab.clock.now()) > 0:
+    while not loop.heard(tick) and lab.running and (left := loop.latest(tick) - clock.now()) > 0:
         received = lab.endpoint.receive(left * 1e-9)
         if received is not None:
             loop.take(received)

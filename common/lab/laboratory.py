@@ -55,6 +55,7 @@ class Laboratory:
         self.answers: dict[int, tuple[bool, str]] = {}  # to the operator's presses
         self._exact_ns = setting.plan.test.interval * 1e9
         self.interval_ns = round(self._exact_ns)
+        self._even = self._exact_ns == self.interval_ns
         self.start_ns = 0  # own clock, tick 0
         self.epoch_ns = 0  # Unix time of tick 0 on the master's base
         self.outlet = Outlet(0, name, kept_items(self.plan, name))
@@ -80,8 +81,12 @@ class Laboratory:
         self.report("state", {"lab": self.name, "state": self.exchange.state.value})
 
     def tick_ns(self, tick: int) -> int:
-        """Nominal time of a tick on this laboratory's clock."""
-        return self.start_ns + round(tick * self._exact_ns)  # as of the plan; a loop asks ten times per tick
+        """Nominal time of a tick on this laboratory's clock; a loop asks ten times per tick."""
+        return self.start_ns + (tick * self.interval_ns if self._even else round(tick * self._exact_ns))
+
+    def unix_ns(self, tick: int) -> int:
+        """Nominal Unix time of a tick on the master's base."""
+        return self.epoch_ns + (tick * self.interval_ns if self._even else round(tick * self._exact_ns))
 
     def tick_at(self, elapsed_ns: int) -> int:
         """The tick whose interval a time after the first tick falls into."""
@@ -98,7 +103,7 @@ class Laboratory:
     ) -> None:
         """Record and report an event."""
         t = tick * self.plan.test.interval
-        at = self.epoch_ns + self.plan.tick_ns(tick)
+        at = self.unix_ns(tick)
         self.outlet.add("event", at, at, (t, self.name, level, code, text, dict(values)))
         self.report(
             "event", {"t": t, "lab": self.name, "level": level, "code": code, "text": text} | dict(values)
@@ -107,7 +112,7 @@ class Laboratory:
     def explain(self, error: Exception | None, *, tick: int = 0) -> None:
         """Record the traceback of a rig's own exception, where there is one to show; it is not reported."""
         if details := getattr(error, "details", ""):
-            at = self.epoch_ns + self.plan.tick_ns(tick)
+            at = self.unix_ns(tick)
             t = tick * self.plan.test.interval
             self.outlet.add("event", at, at, (t, self.name, "info", "traceback", details, {}))
 
@@ -131,7 +136,7 @@ class Laboratory:
     def sample_ramp(self, topic: str, tick: int, *values: float) -> None:
         """Record one interval of the ramp to rest: commands written, then readings."""
         if self.recorded:
-            at = self.epoch_ns + self.plan.tick_ns(tick)
+            at = self.unix_ns(tick)
             t = tick * self.plan.test.interval
             self.outlet.add(topic, at, at, (tick, t, self.safety.mode.value, *values))
 
@@ -280,7 +285,8 @@ class Laboratory:
     @property
     def recorded(self) -> bool:
         """Whether a recorder takes part in the test."""
-        return self.recorder is not None and self.exchange.belongs(self.recorder.session)
+        recorder = self.recorder
+        return recorder is not None and self.exchange.belongs(recorder.session)
 
     def recorder_has_all(self) -> bool:
         """Whether the recorder says that it has this laboratory's whole stream."""

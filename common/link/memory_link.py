@@ -52,9 +52,10 @@ class MemoryEndpoint:
     def send(self, message: Message, to: str = "") -> int:
         """Put a message into the queue of every role that hears it; the present time, ns."""
         route = (type(message), to)
-        if route not in self._hearers:
-            self._hearers[route] = self._hub.hearers(self._role, *route)
-        for hearer in self._hearers[route]:
+        hearers = self._hearers.get(route)
+        if hearers is None:
+            hearers = self._hearers[route] = self._hub.hearers(self._role, *route)
+        for hearer in hearers:
             hearer.arrive(message, self._role)
         return self.clock.now()
 

@@ -16,6 +16,8 @@ from common.errors import LocalProtocolError
 class Mode(Enum):
     """What a laboratory's rig may do."""
 
+    __hash__ = object.__hash__  # each member is one object; the library's own takes the name's, in Python
+
     IDLE = "idle"
     CONFIGURED = "configured"
     ARMED = "armed"
@@ -28,6 +30,8 @@ class Mode(Enum):
 
 class Turn(Enum):
     """What leads from one mode to another."""
+
+    __hash__ = object.__hash__
 
     CONFIGURE = "configure"
     ARM = "arm"

@@ -39,7 +39,8 @@ class Watchdog:
     @property
     def missed(self) -> int:
         """Intervals of silence, by messages or by echoes beyond their round trip."""
-        return max(self._unheard, self._unechoed - ROUND_TRIP)
+        unanswered = self._unechoed - ROUND_TRIP
+        return unanswered if unanswered > self._unheard else self._unheard
 
     def look(self, tick: int, seq: int, echo: int) -> Finding:
         """One interval: the tick whose message is due, the newest one's own number, and the one it echoes.
@@ -52,7 +53,7 @@ class Watchdog:
         self._unechoed = 0 if fresh and echo > self._echo else self._unechoed + 1
         if fresh:
             self._seq, self._echo = seq, max(echo, self._echo)
-        begun = self._seq >= 0 and self._echo >= 0
-        if self.missed >= (self._ramp if begun else max(self._ramp, self._age)):
+        begun, missed = self._seq >= 0 and self._echo >= 0, self.missed
+        if missed >= (self._ramp if begun else max(self._ramp, self._age)):
             return Finding.RAMP
-        return Finding.HOLD if self.missed >= self._hold and begun else Finding.FINE
+        return Finding.HOLD if missed >= self._hold and begun else Finding.FINE
