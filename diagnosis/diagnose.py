@@ -9,7 +9,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from common.errors import InputError
-from common.signals import MEASURED
+from common.plan.kinds import COLUMN
 from common.terminal.telling import Tell, untold
 from diagnosis.findings import readings, report
 from diagnosis.findings.found import Diagnosis
@@ -20,20 +20,15 @@ from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import Searcher
 from diagnosis.recorded import link
 from diagnosis.recorded.ground import Ground
+from diagnosis.recorded.laboratory import Recorded
 from diagnosis.recorded.link import Finding
-from diagnosis.recorded.parts import Building, ColumnAlone, LaboratoryA, LaboratoryB, Part
+from diagnosis.recorded.parts import Building, ColumnAlone, Laboratory, Part
 from diagnosis.recorded.record import LEAST_TICKS, Record
 from diagnosis.report.records import Report
 from models.system import System
 
 SHORTEST = 0.5  # s of a test that anything can be said of
-BUILDING = (
-    "ground_acceleration",
-    "displacement",
-    "column_force",
-    "column_displacement",
-    "damper_force_used",
-)
+BUILDING = ("ground_acceleration", "displacement")
 AGAINST = -0.7  # correlation from which on a sign is doubted
 
 
@@ -42,7 +37,8 @@ def diagnose(
 ) -> dict[str, Report]:
     """The reports on a test by role of the slave (contract, section 8), but for their verdicts in words.
 
-    Each is of the master and of one slave; in its closed loop the other slaves are what they were found to be.
+    Each is of the master and of one slave; in its closed loop the other slaves are what they were found to be. The one
+    on a test without slaves is the master's.
 
     Raises:
         InputError: the recording holds nothing that a model of the plan could predict.
@@ -51,7 +47,7 @@ def diagnose(
         limits=1, user_api="blas"
     ):  # small matrices: more threads only wait for each other
         found = {role: examine(record, tell) for role, record in records.items()}
-        systems = {role: item.system(noisy=False) for role, item in found.items()}
+        systems = {role: item.systems(noisy=False)[role] for role, item in found.items()}
         return {
             role: report.build(
                 replace(item, record=among(item.record, systems)),
@@ -77,9 +73,9 @@ def examine(record: Record, tell: Tell = untold) -> Diagnosis:
     parts = parts_of(record)
     if not parts:
         raise InputError(
-            "The recording holds no part's input and output together: "
-            "record at least actuator_command with column_displacement, or column_displacement with column_force, "
-            "or table_command or damper_command with a reading of that laboratory."
+            "The recording holds no part's input and output together: record at least one of "
+            f"{' or '.join(name for lab in record.labs for name in lab.commands)} with a reading of that laboratory, "
+            "or column_displacement with column_force."
         )
     rounded = readings.steps(record)
     datas, verdicts = [], []
@@ -148,30 +144,36 @@ def parts_of(record: Record) -> list[Part]:
     parts: list[Part] = []
     if record.ground is not None and record.has("ground_acceleration"):
         parts.append(Ground(record, record.ground))
-    if record.has(*BUILDING):
+    if record.has(*BUILDING, *used(record)):
         parts.append(Building(record))
-    if driven(record):
-        parts.append(LaboratoryA(record))
-    elif record.has(*MEASURED["master"]):
-        parts.append(ColumnAlone(record, record.signals["column_displacement"]))
-    if any(record.has(name) for name in MEASURED["slave"]) and (
-        record.has("table_command") or record.has("damper_command")
-    ):
-        parts.append(LaboratoryB(record))
+    for lab in record.labs:
+        if driven(record, lab):
+            parts.append(Laboratory(record, lab))
+        elif lab.kind.name == COLUMN and record.has(*lab.measured):
+            parts.append(ColumnAlone(record, lab))
     return [part for part in parts if np.any(part.measured)]
 
 
-def driven(record: Record) -> bool:
-    """Whether the actuator's command was recorded with a reading of its laboratory."""
-    return record.has("actuator_command") and any(record.has(name) for name in MEASURED["master"])
+def used(record: Record) -> list[str]:
+    """The signals that the building was computed from, the ground motion aside."""
+    own, other = record.own, record.other
+    names = [own.kind.channels.force, own.kind.channels.position] if own else []
+    return names + ([f"{other.kind.channels.force}_used"] if other else [])
+
+
+def driven(record: Record, lab: Recorded) -> bool:
+    """Whether a command of a laboratory was recorded with a reading of it."""
+    return any(map(record.has, lab.commands)) and any(map(record.has, lab.measured))
 
 
 def not_recorded(record: Record) -> list[str]:
     """What cannot be judged for lack of signals, in sentences."""
     result = []
-    if not driven(record) and record.has(*MEASURED["master"]):
-        result.append("actuator_command was not recorded: nothing can be said of the actuator.")
-    missing = [name for name in (*MEASURED["master"], *MEASURED["slave"]) if not record.has(name)]
+    for lab in record.labs:
+        if lab.kind.name == COLUMN and not driven(record, lab) and record.has(*lab.measured):
+            (command,) = lab.commands
+            result.append(f"{command} was not recorded: nothing can be said of the actuator.")
+    missing = [name for lab in record.labs for name in lab.measured if not record.has(name)]
     if missing:
         result.append(f"Not recorded: {', '.join(missing)}; what only they show cannot be decided.")
     return result

@@ -7,6 +7,7 @@ by `kind = "file.py:Class"`, and its table `[device]` says where the device stan
 from __future__ import annotations
 
 import dataclasses
+import math
 import warnings
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -22,7 +23,7 @@ from common.plan.tables import ForceCorrection
 from common.safety.ramp import MotionRamp, Ramp
 from common.signals import Channels, Signal
 from laboratories import completeness
-from laboratories.kind import Chosen, Coupling, Follows, Kind, Limited, Sensed, usual
+from laboratories.kind import Chosen, Coupling, Follows, Kind, Limited, Machine, Sensed, usual
 from models.compiled import jit
 from models.registry import Array
 from models.system import System
@@ -192,6 +193,30 @@ class Device(Kind):
     def effects(self) -> tuple[Effect, ...]:
         """Its faults as effects of the catalogue, in the order of the class."""
         return tuple(fault.effect(name) for name, fault in self.faults.items())
+
+    def machines(self, plan: Plan) -> tuple[Machine, ...]:
+        """The device with its nominal parameters."""
+        first, *rest = super().machines(plan)
+        return (first._replace(parameters=tuple(f"{SITE}.{name}" for name in self.nominal)), *rest)
+
+    def planned(self, plan: Plan, name: str) -> float:
+        """A nominal parameter as the plan or the class gives it."""
+        return self.values(plan)[name.partition(".")[2]]
+
+    def tolerance(self, plan: Plan, name: str) -> float:
+        """As the class says it."""
+        return self.nominal[name.partition(".")[2]].tolerance
+
+    def scaled(self, system: System, name: str, factor: float) -> System:
+        """The system with a nominal parameter multiplied, as far as the class allows it."""
+        key = name.partition(".")[2]
+        one, value = self.nominal[key], factor * self.planned(system.plan, name)
+        value = min(max(value, one.least), math.inf if one.most is None else one.most)
+        return system.moved("device", parameters=dict(system.plan.device.parameters) | {key: value})
+
+    def noisy(self, system: System, rms: Mapping[str, float]) -> System:
+        """The system with the noise of measured channels replaced."""
+        return system.moved("device", noise=dict(system.plan.device.noise) | dict(rms))
 
     def values(self, plan: Plan) -> dict[str, float]:
         """The nominal parameters by name: the class's, or the plan's where it gives them.

@@ -10,6 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from enum import Enum
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from common.plan.plan import Plan
@@ -102,6 +103,17 @@ def usual(channels: Channels) -> Pictured:
     return Pictured(word, word, across, (loop,), also)
 
 
+class Machine(NamedTuple):
+    """A machine in a laboratory, one of its sites, as a diagnosis looks at it."""
+
+    site: str
+    parameters: tuple[str, ...]  # nominal ones that may be a little off, as the plan's tolerances name them
+    sized: tuple[str, ...]  # channels that tell how large its effects may be, one per unit
+    curve: tuple[str, str]  # signals whose relation shows what it does: abscissa and ordinate
+    shown: tuple[str, ...] = ()  # channels of which one must be recorded to look for its effects; empty: none
+    drive: str = ""  # command without which it stands still; empty: it never does
+
+
 class Kind(ABC):
     """One kind of laboratory. A kind of a user's is a subclass of `laboratories.device.Device` in a file of its own."""
 
@@ -112,6 +124,9 @@ class Kind(ABC):
     sensed: tuple[Sensed, ...] = ()
     sites: tuple[str, ...] = ()  # where effects can be, sensors apart
     pictured: Pictured
+    reaches: Mapping[tuple[str, str], float] = {}  # channels, or their rates, on the default test, by unit
+    responses: tuple[str, ...] = ()  # by which a test's gap is judged; none: `position` and `force`
+    free: str = ""  # channel of a motion that nothing may bring back, so that a replay takes it up anew
     record: type[Any]  # NamedTuple of the laboratory at work
     advance: Callable[..., None]  # (record, truth, command, effort): one interval, see `kinds.advance`
 
@@ -123,6 +138,41 @@ class Kind(ABC):
     def effects(self) -> tuple[Effect, ...]:
         """Its effects beside those in the folders of the catalogue."""
         return ()
+
+    def machines(self, plan: Plan) -> tuple[Machine, ...]:
+        """Its machines, one for each of `sites`."""
+        channels = self.channels
+        curve = (channels.position, channels.force)
+        return tuple(Machine(site, (), channels.names, curve) for site in self.sites)
+
+    def planned(self, plan: Plan, name: str) -> Any:
+        """The value of a nominal parameter of `machines`."""
+        return attrgetter(name)(plan)
+
+    def tolerance(self, plan: Plan, name: str) -> float:
+        """How well a nominal parameter is known, relative."""
+        return plan.tolerances.parameters.get(name, plan.tolerances.default)
+
+    def scaled(self, system: System, name: str, factor: float) -> System:
+        """The system with a nominal parameter multiplied."""
+        table, _, key = name.partition(".")
+        return system.scaled(table, key, factor)
+
+    def noisy(self, system: System, rms: Mapping[str, float]) -> System:
+        """The system with the noise of measured channels replaced."""
+        return system.moved("sensors", **rms)
+
+    def settle(self, lab: Any, truth: Array, command: float, interval: float) -> bool:
+        """Bring a laboratory at rest to a command (m) that has been there for long; whether its model can be."""
+        return False
+
+    def resume(self, lab: Any, truth: Array, motion: float, rate: float) -> None:
+        """Take up the motion of `free` (m) with its rate (m/s)."""
+        raise NotImplementedError(f"No motion of a laboratory of the kind {self.name} can be taken up anew.")
+
+    def drifts(self, plan: Plan) -> bool:
+        """Whether nothing brings the motion of `free` back."""
+        return False
 
     @abstractmethod
     def build(self, system: System) -> Any:

@@ -11,13 +11,10 @@ import numpy as np
 
 from laboratories.column import model as column_lab
 from laboratories.column import specimen
-from laboratories.column.kind import COLUMN
 from laboratories.column.specimen import Specimen
 from laboratories.kind import Kind
 from laboratories.sensors import readings
 from laboratories.sensors.readings import Readings
-from laboratories.table import model as table_lab
-from laboratories.table.kind import TABLE
 from loop import site, substructure
 from loop.site import Site
 from loop.substructure import Substructure
@@ -25,36 +22,26 @@ from models.compiled import jit
 from models.registry import Array
 from models.system import System
 
-STROKE = TABLE.channels.names.index("damper_stroke")  # channel
 
+def laboratory(
+    kind: Kind, system: System, drive: Array, start: float = 0.0, anew: Array | None = None
+) -> Array:
+    """Readings (ticks, channels) of a laboratory without noise under its commands, from rest.
 
-def laboratory_a(system: System, command: Array, start: float = 0.0) -> Array:
-    """Readings (ticks, 2) of laboratory A without noise for actuator commands (ticks,) m.
-
-    From rest at a command of `start` m that has been there for long.
+    `drive` (ticks, 2) are the transfer system's command (m) and a motor's (N), zero where the kind has none. `start` is
+    a command (m) that has been there for long before the first tick. `anew` (m, 3) are ticks, ascending, at which the
+    kind's free motion begins anew with a place (m) and a rate (m/s).
     """
-    interval, played = system.plan.test.interval, silent(COLUMN, system, command.size)
+    ticks, interval = drive.shape[0], system.plan.test.interval
+    played = silent(kind, system, ticks)
     if start != 0.0:
-        column_lab.begin(played.lab, start, interval)
-        played.truth[:] = played.lab.state[[column_lab.DISPLACEMENT, column_lab.FORCE]]
-    site.play(played, np.stack([command, np.zeros_like(command)], axis=1), interval, 0, command.size)
-    return played.measured
-
-
-def laboratory_b(system: System, command: Array, motor: Array, anew: Array | None = None) -> Array:
-    """Readings (ticks, 4) of laboratory B without noise for table (m) and motor (N) commands, from rest.
-
-    `anew` (m, 3) are ticks, ascending, at which the damper begins anew with a stroke (m) and its rate (m/s).
-    """
-    interval, played = system.plan.test.interval, silent(TABLE, system, command.size)
-    drive, state = np.stack([command, motor], axis=1), played.lab.state
+        kind.settle(played.lab, played.truth, start, interval)
     begun = np.zeros((0, 3)) if anew is None else anew
-    begun = begun[begun[:, 0] < command.size]
-    borders = [0, *begun[:, 0].astype(int).tolist(), command.size]
+    begun = begun[begun[:, 0] < ticks]
+    borders = [0, *begun[:, 0].astype(int).tolist(), ticks]
     site.play(played, drive, interval, 0, borders[1])
-    for place, (_, stroke, rate) in enumerate(begun.tolist(), 1):
-        state[table_lab.STROKE], state[table_lab.STROKE_RATE] = stroke, rate
-        played.truth[STROKE] = stroke
+    for place, (_, motion, rate) in enumerate(begun.tolist(), 1):
+        kind.resume(played.lab, played.truth, motion, rate)
         site.play(played, drive, interval, borders[place], borders[place + 1])
     return played.measured
 

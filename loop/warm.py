@@ -9,6 +9,7 @@ import numpy as np
 
 from common.plan.plan import Plan
 from laboratories.column import model as column_lab
+from laboratories.kinds import KINDS
 from laboratories.sensors import readings
 from laboratories.table import model as table_lab
 from loop import replay, substructure
@@ -27,9 +28,9 @@ def compile_all() -> None:
     alone = replace(plan, control=replace(plan.control, amd=False))
     simulate(alone, ground, slaves={})
     response(alone, ground)
-    still = np.zeros(plan.ticks)
-    replay.laboratory_a(System(plan), still)
-    replay.laboratory_b(System(plan), still, still)
+    still, drive = np.zeros(plan.ticks), np.zeros((plan.ticks, 2))
+    for kind in KINDS.values():
+        replay.laboratory(kind, System(plan), drive)
     replay.column(System(plan), still)
     replay.building(System(plan), ground, still, still, still)
     substructure.enter(plain(substructure.build(plan, ground)), 0, 0.0, 0.0)

@@ -5,28 +5,22 @@ from __future__ import annotations
 import numpy as np
 
 from common.errors import InputError
-from common.plan.limits import UNITS
 from diagnosis.findings import where
 from diagnosis.findings.found import Diagnosis
 from diagnosis.fits import fitting
 from diagnosis.fits.search import Search, gaps
-from diagnosis.recorded.parts import LaboratoryA, LaboratoryB
+from diagnosis.recorded.parts import Laboratory
 from diagnosis.report.evidence import Ceiling, Coordinate, Dependence, Unknown
 from diagnosis.signals import windows
 from diagnosis.signals.ceiling import ceiling, depends_on
 from models.registry import Array
 
 COORDINATE: dict[str, Coordinate] = {
-    "column_displacement": "displacement",
-    "column_force": "force",
-    "table_displacement": "displacement",
-    "table_acceleration": "acceleration",
-    "damper_stroke": "displacement",
-    "damper_force": "force",
-    "actuator_command": "command",
-    "table_command": "command",
-    "damper_command": "command",
-}
+    "m": "displacement",
+    "N": "force",
+    "m/s²": "acceleration",
+}  # by a reading's unit
+PREDICTED = "predicted "  # before the name of a reading
 SMOOTH = 0.008  # s, over which rates are taken
 FAINT = 0.02  # share below which a residual does not depend on a coordinate
 
@@ -40,12 +34,12 @@ def inputs_of(found: Diagnosis, search: Search) -> dict[str, Array]:
     """Commands of a part, and its readings as predicted without effects."""
     part = search.data.part
     result: dict[str, Array] = {}
-    if isinstance(part, LaboratoryA | LaboratoryB):
+    if isinstance(part, Laboratory):
         result |= {name: values for name, values in part.inputs.items() if np.ptp(values) > 0.0}
     predicted = part.predict(fitting.lay(search.data, search.chosen.z, {}))
     for name, values in zip(part.signals, predicted.T, strict=True):
         if np.ptp(values) > 0.0:
-            result[f"predicted {name}"] = values
+            result[PREDICTED + name] = values
     return result
 
 
@@ -105,7 +99,7 @@ def unknown(found: Diagnosis) -> Unknown | None:
             depends_on=tuple(item for item in shares if (item.share or 0.0) > FAINT),
             frequency=float(spectrum.frequency[peak]),
             amplitude=float(np.sqrt(2.0 * np.mean(residual**2))),
-            unit=UNITS.get(data.part.signals[place], ""),
+            unit=found.record.unit(data.part.signals[place]),
         )
     return None
 
@@ -116,7 +110,8 @@ def dependence(found: Diagnosis, search: Search, residual: Array, noise: float) 
     step = max(1, round(SMOOTH / interval))
     coordinates: dict[Coordinate, Array] = {"time": found.record.time}
     for name, values in inputs_of(found, search).items():
-        short = COORDINATE.get(name.removeprefix("predicted "))
+        read = name.startswith(PREDICTED)
+        short = COORDINATE.get(found.record.unit(name.removeprefix(PREDICTED))) if read else "command"
         if short and short not in coordinates:
             coordinates[short] = values
         if short == "displacement" and "velocity" not in coordinates:

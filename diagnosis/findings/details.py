@@ -12,7 +12,7 @@ from diagnosis.findings.ceilings import ceilings, unknown
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.how_far import Response
 from diagnosis.findings.next_test import Choice
-from diagnosis.findings.series import UNITS, numbers, strongest
+from diagnosis.findings.series import numbers, strongest
 from diagnosis.findings.verdict import Verdict
 from diagnosis.findings.where import Trace
 from diagnosis.fits import fitting
@@ -39,16 +39,7 @@ from diagnosis.report.evidence import (
 )
 from diagnosis.report.records import Candidate
 from diagnosis.signals import windows
-from laboratories.effects import CATALOGUE
 from models.registry import Array
-from models.system import System
-
-COORDINATES = {  # natural coordinates of a site: abscissa and ordinate
-    "actuator": ("actuator_command", "column_displacement"),
-    "column": ("column_displacement", "column_force"),
-    "table": ("table_command", "table_displacement"),
-    "damper": ("damper_stroke", "damper_force"),
-}
 
 LISTED = 5  # tests
 SHOWN_UP_TO = 60.0  # Hz, above which nothing of a test moves
@@ -113,9 +104,9 @@ def remains(found: Diagnosis, far: Response) -> Remaining:
 def nominal_signals(found: Diagnosis) -> dict[str, Array] | None:
     """Signals of the closed loop of nominal models, None where there is no loop."""
     record = found.record
-    if record.ground is None or not record.has("displacement", "column_target"):
+    if record.ground is None or not record.has("displacement", *record.targets[:1]):
         return None
-    return simulated(record, System(record.plan), record.ground)
+    return simulated(record, record.systems, record.ground)
 
 
 def part(found: Diagnosis, trace: Trace) -> PartSeen:
@@ -150,7 +141,7 @@ def reading(record: Record, data: Data, fit: Fit, trace: Trace) -> Reading:
     measured = data.part.measured[:, place]
     return Reading(
         signal=trace.signal,
-        unit=UNITS.get(trace.signal, ""),
+        unit=record.unit(trace.signal),
         residual_rms=float(np.sqrt(np.mean((measured - nominal) ** 2))),
         noise_floor=trace.sigma,
         t=numbers(record.time[shown]),
@@ -162,7 +153,7 @@ def reading(record: Record, data: Data, fit: Fit, trace: Trace) -> Reading:
 
 def candidate(found: Diagnosis, entry: Candidate) -> Evidence:
     """A candidate with the evidence for and against it."""
-    kinds = {CATALOGUE[name].kind for name in entry.effects}
+    kinds = {found.record.catalogue[name].kind for name in entry.effects}
     explained, against = [], []
     for verdict in found.verdicts:
         own = {item.name for item in verdict.search.data.part.candidates}.intersection(entry.effects)
@@ -192,8 +183,13 @@ def curves(found: Diagnosis, verdict: Verdict) -> list[Curve]:
     """Hysteresis or scatter of each site found, in its natural coordinates."""
     data, fit = verdict.search.data, verdict.search.chosen
     result = []
+    coordinates = {
+        lab.site(machine.site): (lab.signal(machine.curve[0]), lab.signal(machine.curve[1]))
+        for lab in found.record.labs
+        for machine in lab.kind.machines(lab.plan)
+    }
     for trace in where.traces(data, fit):
-        pair = COORDINATES.get(trace.site)
+        pair = coordinates.get(trace.site)
         if pair is not None and found.record.has(*pair) and pair[1] in data.part.signals:
             result.append(curve(found.record, data, fit, trace, pair))
     return result
@@ -203,14 +199,14 @@ def curve(record: Record, data: Data, fit: Fit, trace: Trace, pair: tuple[str, s
     """One signal of a pair over the other, measured, and predicted without and with the effects of a site."""
     place = data.part.signals.index(pair[1])
     shown = strongest(trace.series, record.plan.test.interval)
-    own = {name: values for name, values in fit.values.items() if CATALOGUE[name].site != trace.site}
+    own = {name: values for name, values in fit.values.items() if data.catalogue[name].site != trace.site}
     before = data.part.predict(fitting.lay(data, fit.z, own))[:, place]
     after = data.part.predict(fitting.lay(data, fit.z, fit.values))[:, place]
     x, y = (name.replace("_", " ") for name in pair)
     return Curve(
         title=f"{trace.site}: {y} over {x}",
-        x=Abscissa(label=f"{x} ({UNITS[pair[0]]})", values=numbers(record.signals[pair[0]][shown])),
-        y=Ordinate(label=f"{y} ({UNITS[pair[1]]})"),
+        x=Abscissa(label=f"{x} ({record.unit(pair[0])})", values=numbers(record.signals[pair[0]][shown])),
+        y=Ordinate(label=f"{y} ({record.unit(pair[1])})"),
         measured=numbers(data.part.measured[shown, place]),
         before=numbers(before[shown]),
         after=numbers(after[shown]),

@@ -11,7 +11,6 @@ from diagnosis.findings.verdict import Verdict
 from diagnosis.fits.fitting import Values
 from diagnosis.recorded.link import Finding
 from diagnosis.recorded.record import Record
-from laboratories.effects import CATALOGUE
 from models.system import System
 
 
@@ -31,29 +30,35 @@ class Diagnosis:
         """The effects found at a site."""
         names = [name for verdict in self.verdicts for name in verdict.effects]
         names += [item.effect for item in self.readings] + [item.effect for item in self.link]
-        return [name for name in names if CATALOGUE[name].site == site]
+        return [name for name in names if self.record.catalogue[name].site == site]
 
-    def system(
-        self, sites: frozenset[str] | None = None, plan: Plan | None = None, *, noisy: bool = True
-    ) -> System:
-        """A plan with parameters moved inside their tolerances and the effects found, of some sites or of all.
+    def systems(
+        self,
+        sites: frozenset[str] | None = None,
+        plans: Mapping[str, Plan] | None = None,
+        *,
+        noisy: bool = True,
+    ) -> dict[str, System]:
+        """What master and slave are by role: parameters moved inside tolerances, and effects of some sites or of all.
 
-        The recording's own plan where none is given; without added noise of sensors where not `noisy`.
+        Under the recording's own plans where none are given; without added noise of sensors where not `noisy`.
         """
-        system = System(plan or self.record.plan)
+        catalogue = self.record.catalogue
+        systems = {role: System(plan) for role, plan in (plans or self.record.plans).items()}
         for verdict in self.verdicts:
-            fit = verdict.search.chosen
+            fit, role = verdict.search.chosen, verdict.search.data.part.role
             kept = {
                 name: values
                 for name, values in fit.values.items()
-                if sites is None or CATALOGUE[name].site in sites
+                if sites is None or catalogue[name].site in sites
             }
-            system = laid(system, verdict, kept)
+            systems[role] = laid(systems[role], verdict, kept)
         for reading in self.readings:
-            effect = CATALOGUE[reading.effect]
+            effect = catalogue[reading.effect]
+            role = next(lab.role for lab in self.record.labs if effect.signal in lab.measured)
             if (sites is None or effect.site in sites) and (noisy or not effect.random):
-                system = effect.apply(system, **{reading.parameter: reading.value})
-        return system
+                systems[role] = effect.apply(systems[role], **{reading.parameter: reading.value})
+        return systems
 
 
 def laid(system: System, verdict: Verdict, values: Values) -> System:
@@ -62,5 +67,5 @@ def laid(system: System, verdict: Verdict, values: Values) -> System:
     for nuisance, place in zip(part.nuisances, z, strict=True):
         system = nuisance.moved(system, float(place))
     for name, given in values.items():
-        system = CATALOGUE[name].apply(system, **given)
+        system = verdict.search.data.catalogue[name].apply(system, **given)
     return system

@@ -10,20 +10,25 @@ import numpy as np
 
 from diagnosis.findings import where
 from diagnosis.findings.found import Diagnosis
-from diagnosis.findings.series import UNITS, numbers, strongest
+from diagnosis.findings.series import numbers, strongest
 from diagnosis.findings.where import Trace
 from diagnosis.fits import fitting
 from diagnosis.recorded import link, loop
-from diagnosis.recorded.loop import RESPONSE, UNIT, Loop, closed_share, overall
+from diagnosis.recorded.loop import Loop, closed_share, overall
 from diagnosis.recorded.record import Record
 from diagnosis.report.evidence import History, LoopShare, Step
 from diagnosis.report.records import Gap, HowFar, SignalGap
 from diagnosis.signals.mask import Mask
-from laboratories.effects import CATALOGUE
 from models.registry import Array
 
 QUIET = 0.2  # noise over a signal's rms from which on a part alone is not judged by it
 PLAYERS = 6  # sites among which shares are computed exactly
+LIKE_MISSED = (
+    "damper",
+    "column",
+    "table",
+    "device",
+)  # machines that a search blames for samples that are missed
 DRAWS = 200  # of the bootstrap
 
 
@@ -46,29 +51,28 @@ class Judge:
 
     def __init__(self, found: Diagnosis, record: Record, mask: Mask) -> None:
         self.found, self.record, self.mask = found, record, mask
-        names = tuple(name for name in RESPONSE if record.has(name))
+        names = tuple(name for name in record.responses if record.has(name))
         self.loop: Loop | None = None
-        if record.ground is not None and record.has("displacement", "table_target") and names:
+        if record.ground is not None and record.has("displacement", *record.targets) and names:
             exchange = link.exchange_of(record.run, record.ticks) if found.link else None
             self.loop = Loop(record, record.ground, exchange, names)
 
     def signals(self, sites: frozenset[str] | None) -> Mapping[str, Array] | None:
         """Simulated response with the effects of some sites, of all where None."""
-        system = self.found.system(sites, self.record.plan)
+        systems = self.found.systems(sites, self.record.plans)
         if self.loop is not None:
             linked = bool(self.found.link) and (sites is None or "link" in sites)
-            moved = loop.noised(system, {}) if system.plan is self.record.plan else system
-            return self.loop.simulate(moved, linked=linked)
+            return self.loop.simulate(systems, linked=linked)
         return self.open(sites)
 
     def open(self, sites: frozenset[str] | None) -> Mapping[str, Array]:
         """Each part's own prediction, where no loop was recorded."""
-        system = self.found.system(sites)
+        systems = self.found.systems(sites)
         result: dict[str, Array] = {}
         for verdict in self.found.verdicts:
             part = verdict.search.data.part
             if not part.exact:
-                result |= dict(zip(part.signals, part.predict(system).T, strict=True))
+                result |= dict(zip(part.signals, part.predict(systems[part.role]).T, strict=True))
         return result
 
     def gap(self, simulated: Mapping[str, Array] | None, mask: Mask | None = None) -> dict[str, float]:
@@ -77,7 +81,11 @@ class Judge:
         if self.loop is not None:
             return self.loop.gap(simulated, chosen)
         known = simulated or {}
-        names = [name for name in RESPONSE if name in known and self.record.has(name) and self.moves(name)]
+        names = [
+            name
+            for name in self.record.responses
+            if name in known and self.record.has(name) and self.moves(name)
+        ]
         result = {}
         for name in names or [name for name in known if self.record.has(name)]:
             there = self.record.present[name] & chosen
@@ -95,8 +103,8 @@ class Judge:
     def floor(self) -> dict[str, float]:
         """Gap that noise alone makes."""
         if self.loop is not None:
-            system = self.found.system(plan=self.record.plan, noisy=False)
-            return self.loop.floor(system, self.found.white, self.mask)
+            systems = self.found.systems(plans=self.record.plans, noisy=False)
+            return self.loop.floor(systems, self.found.white, self.mask)
         result = {}
         for name, white in self.found.white.items():
             there = self.record.present[name] & self.mask
@@ -168,7 +176,7 @@ def histories(
         result.append(
             History(
                 signal=name,
-                unit=UNITS.get(name, ""),
+                unit=own.record.unit(name),
                 t=numbers(own.record.time[shown]),
                 recorded=numbers(recorded[shown]),
                 before=numbers(before[name][shown]),
@@ -185,17 +193,15 @@ def held_out(record: Record) -> Mask:
 
 def bare(found: Diagnosis, own: Judge) -> Mapping[str, Array] | None:
     """Response of the nominal models."""
-    from models.system import System
-
     if own.loop is not None:
-        return own.loop.simulate(System(own.record.plan), linked=False)
+        return own.loop.simulate(own.record.systems, linked=False)
     return {
         name: series
         for verdict in found.verdicts
         if not verdict.search.data.part.exact
         for name, series in zip(
             verdict.search.data.part.signals,
-            verdict.search.data.part.predict(System(found.record.plan)).T,
+            verdict.search.data.part.predict(found.record.systems[verdict.search.data.part.role]).T,
             strict=True,
         )
     }
@@ -216,7 +222,7 @@ def gap_entry(
             nrmse=value,
             noise_floor=floors.get(name, 0.0),
             peak_error=peak,
-            unit=UNIT.get(name, "m"),
+            unit=record.unit(name),
         )
     floor = overall({name: floors.get(name, 0.0) for name in gaps})
     return Gap(signals=signals, overall=overall(gaps), overall_noise_floor=floor)
@@ -290,15 +296,17 @@ def all_traces(found: Diagnosis) -> list[Trace]:
             extra = where.unexplained(verdict.search.data, verdict.search.chosen)
             result = [*(item for item in result if item.site != extra.site), extra]
     for reading in found.readings:
-        site = CATALOGUE[reading.effect].site
+        site = found.record.catalogue[reading.effect].site
         result = [
             *(item for item in result if item.site != site),
             Trace(site, np.zeros(0), reading.ratio, "", 1.0),
         ]
     for name, share in found.held.items():
-        site = f"sensor.{name}"
+        lab = next(lab for lab in found.record.labs if name in lab.measured)
+        site = lab.site(f"sensor.{name.removeprefix(lab.ahead)}")
+        gone = {site, *(one.site(place) for one in found.record.labs for place in LIKE_MISSED)}
         result = [
-            *(item for item in result if item.site not in (site, "damper", "column", "table")),
+            *(item for item in result if item.site not in gone),
             Trace(site, np.zeros(0), share, "", 1.0),
         ]
     if found.link:

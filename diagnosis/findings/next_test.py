@@ -19,7 +19,7 @@ from diagnosis.findings.found import Diagnosis
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data, Fit, Problem
 from diagnosis.fits.search import Search, exchanged_pair
-from diagnosis.recorded.parts import LaboratoryA, LaboratoryB
+from diagnosis.recorded.parts import Laboratory
 from models.registry import Array
 
 SECONDS = 10.0  # length of a test
@@ -41,7 +41,7 @@ def choices(found: Diagnosis) -> list[Choice]:
     result: list[Choice] = []
     for verdict in found.verdicts:
         search = verdict.search
-        if not isinstance(search.data.part, LaboratoryA | LaboratoryB) or not search.chosen.names:
+        if not isinstance(search.data.part, Laboratory) or not search.chosen.names:
             continue
         for other in search.alternatives[:MOST]:
             pair = exchanged_pair(search.chosen, other)
@@ -83,7 +83,7 @@ def separation(data: Data, one: Fit, other: Fit) -> float:
 def played(data: Data, truth: Array) -> Data:
     """The data of a test that has given `truth`."""
     part = data.part
-    if isinstance(part, LaboratoryA | LaboratoryB):
+    if isinstance(part, Laboratory):
         read = np.broadcast_to(part.present.any(axis=0), truth.shape).copy()
         part = part.replaced(measured=np.where(read, truth, 0.0), present=read)
     return replace(data, part=part)
@@ -92,7 +92,7 @@ def played(data: Data, truth: Array) -> Data:
 def menu(data: Data) -> list[tuple[str, Data]]:
     """Tests at hand in the part's laboratory: the same motion at other scales, sines, steps."""
     part = data.part
-    if not isinstance(part, LaboratoryA | LaboratoryB):
+    if not isinstance(part, Laboratory):
         return []
     interval = data.system.plan.test.interval
     ticks = round(SECONDS / interval)

@@ -9,8 +9,6 @@ import numpy as np
 from diagnosis.fits.fitting import Data
 from diagnosis.recorded.record import Record
 from diagnosis.signals.noise import quantum
-from laboratories.column.kind import COLUMN
-from laboratories.table.kind import TABLE
 from models.registry import Array
 
 LOUDER = 2.5  # noise over what the plan and the other sensors' noise make expected
@@ -28,10 +26,21 @@ class Reading(NamedTuple):
     ratio: float  # of the added noise to the sensor's usual one
 
 
+def read_by(record: Record) -> list[str]:
+    """The measured signals of all laboratories."""
+    return [name for lab in record.labs for name in lab.measured]
+
+
+def effect_on(record: Record, name: str, fault: str) -> str:
+    """The effect of a fault on the reading of that name."""
+    lab = next(lab for lab in record.labs if name in lab.measured)
+    return lab.site(f"sensor.{name.removeprefix(lab.ahead)}.{fault}")
+
+
 def steps(record: Record) -> dict[str, float]:
     """Step of every reading that is rounded to one."""
     found = {}
-    for name in (*COLUMN.channels.names, *TABLE.channels.names):
+    for name in read_by(record):
         if record.has(name):
             there = record.signals[name][record.present[name]]
             if np.ptp(there) > 0.0 and (step := quantum(there)) > 0.0:
@@ -42,7 +51,7 @@ def steps(record: Record) -> dict[str, float]:
 def held(record: Record, rounded: dict[str, float]) -> dict[str, float]:
     """Share of samples that repeat the one before to the last bit, of sensors whose noise rules that out."""
     found = {}
-    for name in (*COLUMN.channels.names, *TABLE.channels.names):
+    for name in read_by(record):
         if record.has(name) and name not in rounded and np.ptp(record.signals[name]) > 0.0:
             there = record.signals[name][record.present[name]]
             share = float(np.mean(there[1:] == there[:-1]))
@@ -70,7 +79,7 @@ def levels(searches: list[Data]) -> dict[str, float]:
 
 def findings(record: Record, white: dict[str, float], rounded: dict[str, float]) -> list[Reading]:
     """Sensors that round coarsely, or are far noisier than planned and than the others."""
-    planned = {name: level for name, level in vars(record.plan.sensors).items() if level > 0.0}
+    planned = {name: level for lab in record.labs for name, level in lab.noise.items() if level > 0.0}
     plain = [name for name in white if name in planned and name not in rounded]
     ratios = {name: white[name] / planned[name] for name in plain}
     usual = max(float(np.median(list(ratios.values()))) if ratios else 1.0, 1e-3)
@@ -79,7 +88,7 @@ def findings(record: Record, white: dict[str, float], rounded: dict[str, float])
         noise = planned.get(name, 0.0) * usual
         if step > noise:
             size = step / np.sqrt(12.0) / noise if noise > 0.0 else 0.0
-            result.append(Reading(f"sensor.{name}.quantization", "step", step, (step, step), size))
+            result.append(Reading(effect_on(record, name, "quantization"), "step", step, (step, step), size))
     if not record.has("displacement"):  # the plan's sensors may be another laboratory's
         return result
     for name, ratio in ratios.items():
@@ -88,5 +97,5 @@ def findings(record: Record, white: dict[str, float], rounded: dict[str, float])
         if ratio > LOUDER * max(expected, 0.4) and ratio > LEAST:
             value = float(np.sqrt(max(white[name] ** 2 - (expected * planned[name]) ** 2, 0.0)))
             bounds = (0.97 * value, 1.03 * value)
-            result.append(Reading(f"sensor.{name}.noise", "rms", value, bounds, ratio / expected))
+            result.append(Reading(effect_on(record, name, "noise"), "rms", value, bounds, ratio / expected))
     return result

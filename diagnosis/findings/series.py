@@ -8,20 +8,6 @@ from models.registry import Array
 
 SHOWN = 6.0  # s of a history
 POINTS = 1500  # of a series at most
-UNITS = {
-    "actuator_command": "m",
-    "column_displacement": "m",
-    "column_force": "N",
-    "table_command": "m",
-    "table_displacement": "m",
-    "table_acceleration": "m/s²",
-    "damper_stroke": "m",
-    "damper_force": "N",
-    "ground_acceleration": "m/s²",
-    "displacement": "m",
-    "velocity": "m/s",
-    "acceleration": "m/s²",
-}
 
 
 def strongest(series: Array, interval: float) -> slice:

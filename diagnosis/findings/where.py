@@ -9,13 +9,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from common.plan.kinds import COLUMN, TABLE
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data, Fit
 from diagnosis.fits.search import gap
-from diagnosis.recorded.parts import LaboratoryB
+from diagnosis.recorded.parts import ColumnAlone, Laboratory
 from diagnosis.recorded.record import Record
 from diagnosis.signals import windows
-from laboratories.effects import CATALOGUE
 from models.registry import Array
 
 # set on draws of `rths blind --set tune` (docs/decisions/0012-diagnosis.md)
@@ -38,7 +38,7 @@ def traces(data: Data, fit: Fit) -> list[Trace]:
     whole = data.part.predict(fitting.lay(data, fit.z, fit.values))
     sites: dict[str, list[str]] = {}
     for name in fit.names:
-        sites.setdefault(CATALOGUE[name].site, []).append(name)
+        sites.setdefault(data.catalogue[name].site, []).append(name)
     result = []
     for site, names in sites.items():
         less = {name: values for name, values in fit.values.items() if name not in names}
@@ -74,16 +74,22 @@ def unexplained(data: Data, fit: Fit) -> Trace:
 
 def culprit(data: Data, residual: Array, left: Sequence[float]) -> str:
     """The site that residuals (ticks, signals) in σ speak for, by which signals show them and which do not."""
-    if data.part.name in ("ground", "structure", "column"):
-        return data.part.name
-    amount = dict(zip(data.part.signals, left, strict=True))
-    if isinstance(data.part, LaboratoryB):
-        return culprit_b(data, residual, amount)
-    return culprit_a(data, residual, amount)
+    part = data.part
+    if not isinstance(part, Laboratory):
+        return part.lab.site(part.name) if isinstance(part, ColumnAlone) else part.name
+    amount = dict(zip(part.lab.kind.channels.names, left, strict=True))
+    culprits = {TABLE: culprit_b, COLUMN: culprit_a}
+    return part.lab.site(culprits.get(part.lab.kind.name, culprit_of_device)(data, residual, amount))
+
+
+def culprit_of_device(data: Data, _residual: Array, amount: dict[str, float]) -> str:
+    """A laboratory of a user's kind: its device, of which nothing more is known."""
+    part = data.part
+    return part.lab.kind.sites[0] if isinstance(part, Laboratory) else next(iter(amount))
 
 
 def culprit_a(data: Data, residual: Array, amount: dict[str, float]) -> str:
-    """Laboratory A: the actuator moves displacement and force together, the column the force alone."""
+    """A column under an actuator: the actuator moves displacement and force together, the column the force alone."""
     displacement, force = amount["column_displacement"], amount["column_force"]
     if not data.part.present[:, 1].any():
         return "actuator"
@@ -107,7 +113,7 @@ SEEN = 0.3  # systematic residual over noise that counts as seen
 
 
 def culprit_b(data: Data, residual: Array, amount: dict[str, float]) -> str:
-    """Laboratory B: the table moves everything, the damper its stroke and force; one alone is a sensor's."""
+    """A damper on a table: the table moves everything, the damper its stroke and force; one alone is a sensor's."""
     seen = {name for name, value in amount.items() if value > SEEN}
     if "table_displacement" in seen:
         return "table"

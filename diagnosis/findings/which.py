@@ -10,11 +10,11 @@ import numpy as np
 
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.verdict import Interval, Verdict, intervals
-from diagnosis.fits.fitting import Values
+from diagnosis.fits.fitting import Fit
 from diagnosis.fits.search import MATERIAL, PRIOR_GAIN, gaps
 from diagnosis.report.records import Candidate
 from diagnosis.report.values import Parameters, Value
-from laboratories.effects import CATALOGUE
+from laboratories.effects.effect import Effect
 
 MOST_OTHERS = 5  # alternatives listed
 
@@ -36,12 +36,13 @@ def which(found: Diagnosis) -> Named:
         probability = min(probability, nothing(found))
     fits = {name: values for verdict in named for name, values in intervals(verdict.search.chosen).items()}
     parameters = {name: fitted(values) for name, values in fits.items()} | seen(found)
+    catalogue = found.record.catalogue
     others = [
         item for verdict in found.verdicts for item in alternatives(verdict, effects, parameters, probability)
     ]
     others.sort(key=lambda item: -(item.probability or 0.0))
     first = entry(effects, probability, parameters, 0.0)
-    ends = tuple(warning for name, values in fits.items() for warning in at_the_end(name, values))
+    ends = tuple(warning for name, values in fits.items() for warning in at_the_end(catalogue[name], values))
     return Named((first, *others[:MOST_OTHERS]), ends)
 
 
@@ -50,11 +51,11 @@ def fitted(values: Mapping[str, Interval]) -> dict[str, Value]:
     return {key: value(item.value, item.low, item.high, item.unit) for key, item in values.items()}
 
 
-def at_the_end(name: str, values: Mapping[str, Interval]) -> list[str]:
+def at_the_end(effect: Effect, values: Mapping[str, Interval]) -> list[str]:
     """A sentence for each parameter of an effect, shapes aside, that a fit left at the end of its range."""
-    shapes = {item.name for item in CATALOGUE[name].parameters if item.shape}
+    shapes = {item.name for item in effect.parameters if item.shape}
     return [
-        f"{key} of {name} lies at the end of its range."
+        f"{key} of {effect.name} lies at the end of its range."
         for key, item in values.items()
         if item.on_bound and key not in shapes
     ]
@@ -63,12 +64,13 @@ def at_the_end(name: str, values: Mapping[str, Interval]) -> list[str]:
 def seen(found: Diagnosis) -> dict[str, dict[str, Value]]:
     """Parameters of effects that were read off samples and message numbers."""
     result = {}
+    catalogue = found.record.catalogue
     for reading in found.readings:
-        unit = unit_of(reading.effect, reading.parameter)
+        unit = unit_of(catalogue[reading.effect], reading.parameter)
         result[reading.effect] = {reading.parameter: value(reading.value, *reading.interval, unit)}
     for item in found.link:
         result[item.effect] = {
-            key: value(size, *bounds, unit_of(item.effect, key))
+            key: value(size, *bounds, unit_of(catalogue[item.effect], key))
             for key, (size, bounds) in item.parameters.items()
         }
     return result
@@ -86,15 +88,16 @@ def alternatives(
             share = probability / verdict.probability * chance
         kept = {name: parameters[name] for name in rest}
         worse = 0.5 * (other.cost - verdict.search.chosen.cost) if verdict.effects else 0.0
-        result.append(entry([*other.names, *rest], share, kept | bare(other.values), worse))
+        result.append(entry([*other.names, *rest], share, kept | bare(other), worse))
     return result
 
 
-def bare(values: Values) -> dict[str, dict[str, Value]]:
-    """Parameters without intervals."""
+def bare(fit: Fit) -> dict[str, dict[str, Value]]:
+    """Parameters of a fit without intervals."""
+    catalogue = fit.data.catalogue
     return {
-        name: {key: value(size, None, None, unit_of(name, key)) for key, size in given.items()}
-        for name, given in values.items()
+        name: {key: value(size, None, None, unit_of(catalogue[name], key)) for key, size in given.items()}
+        for name, given in fit.values.items()
     }
 
 
@@ -104,9 +107,9 @@ def value(size: float, low: float | None, high: float | None, unit: str) -> Valu
     return Value(value=size, interval=(lower, upper), unit=unit)
 
 
-def unit_of(effect: str, parameter: str) -> str:
+def unit_of(effect: Effect, parameter: str) -> str:
     """Unit of an effect's parameter."""
-    return next(item.unit for item in CATALOGUE[effect].parameters if item.name == parameter)
+    return next(item.unit for item in effect.parameters if item.name == parameter)
 
 
 def nothing(found: Diagnosis) -> float:

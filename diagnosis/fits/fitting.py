@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -53,6 +53,7 @@ class Data:
     group: int  # ticks averaged
     train: Mask  # (groups,) fitted on; the others judge
     rounded: Array  # (signals,) step that a reading is rounded to, 0 for none
+    catalogue: Mapping[str, Effect] = field(default_factory=lambda: CATALOGUE)  # the effects of the test
 
     @property
     def groups(self) -> int:
@@ -83,12 +84,12 @@ def prepare(part: Part, record: Record, steps: Mapping[str, float] | None = None
     `steps` of readings that are rounded, by signal: a coarse step's error is no white noise and must not
     be taken for a gap.
     """
-    system = System(record.plan)
+    system = record.systems[part.role]
     interval = record.plan.test.interval
     group, train = withheld(part.measured.shape[0], interval)
     ones = np.ones(part.measured.shape[1])
     rounded = np.array([(steps or {}).get(name, 0.0) for name in part.signals])
-    data = Data(part, system, ones, 0.0 * ones, group, train, rounded)
+    data = Data(part, system, ones, 0.0 * ones, group, train, rounded, record.catalogue)
     return measured_by(data, 0.0 * ones if part.exact else noise(data.residual(system)))
 
 
@@ -235,7 +236,7 @@ def lay(data: Data, z: Array, values: Values) -> System:
     for nuisance, place in zip(data.part.nuisances, z, strict=True):
         system = nuisance.moved(system, float(place))
     for name, given in values.items():
-        system = CATALOGUE[name].apply(system, **given)
+        system = data.catalogue[name].apply(system, **given)
     return system
 
 
@@ -255,7 +256,7 @@ class Problem:
         self._weights = np.tile(weights, kept) if weights is not None else 1.0
         self._train = np.repeat(data.train, data.sigma.size)
         self.names = tuple(start)
-        self.frees = tuple(item for name in start for item in free(CATALOGUE[name], start[name]))
+        self.frees = tuple(item for name in start for item in free(data.catalogue[name], start[name]))
         self.count = len(data.part.nuisances)
         self._step = FINE_STEP if data.part.exact else STEP
         self._slopes = slopes

@@ -10,36 +10,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from common.plan.plan import Plan
+from diagnosis.recorded.laboratory import Recorded
 from diagnosis.recorded.record import Record
+from laboratories.effects import readings_of
 from laboratories.effects.effect import Effect, Parameter
 
-USUAL = {  # what the default test reaches
-    ("a", "m"): 2.4e-3,
-    ("a", "N"): 30e3,
-    ("a", "m/s"): 0.035,
-    ("b", "m"): 20e-3,
-    ("b", "m/s²"): 1.0,
-    ("damper", "m"): 49e-3,
-    ("damper", "N"): 76.0,
-}
-SIGNAL = {
-    ("a", "m"): "column_displacement",
-    ("a", "N"): "column_force",
-    ("b", "m"): "table_displacement",
-    ("b", "m/s²"): "table_acceleration",
-    ("damper", "m"): "damper_stroke",
-    ("damper", "N"): "damper_force",
-}
-GROUP = {"actuator": "a", "column": "a", "table": "b", "damper": "damper"}
-SENSORS = {
-    "column_displacement": "a",
-    "column_force": "a",
-    "table_displacement": "b",
-    "table_acceleration": "b",
-    "damper_stroke": "damper",
-    "damper_force": "damper",
-}
 HARD = (0.5, 5.0, 50.0)  # times the largest force over the largest stroke: an end stop from soft to hard
+USUAL_RATE = 0.05  # m/s, of a part whose motion was not recorded or is none
 FARTHEST = 4.0  # times a usual size where a search still begins
 LIMITS = (0.25, 0.4, 0.55, 0.7, 0.85, 0.95)  # of what is reached: where a limit is looked for
 
@@ -50,31 +28,37 @@ class Scales:
     def __init__(self, record: Record, shift: float = 0.0) -> None:
         self._shift = shift
         self._record = record
-        self._reached: dict[tuple[str, str], float] = {}
-        for key, name in SIGNAL.items():
-            if record.has(name):
-                self._reached[key] = self.peak(name)
-        if record.has("column_displacement"):
-            rate = np.diff(record.signals["column_displacement"][::8]) / (8 * record.plan.test.interval)
-            self._reached["a", "m/s"] = float(np.max(np.abs(rate), initial=0.0))
-        self._velocities: dict[str, float] = {}
-        for group, name in (
-            ("a", "column_displacement"),
-            ("b", "table_displacement"),
-            ("damper", "damper_stroke"),
-        ):
-            if record.has(name):
-                steps = np.diff(record.signals[name][::8]) / (8 * record.plan.test.interval)
-                self._velocities[group] = float(np.max(np.abs(steps), initial=0.0)) or 0.05
+        # what signals, or their rates, usually reach, by unit; for readings of users' kinds their typical size
+        self._usual: dict[tuple[str, str], float] = {}
+        self._typical: dict[tuple[str, str], float] = {}
+        self._of_site: dict[str, tuple[str, ...]] = {}  # signals that tell how large a site's effects may be
+        for lab in record.labs:
+            self._usual |= {(lab.signal(name), unit): size for (name, unit), size in lab.kind.reaches.items()}
+            readings = readings_of(lab.kind, lab.plan).items()
+            self._typical |= {(lab.signal(name), one.unit): one.typical for name, one in readings}
+            self._of_site |= sized(lab)
 
     def peak(self, signal: str) -> float:
         """Largest magnitude of a recorded signal, 0 where it was not recorded."""
         record = self._record
         return float(np.max(np.abs(record.signals[signal]))) if record.has(signal) else 0.0
 
-    def group(self, effect: Effect) -> str:
-        """Which of the signals' scales an effect lives on."""
-        return SENSORS[effect.signal] if effect.signal else GROUP.get(effect.site, "")
+    def signal(self, effect: Effect, unit: str) -> str:
+        """The signal, or with a unit of velocity the motion, whose size a parameter follows; empty for none."""
+        wanted = "m" if unit == "m/s" else unit
+        names = self._of_site.get(effect.site, ())
+        return next((name for name in names if self._record.unit(name) == wanted), "")
+
+    def reached(self, name: str, unit: str) -> float | None:
+        """What a signal reaches, its rate with a unit of velocity; None where it was not recorded."""
+        if not name or not self._record.has(name):
+            return None
+        return self.rate(name) if unit == "m/s" and self._record.unit(name) == "m" else self.peak(name)
+
+    def rate(self, name: str) -> float:
+        """Largest rate of a recorded motion, m/s."""
+        steps = np.diff(self._record.signals[name][::8]) / (8 * self._record.plan.test.interval)
+        return float(np.max(np.abs(steps), initial=0.0))
 
     def starts(self, effect: Effect) -> Iterator[tuple[tuple[float, ...], dict[str, float]]]:
         """Parameters from which a search starts, from weak to strong, and the form that each belongs to."""
@@ -105,27 +89,35 @@ class Scales:
 
     def velocity(self, effect: Effect) -> float:
         """Velocity that a part reaches, m/s."""
-        return self._velocities.get(self.group(effect), 0.05)
+        motion = self.signal(effect, "m")
+        return (self.rate(motion) if motion and self._record.has(motion) else 0.0) or USUAL_RATE
 
     def sizes(self, effect: Effect, parameter: Parameter) -> list[float]:
         """Sizes of the parameter that counts."""
         if effect.shifts_time and self._shift != 0.0:
             return [self._shift]
-        if starts := effect.starts(self._record.plan):
+        if starts := effect.starts(self._plan(effect)):
             return list(starts)
-        key = (self.group(effect), parameter.unit)
-        reached = self._reached.get(key)
+        key = (self.signal(effect, parameter.unit), parameter.unit)
+        known = key in self._usual or parameter.unit != "m/s"
+        reached = self.reached(*key) if known else None
+        usual = self._usual.get(key) or (self._typical.get(key) if effect.signal else None)
         if parameter.follows:
             reached = self.peak(parameter.follows) or None
         if np.isinf(parameter.null) and reached:
             sizes = [share * reached for share in LIMITS]
-        elif reached and key in USUAL:
-            sizes = [size * reached / USUAL[key] for size in parameter.sizes]
+        elif reached and usual:
+            sizes = [size * reached / usual for size in parameter.sizes]
         else:
             sizes = list(parameter.sizes)
         if np.isfinite(parameter.null) and len(sizes) > 2:
             sizes = sizes[1:-1:2] if len(sizes) > 4 else [sizes[1], sizes[-1]]
         return [min(max(size, parameter.least), parameter.most) for size in sizes]
+
+    def _plan(self, effect: Effect) -> Plan:
+        """The plan as the role sees it whose laboratory has an effect's site."""
+        owners = (lab.plan for lab in self._record.labs if effect.site in sized(lab))
+        return next(owners, self._record.plan)
 
     def stretch(self, effect: Effect) -> tuple[float, float]:
         """How far a start may be stretched along a straight line from the null value, and mirrored."""
@@ -142,3 +134,13 @@ class Scales:
                 moved = item.null + share * (values[item.name] - item.null)
                 result[item.name] = min(max(moved, item.least), item.most)
         return result
+
+
+def sized(lab: Recorded) -> dict[str, tuple[str, ...]]:
+    """The signals that tell how large effects may be, by site: a machine's, and of a reading those of its machine."""
+    machines = lab.kind.machines(lab.plan)
+    result = {lab.site(item.site): tuple(map(lab.signal, item.sized)) for item in machines}
+    for name in lab.kind.channels.names:
+        names = next((item.sized for item in machines if name in item.sized), (name,))
+        result[lab.site(f"sensor.{name}")] = tuple(map(lab.signal, names))
+    return result

@@ -17,7 +17,6 @@ from diagnosis.fits import contact, fitting
 from diagnosis.fits.fitting import Data, Fit, Values, excess
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.screening import WORKERS, Candidate, screen
-from laboratories.effects import CATALOGUE
 from models.registry import Array
 
 # The figures below were set on draws of `rths blind --set tune` (docs/decisions/0012-diagnosis.md), as a compromise
@@ -275,9 +274,10 @@ def tied(search: Search, other: Fit) -> bool:
 
 def physical(search: Search) -> Search:
     """The search with a machine's effect in front where the data cannot tell it from a sensor's."""
-    measured = sum(CATALOGUE[name].kind == "measurement" for name in search.chosen.names)
+    catalogue = search.data.catalogue
+    measured = sum(catalogue[name].kind == "measurement" for name in search.chosen.names)
     for other in search.alternatives:
-        artefacts = sum(CATALOGUE[name].kind == "measurement" for name in other.names)
+        artefacts = sum(catalogue[name].kind == "measurement" for name in other.names)
         if artefacts < measured and len(other.names) == len(search.chosen.names) and tied(search, other):
             rest = [search.chosen, *(item for item in search.alternatives if item is not other)]
             return replace(search, chosen=other, alternatives=tuple(rest))

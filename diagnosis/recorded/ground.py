@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from common.roles import MASTER
 from diagnosis.recorded.parts import Nuisance, of_sites
 from diagnosis.recorded.record import Record
 from loop import substructure
@@ -15,6 +16,7 @@ class Ground:
     """The recorded ground acceleration against the plan's record."""
 
     name = "ground"
+    role = MASTER
     exact = True
     signals: tuple[str, ...] = ("ground_acceleration",)
 
@@ -25,7 +27,7 @@ class Ground:
         self.measured = record.signals["ground_acceleration"][:, None]
         self.present = record.present["ground_acceleration"][:, None]
         self.nuisances: tuple[Nuisance, ...] = ()
-        self.candidates = of_sites(("ground",), record.plan)
+        self.candidates = of_sites(record, ("ground",), record.plan)
 
     def predict(self, system: System) -> Array:
         """Ground acceleration."""

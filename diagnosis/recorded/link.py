@@ -168,13 +168,19 @@ def laid(run: Run) -> Ticks:
         return values, there
 
     command, has_slave = column("slave", "command_seq")
-    feedback, has_master = column("master", "damper_force_seq")
+    feedback, has_master = column("master", answered(run))
     names = run.columns.get("latency", {}) if run.has("latency") else {}
     rows = {name: column("latency", name)[0] for name in names}
     whole = [np.where(np.isfinite(item), item, -1.0).astype(np.int64) for item in (command, feedback)]
     has_rows = np.zeros(size, dtype=bool)
     has_rows[run.sequences["latency"] if rows else []] = True
     return Ticks(whole[0], has_slave, whole[1], has_master, rows, has_rows)
+
+
+def answered(run: Run) -> str:
+    """The master's signal that says when the slave measured the force used; empty where it was not recorded."""
+    names = (name for name in run.columns.get("master", {}) if name.endswith("_seq"))
+    return next((name for name in names if name != "seq"), "")
 
 
 def on_a_virtual_clock(ticks: Ticks) -> bool:
@@ -488,7 +494,7 @@ def fitted(counts: Array, interval: float, places: tuple[int, ...]) -> tuple[Gue
 def exchange_of(run: Run, ticks: int) -> Exchange:
     """Which message each tick used, as recorded; where a tick is missing, the one before serves on."""
     result = []
-    for topic, name in (("slave", "command_seq"), ("master", "damper_force_seq")):
+    for topic, name in (("slave", "command_seq"), ("master", answered(run))):
         values, there = laid_out(run.columns[topic][name].astype(np.float64), run.sequences[topic], ticks)
         known = np.where(there.cumsum() > 0, values, -1.0).astype(np.int64)
         result.append(np.minimum(known, np.arange(ticks)))

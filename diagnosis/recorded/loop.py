@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from common.recording.reader import share
-from common.roles import MASTER, SLAVE
+from common.roles import MASTER
 from common.signals import shared
 from diagnosis.recorded.record import Record
 from diagnosis.signals.mask import Mask
@@ -18,12 +18,11 @@ from loop.closed_loop import Exchange
 from models.registry import Array
 from models.system import System
 
-RESPONSE = ("column_displacement", "column_force", "table_acceleration", "damper_force")
-UNIT = {"column_displacement": "m", "column_force": "N", "table_acceleration": "m/s²", "damper_force": "N"}
 NOISY = 2  # noisy simulations by which the floor is found
 DIVERGED = 10.0  # gap of a simulation that diverges
 
 Signals = dict[str, Array]
+Systems = Mapping[str, System]  # master and slave by role
 
 
 @dataclass(frozen=True)
@@ -35,14 +34,14 @@ class Loop:
     exchange: Exchange | None  # as it was, where the link was not as planned
     names: tuple[str, ...]  # response signals that were recorded
 
-    def simulate(self, system: System, *, linked: bool = True, seed: int | None = None) -> Signals | None:
-        """Response signals (ticks,) of a system, None where the loop diverges; `linked` with the recorded exchange."""
-        believed = self.record.plan.ground_motion.scale
+    def simulate(self, systems: Systems, *, linked: bool = True, seed: int | None = None) -> Signals | None:
+        """Response signals (ticks,) of systems, None where the loop diverges; `linked` with the recorded exchange."""
+        believed, system = self.record.plan.ground_motion.scale, systems[MASTER]
         factor = system.plan.ground_motion.scale / believed if believed else 1.0
         rows = substructure.shifted(
             self.ground * factor, system.effects.time_shift / system.plan.test.interval
         )
-        found = simulated(self.record, system, rows, self.exchange if linked else None, seed)
+        found = simulated(self.record, systems, rows, self.exchange if linked else None, seed)
         return None if found is None else {name: found[name] for name in self.names}
 
     def gap(self, simulated: Mapping[str, Array] | None, mask: Mask | None = None) -> dict[str, float]:
@@ -61,11 +60,11 @@ class Loop:
         return result
 
     def floor(
-        self, system: System, levels: Mapping[str, float], mask: Mask | None = None
+        self, systems: Systems, levels: Mapping[str, float], mask: Mask | None = None
     ) -> dict[str, float]:
         """Gap that the sensors' noise alone makes: noisy simulations against one without noise."""
-        quiet = self.simulate(system)
-        noisy = System(noised(system, levels).plan, system.effects)
+        quiet = self.simulate(systems)
+        noisy = noised(self.record, systems, levels)
         squares = dict.fromkeys(self.names, 0.0)
         for seed in range(NOISY):
             loud = self.simulate(noisy, seed=seed)
@@ -79,41 +78,49 @@ class Loop:
 
 
 def simulated(
-    record: Record, system: System, ground: Array, exchange: Exchange | None = None, seed: int | None = None
+    record: Record,
+    systems: Systems,
+    ground: Array,
+    exchange: Exchange | None = None,
+    seed: int | None = None,
 ) -> Signals | None:
     """Signals of the closed loop of a record's test by name, None where it diverges.
 
     Of a test with several slaves those of the master and of the slave that the record shows; the other slaves are what
     they were found to be, or what the plan says.
     """
-    whole, ticks = record.whole, record.ticks
-    if whole is None:
-        role, plan, slaves = SLAVE, system.plan.with_ticks(ticks), None
-    else:
-        role, plan = whole.role, whole.joined(system.plan).with_ticks(ticks)
-        slaves = {one: System(plan.of(one)) for one in plan.roles} | {
-            one: replace(given, plan=given.plan.with_ticks(ticks))
-            for one, given in (whole.others | {role: system}).items()
-        }
+    plan = systems[MASTER].plan.with_ticks(record.ticks)
+    role = next((one for one in systems if one != MASTER), "")
+    others = record.whole.others if record.whole else {}
+    given = {one: system for one, system in {**others, **systems}.items() if one != MASTER}
+    slaves = {one: System(plan.of(one)) for one in plan.roles} | {
+        one: replace(system, plan=system.plan.with_ticks(record.ticks)) for one, system in given.items()
+    }
     rollout = closed_loop.simulate(
         plan,
         ground,
-        effects=system.effects,
+        effects=systems[MASTER].effects,
         slaves=slaves,
-        exchange={role: exchange} if exchange else None,
+        exchange={role: exchange} if exchange and role else None,
         seed=seed,
     )
     if not rollout.finite:
         return None
-    if whole is None:
-        return rollout.master | rollout.slaves[role]
-    return share(rollout.master, shared(topics(plan)[MASTER]), role) | rollout.slaves[role]
+    if not role:
+        return rollout.master
+    mine = share(rollout.master, shared(topics(plan)[MASTER]), role)
+    other = record.other
+    return mine | {other.signal(name) if other else name: row for name, row in rollout.slaves[role].items()}
 
 
-def noised(system: System, levels: Mapping[str, float]) -> System:
-    """The system with sensors as noisy as they were found to be."""
-    known = vars(system.plan.sensors)
-    return system.moved("sensors", **{name: value for name, value in levels.items() if name in known})
+def noised(record: Record, systems: Systems, levels: Mapping[str, float]) -> dict[str, System]:
+    """The systems with sensors as noisy as they were found to be."""
+    result = dict(systems)
+    for lab in record.labs:
+        names = zip(lab.kind.channels.names, lab.measured, strict=True)
+        known = {channel: levels[name] for channel, name in names if name in levels}
+        result[lab.role] = lab.kind.noisy(result[lab.role], known)
+    return result
 
 
 def overall(gaps: Mapping[str, float]) -> float:

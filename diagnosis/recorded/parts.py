@@ -7,19 +7,19 @@ the sensors' noise alone as long as its model is right. A gap in one piece does 
 from __future__ import annotations
 
 import copy
-from dataclasses import dataclass, replace
-from operator import attrgetter
-from typing import Any, ClassVar, Protocol
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 
 from common.plan.plan import Plan
+from common.roles import MASTER
+from diagnosis.recorded.laboratory import Recorded
 from diagnosis.recorded.record import Record
 from diagnosis.signals.mask import Mask
-from laboratories import effects
-from laboratories.column.kind import COLUMN
 from laboratories.effects.effect import Effect
-from laboratories.table.kind import TABLE
+from laboratories.kind import Machine
 from loop import replay
 from models.registry import Array
 from models.system import System
@@ -32,26 +32,33 @@ MODEL_ERROR = 1e-3  # share of a measured signal's rms that two good solutions o
 
 @dataclass(frozen=True)
 class Nuisance:
-    """A nominal parameter that may move within its tolerance."""
+    """A nominal parameter that may move within its tolerance, of the building or of a laboratory."""
 
-    table: str
-    field: str
+    parameter: str  # table.name of the plan
     tolerance: float
+    lab: Recorded | None = None
 
     @property
     def name(self) -> str:
         """The name in reports: part.parameter."""
-        return f"{self.table}.{self.field}"
+        return self.lab.site(self.parameter) if self.lab else self.parameter
 
     def moved(self, system: System, z: float) -> System:
         """The system with the parameter moved by `z` tolerances."""
-        return system if z == 0.0 else system.scaled(self.table, self.field, 1.0 + z * self.tolerance)
+        if z == 0.0:
+            return system
+        factor = 1.0 + z * self.tolerance
+        if self.lab:
+            return self.lab.kind.scaled(system, self.parameter, factor)
+        table, _, key = self.parameter.partition(".")
+        return system.scaled(table, key, factor)
 
 
 class Part(Protocol):
     """A piece of the test with its recorded inputs and outputs."""
 
     name: str
+    role: str  # of whom it is
     signals: tuple[str, ...]
     nuisances: tuple[Nuisance, ...]
     candidates: tuple[Effect, ...]
@@ -66,15 +73,28 @@ class Part(Protocol):
         """The piece over the first ticks only."""
 
 
-def nuisances(record: Record, fields: tuple[tuple[str, str], ...]) -> tuple[Nuisance, ...]:
-    """Those of the parameters that can move: finite and not zero."""
-    known, result = record.plan.tolerances, []
-    for table, field in fields:
-        value = np.asarray(attrgetter(f"{table}.{field}")(record.plan))
-        tolerance = known.parameters.get(f"{table}.{field}", known.default)
-        if tolerance > 0.0 and np.all(np.isfinite(value)) and np.all(value != 0.0):
-            result.append(Nuisance(table, field, tolerance))
+def nuisances(lab: Recorded, names: tuple[str, ...]) -> tuple[Nuisance, ...]:
+    """Those of a laboratory's parameters that can move: finite and not zero."""
+    found = ((name, lab.kind.planned(lab.plan, name), lab.kind.tolerance(lab.plan, name)) for name in names)
+    return tuple(
+        Nuisance(name, tolerance, lab) for name, value, tolerance in found if movable(value, tolerance)
+    )
+
+
+def of_building(plan: Plan) -> tuple[Nuisance, ...]:
+    """Those of the building's parameters that can move."""
+    known, result = plan.tolerances, []
+    for key in ("mass", "stiffness", "damping", "damping_ratio"):
+        tolerance = known.parameters.get(f"structure.{key}", known.default)
+        if movable(getattr(plan.structure, key), tolerance):
+            result.append(Nuisance(f"structure.{key}", tolerance))
     return tuple(result)
+
+
+def movable(value: Any, tolerance: float) -> bool:
+    """Whether a parameter's values are finite and not zero, and uncertain at all."""
+    values = np.asarray(value)
+    return tolerance > 0.0 and bool(np.all(np.isfinite(values)) and np.all(values != 0.0))
 
 
 def cut(part: Any, ticks: int, inputs: Any) -> Any:
@@ -100,63 +120,87 @@ def outputs(record: Record, names: tuple[str, ...]) -> tuple[Array, Mask]:
     return np.stack(values, axis=1), np.stack(there, axis=1)
 
 
-def of_sites(sites: tuple[str, ...], plan: Plan) -> tuple[Effect, ...]:
-    """The catalogue's effects on these sites that change a waveform and that the plan's models can have.
+def of_sites(record: Record, sites: Collection[str], plan: Plan) -> tuple[Effect, ...]:
+    """The effects on these sites that change a waveform and that the plan's models can have.
 
     Noise and rounding are seen directly.
     """
-    found = [effect for effect in effects.CATALOGUE.values() if effect.site in sites and effect.fits(plan)]
+    found = [effect for effect in record.catalogue.values() if effect.site in sites and effect.fits(plan)]
     return tuple(effect for effect in found if not effect.in_samples)
 
 
-ACTUATOR = {
-    "fopdt": ("gain", "delay", "time_constant"),
-    "servo_hydraulic": (
-        "servo.gain",
-        "servo.valve",
-        "servo.valve_damping",
-        "servo.valve_stiffness",
-        "servo.leakage",
-        "servo.piston",
-        "servo.delay",
-    ),
-}
-OF_COLUMN = (("column", "stiffness"), ("column", "mass"), ("column", "damping"))
+class Laboratory:
+    """A laboratory from its recorded commands."""
 
-
-class LaboratoryA:
-    """Actuator and column from the recorded actuator command."""
-
-    name = "laboratory A"
     exact = False
-    signals: tuple[str, ...] = COLUMN.channels.names
 
-    devices: ClassVar[dict[str, str]] = {"actuator_command": "actuator"}
-    units: ClassVar[dict[str, str]] = {"actuator_command": "m"}
-
-    def __init__(self, record: Record) -> None:
-        self.inputs = {"actuator_command": record.signals["actuator_command"]}
-        first, most = self.inputs["actuator_command"][0], np.max(np.abs(self.inputs["actuator_command"]))
+    def __init__(self, record: Record, lab: Recorded) -> None:
+        self.lab, self.name, self.role = lab, lab.title, lab.role
+        self.signals = lab.measured
+        self.devices = lab.commands
+        self.units = {name: record.unit(name) for name in self.devices}
+        none = np.zeros(record.ticks)
+        self.inputs = {name: record.signals.get(name, none) for name in self.devices}
+        self.measured, self.present = outputs(record, self.signals)
+        machines = [machine for machine in lab.kind.machines(lab.plan) if self.moves(record, machine)]
+        names = tuple(name for machine in machines for name in machine.parameters)
+        self.nuisances = nuisances(lab, names)
+        pairs = zip(self.signals, lab.kind.channels.names, self.measured.T, strict=True)
+        sites = [
+            f"sensor.{channel}" for name, channel, read in pairs if np.ptp(read) > 0.0 and record.has(name)
+        ]
+        sites += [machine.site for machine in machines if self.shows(record, machine)]
+        self.candidates = of_sites(record, set(map(lab.site, sites)), lab.plan)
+        self.anew = self.beginnings(record)
+        command = self.inputs[next(iter(self.inputs))]
+        first, most = command[0], np.max(np.abs(command))
         self._start = float(first) if abs(first) > UNREST * most else 0.0
-        self.measured, self.present = outputs(record, COLUMN.channels.names)
-        self.nuisances = nuisances(
-            record,
-            tuple(("actuator", name) for name in ACTUATOR[record.plan.actuator.model]) + OF_COLUMN,
-        )
-        sites = ["actuator", *(f"sensor.{name}" for name in COLUMN.channels.names if record.has(name))]
-        with_column = (*sites, "column") if record.has("column_force") else tuple(sites)
-        self.candidates = of_sites(with_column, record.plan)
+
+    def moves(self, record: Record, machine: Machine) -> bool:
+        """Whether a machine is driven at all."""
+        name = self.lab.signal(machine.drive)
+        return not name or (record.has(name) and float(np.ptp(self.inputs[name])) > 0.0)
+
+    def shows(self, record: Record, machine: Machine) -> bool:
+        """Whether any of the signals that show a machine's effects was recorded."""
+        return not machine.shown or any(record.has(self.lab.signal(name)) for name in machine.shown)
 
     def predict(self, system: System) -> Array:
         """Readings of the laboratory."""
-        return replay.laboratory_a(system, self.inputs["actuator_command"], self._start)
+        none = np.zeros(max(values.size for values in self.inputs.values()))
+        drive = [self.inputs.get(name, none) for name in self.devices]
+        drive += [none] * (2 - len(drive))
+        return replay.laboratory(self.lab.kind, system, np.stack(drive, axis=1), self._start, self.anew)
 
-    def first(self, ticks: int) -> LaboratoryA:
+    def beginnings(self, record: Record) -> Array | None:
+        """Ticks, places and rates from which a motion that nothing brings back is replayed anew.
+
+        Without a spring every error of force adds up to a drift for ever, so it is replayed piece by piece, each from
+        the measured motion. The same where a record does not begin at rest.
+        """
+        name = self.lab.signal(self.lab.kind.free)
+        if not name or not record.has(name):
+            return None
+        motion, interval = record.signals[name], record.plan.test.interval
+        free = self.lab.kind.drifts(self.lab.plan)
+        if not free and abs(motion[0]) <= UNREST * float(np.max(np.abs(motion))):
+            return None
+        length = max(4 * REACH, round(PIECE / interval)) if free else motion.size
+        rows = []
+        for tick in range(0, motion.size - 2 * REACH, length):
+            window = np.arange(max(0, tick - REACH), tick + REACH + 1)
+            cubic = np.polynomial.polynomial.polyfit((window - tick) * interval, motion[window], 3)
+            rows.append((tick, cubic[0], cubic[1]))
+        return np.array(rows)
+
+    def first(self, ticks: int) -> Laboratory:
         """The laboratory over the first ticks."""
-        result: LaboratoryA = cut(self, ticks, {name: values[:ticks] for name, values in self.inputs.items()})
+        result: Laboratory = cut(self, ticks, {name: values[:ticks] for name, values in self.inputs.items()})
+        if self.anew is not None:
+            result.anew = self.anew[self.anew[:, 0] < ticks]
         return result
 
-    def replaced(self, **fields: Any) -> LaboratoryA:
+    def replaced(self, **fields: Any) -> Laboratory:
         """The same laboratory in another test: other inputs, or other readings."""
         return with_fields(self, fields)
 
@@ -166,13 +210,17 @@ class ColumnAlone:
 
     name = "column"
     exact = False
-    signals: tuple[str, ...] = ("column_force",)
 
-    def __init__(self, record: Record, deformation: Array) -> None:
-        self.inputs = deformation
+    def __init__(self, record: Record, lab: Recorded) -> None:
+        self.lab, self.role = lab, lab.role
+        displacement, force = lab.kind.channels.position, lab.kind.channels.force
+        self.signals: tuple[str, ...] = (lab.signal(force),)
+        self.inputs = record.signals[lab.signal(displacement)]
         self.measured, self.present = outputs(record, self.signals)
-        self.nuisances = nuisances(record, OF_COLUMN)
-        self.candidates = of_sites(("column", "sensor.column_force"), record.plan)
+        machine = next(item for item in lab.kind.machines(lab.plan) if item.site == "column")
+        self.nuisances = nuisances(lab, machine.parameters)
+        sites = (lab.site("column"), lab.site(f"sensor.{force}"))
+        self.candidates = of_sites(record, sites, lab.plan)
 
     def predict(self, system: System) -> Array:
         """Force readings."""
@@ -184,97 +232,30 @@ class ColumnAlone:
         return result
 
 
-class LaboratoryB:
-    """Table and damper from the recorded table and motor commands."""
-
-    name = "laboratory B"
-    exact = False
-    signals: tuple[str, ...] = TABLE.channels.names
-    devices: ClassVar[dict[str, str]] = {"table_command": "table", "damper_command": "damper's motor"}
-    units: ClassVar[dict[str, str]] = {"table_command": "m", "damper_command": "N"}
-
-    def __init__(self, record: Record) -> None:
-        none = np.zeros(record.ticks)
-        self.inputs = {name: record.signals.get(name, none) for name in self.devices}
-        self.measured, self.present = outputs(record, TABLE.channels.names)
-        driven = record.has("table_command") and float(np.ptp(self.inputs["table_command"])) > 0.0
-        self.nuisances = nuisances(record, (*OF_TABLE, *OF_DAMPER) if driven else OF_DAMPER)
-        moving = [
-            name
-            for name, values in zip(TABLE.channels.names, self.measured.T, strict=True)
-            if np.ptp(values) > 0.0
-        ]
-        sites = [f"sensor.{name}" for name in moving if record.has(name)] + (["table"] if driven else [])
-        self.anew = self.beginnings(record)
-        with_damper = record.has("damper_stroke") or record.has("damper_force")
-        self.candidates = of_sites((*sites, "damper") if with_damper else tuple(sites), record.plan)
-
-    def predict(self, system: System) -> Array:
-        """Readings of the laboratory."""
-        none = np.zeros(max(values.size for values in self.inputs.values()))
-        command, motor = (self.inputs.get(name, none) for name in self.devices)
-        return replay.laboratory_b(system, command, motor, self.anew)
-
-    def beginnings(self, record: Record) -> Array | None:
-        """Ticks, strokes and rates from which a damper that nothing brings back is replayed anew.
-
-        Without a spring every error of force adds up to a drift for ever, so it is replayed piece by piece, each from
-        the measured motion. The same where a record does not begin at rest.
-        """
-        if not record.has("damper_stroke"):
-            return None
-        stroke, interval = record.signals["damper_stroke"], record.plan.test.interval
-        free = record.plan.damper.stiffness == 0.0
-        if not free and abs(stroke[0]) <= UNREST * float(np.max(np.abs(stroke))):
-            return None
-        length = max(4 * REACH, round(PIECE / interval)) if free else stroke.size
-        rows = []
-        for tick in range(0, stroke.size - 2 * REACH, length):
-            window = np.arange(max(0, tick - REACH), tick + REACH + 1)
-            cubic = np.polynomial.polynomial.polyfit((window - tick) * interval, stroke[window], 3)
-            rows.append((tick, cubic[0], cubic[1]))
-        return np.array(rows)
-
-    def first(self, ticks: int) -> LaboratoryB:
-        """The laboratory over the first ticks."""
-        result: LaboratoryB = cut(self, ticks, {name: values[:ticks] for name, values in self.inputs.items()})
-        if self.anew is not None:
-            result.anew = self.anew[self.anew[:, 0] < ticks]
-        return result
-
-    def replaced(self, **fields: Any) -> LaboratoryB:
-        """The same laboratory in another test: other inputs, or other readings."""
-        return with_fields(self, fields)
-
-
-OF_TABLE = (
-    ("table", "frequency"),
-    ("table", "damping_ratio"),
-    ("table", "delay"),
-)
-OF_DAMPER = (
-    ("damper", "mass"),
-    ("damper", "stiffness"),
-    ("damper", "damping"),
-    ("damper", "motor_time_constant"),
-)
-
-
 class Building:
     """The numerical substructure from the ground motion and the forces that the master used."""
 
     name = "structure"
+    role = MASTER
     exact = True
     signals: tuple[str, ...] = ("displacement", "velocity", "acceleration")
 
     def __init__(self, record: Record) -> None:
-        self._whole = record.whole
-        dampers = record.signals["damper_force_used"] if self._whole is None else self._whole.dampers
-        self._inputs = (record.signals["column_displacement"], record.signals["column_force"], dampers)
+        plan, none = record.plans[MASTER], np.zeros(record.ticks)
+        own, other = record.own, record.other
+        if record.whole is not None:
+            used = record.whole.used
+        elif other is not None:
+            used = record.signals[f"{other.kind.channels.force}_used"][:, None]
+        else:
+            used = np.zeros((record.ticks, 0))
+        names = (own.kind.channels.position, own.kind.channels.force) if own else ()
+        read = [record.signals[name] for name in names] or [none, none]
+        self._inputs = (read[0], read[1], used)
         here = record.signals["ground_acceleration"]
         self._ground = np.zeros((2, record.ticks + 1))
         self._ground[0, :-1] = here
-        storeys = record.plan.storeys
+        storeys = plan.storeys
         self.signals = tuple(name for name in type(self).signals for _ in range(storeys))
         columns = [
             record.signals[name].reshape(record.ticks, -1)[:, i]
@@ -283,15 +264,11 @@ class Building:
         ]
         self.measured = np.stack(columns, axis=1)
         self.present = np.repeat(record.present["displacement"][:, None], self.measured.shape[1], axis=1)
-        self.nuisances = nuisances(
-            record, tuple(("structure", name) for name in ("mass", "stiffness", "damping", "damping_ratio"))
-        )
-        self.candidates = of_sites(("structure",), record.plan)
+        self.nuisances = of_building(plan)
+        self.candidates = of_sites(record, ("structure",), plan)
 
     def predict(self, system: System) -> Array:
         """Displacement, velocity and acceleration of every storey."""
-        if self._whole is not None:
-            system = replace(system, plan=self._whole.joined(system.plan))
         rows = replay.building(system, self._ground, *self._inputs)
         return np.column_stack([rows[name] for name in type(self).signals])
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from common.errors import InputError
+from common.plan.kinds import COLUMN
+from common.roles import MASTER
 from diagnosis.recorded.record import Record
 from diagnosis.report.evidence import ForcePath, Path, Paths
 from loop import force_path as force
@@ -21,11 +23,20 @@ def paths(record: Record, nominal: dict[str, Array] | None) -> Paths:
     to the force that the master used, the exchange from the damper's force in its laboratory to its use.
     Delay and amplitude by Guo's frequency evaluation index, the effect in points added to the first mode's damping.
     """
-    return Paths(
-        command=path(record, nominal, "column_target", "column_displacement"),
-        force=path(record, nominal, "column_displacement", "column_force"),
-        exchange=path(record, nominal, "damper_force", "damper_force_used", damped=False),
-    )
+    own, other = record.own, record.other
+    command = force = exchange = None
+    if own is not None:
+        channels = own.kind.channels
+        damped = (
+            own.kind.coupling(own.plan).stiffness > 0.0
+        )  # what it adds to the damping follows from the stiffness
+        command = path(record, nominal, channels.target.name, channels.position, damped=damped)
+        if own.kind.name == COLUMN:
+            force = path(record, nominal, channels.position, channels.force)
+    if other is not None:
+        measured = other.kind.channels.force
+        exchange = path(record, nominal, other.signal(measured), f"{measured}_used", damped=False)
+    return Paths(command=command, force=force, exchange=exchange)
 
 
 def path(
@@ -47,7 +58,7 @@ def path(
 
 def points(record: Record, path: FrequencyEvaluation) -> float:
     """What a path adds to the first mode's damping, in points of a percent."""
-    return -100.0 * damping_lost(record.plan, path)
+    return -100.0 * damping_lost(record.plans[MASTER], path)
 
 
 def measured(record: Record, signals: dict[str, Array], start: str, end: str) -> FrequencyEvaluation | None:
@@ -55,8 +66,8 @@ def measured(record: Record, signals: dict[str, Array], start: str, end: str) ->
     if start not in signals or end not in signals or not record.has(start, end):
         return None
     target, reached = signals[start], signals[end]
-    if end == "column_force":
-        reached = reached / record.plan.column.stiffness
+    if record.own is not None and record.own.kind.name == COLUMN and end == record.own.kind.channels.force:
+        reached = reached / record.plans[MASTER].column.stiffness
     try:
         return indicators.frequency_evaluation_index(
             np.asarray(target), np.asarray(reached), record.plan.test.interval
@@ -67,9 +78,8 @@ def measured(record: Record, signals: dict[str, Array], start: str, end: str) ->
 
 def force_path(record: Record) -> ForcePath | None:
     """Delay (s) with its interval of 95 % and gain of the column force beside the plan's specimen, if known."""
-    if not record.has("column_displacement", "column_force"):
+    own = record.own
+    if own is None or own.kind.name != COLUMN or not record.has("column_displacement", "column_force"):
         return None
-    found = force.force_path(
-        record.plan, record.signals["column_displacement"], record.signals["column_force"]
-    )
+    found = force.force_path(own.plan, record.signals["column_displacement"], record.signals["column_force"])
     return None if found is None else ForcePath(**found._asdict())

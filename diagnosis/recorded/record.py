@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,14 +12,21 @@ from common.errors import InputError
 from common.plan.plan import Plan, ideal, parse
 from common.recording.reader import GROUND, Run
 from common.roles import MASTER, SLAVE, title
+from common.signals import BUILDING as OF_BUILDING
+from common.signals import shared
+from diagnosis.recorded.laboratory import Recorded, recorded
 from diagnosis.signals.mask import Mask
+from laboratories import effects
+from laboratories.effects.effect import Effect
+from laboratories.effects.sites import BUILDING, LINK, sensors
+from laboratories.kinds import KINDS
+from laboratories.kinds import topics as topics_of
 from loop import substructure
 from models.registry import Array
 from models.system import System
 
 MASTER_FIRST = ("master", "slave")
 SLAVE_FIRST = ("slave", "master")
-OF_SLAVE = ("table_command", "damper_command", "table_displacement", "table_acceleration", "damper_stroke")
 LEAST_TICKS = 50
 
 
@@ -28,26 +36,16 @@ class Whole:
 
     plan: Plan
     role: str  # of the slave that the record shows
-    dampers: Array  # (ticks, slaves) forces that the master used, N
+    used: Array  # (ticks, slaves) forces that the master used, N
     others: dict[str, System] = field(default_factory=dict)  # what the other slaves were found to be, by role
-
-    def joined(self, plan: Plan) -> Plan:
-        """The whole test with the master's tables of a plan of one slave."""
-        whole = self.plan
-        return replace(
-            plan,
-            slave=whole.slave,
-            slaves=whole.slaves,
-            follows_in=whole.follows_in,
-            table=whole.table,
-            damper=whole.damper,
-            control=whole.control,
-        )
 
 
 @dataclass(frozen=True)
 class Record:
-    """Signals (ticks,) or (ticks, storeys) by name; a value that is missing is that of the tick before."""
+    """Signals (ticks,) or (ticks, storeys) by name; a value that is missing is that of the tick before.
+
+    It shows the master and one slave, or the master alone; `plan` is the one of that slave, `plans` are those of both.
+    """
 
     plan: Plan
     run: Run
@@ -57,6 +55,57 @@ class Record:
     ground: Array | None  # (2, ticks + 1) as the plan believes it, None where it is not known
     other_plan: bool = False  # whether the building or its control were other than this plan's
     whole: Whole | None = None  # the test around it, where that has several slaves
+    plans: dict[str, Plan] = field(default_factory=dict)  # by role, as each sees it
+    labs: tuple[Recorded, ...] = ()  # the laboratories that it shows, the master's first
+
+    @cached_property
+    def catalogue(self) -> dict[str, Effect]:
+        """The effects that may act in the part of the test that it shows, by name."""
+        found = dict(effects.of_test())
+        for lab in self.labs:
+            found |= lab.effects()
+        order = {site: place for place, site in enumerate(self.sites)}
+        return dict(sorted(found.items(), key=lambda item: order.get(item[1].site, 0)))
+
+    @property
+    def sites(self) -> list[str]:
+        """Its sites in the order in which effects are listed."""
+        machines = [[lab.site(site) for site in lab.kind.sites] for lab in self.labs]
+        own = [lab.role == MASTER for lab in self.labs]
+        first = [site for found, mine in zip(machines, own, strict=True) if mine for site in found]
+        rest = [site for found, mine in zip(machines, own, strict=True) if not mine for site in found]
+        read = [lab.site(site) for lab in self.labs for site in sensors(lab.kind)]
+        return [*BUILDING, *first, LINK, *rest, *read]
+
+    @property
+    def systems(self) -> dict[str, System]:
+        """What the plan says that master and slave are, by role."""
+        return {role: System(plan) for role, plan in self.plans.items()}
+
+    @property
+    def own(self) -> Recorded | None:
+        """The master's laboratory."""
+        return next((lab for lab in self.labs if lab.role == MASTER), None)
+
+    @property
+    def other(self) -> Recorded | None:
+        """The slave's laboratory."""
+        return next((lab for lab in self.labs if lab.role != MASTER), None)
+
+    @property
+    def responses(self) -> tuple[str, ...]:
+        """The signals by which the gap of the test is judged."""
+        return tuple(name for lab in self.labs for name in lab.responses)
+
+    @property
+    def targets(self) -> tuple[str, ...]:
+        """What the laboratories were to follow."""
+        return tuple(lab.signal(lab.kind.channels.target.name) for lab in self.labs)
+
+    def unit(self, name: str) -> str:
+        """The unit of a signal, empty for one that is not known."""
+        rows = (*OF_BUILDING, *(row for lab in self.labs for row in lab.rows))
+        return next((row.unit for row in rows if row.name == name), "")
 
     def has(self, *names: str) -> bool:
         """Whether all these signals are there for most of the test."""
@@ -71,7 +120,7 @@ class Record:
 def build(run: Run, plan: Plan | None = None, *, against_ideal: bool = False, role: str = SLAVE) -> Record:
     """The record of a recording under a plan, its own where none is given.
 
-    Of a test with several slaves it shows the master and the slave whose `role` is given.
+    It shows the master and the slave whose `role` is given, or with the role of the master that one alone.
     With `against_ideal` it is compared with the pure simulation of that plan: transfer systems that do what
     the building wants. Their command is then the target, and their compensation a part of them.
 
@@ -83,38 +132,60 @@ def build(run: Run, plan: Plan | None = None, *, against_ideal: bool = False, ro
     if chosen is None:
         raise InputError(f"{run.path} carries no plan: give the one that it was recorded under with --plan.")
     check_slaves(run, chosen)
-    whole = run.columns.get(MASTER, {}).get("damper_force_used") if chosen.slaves else None
-    every, run, chosen = chosen, run.of(role), chosen.of(role)
-    own = own.of(role) if own is not None and own.slaves else own
+    every, whole = chosen, run
+    if role != MASTER:
+        run, chosen = run.of(role), chosen.of(role)
+        own = own.of(role) if own is not None and own.slaves else own
     topics = [topic for topic in MASTER_FIRST if run.has(topic)]
     if not topics:
         raise InputError(f"{run.path} holds no signals of a master or a slave to diagnose.")
     ticks = 1 + max(int(run.sequences[topic].max()) for topic in topics)
-    signals, present = on_ticks(run, topics, ticks)
     tables = ("structure", "compensator", "control", "column")
     other = own is not None and any(getattr(own, name) != getattr(chosen, name) for name in tables)
     if against_ideal:
         chosen, every = ideal(chosen), ideal(every)
-        for command, target in (("actuator_command", "column_target"), ("table_command", "table_target")):
-            if target in signals:
-                signals[command], present[command] = wanted(signals, present, target)
+    plans = {MASTER: every} | ({role: chosen} if role != MASTER else {})
+    labs = recorded(plans)
+    signals, present = on_ticks(run, topics, ticks, labs)
+    if against_ideal:
+        commanded(signals, present, labs)
     known = plan is None or (own is not None and own.ground_motion == plan.ground_motion)
     ground = believed_ground(run, chosen, ticks, known)
     around = None
-    if whole is not None:
-        used, _ = laid_out(whole.reshape(whole.shape[0], -1), run.sequences[MASTER], ticks)
-        around = Whole(every, role, used)
-    return Record(chosen, run, ticks, signals, present, ground, other, around)
+    if every.slaves and whole.has(MASTER):
+        around = Whole(every, role, used_forces(whole, every, ticks))
+    return Record(chosen, run, ticks, signals, present, ground, other, around, plans, labs)
 
 
-def on_ticks(run: Run, topics: list[str], ticks: int) -> tuple[dict[str, Array], dict[str, Mask]]:
-    """The topics' numbers on their ticks, and where they are there; what two topics hold is the first one's."""
+def used_forces(run: Run, plan: Plan, ticks: int) -> Array:
+    """Forces of all slaves that the master used, (ticks, slaves) N; zero where they were not recorded."""
+    result = np.zeros((ticks, len(plan.roles)))
+    for name, roles in shared(topics_of(plan)[MASTER]).items():
+        values = run.columns[MASTER].get(name) if name.endswith("_used") else None
+        if values is not None:
+            rows, _ = laid_out(values.reshape(values.shape[0], -1), run.sequences[MASTER], ticks)
+            result[:, [plan.roles.index(role) for role in roles]] = rows
+    return result
+
+
+def on_ticks(
+    run: Run, topics: list[str], ticks: int, labs: tuple[Recorded, ...]
+) -> tuple[dict[str, Array], dict[str, Mask]]:
+    """The topics' numbers on their ticks, and where they are there.
+
+    What two topics hold is the master's, but what a slave wrote and measured is its own.
+    """
     signals: dict[str, Array] = {}
     present: dict[str, Mask] = {}
+    there = [lab for lab in labs if lab.role != MASTER]
+    own = {name: lab for lab in there for name in (*lab.kind.channels.drives, *lab.kind.channels.names)}
+    named = own | {name: lab for lab in there if lab.ahead for name in lab.kind.channels.sent}
     for topic in topics:
         places = run.sequences[topic]
-        for name, values in run.columns[topic].items():
-            if name in signals and not (topic == "slave" and name in OF_SLAVE):
+        for given, values in run.columns[topic].items():
+            lab = named.get(given) if topic == SLAVE else None
+            name = lab.signal(given) if lab else given
+            if name in signals and not (topic == SLAVE and given in own):
                 continue
             if not np.issubdtype(values.dtype, np.number):
                 continue
@@ -122,22 +193,32 @@ def on_ticks(run: Run, topics: list[str], ticks: int) -> tuple[dict[str, Array],
     return signals, present
 
 
+def commanded(signals: dict[str, Array], present: dict[str, Mask], labs: tuple[Recorded, ...]) -> None:
+    """Put the targets in place of the commands of transfer systems that a plan says to be ideal."""
+    for lab in labs:
+        channels = lab.kind.channels
+        command, target = lab.signal(channels.command.name), lab.signal(channels.target.name)
+        if target in signals and lab.kind.name in KINDS:
+            signals[command], present[command] = wanted(
+                signals[target], present[target], at_end=lab.role != MASTER
+            )
+
+
 def check_slaves(run: Run, plan: Plan) -> None:
     """Raise InputError where the recording's slaves are not those of the plan."""
     if run.roles != plan.roles:
         raise InputError(
-            f"{run.path} is of the {' and the '.join(map(title, run.roles))}, but the plan is of the "
-            f"{' and the '.join(map(title, plan.roles))}: give the plan of that test with --plan."
+            f"{run.path} is of the {' and the '.join(map(title, run.roles or [MASTER]))}, but the plan is of the "
+            f"{' and the '.join(map(title, plan.roles or [MASTER]))}: give the plan of that test with --plan."
         )
 
 
-def wanted(signals: dict[str, Array], present: dict[str, Mask], target: str) -> tuple[Array, Mask]:
+def wanted(values: Array, there: Mask, *, at_end: bool) -> tuple[Array, Mask]:
     """A target as the command of an ideal transfer system: what is wanted for the interval's end.
 
-    The recorded column target is that of the tick, the table's that of the interval's end.
+    The recorded target of the master's own laboratory is that of the tick, one that is sent that of the interval's end.
     """
-    values, there = signals[target], present[target]
-    if target == "table_target":
+    if at_end:
         return values, there
     return np.append(values[1:], values[-1]), np.append(there[1:], there[-1])
 

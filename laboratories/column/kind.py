@@ -11,10 +11,23 @@ from common.signals import COLUMN_CHANNELS
 from laboratories.column import model
 from laboratories.column.descent import ColumnRamp
 from laboratories.column.model import ColumnLab
-from laboratories.kind import Chosen, Coupling, Follows, Hysteresis, Kind, Limited, Pictured, Sensed
+from laboratories.kind import Chosen, Coupling, Follows, Hysteresis, Kind, Limited, Machine, Pictured, Sensed
 from laboratories.sensors import noise
 from models.registry import Array
 from models.system import System
+
+PARAMETERS = {  # of [actuator] that may be a little off, by its model
+    "fopdt": ("actuator.gain", "actuator.delay", "actuator.time_constant"),
+    "servo_hydraulic": (
+        "actuator.servo.gain",
+        "actuator.servo.valve",
+        "actuator.servo.valve_damping",
+        "actuator.servo.valve_stiffness",
+        "actuator.servo.leakage",
+        "actuator.servo.piston",
+        "actuator.servo.delay",
+    ),
+}
 
 
 class ColumnKind(Kind):
@@ -32,7 +45,35 @@ class ColumnKind(Kind):
         "deformation",
         (Hysteresis("column", "column_displacement", "column_force", "deformation", "kN"),),
     )
+    reaches = {  # noqa: RUF012 - a constant
+        ("column_displacement", "m"): 2.4e-3,
+        ("column_displacement", "m/s"): 0.035,
+        ("column_force", "N"): 30e3,
+    }
+    responses = ("column_displacement", "column_force")
     record = ColumnLab
+
+    def machines(self, plan: Plan) -> tuple[Machine, ...]:
+        """The actuator by its model, and the specimen."""
+        read = self.channels.names
+        return (
+            Machine(
+                "actuator", PARAMETERS[plan.actuator.model], read, ("actuator_command", "column_displacement")
+            ),
+            Machine(
+                "column",
+                ("column.stiffness", "column.mass", "column.damping"),
+                read,
+                ("column_displacement", "column_force"),
+                shown=("column_force",),
+            ),
+        )
+
+    def settle(self, lab: ColumnLab, truth: Array, command: float, interval: float) -> bool:
+        """The specimen deformed as far as the command says, at rest."""
+        model.begin(lab, command, interval)
+        truth[:] = lab.state[[model.DISPLACEMENT, model.FORCE]]
+        return True
 
     def build(self, system: System) -> ColumnLab:
         """Actuator and column of a system, at rest."""

@@ -67,15 +67,20 @@ def of_kind(kind: Kind, plan: Plan) -> dict[str, Effect]:
     places = sites.of_kind(kind)
     found = {name: effect for name, effect in CATALOGUE.items() if effect.site in places}
     found |= {effect.name: effect for effect in kind.effects}
-    limits = kind.limits(plan)
-    for signal, noise in zip(kind.channels.measured, kind.noise(plan), strict=True):
-        size = reading.channel(signal.name, signal.unit, limits.get(signal.name, 0.0), float(noise))
+    for name, size in readings_of(kind, plan).items():
         found |= {
-            effect.name: effect
-            for fault in FAULTS
-            if (effect := fault.on(signal.name, size)).name not in found
+            effect.name: effect for fault in FAULTS if (effect := fault.on(name, size)).name not in found
         }
     return dict(sorted(found.items(), key=lambda item: places.index(item[1].site)))
+
+
+def readings_of(kind: Kind, plan: Plan) -> dict[str, reading.Signal]:
+    """How large the measured channels of a kind are, by name; `plan` as the role that hosts it sees it."""
+    limits = kind.limits(plan)
+    return {
+        signal.name: reading.channel(signal.name, signal.unit, limits.get(signal.name, 0.0), float(noise))
+        for signal, noise in zip(kind.channels.measured, kind.noise(plan), strict=True)
+    }
 
 
 def of_role(plan: Plan, role: str) -> dict[str, Effect]:

@@ -9,7 +9,7 @@ from typing import Any
 from common.plan.plan import Plan
 from common.plan.tables import ForceCorrection
 from common.signals import TABLE_CHANNELS
-from laboratories.kind import Chosen, Coupling, Follows, Hysteresis, Kind, Limited, Pictured, Sensed
+from laboratories.kind import Chosen, Coupling, Follows, Hysteresis, Kind, Limited, Machine, Pictured, Sensed
 from laboratories.sensors import noise
 from laboratories.table import model
 from laboratories.table.descent import TableRamp
@@ -35,7 +35,43 @@ class TableKind(Kind):
     pictured = Pictured(
         "table", "table", "displacement", (Hysteresis("damper", "damper_stroke", "damper_force", "stroke"),)
     )
+    reaches = {  # noqa: RUF012 - a constant
+        ("table_displacement", "m"): 20e-3,
+        ("table_acceleration", "m/s²"): 1.0,
+        ("damper_stroke", "m"): 49e-3,
+        ("damper_force", "N"): 76.0,
+    }
+    responses = ("table_acceleration", "damper_force")
+    free = "damper_stroke"
     record = TableLab
+
+    def machines(self, plan: Plan) -> tuple[Machine, ...]:
+        """The table, which its command drives, and the damper on it."""
+        return (
+            Machine(
+                "table",
+                ("table.frequency", "table.damping_ratio", "table.delay"),
+                ("table_displacement", "table_acceleration"),
+                ("table_command", "table_displacement"),
+                drive="table_command",
+            ),
+            Machine(
+                "damper",
+                ("damper.mass", "damper.stiffness", "damper.damping", "damper.motor_time_constant"),
+                ("damper_stroke", "damper_force"),
+                ("damper_stroke", "damper_force"),
+                shown=("damper_stroke", "damper_force"),
+            ),
+        )
+
+    def resume(self, lab: TableLab, truth: Array, motion: float, rate: float) -> None:
+        """The damper with this stroke and its rate."""
+        lab.state[model.STROKE], lab.state[model.STROKE_RATE] = motion, rate
+        truth[self.channels.names.index(self.free)] = motion
+
+    def drifts(self, plan: Plan) -> bool:
+        """Whether the damper has no spring."""
+        return plan.damper.stiffness == 0.0
 
     def build(self, system: System) -> TableLab:
         """Shaking table and damper of a system, at rest."""

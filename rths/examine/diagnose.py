@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from common.errors import InputError
 from common.plan.schema import nearest
-from common.roles import name_of
+from common.roles import MASTER, name_of
 from common.terminal import cli, outputs
 from common.terminal.printable import all_shown
 from common.terminal.telling import Tell, untold
@@ -95,7 +95,7 @@ def check(args: argparse.Namespace) -> None:
 
 def chosen(recording: Run, args: argparse.Namespace) -> list[str]:
     """Names of the slaves that are asked for, of which a file holds one; empty for the one without a name."""
-    names = [name_of(role) for role in recording.roles]
+    names = [name_of(role) for role in recording.roles or (MASTER,)]
     if args.name and args.name not in names:
         hint = nearest(args.name, names) if any(names) else "leave out --name."
         raise InputError(f"{args.file} has no slave '{args.name}': {hint}")
@@ -114,7 +114,7 @@ def diagnose_file(
     against_ideal: bool = False,
     tell: Tell = untold,
 ) -> Report:
-    """The report on a recording of a test with one slave.
+    """The report on a recording of a test with one slave, or without.
 
     Raises:
         InputError: a file cannot be read, or holds nothing to diagnose.
@@ -135,7 +135,7 @@ def diagnose_slaves(
     against_ideal: bool = False,
     tell: Tell = untold,
 ) -> dict[str, Report]:
-    """The reports on a recording by the name of the slave, empty where there is one without.
+    """The reports on a recording by the name of the slave, empty where there is one without or none.
 
     Each is of the master and that slave, and its verdict begins with the laboratory's name where there are several.
 
@@ -150,7 +150,10 @@ def diagnose_slaves(
 
     believed = plans.load(cli.plan_path(plan)) if plan else None
     own, *others = (
-        {role: record.build(run, believed, against_ideal=against_ideal, role=role) for role in run.roles}
+        {
+            role: record.build(run, believed, against_ideal=against_ideal, role=role)
+            for role in run.roles or (MASTER,)
+        }
         for run in (recording, *map(read, validate))
     )
     further = {role: [other[role] for other in others if role in other] for role in own}

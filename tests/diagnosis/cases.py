@@ -14,6 +14,7 @@ from common.plan.plan import Plan
 from common.recording.reader import read
 from common.terminal import cli
 from diagnosis.recorded import record
+from diagnosis.recorded.parts import Laboratory
 from diagnosis.recorded.record import Record
 from laboratories.effects import CATALOGUE
 from models.registry import Array
@@ -62,6 +63,18 @@ def play(base: Plan, given: Mapping[str, Any], path: Path) -> RthsError | None:
     """Record the test of a plan in laboratories that are what `given` says; the error that ended it."""
     true = reality.from_reality(dict(given), base, Path())
     return virtual.run(virtual.assemble(base, true, path), lambda: "")
+
+
+def lab_a(whole: Record) -> Laboratory:
+    """The master's laboratory of a record as a part."""
+    assert whole.own is not None
+    return Laboratory(whole, whole.own)
+
+
+def lab_b(whole: Record) -> Laboratory:
+    """The slave's laboratory of a record as a part."""
+    assert whole.other is not None
+    return Laboratory(whole, whole.other)
 
 
 class Cases:

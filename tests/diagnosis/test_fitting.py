@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -17,14 +17,15 @@ from common.recording.reader import read
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data, Fit
 from diagnosis.recorded import record
-from diagnosis.recorded.parts import MODEL_ERROR, Building, LaboratoryA, LaboratoryB, Part
+from diagnosis.recorded.parts import MODEL_ERROR, Building, Laboratory, Part
+from diagnosis.recorded.record import Record
 from laboratories.effects import CATALOGUE
 from models.registry import Array
 from models.system import System
 from tests.diagnosis import cases as made
-from tests.diagnosis.cases import Cases, jitter, short, white
+from tests.diagnosis.cases import Cases, jitter, lab_a, lab_b, short, white
 
-PARTS: dict[str, type[Part]] = {"a": LaboratoryA, "b": LaboratoryB, "building": Building}
+PARTS: dict[str, Callable[[Record], Part]] = {"a": lab_a, "b": lab_b, "building": Building}
 
 
 def data_of(cases: Cases, kind: str, **options: float) -> Data:
@@ -108,7 +109,7 @@ def test_noise_of_white_noise_over_anything_smooth() -> None:
 def test_residuals_of_white_noise_have_unit_variance(cases: Cases) -> None:
     data = data_of(cases, "b")
     part = data.part
-    assert isinstance(part, LaboratoryB)
+    assert isinstance(part, Laboratory)
     noisy = part.predict(data.system) + data.sigma * white(3, *part.measured.shape)
     again = dataclasses.replace(data, part=part.replaced(measured=noisy))
     reduced = again.reduced(data.system)
@@ -118,7 +119,7 @@ def test_residuals_of_white_noise_have_unit_variance(cases: Cases) -> None:
 def test_what_is_missing_does_not_count(cases: Cases) -> None:
     data = data_of(cases, "a")
     part = data.part
-    assert isinstance(part, LaboratoryA)
+    assert isinstance(part, Laboratory)
     present = part.present.copy()
     present[1000:2000, 1] = False
     spoilt = part.measured.copy()

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from common.recording.reader import read
+from common.roles import MASTER
 from diagnosis.diagnose import examine
 from diagnosis.findings import how_far
 from diagnosis.recorded import record
@@ -138,7 +139,9 @@ def test_a_diverging_simulation_is_a_gap_not_a_crash(cases: Cases) -> None:
     found = examine(cases.record(FOUND["column"]))
     judge = how_far.Judge(found, found.record, how_far.held_out(found.record))
     assert judge.loop is not None
-    wild = judge.loop.simulate(found.system().moved("actuator", delay=0.2))
+    systems = found.systems()
+    wild_systems = systems | {MASTER: systems[MASTER].moved("actuator", delay=0.2)}
+    wild = judge.loop.simulate(wild_systems)
     assert set(judge.gap(wild).values()) == set(judge.gap(None).values()) == {10.0}
     assert how_far.histories(judge, None, judge.signals(None)) == ()
     quiet = dataclasses.replace(judge.loop, names=("column_force",))

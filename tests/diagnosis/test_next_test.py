@@ -11,15 +11,15 @@ from diagnosis.findings import next_test
 from diagnosis.findings.next_test import Choice
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data, Values
-from diagnosis.recorded.parts import LaboratoryA
+from diagnosis.recorded.parts import Laboratory
 from laboratories.effects import CATALOGUE, checked
-from tests.diagnosis.cases import Cases
+from tests.diagnosis.cases import Cases, lab_a
 
 
 def laboratory(cases: Cases) -> Data:
     """A clean laboratory A."""
     whole = cases.record(duration=8.0)
-    return fitting.prepare(LaboratoryA(whole), whole)
+    return fitting.prepare(lab_a(whole), whole)
 
 
 def hypothesis(data: Data, effect: str, **given: float) -> fitting.Fit:
@@ -31,7 +31,7 @@ def hypothesis(data: Data, effect: str, **given: float) -> fitting.Fit:
 def scaled(data: Data, factor: float) -> Data:
     """The same motion at another scale."""
     part = data.part
-    assert isinstance(part, LaboratoryA)
+    assert isinstance(part, Laboratory)
     inputs = {name: factor * values for name, values in part.inputs.items()}
     return dataclasses.replace(data, part=part.replaced(inputs=inputs))
 
@@ -62,13 +62,13 @@ def test_a_hypothesis_is_not_separated_from_itself(cases: Cases) -> None:
 def test_the_menu_stays_within_what_was_reached_or_says_so(cases: Cases) -> None:
     data = laboratory(cases)
     part = data.part
-    assert isinstance(part, LaboratoryA)
+    assert isinstance(part, Laboratory)
     largest = float(np.max(np.abs(part.inputs["actuator_command"])))
     tests = next_test.menu(data)
     names = [name for name, _ in tests]
     assert len(set(names)) == len(names) == 6
     for _, item in tests:
-        assert isinstance(item.part, LaboratoryA)
+        assert isinstance(item.part, Laboratory)
         assert float(np.max(np.abs(item.part.inputs["actuator_command"]))) <= 2.0 * largest * (1 + 1e-9)
     assert part.inputs["actuator_command"] is not None  # the recording's own are as they were
 

@@ -10,15 +10,14 @@ from diagnosis.findings import readings
 from diagnosis.findings.readings import Reading
 from diagnosis.fits import fitting
 from diagnosis.recorded import record
-from diagnosis.recorded.parts import LaboratoryA, LaboratoryB
 from diagnosis.recorded.record import Record
-from tests.diagnosis.cases import Cases, named
+from tests.diagnosis.cases import Cases, lab_a, lab_b, named
 
 
 def found_in(whole: Record) -> list[Reading]:
     """Findings as a diagnosis makes them."""
     steps = readings.steps(whole)
-    datas = [fitting.prepare(kind(whole), whole, steps) for kind in (LaboratoryA, LaboratoryB)]
+    datas = [fitting.prepare(kind(whole), whole, steps) for kind in (lab_a, lab_b)]
     return readings.findings(whole, readings.levels(datas), steps)
 
 
@@ -59,7 +58,7 @@ def test_sensors_as_planned_are_left_in_peace(cases: Cases) -> None:
 
 def test_sensors_that_are_all_noisier_than_planned_are_not_blamed(cases: Cases) -> None:
     whole = cases.record(duration=8.0)
-    datas = [fitting.prepare(kind(whole), whole) for kind in (LaboratoryA, LaboratoryB)]
+    datas = [fitting.prepare(kind(whole), whole) for kind in (lab_a, lab_b)]
     loud = {name: 1.9 * level for name, level in readings.levels(datas).items()}
     assert readings.findings(whole, loud, {}) == []
 

@@ -8,8 +8,7 @@ import pytest
 from diagnosis.fits import fitting, search
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import Searcher
-from diagnosis.recorded.parts import LaboratoryA
-from tests.diagnosis.cases import Cases, Effects, counts_as, estimate, named, white
+from tests.diagnosis.cases import Cases, Effects, counts_as, estimate, lab_a, named, white
 
 ALONE: list[tuple[str, dict[str, float], dict[str, float]]] = [  # effect, truth, relative error allowed
     ("ground.scale", {"factor": 1.08}, {"factor": 0.005}),
@@ -112,7 +111,7 @@ def test_the_gap_of_noise_is_none_and_that_of_a_trend_is_seen() -> None:
 
 def test_a_search_says_what_it_explained(cases: Cases) -> None:
     whole = cases.record({"column.friction": {"force": 900.0}})
-    data = fitting.prepare(LaboratoryA(whole), whole)
+    data = fitting.prepare(lab_a(whole), whole)
     found = Searcher(data, Scales(whole)).run()
     assert found.chosen.names == ("column.friction",)
     assert found.explained > 0.99

@@ -14,11 +14,11 @@ from diagnosis.findings import where
 from diagnosis.findings.where import Trace
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data
-from diagnosis.recorded.parts import Building, LaboratoryA, LaboratoryB, Part
+from diagnosis.recorded.parts import Building, Part
 from diagnosis.recorded.record import Record
 from laboratories.effects import CATALOGUE, checked, lay
 from models.registry import Array
-from tests.diagnosis.cases import Cases, white
+from tests.diagnosis.cases import Cases, lab_a, lab_b, white
 
 PLAYERS = ("actuator", "column", "table", "damper", "link")
 WORTH = st.floats(-1e3, 1e3)
@@ -91,7 +91,7 @@ SITES: dict[str, tuple[str, fitting.Values]] = {
     "sensor.column_displacement": ("a", {"sensor.column_displacement.bias": {"offset": 1e-4}}),
     "structure": ("building", {"structure.damping": {"factor": 1.3}}),
 }
-PARTS: dict[str, Callable[[Record], Part]] = {"a": LaboratoryA, "b": LaboratoryB, "building": Building}
+PARTS: dict[str, Callable[[Record], Part]] = {"a": lab_a, "b": lab_b, "building": Building}
 
 
 def spoilt(cases: Cases, kind: str, effects: fitting.Values) -> Data:

@@ -45,12 +45,17 @@ def measured(found: Rollout) -> tuple[Array, Array]:
     return displacement, force
 
 
+def driven(command: Array, motor: Array | float = 0.0) -> Array:
+    """Commands of a laboratory as the replay takes them."""
+    return np.stack([command, np.broadcast_to(motor, command.shape)], axis=1)
+
+
 def alone(system: System, found: Rollout) -> tuple[Array, Array]:
     """Both laboratories alone, behind the commands that they had in the loop."""
     slave = found.slaves["slave"]
     return (
-        replay.laboratory_a(system, found.master["actuator_command"]),
-        replay.laboratory_b(system, slave["table_command"], found.master["damper_command"]),
+        replay.laboratory(COLUMN, system, driven(found.master["actuator_command"])),
+        replay.laboratory(TABLE, system, driven(slave["table_command"], found.master["damper_command"])),
     )
 
 
@@ -185,7 +190,7 @@ def test_the_specimen_alone_reads_through_its_load_cell(plan: Plan) -> None:
 
 
 def test_a_laboratory_that_begins_at_a_command_stays_there(plan: Plan) -> None:
-    got = replay.laboratory_a(System(plan), np.full(50, 2e-3), 2e-3)
+    got = replay.laboratory(COLUMN, System(plan), driven(np.full(50, 2e-3)), 2e-3)
     assert np.allclose(got[:, 0], 2e-3, rtol=1e-12)
     assert np.allclose(got[1:, 1], 12.5e6 * 2e-3, rtol=1e-12)
 
@@ -193,7 +198,7 @@ def test_a_laboratory_that_begins_at_a_command_stays_there(plan: Plan) -> None:
 @pytest.mark.parametrize("tick", [0, 40])
 def test_a_damper_that_begins_anew_swings_freely_from_there(tick: int, plan: Plan) -> None:
     anew, none = np.array([[tick, 0.03, 0.1]]), np.zeros(800)
-    got = replay.laboratory_b(System(plan), none, none, anew)[:, 2]
+    got = replay.laboratory(TABLE, System(plan), driven(none), 0.0, anew)[:, 2]
     assert not got[:tick].any()
     natural, rate = math.sqrt(56.8 / 16.0), 6.0 / 32.0
     damped, t = math.sqrt(natural**2 - rate**2), plan.test.interval * np.arange(800 - tick)

@@ -14,10 +14,11 @@ from common.plan import reality
 from common.plan.plan import parse
 from common.recording.reader import Run, read
 from diagnosis.recorded import record
-from diagnosis.recorded.parts import Building, LaboratoryA
+from diagnosis.recorded.parts import Building
 from loop import closed_loop, substructure
 from models.system import System
 from simulation import virtual
+from tests.diagnosis.cases import lab_a
 from tests.helpers import SERVO_PLAN
 
 Call = Callable[..., int]
@@ -68,7 +69,7 @@ def test_the_report_and_the_summary_take_it(call: Call, recording: Path, capsys:
 def test_the_pieces_of_a_diagnosis_are_replayed_to_the_noise(recording: Path) -> None:
     run, plan = read(recording), parse(BRIEF, Path())
     built = record.build(run)
-    lab, building = LaboratoryA(built), Building(built)
+    lab, building = lab_a(built), Building(built)
     error = lab.measured - lab.predict(System(plan))
     assert np.abs(np.std(error, axis=0) / [1.6e-5, 2.2] - 1.0).max() < 0.05
     assert np.array_equal(building.predict(System(plan)), building.measured)
