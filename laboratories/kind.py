@@ -11,7 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from enum import Enum
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from common.plan.plan import Plan
 from common.plan.tables import ForceCorrection
@@ -124,7 +124,9 @@ class Kind(ABC):
     sensed: tuple[Sensed, ...] = ()
     sites: tuple[str, ...] = ()  # where effects can be, sensors apart
     pictured: Pictured
-    reaches: Mapping[tuple[str, str], float] = {}  # channels, or their rates, on the default test, by unit
+    reaches: ClassVar[
+        Mapping[tuple[str, str], float]
+    ] = {}  # channels, or their rates, on the default test, by unit
     responses: tuple[str, ...] = ()  # by which a test's gap is judged; none: `position` and `force`
     free: str = ""  # channel of a motion that nothing may bring back, so that a replay takes it up anew
     record: type[Any]  # NamedTuple of the laboratory at work

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 from common.plan.plan import Plan
 from common.signals import COLUMN_CHANNELS
@@ -45,7 +45,7 @@ class ColumnKind(Kind):
         "deformation",
         (Hysteresis("column", "column_displacement", "column_force", "deformation", "kN"),),
     )
-    reaches = {  # noqa: RUF012 - a constant
+    reaches: ClassVar[Mapping[tuple[str, str], float]] = {
         ("column_displacement", "m"): 2.4e-3,
         ("column_displacement", "m/s"): 0.035,
         ("column_force", "N"): 30e3,

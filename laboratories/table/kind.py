@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 from common.plan.plan import Plan
 from common.plan.tables import ForceCorrection
@@ -35,7 +35,7 @@ class TableKind(Kind):
     pictured = Pictured(
         "table", "table", "displacement", (Hysteresis("damper", "damper_stroke", "damper_force", "stroke"),)
     )
-    reaches = {  # noqa: RUF012 - a constant
+    reaches: ClassVar[Mapping[tuple[str, str], float]] = {
         ("table_displacement", "m"): 20e-3,
         ("table_acceleration", "m/s²"): 1.0,
         ("damper_stroke", "m"): 49e-3,

@@ -5,14 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TypeVar
 
+from common.roles import MASTER, SLAVE, title
 from diagnosis.report.evidence import Evidence
 from diagnosis.report.records import Candidate, Report, SignalGap, Tolerance
+from laboratories import effects as catalogue
 from laboratories.effects import CATALOGUE
 from report.text.force_path import sentence as force_sentence
 from report.text.formats import percent, percent_interval, quantity
 
 Named = TypeVar("Named", Candidate, Evidence)
 
+FAULTS = {fault.name: fault for fault in catalogue.FAULTS}
 STATUS = {
     "no_gap": "no gap",
     "explained": "explained",
@@ -37,22 +40,38 @@ def joined(names: Sequence[str], last: str = "and") -> str:
 
 
 def plain(name: str) -> str:
-    """A name as words: `column_force` is `column force`."""
-    return name.replace("_", " ")
+    """A name as words: `column_force` is `column force`, `slave.column_force` is `column force at the slave`."""
+    role, _, signal = name.rpartition(".")
+    return f"{signal} at the {title(role)}".replace("_", " ") if role else name.replace("_", " ")
+
+
+def placed(name: str, count: int = 1) -> tuple[str, str]:
+    """A site, or with a count of 2 an effect, without the role that it may begin with, and that role, or nothing."""
+    words = name.split(".")
+    if words[0] not in (MASTER, SLAVE) or len(words) <= count:
+        return name, ""
+    first = len(words) - count
+    first -= words[first - 1] == "sensor" and first > 1  # a reading has a name of two words
+    return ".".join(words[first:]), ".".join(words[:first])
 
 
 def site(name: str) -> str:
-    """A site in words."""
-    kind, _, signal = name.partition(".")
-    return f"{plain(signal)} sensor" if kind == "sensor" and signal else plain(name)
+    """A site in words: `column`, `table acceleration sensor`, `column at the slave`."""
+    bare, role = placed(name)
+    kind, _, signal = bare.partition(".")
+    words = f"{plain(signal)} sensor" if kind == "sensor" and signal else plain(bare)
+    return f"{words} at the {title(role)}" if role else words
 
 
 def effect(name: str) -> str:
-    """An effect in words: `damper friction`, `gain of the column force sensor`."""
-    entry = CATALOGUE.get(name)
-    if entry and entry.signal:
-        return f"{'added ' if entry.random else ''}{plain(entry.fault)} of the {plain(entry.signal)} sensor"
-    return plain(name.replace(".", " "))
+    """An effect in words: `damper friction`, `gain of the column force sensor`, `column slip at the slave`."""
+    bare, role = placed(name, 2)
+    kind, _, rest = bare.partition(".")
+    signal, _, fault = rest.partition(".")
+    words = plain(bare.replace(".", " "))
+    if kind == "sensor" and fault in FAULTS:
+        words = f"{'added ' if FAULTS[fault].random else ''}{plain(fault)} of the {plain(signal)} sensor"
+    return f"{words} at the {title(role)}" if role else words
 
 
 def effects(names: Sequence[str]) -> str:
@@ -62,7 +81,7 @@ def effects(names: Sequence[str]) -> str:
 
 def says(name: str) -> str:
     """What the catalogue says of an effect; nothing of one it does not list."""
-    entry = CATALOGUE.get(name)
+    entry = CATALOGUE.get(placed(name, 2)[0])
     return entry.says if entry else ""
 
 
@@ -83,8 +102,8 @@ def kind(candidate: Candidate | Evidence) -> str:
     """Whether a candidate is physics or measurement; a mixture counts as physics."""
     if isinstance(candidate, Evidence):
         return candidate.kind
-    kinds = {CATALOGUE[name].kind if name in CATALOGUE else "physics" for name in candidate.effects}
-    return "measurement" if kinds == {"measurement"} else "physics"
+    readings = [placed(name, 2)[0].startswith("sensor.") for name in candidate.effects]
+    return "measurement" if readings and all(readings) else "physics"
 
 
 def parameters(candidate: Candidate | Evidence) -> list[tuple[str, str, str]]:
@@ -98,8 +117,7 @@ def parameters(candidate: Candidate | Evidence) -> list[tuple[str, str, str]]:
 
 def called(effect: str, parameter: str) -> str:
     """A parameter behind its effect's words; empty where these say it already: `table delay` has but one."""
-    entry = CATALOGUE.get(effect)
-    return "" if entry and entry.is_called_by(parameter) else plain(parameter)
+    return "" if effect.replace(".", "_").endswith(f"_{parameter}") else plain(parameter)
 
 
 def equivalent(names: Sequence[str]) -> str:
