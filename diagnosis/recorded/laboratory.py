@@ -100,22 +100,17 @@ class Recorded:
         return replace(parameter, follows=self.signal(parameter.follows))
 
 
-def recorded(plans: Mapping[str, Plan]) -> tuple[Recorded, ...]:
-    """The laboratories of a record, of the master and of one slave at most; `plans` as each role sees it.
+def recorded(plan: Plan, plans: Mapping[str, Plan]) -> tuple[Recorded, ...]:
+    """The laboratories of a record of a plan's test, of the master and of one slave at most; `plans` as each sees it.
 
     Raises:
         InputError: a kind of the plan cannot be loaded.
     """
-    kinds = {role: kind_of(plan, role) for role, plan in plans.items() if role in plan.kinds}
+    kinds = {role: kind_of(plan, role) for role in plans if role in plan.kinds}
     names = [{*sites.of_kind(kind), *kind.channels.drives, *kind.channels.names} for kind in kinds.values()]
     alike = len(names) > 1 and bool(names[0] & names[1])
+    before = {role: f"{role}." if alike else "" for role in kinds}
     return tuple(
-        Recorded(
-            role,
-            kind,
-            plans[role],
-            f"{role}." if alike else "",
-            f"{role}." if alike and role != MASTER else "",
-        )
+        Recorded(role, kind, plans[role], before[role], before[role] if role != MASTER else "")
         for role, kind in kinds.items()
     )

@@ -145,7 +145,7 @@ def build(run: Run, plan: Plan | None = None, *, against_ideal: bool = False, ro
     if against_ideal:
         chosen, every = ideal(chosen), ideal(every)
     plans = {MASTER: every} | ({role: chosen} if role != MASTER else {})
-    labs = recorded(plans)
+    labs = recorded(every, plans)
     signals, present = on_ticks(run, topics, ticks, labs)
     if against_ideal:
         commanded(signals, present, labs)

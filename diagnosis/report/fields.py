@@ -32,8 +32,9 @@ Number = float | None  # None: not determined
 Ends = tuple[Number, Number]  # of an interval, lower and upper
 Series = tuple[Number, ...]
 Share = Annotated[Number, Rule(least=0.0, most=1.0)]
-# of the building, the link or a laboratory, which stands before it where two of a report have that site
-Site = Annotated[str, Rule(pattern=r"^[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)*$")]
+PLACE = r"ground|structure|actuator|column|link|table|damper|device|sensor\.[a-z][a-z0-9_]*"
+# the laboratory stands before it where two of a report have that site
+Site = Annotated[str, Rule(pattern=rf"^((master|slave(\.[a-z][a-z0-9_]*)?)\.)?({PLACE})$")]
 EffectName = Annotated[str, Rule(pattern=r"^[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)+$")]
 
 

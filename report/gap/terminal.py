@@ -11,6 +11,7 @@ from report.text.formats import as_float, percent, percent_interval, probability
 
 WIDTH = 100
 LABEL = 12
+NAME = 22  # of a signal or a site, at least
 BAR = 16
 MOST = 25  # lines of the whole
 UNBROKEN = "\u00a0%"
@@ -69,8 +70,9 @@ def gap(report: Report) -> list[str]:
     entries += [
         (wording.plain(name), item.nrmse, item.noise_floor) for name, item in wording.by_floor(report)[:4]
     ]
+    width = max(NAME, *(len(name) for name, _, _ in entries))
     lines = [
-        f"{name:<22} {percent(value):>7}   noise floor {percent(floor)}"
+        f"{name:<{width}} {percent(value):>7}   noise floor {percent(floor)}"
         for name, value, floor in entries
         if value is not None
     ]
@@ -86,12 +88,13 @@ def bar(share: float) -> str:
 def where(report: Report) -> list[str]:
     """The foremost sites with their shares."""
     lines = []
+    width = max([NAME, *(len(wording.site(item.site)) for item in report.where[:3])])
     for item in report.where[:3]:
         facts = [f"{times(item.residual_to_noise)} noise" if item.residual_to_noise is not None else ""]
         facts += [span(window, "s") for window in item.when[:2]]
         facts.append(span(item.frequency_band, "Hz"))
         interval = percent_interval(item.share_interval)
-        head = f"{wording.site(item.site):<22} {bar(item.share or 0.0)} {percent(item.share)}"
+        head = f"{wording.site(item.site):<{width}} {bar(item.share or 0.0)} {percent(item.share)}"
         lines.append(
             head + (f" ({interval})" if interval else "") + "".join(f"  {fact}" for fact in facts if fact)
         )

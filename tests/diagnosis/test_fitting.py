@@ -31,7 +31,7 @@ PARTS: dict[str, Callable[[Record], Part]] = {"a": lab_a, "b": lab_b, "building"
 def data_of(cases: Cases, kind: str, **options: float) -> Data:
     """A part of a clean laboratory with jittered parameters."""
     found = cases.record(**options)  # type: ignore[arg-type]
-    return fitting.prepare(PARTS[kind](found), found)  # type: ignore[call-arg]
+    return fitting.prepare(PARTS[kind](found), found)
 
 
 def at_nominal(data: Data) -> Fit:

@@ -1,0 +1,87 @@
+"""Tests of other kinds of laboratory: the cause is named at the laboratory that hides it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from common.plan import reality
+from common.plan.plan import Plan, from_tables, load
+from common.recording.reader import read
+from diagnosis.report.records import Report
+from loop import substructure
+from report.gap import terminal
+from rths.examine.diagnose import diagnose_slaves
+from rths.prepare.simulate import really, write
+
+SECONDS = 6.0
+SHAKEN = {"ground_motion": {"scale": 0.2}, "control": {"amd": False}}
+SINGLE = from_tables({"slave": {"kind": "none"}, **SHAKEN}, Path())
+TWO = from_tables({"slave": {"kind": "column"}, **SHAKEN}, Path())
+NO_RIG = from_tables(
+    {
+        "master": {"kind": "none"},
+        "slave": {"left": {"kind": "column"}, "roof": {}},
+        "ground_motion": {"scale": 0.1},
+    },
+    Path(),
+)
+OWN = load(Path(__file__).resolve().parents[2] / "examples" / "viscous_damper.toml")
+YIELDING = {"name": "column.yielding", "yield_displacement": 0.002}
+
+
+def diagnosed(plan: Plan, path: Path, *hidden: dict[str, Any]) -> dict[str, Report]:
+    """Reports on a simulated recording of laboratories with hidden effects, by the slave's name."""
+    short = plan.with_test(duration=SECONDS)
+    truth = reality.from_reality({"effect": list(hidden), "seed": 3}, short, short.base)
+    rollout, motion = really(truth, noise=True), substructure.motion(short)
+    write(path / "test.mcap", short, rollout, motion, substructure.ground_rows(short, motion))
+    (path / "plan.toml").write_text(short.toml())
+    recording = read(path / "test.mcap")
+    recording.path = short.base / "test.mcap"  # where the plan in it finds the user's file
+    return diagnose_slaves(recording)
+
+
+def named(report: Report) -> tuple[str, ...]:
+    return report.which[0].effects
+
+
+@pytest.mark.parametrize("lab", ["master", "slave"])
+def test_of_two_columns_the_one_that_yields_is_named(lab: str, tmp_path: Path) -> None:
+    report = diagnosed(TWO, tmp_path, {**YIELDING, "laboratory": lab})[""]
+    assert report.status == "explained"
+    assert named(report) == (f"{lab}.column.yielding",)
+    assert [place.site for place in report.where] == [f"{lab}.column"]
+    assert f"column yielding at the {lab}" in terminal.summary(report)
+    assert {"column_force", "slave.column_force"} <= report.gap.signals.keys()
+    assert {"master.column.stiffness", "slave.actuator.delay"} <= report.tolerances.keys()
+
+
+def test_a_test_without_slaves_gives_one_report(tmp_path: Path) -> None:
+    reports = diagnosed(SINGLE, tmp_path, {"name": "actuator.delay", "delay": 0.004})
+    assert list(reports) == [""]
+    assert named(reports[""]) == ("actuator.delay",)
+    assert reports[""].gap.signals.keys() == {"column_displacement", "column_force"}
+
+
+def test_a_master_without_a_rig_gives_a_report_per_slave(tmp_path: Path) -> None:
+    delay, friction = {"name": "actuator.delay", "delay": 0.004}, {"name": "damper.friction", "force": 3.0}
+    reports = diagnosed(NO_RIG, tmp_path, delay, friction)
+    assert list(reports) == ["left", "roof"]
+    assert named(reports["left"]) == ("actuator.delay",)
+    assert named(reports["roof"]) == ("damper.friction",)
+    assert "structure.stiffness" in reports["left"].tolerances
+
+
+def test_a_fault_of_a_users_device_is_named(tmp_path: Path) -> None:
+    report = diagnosed(OWN, tmp_path, {"name": "device.leak", "share": 0.2})[""]
+    assert named(report) == ("device.leak",)
+    found = report.which[0].parameters["device.leak"]["share"]
+    assert found.value == pytest.approx(0.2, abs=0.03)
+    assert report.where[0].site == "device"
+
+
+def test_a_test_that_is_as_planned_has_no_gap(tmp_path: Path) -> None:
+    assert diagnosed(TWO, tmp_path)[""].status == "no_gap"
