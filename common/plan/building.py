@@ -1,15 +1,18 @@
-"""Whether the building, the specimen and the actuator of a plan fit together."""
+"""Whether the building, the specimens and the actuators of a plan fit together."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from common.errors import PlanError
+from common.plan.kinds import COLUMN, OWN, TABLE, known_kind
 from common.plan.schema import StoreysOrMatrix
 from common.plan.tables import Actuator, Experimental, ServoHydraulics, Structure
+from common.roles import name_of
 
 if TYPE_CHECKING:
     from common.plan.plan import Plan
@@ -29,10 +32,25 @@ def check(plan: Plan) -> None:
     """Raise PlanError where parts of the plan contradict each other."""
     check_storeys(plan)
     check_damping(plan.structure)
-    check_columns(plan)
+    columns = specimens(plan)
+    for where, seen in columns.items():
+        check_column(seen, where)
+    check_shares(plan, columns)
     if plan.structure.experimental is not None:
-        check_experimental(plan, plan.structure.experimental)
-    check_actuator(plan)
+        check_experimental(plan, columns, plan.structure.experimental)
+    for where, seen in columns.items():
+        check_actuator(seen, where)
+
+
+def specimens(plan: Plan) -> dict[str, Plan]:
+    """The plan as every role with a column sees it, by what stands before its tables' names in the file."""
+    return of_kind(plan, COLUMN)
+
+
+def of_kind(plan: Plan, kind: str) -> dict[str, Plan]:
+    """The plan as every role with that kind of laboratory sees it, by what stands before its tables' names."""
+    hosting = [role for role, one in plan.kinds.items() if known_kind(one) == kind]
+    return {f"{role}." if name_of(role) else "": plan.of(role) for role in hosting}
 
 
 def is_matrix(stiffness: StoreysOrMatrix) -> bool:
@@ -56,12 +74,19 @@ def check_storeys(plan: Plan) -> None:
             raise PlanError(
                 f"[structure] has {storeys} masses but {len(given)} values of {name}: give one per storey."
             )
-    if plan.column.storey > storeys:
-        raise PlanError(f"storey in [column] is {plan.column.storey}, but the structure has {storeys}.")
-    dampers = {f"slave.{name}.damper": lab.damper for name, lab in plan.slaves.items()}
-    for where, damper in (dampers or {"damper": plan.damper}).items():
-        if damper.floor > storeys:
-            raise PlanError(f"floor in [{where}] is {damper.floor}, but the structure has {storeys}.")
+    check_places(plan)
+
+
+def check_places(plan: Plan) -> None:
+    """The storey or floor of every laboratory must be in the building."""
+    places = ((COLUMN, "column", "storey"), (TABLE, "damper", "floor"), (OWN, "device", "place"))
+    for kind, table, key in places:
+        for where, seen in of_kind(plan, kind).items():
+            place = getattr(getattr(seen, table), key)
+            if place > plan.storeys:
+                raise PlanError(
+                    f"{key} in [{where}{table}] is {place}, but the structure has {plan.storeys}."
+                )
 
 
 def check_matrix(rows: Sequence[Any], storeys: int) -> None:
@@ -129,12 +154,13 @@ def check_damping(structure: Structure) -> None:
         )
 
 
-def check_columns(plan: Plan) -> None:
-    """The specimen cannot stand for more columns than its storey has, nor for a share of a matrix."""
+def check_column(plan: Plan, where: str) -> None:
+    """A specimen cannot stand for more columns than its storey has, nor for a share of a matrix."""
     column = plan.column
     if column.represents > column.columns_per_storey:
         raise PlanError(
-            f"represents in [column] is {column.represents}, but the storey has {column.columns_per_storey} columns."
+            f"represents in [{where}column] is {column.represents}, but the storey has "
+            f"{column.columns_per_storey} columns."
         )
     if is_matrix(plan.structure.stiffness) and plan.structure.experimental is None:
         raise PlanError(
@@ -143,16 +169,44 @@ def check_columns(plan: Plan) -> None:
         )
 
 
-def check_experimental(plan: Plan, experimental: Experimental) -> None:
-    """The specimen cannot take over more than the building has; nor all of a floor's mass or of a matrix."""
-    place = plan.column.storey - 1
+def check_shares(plan: Plan, columns: Mapping[str, Plan]) -> None:
+    """The specimens of one storey cannot stand for more columns together than it has."""
+    by_storey: dict[int, list[tuple[str, Fraction]]] = {}
+    for where, seen in columns.items():
+        share = Fraction(seen.column.represents, seen.column.columns_per_storey)
+        by_storey.setdefault(seen.column.storey, []).append((f"[{where}column]", share))
+    for storey, shares in by_storey.items():
+        if sum(share for _, share in shares) > 1:
+            parts = ", ".join(f"{share} by {where}" for where, share in shares)
+            raise PlanError(
+                f"The specimens of storey {storey} stand for more columns than it has ({parts}): lower represents, or "
+                "place one of them in another storey."
+            )
+
+
+def check_experimental(plan: Plan, columns: Mapping[str, Plan], experimental: Experimental) -> None:
+    """One specimen cannot take over more than the building has; nor all of a floor's mass or of a matrix.
+
+    Whether a device of the user's own follows a drift is known to its class alone, so that it may be the one.
+    """
+    devices = of_kind(plan, OWN)
+    if len(columns) > 1 or not (columns or devices):
+        raise PlanError(
+            f"[structure.experimental] says what one specimen takes over, but the plan has {len(columns)} columns: "
+            "leave it out, or leave one column."
+        )
+    storeys = [seen.column.storey for seen in columns.values()]
+    for storey in storeys or [seen.device.place for seen in devices.values()]:
+        check_taken_over(plan, storey, experimental)
+
+
+def check_taken_over(plan: Plan, storey: int, experimental: Experimental) -> None:
+    """What a specimen takes over of a storey must be there."""
+    place = storey - 1
     matrix = is_matrix(plan.structure.stiffness)
     limits = {"mass": ("floor", plan.structure.mass[place])}
     if matrix:
-        limits["stiffness"] = (
-            "the drift of storey",
-            stiffness_of_drift(plan.structure.stiffness, plan.column.storey),
-        )
+        limits["stiffness"] = ("the drift of storey", stiffness_of_drift(plan.structure.stiffness, storey))
     else:
         limits["stiffness"] = ("storey", plan.structure.stiffness[place])
     if plan.structure.damping_ratio == 0.0:
@@ -167,26 +221,26 @@ def check_experimental(plan: Plan, experimental: Experimental) -> None:
             )
 
 
-def check_actuator(plan: Plan) -> None:
+def check_actuator(plan: Plan, where: str) -> None:
     """Parameters belong to the model that is chosen, and servo-hydraulics move a specimen with a mass."""
     actuator, plain = plan.actuator, Actuator()
     if actuator.model == "fopdt":
         if actuator.servo != ServoHydraulics():
             raise PlanError(
-                "[actuator.servo] is given, but model in [actuator] is 'fopdt': choose 'servo_hydraulic' or leave the "
-                "table out."
+                f"[{where}actuator.servo] is given, but model in [{where}actuator] is 'fopdt': choose "
+                "'servo_hydraulic' or leave the table out."
             )
         return
     for name in OF_FOPDT:
         if getattr(actuator, name) != getattr(plain, name):
             raise PlanError(
-                f"{name} in [actuator] is of the model 'fopdt', but 'servo_hydraulic' is chosen: leave it out and look "
-                "at [actuator.servo]."
+                f"{name} in [{where}actuator] is of the model 'fopdt', but 'servo_hydraulic' is chosen: leave it "
+                f"out and look at [{where}actuator.servo]."
             )
     if plan.column.mass == 0.0:
         raise PlanError(
-            "mass in [column] is 0, but the actuator 'servo_hydraulic' moves the specimen by its force: give the "
-            "moving mass."
+            f"mass in [{where}column] is 0, but the actuator 'servo_hydraulic' moves the specimen by its force: "
+            "give the moving mass."
         )
 
 
