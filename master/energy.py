@@ -13,7 +13,7 @@ from common.plan.limits import Violation, violated
 from common.plan.plan import Plan
 from laboratories import kinds
 from laboratories.kind import Follows, Kind
-from loop.nominal.partition import felt, storey_stiffness
+from loop.nominal.partition import drifts, felt, storey_stiffness
 from master.step import Outputs
 from models import energy_balance
 from models.compiled import plain
@@ -81,7 +81,9 @@ def interface(own: Kind | None, plan: Plan) -> tuple[float, float, Callable[[Any
 def floor(plan: Plan) -> float:
     """Energy (J) below which nothing is judged: strain of the specimen's storey at `FLOOR_SHARE` of the limit.
 
-    Infinite for a storey without stiffness, of which no share can be taken.
+    It is the storey of the first specimen, without one that below the floor of the first laboratory. Infinite for a
+    storey without stiffness, of which no share can be taken.
     """
-    stiffness = max(storey_stiffness(plan), felt(plan).stiffness)
+    role = next(iter(drifts(plan) or plan.kinds))
+    stiffness = max(storey_stiffness(plan, role), felt(plan, role).stiffness)
     return 0.5 * stiffness * (FLOOR_SHARE * plan.limits.displacement) ** 2 or math.inf

@@ -12,6 +12,7 @@ from common.plan.plan import PROTOCOL_VERSION, Plan
 from common.protocol import codec
 from common.protocol.messages import Arm, Command, Feedback, Message, Register, Start, Stop, Trip
 from common.roles import MASTER
+from laboratories.kinds import kind_of
 from validation.faults.wire import INSIDER, Direction, Letter
 
 LONGEST = 300  # bytes of noise
@@ -33,22 +34,35 @@ def garbage(count: int, chance: np.random.Generator) -> list[Letter]:
 def forged(direction: Direction, plan: Plan, session: int, count: int) -> list[Letter]:
     """Messages of the test's session under the key of another plan."""
     key = codec.session_key(session, plan.digest()[::-1] + "x")
-    return [letter(tick_message(direction, session, FAR + seq), key, "injected") for seq in range(count)]
+    return [
+        letter(tick_message(direction, plan, session, FAR + seq), key, "injected") for seq in range(count)
+    ]
 
 
 def foreign(direction: Direction, plan: Plan, count: int) -> list[Letter]:
     """Messages of another session, as of a test that ran before."""
     key = codec.session_key(OTHER_SESSION, plan.digest())
     return [
-        letter(tick_message(direction, OTHER_SESSION, FAR + seq), key, "injected") for seq in range(count)
+        letter(tick_message(direction, plan, OTHER_SESSION, FAR + seq), key, "injected")
+        for seq in range(count)
     ]
 
 
-def tick_message(direction: Direction, session: int, seq: int, value: float = 0.01) -> Command | Feedback:
+def tick_message(
+    direction: Direction, plan: Plan, session: int, seq: int, value: float = 0.01
+) -> Command | Feedback:
     """A message of a tick for the direction, its first quantity of a given value."""
     if direction.route.role == MASTER:
         return command(session, seq, value)
-    return feedback(session, seq, value)
+    channels = kind_of(plan, direction.route.role).channels
+    return feedback(session, seq, value, channels=len(channels.names))
+
+
+def farthest(direction: Direction, plan: Plan) -> float:
+    """The limit of the target (m) of the slave at one end of a direction; 1 m where there is none."""
+    role = direction.hearer.role if direction.route.role == MASTER else direction.route.role
+    kind = kind_of(plan, role)
+    return kind.limits(plan.of(role)).get(kind.channels.target.name, 1.0)
 
 
 def command(session: int, seq: int, target: float, force: float = 0.0) -> Command:
@@ -77,9 +91,9 @@ def insider(direction: Direction, plan: Plan, session: int, what: int) -> Letter
     role, on_tick = direction.route.role, direction.route.channel == TICK
     newest = max(direction.ledger.numbers["sent"], default=0)
     ticks: dict[int, Callable[[], Message]] = {
-        0: lambda: tick_message(direction, session, newest + 3, 10.0 * plan.limits.table_target),
-        1: lambda: tick_message(direction, session, newest + 3, 0.5 * plan.limits.table_target),
-        2: lambda: tick_message(direction, session, newest + FAR),
+        0: lambda: tick_message(direction, plan, session, newest + 3, 10.0 * farthest(direction, plan)),
+        1: lambda: tick_message(direction, plan, session, newest + 3, 0.5 * farthest(direction, plan)),
+        2: lambda: tick_message(direction, plan, session, newest + FAR),
     }
     words: dict[int, Callable[[], Message]] = {
         3: lambda: Stop(session, newest, "an insider's wish."),

@@ -6,6 +6,7 @@ they know the mode at each write (`rigs.mode_of`) and the cause of a stop alone.
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_right
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
@@ -14,24 +15,45 @@ import numpy as np
 
 from common.errors import InputError
 from common.link.transport import TICK
+from common.plan.plan import Plan
 from common.protocol.codec import Reject
 from common.recording.reader import read
-from common.roles import MASTER, RECORDER, kind_of
+from common.roles import MASTER, RECORDER
+from laboratories.kinds import kind_of
 from models.registry import Array
 from validation.faults.lab import Simulation
 from validation.faults.rigs import COMPUTED, mode_of, named
 from validation.faults.wire import CABLE, Direction
 
-LIMITED = {  # what a rig is told: its largest value, its largest change in an interval, its largest speed
-    MASTER: (("actuator_command", "actuator_step", "actuator_velocity"),),
-    "slave": (("table_command", "table_step", "table_velocity"), ("damper_command", "damper_step", "")),
-}
+MOTOR = 1  # place of a motor's force among the commands
 MOVING = ("RUNNING", "HOLDING")
 LATCHED = ("RAMPING", "SAFE", "EMERGENCY_STOP")
 PATH = (
     round((CABLE.minimum + 10.0 * CABLE.mean) * 1e9) + COMPUTED
 )  # ns of a message, and of the tick that uses it
 ROUNDING = 1.0 + 1e-9
+
+
+class Drive(NamedTuple):
+    """What a rig is told: largest value, largest change in an interval, largest speed; inf without a limit."""
+
+    name: str
+    most: float
+    step: float
+    speed: float
+
+
+def drives(plan: Plan, role: str) -> tuple[Drive, ...]:
+    """What the rig of a role is told, in the order of its commands; nothing where it has none."""
+    if role not in plan.kinds:
+        return ()
+    kind = kind_of(plan, role)
+    limits, limited = kind.limits(plan.of(role)), kind.limited
+    names = ((limited.step, limited.velocity), (limited.effort_step, ""))
+    return tuple(
+        Drive(name, *(limits.get(limit, math.inf) for limit in (name, *rates)))
+        for name, rates in zip(kind.channels.drives, names, strict=False)
+    )
 
 
 class Violation(NamedTuple):
@@ -59,11 +81,11 @@ class Seen(NamedTuple):
 def seen(simulation: Simulation, role: str) -> Seen:
     """What the rig of a role was told."""
     log = simulation.probes[role].log
-    width = len(LIMITED[kind_of(role)])
+    width = len(drives(simulation.plan, role))
     names = {mode: named(mode) for mode in set(log.modes)}
     return Seen(
         np.array(log.times, dtype=np.int64),
-        np.array(log.commands, dtype=float).reshape(-1, width),
+        np.array(log.commands, dtype=float).reshape(len(log.times), width),
         [names[mode] for mode in log.modes],
     )
 
@@ -144,8 +166,7 @@ def commands_within_limits(simulation: Simulation) -> Iterator[str]:
     """Every command at a rig is finite and within its limit."""
     for role in simulation.probes:
         told = seen(simulation, role)
-        for place, (name, _, _) in enumerate(LIMITED[kind_of(role)]):
-            most = getattr(simulation.plan.limits, name)
+        for place, (name, most, *_) in enumerate(drives(simulation.plan, role)):
             bad = np.flatnonzero(~(np.abs(told.commands[:, place]) <= most))
             if bad.size:
                 yield f"{role}: {name} {told.commands[bad[0], place]:g} at {at(told, int(bad[0]))}."
@@ -155,8 +176,8 @@ def steps_within_limits(simulation: Simulation) -> Iterator[str]:
     """No command at a rig differs from the one before by more than its limit."""
     for role in simulation.probes:
         told = seen(simulation, role)
-        for place, (name, step, _) in enumerate(LIMITED[kind_of(role)]):
-            most = getattr(simulation.plan.limits, step) * ROUNDING
+        for place, (name, _, step, _) in enumerate(drives(simulation.plan, role)):
+            most = step * ROUNDING
             changes = np.abs(np.diff(told.commands[:, place], prepend=0.0))
             bad = np.flatnonzero(~(changes <= most))
             if bad.size:
@@ -197,13 +218,13 @@ def nobody_runs_unheard(simulation: Simulation) -> Iterator[str]:
 
 def motion_is_bounded(simulation: Simulation) -> Iterator[str]:
     """After the last valid message a rig moves by no more than v·W2 + v²/(2a), then no faster than the ramp."""
-    safety, limits = simulation.plan.safety, simulation.plan.limits
+    safety = simulation.plan.safety
     watched = safety.ramp_after * simulation.plan.test.interval
     for role in simulation.probes:
-        if not stopped_early(simulation, role):
+        speed = next((drive.speed for drive in drives(simulation.plan, role)), math.inf)
+        if speed == math.inf or not stopped_early(simulation, role):
             continue
         told = seen(simulation, role)
-        speed = getattr(limits, LIMITED[kind_of(role)][0][2])
         most = speed * watched + speed**2 / (2.0 * safety.acceleration)
         valid = last_valid(simulation, role, told)
         first = max(told.until(valid + round(interval(simulation))) - 1, 0)
@@ -230,13 +251,13 @@ def damper_is_released(simulation: Simulation) -> Iterator[str]:
     safety = simulation.plan.safety
     allowed = round(safety.release * 1e9 + 2 * interval(simulation))
     for role in simulation.plan.roles:
-        if not stopped_early(simulation, role):
+        if len(drives(simulation.plan, role)) < MOTOR + 1 or not stopped_early(simulation, role):
             continue
         told = seen(simulation, role)
         valid = last_valid(simulation, role, told)
         late = told.until(noticed(simulation, told, valid) + allowed)
-        if np.any(told.commands[late:, 1] != 0.0) or told.commands[-1, 1] != 0.0:
-            yield f"{role}: damper force {told.commands[-1, 1]:g} N at the end, after {valid * 1e-9:.4f} s."
+        if np.any(told.commands[late:, MOTOR] != 0.0) or told.commands[-1, MOTOR] != 0.0:
+            yield f"{role}: damper force {told.commands[-1, MOTOR]:g} N at the end, after {valid * 1e-9:.4f} s."
 
 
 def latched_stays(simulation: Simulation) -> Iterator[str]:

@@ -32,7 +32,7 @@ from slave import assembly as slave_assembly
 from slave.loop import SlaveLoop
 from tests.helpers import without_recorder
 from validation.faults.hostile import command, feedback
-from validation.faults.invariants import LIMITED
+from validation.faults.invariants import drives
 from validation.faults.lab import PROBED
 from validation.faults.rigs import Probe
 
@@ -153,9 +153,9 @@ class Laboratory(RuleBasedStateMachine):
     @invariant()
     def commands_stay_within_limits(self) -> None:
         for told in self.probe.log.commands[-2:]:
-            for value, (name, _, _) in zip(told, LIMITED[self.role], strict=True):
+            for value, drive in zip(told, drives(PLAN, self.role), strict=True):
                 assert math.isfinite(value)
-                assert abs(value) <= getattr(PLAN.limits, name)
+                assert abs(value) <= drive.most
 
     @invariant()
     def states_follow_the_table(self) -> None:
