@@ -155,7 +155,7 @@ def everybody_ends(simulation: Simulation) -> Iterator[str]:
     for name, process in simulation.world.processes.items():
         if not process.ended:
             yield f"{name} still goes on at {simulation.world.time * 1e-9:.3f} s."
-        elif name in simulation.probes and not process.killed and not simulation.probes[name].disarmed:
+        elif name in simulation.plan.kinds and not process.killed and not simulation.probes[name].disarmed:
             yield f"{name} has ended and its rig was not disarmed."
 
 
