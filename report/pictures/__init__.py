@@ -42,17 +42,17 @@ def needs(recording: Run, picture: Picture) -> str:
 _ALL = (
     Picture(
         "histories",
-        "ground, column, floors and damper over time: drift that grows, clipped peaks, holes",
-        "any of ground, column, floor or damper motion or force",
+        "ground, laboratories and floors over time: drift that grows, clipped peaks, holes",
+        "any motion or force of ground, floors or laboratories",
         (SINGLE, 5.6),
         (DOUBLE, 6.0),
         histories.draw,
     ),
     Picture(
         "hysteresis",
-        "force over deformation of column and damper, with the energy absorbed: a loop that turns the other way "
+        "force over motion in the laboratories, with the energy absorbed: a loop that turns the other way "
         "puts energy in",
-        "column_displacement and column_force, or damper_stroke and damper_force",
+        "the measured displacement or stroke and the force of a laboratory",
         (SINGLE, 4.6),
         (DOUBLE, 2.9),
         hysteresis.draw,
@@ -60,7 +60,7 @@ _ALL = (
     Picture(
         "synchronisation",
         "measured over target of each transfer system: a delay opens the line to a loop, an amplitude error tilts it",
-        "column_target and column_displacement, or table_target and table_displacement",
+        "the target and the measured displacement of a laboratory",
         (SINGLE, 6.2),
         (DOUBLE, 3.8),
         synchronisation.draw,
@@ -69,16 +69,16 @@ _ALL = (
         "tracking",
         "target, measurement and error around the strongest motion: an error shaped like velocity means delay; "
         "shaped like the target, wrong amplitude",
-        "column_target and column_displacement, or table_target and table_displacement",
+        "the target and the measured displacement of a laboratory",
         (SINGLE, 5.2),
         (DOUBLE, 3.6),
         tracking.draw,
     ),
     Picture(
         "spectra",
-        "amplitude density of ground, table, column and tracking errors over frequency: errors beside the natural "
+        "amplitude density of ground, laboratories and tracking errors over frequency: errors beside the natural "
         "frequency, peaks that no model has",
-        "ground_acceleration, table or column motion over 64 ticks or more",
+        "ground_acceleration or the motion of a laboratory over 64 ticks or more",
         (SINGLE, 4.6),
         (DOUBLE, 4.6),
         spectra.draw,

@@ -165,7 +165,7 @@ def followed(name: str, facts: Mapping[str, Any]) -> str:
 def force_paths(summary: Summary) -> list[str]:
     """How late the measured force of each column was; the tracking of displacements does not show it."""
     paths = summary["force_paths"]
-    lead = {name: f"At the {of_whom(name)}: " if len(paths) > 1 else "" for name in paths}
+    lead = {name: f"{of_whom(name).capitalize()}: " if len(paths) > 1 else "" for name in paths}
     return [
         lead[name] + force_sentence(found["delay"], found["interval"], found["gain"])
         for name, found in paths.items()

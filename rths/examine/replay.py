@@ -121,7 +121,7 @@ def per_slave(values: float | list[float]) -> list[float]:
 
 def held_ticks(recording: Run) -> set[int]:
     """Ticks in which the master moved nothing, because it came too late or stopped; then no slave was sent anything."""
-    topic = latency_topic(recording.roles[0])
+    topic = latency_topic(recording.roles[0]) if recording.roles else ""
     if not recording.has(topic):
         return set()
     latency = recording.columns[topic]
