@@ -303,8 +303,6 @@ OF_BUILDING = tuple(
 SENT = TABLE_CHANNELS.sent
 OF_STOREYS = tuple(row.name for row in TOPICS["master"] if row.kind is Kind.STOREYS)
 
-RESPONSES = ("column_displacement", "column_force", "table_acceleration", "damper_force")
-
 
 def signal(topic: str, name: str) -> Signal:
     """The row of `name` in `topic`, that of a named slave included; raises KeyError where there is none."""
