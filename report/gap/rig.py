@@ -70,8 +70,10 @@ class Circle(NamedTuple):
     opacity: str
 
 
-def rig(report: Report) -> dict[str, Any]:
-    """What the template of the diagram takes."""
+def rig(report: Report) -> dict[str, Any] | None:
+    """What the template of the diagram takes; None for laboratories that the diagram does not have."""
+    if not drawn(report):
+        return None
     shares = {item.site: item.share for item in report.where}
     named = ", ".join(f"{wording.site(name)} {percent(share)}" for name, share in shares.items()) or "none"
     return {
@@ -86,6 +88,14 @@ def rig(report: Report) -> dict[str, Any]:
             for site, sensor in ((f"sensor.{name}", item) for name, item in SENSORS.items())
         ],
     }
+
+
+def drawn(report: Report) -> bool:
+    """Whether the diagram has all sites and readings of a report."""
+    sites = {*SITES, *(f"sensor.{name}" for name in SENSORS)}
+    return (
+        sites.issuperset(item.site for item in report.where) and SENSORS.keys() >= report.gap.signals.keys()
+    )
 
 
 def opacity(share: float | None) -> str:
