@@ -214,7 +214,7 @@ def test_f30_values_that_are_no_numbers(tmp_path: Path) -> None:
         if message.seq in odd:
             return message._replace(target=odd[message.seq])
         if message.seq in tiny:
-            return message._replace(table_target_jerk=tiny[message.seq])
+            return message._replace(jerk=tiny[message.seq])
         return message._replace(effort=math.nan) if message.seq >= AT else None
 
     scene.change(SLAVE, changed)
