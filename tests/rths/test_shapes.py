@@ -123,6 +123,7 @@ def test_the_live_page_has_plots_of_every_laboratory(
     assert set(NAMES[shape]) <= set(page.plots)
     assert ("trips" in page.plots) is bool(run.roles)
     assert (before._heading.tags == ["anew"]) is (shape != "default")
+    assert not page._heading.tags
     shown = {name for name, plot in page.plots.items() if plot.visible}
     assert shown >= set(NAMES[shape][:1])
     assert ("table" in shown) is (shape == "default")

@@ -31,7 +31,8 @@ def made_up(storeys: int = 1, role: str = SLAVE, record: str = RECORD) -> Run:
         role: {"t": t, "table_target": t, "table_displacement": t},
     }
     for topic in run.columns:
-        run.sequences[topic], run.log_ns[topic], run.units[topic] = np.arange(t.size), np.arange(t.size), {}
+        run.sequences[topic], run.log_ns[topic] = np.arange(t.size), np.arange(t.size)
+        run.units[topic], run.texts[topic] = {}, {}
     run.metadata["ground_motion"] = {"record": record, "scale": "0.1"}
     return run
 
