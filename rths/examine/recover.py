@@ -13,7 +13,7 @@ from report.text.progress import Progress
 from report.text.terminal import table
 
 if TYPE_CHECKING:
-    from common.recording.recovery import Missing, Recovery, Topic
+    from common.recording.account import Missing, Recovery, Topic
 
 SHOWN = 10  # ranges of a topic, and holes of the file; JSON has all
 

@@ -210,10 +210,15 @@ def plan() -> Plan:
     return parse(SERVO_PLAN, Path())
 
 
+def driven(command: Array) -> Array:
+    """The command of an actuator (m) with that of a motor that is none."""
+    return np.stack([command, np.zeros_like(command)], axis=1)
+
+
 def test_gain_and_dead_time_act_on_the_command(plan: Plan) -> None:
     values = commands(300)
     laid = lay(System(plan), [("actuator.gain", {"factor": 0.9}), ("actuator.delay", {"delay": 0.002})])
-    found = replay.laboratory_a(laid, values)
+    found = replay.laboratory(KIND, laid, driven(values))
     expected = solved(values, servo(gain=0.9 * SERVO.gain, delay=0.002))
     np.testing.assert_allclose(
         found[1:, 0], expected[:-1, 0], atol=1e-8 * np.abs(expected[:, 0]).max(), rtol=0
@@ -235,7 +240,7 @@ def test_effects_that_it_cannot_have_are_refused(plan: Plan, entry: tuple[str, d
 
 
 def test_a_record_may_begin_at_a_command_that_has_been_there_for_long(plan: Plan) -> None:
-    found = replay.laboratory_a(System(plan), np.full(200, 2e-3), 2e-3)
+    found = replay.laboratory(KIND, System(plan), driven(np.full(200, 2e-3)), 2e-3)
     np.testing.assert_allclose(found[:, 0], 2e-3 / 0.9925416, rtol=1e-6)
     np.testing.assert_allclose(found[:, 1], 1.19e6 * 2e-3 / 0.9925416, rtol=1e-5)
 
@@ -260,6 +265,6 @@ def test_the_plan_of_the_laboratory_alone_reads_what_the_loop_read(plan: Plan) -
     for base in (short, with_table(short, "actuator", command="ramp")):
         ground = substructure.ground_rows(base, substructure.motion(base))
         found = closed_loop.simulate(base, ground)
-        again = replay.laboratory_a(System(base), found.master["actuator_command"])
+        again = replay.laboratory(KIND, System(base), driven(found.master["actuator_command"]))
         for values, name in zip(again.T, KIND.channels.names, strict=True):
             assert np.array_equal(values, found.master[name])

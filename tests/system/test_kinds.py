@@ -6,11 +6,11 @@ import signal
 from pathlib import Path
 
 import pytest
-from tests.labs.test_kinds import PLANS
 
 from common.plan import plan as plans
 from common.recording.reader import Run, read
 from tests.helpers import PATIENT
+from tests.labs.test_kinds import PLANS
 from tests.system.test_real_time import finish, start, wait_for_ticks
 
 pytestmark = pytest.mark.slow
