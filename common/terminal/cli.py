@@ -24,7 +24,17 @@ from common.safety import risks
 from common.terminal.plain_report import PlainReport, plain, say
 from common.terminal.printable import escaping, shown
 
-SHIPPED = ("benchmark2020", "default", "paper", "rc_column", "two_dampers")
+SHIPPED = (
+    "benchmark2020",
+    "default",
+    "paper",
+    "rc_column",
+    "single_site",
+    "two_columns",
+    "two_dampers",
+    "two_slaves",
+    "two_storeys",
+)
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 
 

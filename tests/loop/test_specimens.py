@@ -11,8 +11,9 @@ import pytest
 from scipy.signal import StateSpace, lsim
 
 from common.errors import PlanError
-from common.plan.plan import Plan, from_tables
-from loop.nominal import critical, partition
+from common.plan.plan import Plan, from_tables, load
+from common.terminal import cli
+from loop.nominal import critical, partition, preflight
 from loop.substructure import Substructure, ground_rows, motion
 from master.step import MasterStep
 from models.registry import Array
@@ -107,6 +108,23 @@ def test_no_specimen_leaves_the_building_whole() -> None:
 def played_without(plan: Plan) -> Array:
     step = MasterStep(plan, ground_rows(plan, motion(plan)))
     return np.array([step(tick, 0.0, 0.0, [0.0]).displacement for tick in range(plan.ticks)])
+
+
+@pytest.mark.parametrize(
+    ("name", "roles", "late"),
+    [
+        ("single_site", ["master"], "master"),
+        ("two_columns", ["master", "slave.east"], "master"),
+        ("two_storeys", ["master", "slave.above"], "slave.above"),
+        ("two_slaves", ["slave.columns"], "slave.columns"),
+    ],
+)
+def test_every_path_of_the_plans_that_ship_keeps_its_margin(name: str, roles: list[str], late: str) -> None:
+    plan = load(cli.plan_path(name))
+    found = partition.assess(plan)
+    assert (list(found.paths), found.role) == (roles, late)
+    assert all(abs(path.delay) < 1e-3 for path in found.paths.values())
+    assert preflight.partition_check(plan, found).risk is None
 
 
 def test_specimens_share_the_storey_and_leave_the_rest_to_the_numerical_columns() -> None:

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from common.errors import InputError
+from common.terminal.cli import SHIPPED
 from rths.__main__ import VERBS, parser_for
 from rths.completion import SHELLS, script
 from tests.helpers import ROOT
@@ -23,7 +24,7 @@ SLOW = ("numba", "scipy", "matplotlib", "zenoh")
 ASKED = {
     "in": ["init", "inspect"],
     "simulate d": ["default"],
-    "simulate ": ["benchmark2020", "default", "other", "paper", "plan.toml", "rc_column", "two_dampers"],
+    "simulate ": sorted([*SHIPPED, "other", "plan.toml"]),
     "simulate --dur": ["--duration"],
     "inspect ": ["a.mcap", "other"],
     "inspect other/": ["other/b.mcap"],
