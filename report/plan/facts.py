@@ -7,7 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from common.lab.preflight import Check
+from common.plan.kinds import COLUMN, TABLE
 from common.plan.plan import Plan
+from common.roles import MASTER
+from laboratories.kinds import kind_of, kinds_of
 from loop import substructure
 from loop.nominal.partition import felt, matrices, taken_over
 from loop.nominal.preflight import LIMITS, Findings, expected_delay, findings
@@ -72,15 +75,17 @@ def structure(plan: Plan) -> dict[str, Any]:
     """Modes of the whole building, and the specimen's part in it."""
     modes = shear_building.modes(*matrices(plan))
     pairs = zip(modes.periods.tolist(), modes.damping_ratios.tolist(), strict=True)
-    return {
+    found: dict[str, Any] = {
         "storeys": plan.storeys,
         "modes": [mode(period, ratio) for period, ratio in pairs],
-        "specimen": {
+    }
+    if plan.kinds.get(MASTER) == COLUMN:
+        found["specimen"] = {
             "storey": plan.column.storey,
             "stiffness_felt": felt(plan).stiffness,
             "stiffness_left_to_it": taken_over(plan).stiffness,
-        },
-    }
+        }
+    return found
 
 
 def mode(period: float, ratio: float) -> dict[str, Any]:
@@ -90,6 +95,9 @@ def mode(period: float, ratio: float) -> dict[str, Any]:
 
 def transfer_systems(plan: Plan) -> dict[str, Any]:
     """What moves the specimens, and the dampers on their tables."""
+    others = {role: system(plan, role) for role in plan.kinds if role != MASTER or plan.kinds[role] != COLUMN}
+    if plan.kinds.get(MASTER) != COLUMN:
+        return others
     actuator = plan.actuator
     first: dict[str, Any] = {
         "model": actuator.model,
@@ -100,7 +108,15 @@ def transfer_systems(plan: Plan) -> dict[str, Any]:
         first["delay"] = actuator.servo.delay
     elif actuator.time_constant > 0.0:
         first["corner_frequency"] = 1.0 / (2.0 * math.pi * actuator.time_constant)
-    return {"actuator": first} | {role: table(plan.of(role)) for role in plan.roles}
+    return {"actuator": first} | others
+
+
+def system(plan: Plan, role: str) -> dict[str, Any]:
+    """A role's laboratory: a table with its damper, or of another kind what stands in it."""
+    if plan.kinds[role] == TABLE:
+        return table(plan.of(role))
+    kind = kind_of(plan, role)
+    return {"says": kind.says, "compensator": kind.compensator(plan.of(role)).kind}
 
 
 def table(plan: Plan) -> dict[str, Any]:
@@ -136,13 +152,19 @@ def peaks(plan: Plan, found: Findings) -> dict[str, Any]:
     """Peaks of the simulated test and their limits; none of a loop that is unstable."""
     if found.unstable or found.peaks is None:
         return {}
-    limits = vars(plan.limits)
+    limits: dict[str, float] = dict(vars(plan.limits))
+    units = {name: one.unit for name, one in LIMITS.items()}
+    for role, kind in kinds_of(plan).items():
+        limits |= kind.limits(plan.of(role))
+        channels = kind.channels
+        units |= {row.name: row.unit for row in (*channels.driving, channels.command, *channels.measured)}
     return {
         name: {
             "peak": peak,
             "limit": finite(limits[name]),
             "share": peak / limits[name],
-            "unit": LIMITS[name].unit,
+            "unit": units.get(name, ""),
         }
         for name, peak in found.peaks.every.items()
+        if name in limits
     }

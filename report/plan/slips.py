@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from common.plan.kinds import COLUMN
 from common.plan.plan import Plan
+from common.roles import MASTER
 from loop.nominal.partition import felt, matrices, taken_over
 from loop.nominal.preflight import LIMITS, Findings
 from models.ground_motion import MOTIONS, STANDARD_GRAVITY, GroundMotion
@@ -127,6 +129,8 @@ def damping_slips(ratio: float) -> list[Slip]:
 
 def specimen_slip(plan: Plan) -> list[Slip]:
     """A specimen that is not of the size of what it stands for."""
+    if plan.kinds.get(MASTER) != COLUMN:
+        return []
     given, wanted = felt(plan).stiffness, taken_over(plan).stiffness
     if given <= 0.0 or wanted <= 0.0 or 1.0 / OFF <= given / wanted <= OFF:
         return []

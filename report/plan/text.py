@@ -37,13 +37,13 @@ def described(facts: Mapping[str, Any]) -> Iterator[str]:
     yield f"ground motion     {ground['text']}; × {ground['scale']:g}: peak {ground['peak']:.3g} m/s²"
     for number, mode in enumerate(facts["structure"]["modes"], start=1):
         yield f"mode {number}            {mode_text(mode)}"
-    specimen = facts["structure"]["specimen"]
-    yield (
-        f"specimen          storey {specimen['storey']}, felt as {specimen['stiffness_felt']:.4g} N/m; the building "
-        f"leaves {specimen['stiffness_left_to_it']:.4g} N/m to it"
-    )
+    if specimen := facts["structure"].get("specimen"):
+        yield (
+            f"specimen          storey {specimen['storey']}, felt as {specimen['stiffness_felt']:.4g} N/m; the "
+            f"building leaves {specimen['stiffness_left_to_it']:.4g} N/m to it"
+        )
     for role, system in facts["transfer_systems"].items():
-        yield f"{role:<17} {actuator_text(system) if role == 'actuator' else table_text(system)}"
+        yield f"{role:<17} {system_text(role, system)}"
     yield f"delay             {delay_text(facts['delay'])}"
     yield f"recording         about {facts['recording']['bytes'] / 1e6:.1f} MB in {facts['recording']['folder']}"
 
@@ -55,6 +55,13 @@ def mode_text(mode: Mapping[str, Any]) -> str:
     return (
         f"{mode['period']:.4g} s ({mode['frequency']:.3f} Hz), damping {mode['damping_ratio'] * 100.0:.2f} %"
     )
+
+
+def system_text(role: str, system: Mapping[str, Any]) -> str:
+    """The actuator, a table, or a laboratory of another kind."""
+    if "says" in system:
+        return f"{system['says']}, compensator {system['compensator']}"
+    return actuator_text(system) if role == "actuator" else table_text(system)
 
 
 def actuator_text(system: Mapping[str, Any]) -> str:
