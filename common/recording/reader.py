@@ -375,10 +375,11 @@ def _decode(run: Run, channel: Channel, schema: Schema, messages: list[Message])
 
 def _texts(run: Run, topic: str) -> dict[str, str]:
     """The meaning of a topic's signals, as the recording has it; of one that says nothing, as kinds that ship do."""
-    said = run.metadata.get(SIGNALS)
-    if said is None:
+    said = run.metadata.get(SIGNALS, {}).get(topic, "")
+    try:
+        return {name: str(text) for name, (_, text) in json.loads(said).items()}
+    except (ValueError, TypeError, AttributeError):  # not there, or no table of signals
         return {row.name: row.text for row in signals.TOPICS.get(kind_of(topic), ())}
-    return {name: str(text) for name, (_, text) in json.loads(said.get(topic, "{}")).items()}
 
 
 def _shared(run: Run, channel: Channel) -> dict[str, tuple[str, ...]]:

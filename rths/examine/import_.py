@@ -17,7 +17,6 @@ from common.plan.schema import fill, key, nearest
 from common.roles import MASTER, name_of
 from common.signals import Kind, Signal
 from common.terminal import cli, outputs
-from laboratories import kinds
 from report.text.progress import Progress
 
 Known = dict[str, tuple[str, Signal]]  # by our name of a signal its topic and its row there
@@ -29,6 +28,8 @@ def lab_signals(plan: Plan) -> Known:
     Where both ends know a signal, the slave's is meant. Of a slave without a name whose laboratory is of the master's
     kind the signals are `slave.signal`.
     """
+    from laboratories import kinds
+
     found: Known = {}
     kind = kinds.own(plan)
     own = (kind.channels.target.name, *kind.channels.drives, *kind.channels.names) if kind else ()

@@ -14,7 +14,6 @@ from common.errors import InputError
 from common.roles import LATENCY, MASTER, SLAVE, latency_topic, name_of
 from common.terminal import cli, outputs
 from common.terminal.printable import shown
-from laboratories import kinds
 
 if TYPE_CHECKING:
     from common.recording.reader import Run
@@ -95,6 +94,7 @@ def of_default_test() -> Subject:
     """The default test as it ships."""
     from common.plan import plan
     from common.recording.reader import Run
+    from laboratories import kinds
     from report.facts.laboratories import laboratories
 
     path = cli.plan_path(None)

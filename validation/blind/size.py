@@ -104,7 +104,11 @@ def play_building(case: Case, laid: tuple[Laid, ...], run: Run) -> dict[str, Val
         strict=True,
     )
     outputs = [step(tick, *values) for tick, values in enumerate(inputs)]
-    return {name: np.array([getattr(row, name) for row in outputs]) for name in COMPUTED}
+    return {
+        "column_target": np.array([row.target for row in outputs]),
+        "table_target": np.array([row.sent[0][0] for row in outputs]),
+        "ground_acceleration": np.array([row.ground_acceleration for row in outputs]),
+    }
 
 
 def _messages(run: Run) -> dict[str, Values]:
