@@ -19,13 +19,13 @@ from benchmarks import (
     scale,
     start,
 )
-from benchmarks.result import Figure
+from benchmarks.result import BenchmarkFigure
 
 
 class Benchmark(Protocol):
     """One benchmark."""
 
-    def __call__(self, *, quick: bool = False) -> list[Figure]:
+    def __call__(self, *, quick: bool = False) -> list[BenchmarkFigure]:
         """Its figures."""
 
 

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 from benchmarks import BENCHMARKS
-from benchmarks.result import Figure
+from benchmarks.result import BenchmarkFigure
 from report.text.terminal import table
 
 
@@ -32,7 +32,7 @@ def number(value: object) -> str:
     return "–" if value is None else f"{value:,.4g}" if isinstance(value, float) else str(value)
 
 
-def row(figure: Figure) -> list[str]:
+def row(figure: BenchmarkFigure) -> list[str]:
     """One line of the table."""
     met = {None: "", True: "met", False: "missed"}[figure.met]
     ratio = "" if figure.ratio is None else f"{figure.ratio:.3g} × {figure.peer}"

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks import loops, opensees_peer
-from benchmarks.opensees_peer import Answer, Case
-from benchmarks.result import Figure, rate_figure, rates
+from benchmarks.opensees_peer import PeerAnswer, PeerCase
+from benchmarks.result import BenchmarkFigure, rate_figure, rates
 from common.plan.plan import Plan, ideal
-from common.plan.tables import Control, Recording
+from common.plan.tables import Control, RecordingTable
 from loop import substructure
 from loop.closed_loop import signals, simulate
 from models.registry import Array
@@ -41,16 +41,16 @@ def bare(plan: Plan) -> Plan:
     return replace(ideal(plan), control=Control(amd=False))
 
 
-def difference(name: str, x: Array, theirs: Array) -> Figure:
+def difference(name: str, x: Array, theirs: Array) -> BenchmarkFigure:
     """Largest difference between two responses (m) over the peak of the first."""
     found = float(np.max(np.abs(x - theirs)) / np.max(np.abs(x)))
-    return Figure(name, "of the peak", found, found, f"≤ {SAME:g}", found <= SAME)
+    return BenchmarkFigure(name, "of the peak", found, found, f"≤ {SAME:g}", found <= SAME)
 
 
-def case_of(plan: Plan, ground: Array) -> Case:
+def case_of(plan: Plan, ground: Array) -> PeerCase:
     """The plan's one storey, specimen included, for OpenSeesPy."""
     structure = plan.structure
-    return Case(
+    return PeerCase(
         structure.mass[0],
         structure.stiffness[0],
         structure.damping[0],
@@ -59,10 +59,10 @@ def case_of(plan: Plan, ground: Array) -> Case:
     )
 
 
-def opensees(answer: Answer | str, x: Array, compiled: float, objects: float) -> list[Figure]:
+def opensees(answer: PeerAnswer | str, x: Array, compiled: float, objects: float) -> list[BenchmarkFigure]:
     """OpenSeesPy's rates over ours, `compiled` and through `objects` (steps/s), and its distance from `x` (m)."""
     if isinstance(answer, str):
-        return [Figure(f"OpenSeesPy: not installed here ({answer[:60]})", "", None, None)]
+        return [BenchmarkFigure(f"OpenSeesPy: not installed here ({answer[:60]})", "", None, None)]
     theirs = np.array([0.0, *answer.displacement[:-1]])  # its first is of the end of the first interval
     return [
         rate_figure(
@@ -83,7 +83,7 @@ def opensees(answer: Answer | str, x: Array, compiled: float, objects: float) ->
     ]
 
 
-def run(*, quick: bool = False) -> list[Figure]:
+def run(*, quick: bool = False) -> list[BenchmarkFigure]:
     """The default test without and with noise; the ideal test beside plain Python and OpenSeesPy."""
     plan, repeats = (Plan().with_test(duration=QUICK_S), 1) if quick else (Plan(), REPEATS)
     alone = bare(plan)
@@ -91,7 +91,7 @@ def run(*, quick: bool = False) -> list[Figure]:
     peer = statistics.median(rates(lambda: len(plain_python(plan, ground)), repeats))
     compiled = rates(lambda: simulate(plan, ground).ticks, repeats)
     noisy = rates(lambda: simulate(plan, ground, seed=1).ticks, repeats)
-    objects = loops.played(replace(plan, recording=Recording(required=False)), lambda: None, repeats)
+    objects = loops.played(replace(plan, recording=RecordingTable(required=False)), lambda: None, repeats)
     x = signals(alone, simulate(alone, ground))["displacement"]
     words = "central difference of the building alone in plain Python"
     return [

@@ -7,7 +7,7 @@ import struct
 
 import msgpack
 
-from benchmarks.result import Figure, rate_figure, rates
+from benchmarks.result import BenchmarkFigure, rate_figure, rates
 from common.protocol import codec
 from common.protocol.messages import Command, Feedback
 
@@ -18,7 +18,7 @@ FEEDBACK = Feedback(2**60, 10_000, 10_000, 2**60, 10_000, 2**60, 2**60, 2**60, (
 LAYOUT = struct.Struct(f"<B{''.join('q' if type(value) is int else 'd' for value in COMMAND)}")
 
 
-def run(*, quick: bool = False) -> list[Figure]:
+def run(*, quick: bool = False) -> list[BenchmarkFigure]:
     """Encoding and decoding of the two frames of a tick."""
     count, repeats = (100, 1) if quick else (COUNT, REPEATS)
     key = codec.session_key(2**60, "plan")

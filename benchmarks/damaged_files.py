@@ -24,14 +24,19 @@ from common.errors import InputError
 from common.recording.reader import read
 from common.recording.recovery import recover
 from common.recording.writer import Recording
-from common.signals import TICK_TOPICS, TOPICS, Kind
+from common.signals import TICK_TOPICS, TOPICS, FieldType
 
 TICKS = 3000  # some 1.5 MB, so that the definitions stand in the file a second time
 PER_FLUSH = 25
 SECTOR = 4096  # bytes that a disk loses at once
 LIMIT = 64 << 20  # bytes of a record
 LIBRARY = (McapError, ValueError, KeyError, struct.error, zstandard.ZstdError, MemoryError, OSError)
-FILLING: dict[Kind, Any] = {Kind.FLAG: False, Kind.INDEX: 3, Kind.STAMP: 2**44, Kind.TEXT: "ramping"}
+FILLING: dict[FieldType, Any] = {
+    FieldType.FLAG: False,
+    FieldType.INDEX: 3,
+    FieldType.STAMP: 2**44,
+    FieldType.TEXT: "ramping",
+}
 
 Change = Callable[[bytearray], None]
 

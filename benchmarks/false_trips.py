@@ -15,10 +15,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.result import Figure
+from benchmarks.result import BenchmarkFigure
 from common.plan.plan import Plan
 from common.plan.reality import as_planned
-from common.plan.tables import Recording
+from common.plan.tables import RecordingTable
 from common.roles import MASTER
 from models.indicators import nrmse, peak_error
 from models.registry import Array
@@ -51,7 +51,7 @@ class Piece(NamedTuple):
 def planned(seed: int, seconds: float) -> Plan:
     """The default test over a piece's length, without a recorder."""
     plan = Plan().with_test(duration=seconds)
-    return replace(plan, test=replace(plan.test, seed=seed), recording=Recording(required=False))
+    return replace(plan, test=replace(plan.test, seed=seed), recording=RecordingTable(required=False))
 
 
 def played(plan: Plan, conditions: Conditions) -> Simulation:
@@ -88,15 +88,15 @@ def piece(link: str, poor: Simulation, perfect: Array) -> Piece:
     return Piece(link, plan.test.seed, seconds, int(tripped), len(judge(poor)), holds, lost, *gaps)
 
 
-def gap_figure(which: str, link: str, values: list[float]) -> Figure:
+def gap_figure(which: str, link: str, values: list[float]) -> BenchmarkFigure:
     """Smallest and median of the pieces; the worst stands in the name."""
     worst = f", worst {max(values):.3g}" if values else ""
     middle = statistics.median(values) if values else None
     name = f"added gap in the storey drift, {which}, {link}{worst}"
-    return Figure(name, "of the drift", min(values, default=None), middle)
+    return BenchmarkFigure(name, "of the drift", min(values, default=None), middle)
 
 
-def figures(pieces: list[Piece]) -> list[Figure]:
+def figures(pieces: list[Piece]) -> list[BenchmarkFigure]:
     """Trips, holds and the added gap over one link; only where frames may overtake is a trip one without a cause."""
     hours = sum(one.seconds for one in pieces) / 3600.0
     trips, link = sum(one.trips for one in pieces), pieces[0].link
@@ -105,7 +105,7 @@ def figures(pieces: list[Piece]) -> list[Figure]:
     met = trips == 0 and not any(one.violations for one in pieces)
     points = [one._asdict() for one in pieces]
     return [
-        Figure(
+        BenchmarkFigure(
             f"trips in {hours:.2g} h, {link}",
             "trips",
             float(trips),
@@ -114,13 +114,13 @@ def figures(pieces: list[Piece]) -> list[Figure]:
             met if judged else None,
             points=points,
         ),
-        Figure(f"holds of either laboratory, {link}", "per hour", holds, holds),
+        BenchmarkFigure(f"holds of either laboratory, {link}", "per hour", holds, holds),
         gap_figure("NRMSE", link, [one.nrmse for one in pieces if one.nrmse is not None]),
         gap_figure("largest", link, [one.peak for one in pieces if one.peak is not None]),
     ]
 
 
-def run(*, quick: bool = False) -> list[Figure]:
+def run(*, quick: bool = False) -> list[BenchmarkFigure]:
     """All pieces, a line of progress after each."""
     began, pieces = time.monotonic(), []
     count, seconds = (1, QUICK_PIECE) if quick else (MINUTES, PIECE)

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from playwright.sync_api import Error as PageError
 
-from benchmarks.result import Figure, cost_figure
+from benchmarks.result import BenchmarkFigure, cost_figure
 from benchmarks.whole_test import ROOT, Ending, command, ended_early, ending
 from common.recording.reader import MACHINES, Run
 from tests.browser import chromium, open_page
@@ -52,7 +52,7 @@ class Turn(NamedTuple):
     test: Test | None
 
 
-def run(*, quick: bool = False) -> list[Figure]:
+def run(*, quick: bool = False) -> list[BenchmarkFigure]:
     """All kinds of tests in turns, their order drawn anew each time."""
     seconds, repeats = (QUICK_S, 1) if quick else (SECONDS, REPEATS)
     kinds = [WITHOUT, VIEW, *([BROWSER] if chromium() and not quick else [])]
@@ -123,7 +123,7 @@ def seconds_of(path: Path) -> float:
     return 0.0
 
 
-def figures(kind: str, turns: list[Turn], without: list[Turn]) -> list[Figure]:
+def figures(kind: str, turns: list[Turn], without: list[Turn]) -> list[BenchmarkFigure]:
     """Late ticks of one kind of test; those beyond the bare loop's are compared with the tests without a view."""
     early = ended_early(f"test, {kind}", [turn.ending for turn in turns])
     tests = [turn.test for turn in turns if turn.test is not None]
@@ -140,7 +140,7 @@ def figures(kind: str, turns: list[Turn], without: list[Turn]) -> list[Figure]:
     ]
 
 
-def beyond(kind: str, turns: list[Turn], without: list[Turn]) -> list[Figure]:
+def beyond(kind: str, turns: list[Turn], without: list[Turn]) -> list[BenchmarkFigure]:
     """Late ticks beyond those of the test without in the same turn; nothing where no turn has both."""
     pairs = [(one.test, other.test) for one, other in zip(turns, without, strict=True)]
     both = [(one, other) for one, other in pairs if one is not None and other is not None]

@@ -10,10 +10,10 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from benchmarks.result import Figure, rate_figure
+from benchmarks.result import BenchmarkFigure, rate_figure
 from common.plan import reality
 from common.plan.plan import Plan
-from common.plan.tables import Recording
+from common.plan.tables import RecordingTable
 from simulation import virtual
 
 TARGET = 50_000
@@ -38,10 +38,10 @@ def played(plan: Plan, output: Callable[[], Path | None], repeats: int) -> list[
     return found
 
 
-def run(*, quick: bool = False) -> list[Figure]:
+def run(*, quick: bool = False) -> list[BenchmarkFigure]:
     """The default test, its drive and loops over the link in memory."""
     plan, repeats = (Plan().with_test(duration=QUICK_S), 1) if quick else (Plan(), REPEATS)
-    alone = played(replace(plan, recording=Recording(required=False)), lambda: None, repeats)
+    alone = played(replace(plan, recording=RecordingTable(required=False)), lambda: None, repeats)
     with tempfile.TemporaryDirectory() as folder:
         recorded = played(plan, lambda: Path(folder) / "a.mcap", repeats)
     return [

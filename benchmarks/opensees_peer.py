@@ -22,7 +22,7 @@ PATIENCE_S = 120.0
 GROUND, FLOOR, SPRING, LOAD = 1, 2, 1, 1  # tags
 
 
-class Case(NamedTuple):
+class PeerCase(NamedTuple):
     """One storey in an earthquake: kg, N/m, N·s/m, s, and the ground's acceleration (m/s²) at every step."""
 
     mass: float
@@ -33,7 +33,7 @@ class Case(NamedTuple):
     repeats: int = REPEATS
 
 
-class Answer(NamedTuple):
+class PeerAnswer(NamedTuple):
     """What OpenSeesPy gives: its version, displacements (m) after each step, steps per second of each repeat."""
 
     version: str
@@ -42,7 +42,7 @@ class Answer(NamedTuple):
     by_step: list[float]  # one call a step, and the displacement read after it
 
 
-def ask(case: Case) -> Answer | str:
+def ask(case: PeerCase) -> PeerAnswer | str:
     """The answer of the interpreter that has OpenSeesPy, or why there is none."""
     command = [os.environ.get(PYTHON) or sys.executable, str(Path(__file__).resolve())]
     try:
@@ -61,7 +61,7 @@ def ask(case: Case) -> Answer | str:
     answers = [line for line in done.stdout.splitlines() if line.startswith("{")]  # OpenSees prints there too
     if not answers:
         return reason(done.stderr)
-    return Answer(**json.loads(answers[-1]))
+    return PeerAnswer(**json.loads(answers[-1]))
 
 
 def reason(stderr: str) -> str:
@@ -70,7 +70,7 @@ def reason(stderr: str) -> str:
     return lines[-1].partition(": ")[2] if lines else "it ended without an answer"
 
 
-def build(ops: Any, case: Case) -> None:
+def build(ops: Any, case: PeerCase) -> None:
     """The storey as a spring and dashpot between ground and floor, explicit Newmark, at rest."""
     ops.wipe()
     ops.model("basic", "-ndm", 1, "-ndf", 1)
@@ -90,13 +90,13 @@ def build(ops: Any, case: Case) -> None:
     ops.analysis("Transient")
 
 
-def at_once(ops: Any, case: Case) -> None:
+def at_once(ops: Any, case: PeerCase) -> None:
     """All steps by one call: the loop runs in C++ and nothing is read."""
     if ops.analyze(len(case.acceleration), case.interval) != 0:
         raise ArithmeticError("OpenSees did not complete the analysis")
 
 
-def by_step(ops: Any, case: Case) -> list[float]:
+def by_step(ops: Any, case: PeerCase) -> list[float]:
     """One call a step and the displacement read after each, as a hybrid test must; displacements, m."""
     found = []
     for _ in case.acceleration:
@@ -105,7 +105,7 @@ def by_step(ops: Any, case: Case) -> list[float]:
     return found
 
 
-def rates(ops: Any, case: Case, work: Callable[[Any, Case], object]) -> list[float]:
+def rates(ops: Any, case: PeerCase, work: Callable[[Any, PeerCase], object]) -> list[float]:
     """Steps per second of each repeat; building the model is not counted."""
     found = []
     for _ in range(case.repeats):
@@ -118,11 +118,11 @@ def rates(ops: Any, case: Case, work: Callable[[Any, Case], object]) -> list[flo
 
 def main() -> int:
     """Answer the case on standard input with one line of JSON."""
-    case = Case(**json.load(sys.stdin))
+    case = PeerCase(**json.load(sys.stdin))
     ops = import_module("openseespy.opensees")
     build(ops, case)
     displacement = by_step(ops, case)
-    answer = Answer(ops.version(), displacement, rates(ops, case, at_once), rates(ops, case, by_step))
+    answer = PeerAnswer(ops.version(), displacement, rates(ops, case, at_once), rates(ops, case, by_step))
     sys.stdout.write("\n" + json.dumps(answer._asdict()) + "\n")
     return 0
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.load import BUSY, busy
-from benchmarks.result import Figure, cost_figure
+from benchmarks.result import BenchmarkFigure, cost_figure
 from benchmarks.whole_test import ended_early, played
 from common.recording.reader import MACHINES, Run
 
@@ -29,7 +29,7 @@ class Facts(NamedTuple):
     late_beside: float  # %, of the bare timing loop
 
 
-def run(*, quick: bool = False) -> list[Figure]:
+def run(*, quick: bool = False) -> list[BenchmarkFigure]:
     """The default test's first seconds, several times."""
     seconds, repeats = (QUICK_S, 1) if quick else (SECONDS, REPEATS)
     return [
@@ -38,7 +38,9 @@ def run(*, quick: bool = False) -> list[Figure]:
     ]
 
 
-def several(name: str, seconds: float, repeats: int, most: float | None, *, loaded: bool) -> list[Figure]:
+def several(
+    name: str, seconds: float, repeats: int, most: float | None, *, loaded: bool
+) -> list[BenchmarkFigure]:
     """Several tests alike; those that end early are counted and give no other figure."""
     endings = []
     with tempfile.TemporaryDirectory() as folder, busy() if loaded else contextlib.nullcontext():
@@ -61,7 +63,7 @@ def found(run: Run) -> Facts:
     )
 
 
-def figures(name: str, tests: list[Facts], most: float | None) -> list[Figure]:
+def figures(name: str, tests: list[Facts], most: float | None) -> list[BenchmarkFigure]:
     """Round trip and late ticks of several tests alike; targets hold for tests with real-time priority."""
     judged = all(test.priority > 0 for test in tests)
     middle, tail = ([test.round_trip[place] for test in tests] for place in (0, 1))

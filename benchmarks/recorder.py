@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from mcap.writer import CompressionType, Writer
 
-from benchmarks.result import Figure, rate_figure, rates
+from benchmarks.result import BenchmarkFigure, rate_figure, rates
 from common.host.clock import MonotonicClock
 from common.lab.laboratory import Laboratory, Setting
 from common.link.endpoint import FrameEndpoint
@@ -24,7 +24,7 @@ from common.plan.plan import PROTOCOL_VERSION, Plan
 from common.protocol.messages import Register, Resend
 from common.recording.reader import Run, read
 from common.recording.writer import CHUNK_SIZE, Recording
-from common.signals import TICK_TOPICS, TOPICS, Kind
+from common.signals import TICK_TOPICS, TOPICS, FieldType
 
 ROOT = Path(__file__).resolve().parent.parent
 COUNT = 20_000
@@ -39,7 +39,7 @@ PATIENCE_S = 30.0  # for the recorder to join
 END_S = 20.0  # for the recorder to end; what it has not written by then counts as missing
 POOL = 1_000  # different samples of a topic: noise, which no compression shrinks
 
-FILLING = {Kind.FLAG: True}
+FILLING = {FieldType.FLAG: True}
 
 Values = list[list[Any]]
 
@@ -49,7 +49,7 @@ Values = list[list[Any]]
 
 def values_of(topic: str) -> list[Any]:
     """A sample of a topic."""
-    return [0.1 if row.kind in (Kind.NUMBER, Kind.STOREYS) else 1 for row in TOPICS[topic]]
+    return [0.1 if row.kind in (FieldType.NUMBER, FieldType.STOREYS) else 1 for row in TOPICS[topic]]
 
 
 def recorded(path: Path, count: int) -> int:
@@ -176,7 +176,7 @@ class Laboratories:
 def pool(topic: str) -> Values:
     """Samples of a topic without their tick."""
     draws = np.random.default_rng(1).normal(size=(POOL, len(TOPICS[topic]))).tolist()
-    kept = (Kind.NUMBER, Kind.STOREYS)
+    kept = (FieldType.NUMBER, FieldType.STOREYS)
     return [
         [
             draw if row.kind in kept else FILLING.get(row.kind, 1)
@@ -247,7 +247,7 @@ def bursts(rates_per_s: Sequence[float], seconds: float) -> list[Burst]:
 # -- figures ------------------------------------------------------------------------------------------
 
 
-def figures(found: list[Burst]) -> list[Figure]:
+def figures(found: list[Burst]) -> list[BenchmarkFigure]:
     """The fastest bursts without loss, with all bursts as points of a curve; and what the next one lost."""
     whole = [each for each in found if each.whole]
     most = max((each.offered for each in whole), default=0.0)
@@ -260,11 +260,13 @@ def figures(found: list[Burst]) -> list[Figure]:
     ]
     if lossy := [each for each in found if not each.whole]:
         share = lossy[0].missing / lossy[0].messages
-        results.append(Figure(f"lost at {lossy[0].offered:,.0f} messages/s", "of them", share, share))
+        results.append(
+            BenchmarkFigure(f"lost at {lossy[0].offered:,.0f} messages/s", "of them", share, share)
+        )
     return results
 
 
-def run(*, quick: bool = False) -> list[Figure]:
+def run(*, quick: bool = False) -> list[BenchmarkFigure]:
     """The writer beside the bare MCAP writer, and the recorder's process behind bursts."""
     count, repeats = (100, 1) if quick else (COUNT, REPEATS)
     with tempfile.TemporaryDirectory() as folder:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 
-class Figure(NamedTuple):
+class BenchmarkFigure(NamedTuple):
     """One figure; `best` and `median` of several repeats, in `unit`; `peer` names what stands beside it."""
 
     name: str
@@ -41,16 +41,16 @@ def rate_figure(
     least: float | None = None,
     peer: str = "",
     beside: float = 0.0,
-) -> Figure:
+) -> BenchmarkFigure:
     """Figure of a rate; `least` is its target, judged by the best repeat, since the machine is shared."""
     best, median = max(found), statistics.median(found)
     met = None if least is None else best >= least
     target = "" if least is None else f"≥ {least:,.0f}"
-    return Figure(name, unit, best, median, target, met, peer, median / beside if beside else None)
+    return BenchmarkFigure(name, unit, best, median, target, met, peer, median / beside if beside else None)
 
 
-def cost_figure(name: str, unit: str, found: list[float], *, most: float | None = None) -> Figure:
+def cost_figure(name: str, unit: str, found: list[float], *, most: float | None = None) -> BenchmarkFigure:
     """Figure of a cost; `most` is its target, judged by the median."""
     best, median = min(found), statistics.median(found)
     met = None if most is None else median <= most
-    return Figure(name, unit, best, median, "" if most is None else f"≤ {most:g}", met)
+    return BenchmarkFigure(name, unit, best, median, "" if most is None else f"≤ {most:g}", met)

@@ -16,10 +16,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.result import Figure
+from benchmarks.result import BenchmarkFigure
 from common.plan import reality
 from common.plan.plan import Plan, ideal
-from common.plan.tables import Recording, SlaveLaboratory
+from common.plan.tables import RecordingTable, SlaveLaboratory
 from loop import substructure
 from loop.closed_loop import simulate
 from loop.nominal import partition
@@ -83,7 +83,7 @@ class Point(NamedTuple):
         }
 
 
-class Curve(NamedTuple):
+class ScaleCurve(NamedTuple):
     """What is varied, over which values, and the plan of a value."""
 
     name: str
@@ -136,7 +136,7 @@ def laboratories(count: int) -> Plan:
 
 def light(plan: Plan) -> Plan:
     """The plan without a recorder."""
-    return replace(plan, recording=Recording(required=False))
+    return replace(plan, recording=RecordingTable(required=False))
 
 
 def first_frequency(storeys: int) -> float:
@@ -145,9 +145,9 @@ def first_frequency(storeys: int) -> float:
 
 
 CURVES = (
-    Curve("storeys", "storeys", STOREYS, uniform),
-    Curve("tick_rate", "Hz", RATES_HZ, at_rate),
-    Curve("laboratories", "slaves", LABORATORIES, laboratories),
+    ScaleCurve("storeys", "storeys", STOREYS, uniform),
+    ScaleCurve("tick_rate", "Hz", RATES_HZ, at_rate),
+    ScaleCurve("laboratories", "slaves", LABORATORIES, laboratories),
 )
 
 
@@ -235,13 +235,13 @@ def frequency_error(storeys: int) -> float:
 # -- figures ----------------------------------------------------------------------------------------
 
 
-def figures(curve: Curve, points: list[Point]) -> list[Figure]:
+def figures(curve: ScaleCurve, points: list[Point]) -> list[BenchmarkFigure]:
     """The curve's last point as figures, the whole curve in the one of the loop objects."""
     last = points[-1]
     name = f"{last.value:,.0f} {curve.unit}"
     limit = last.interval * 1e6
     return [
-        Figure(
+        BenchmarkFigure(
             f"loop objects, {name}",
             "µs/tick",
             last.objects,
@@ -252,7 +252,7 @@ def figures(curve: Curve, points: list[Point]) -> list[Figure]:
             last.real_time,
             [each.plain(curve.name) for each in points],
         ),
-        Figure(
+        BenchmarkFigure(
             f"compiled loop, {name}",
             "µs/tick",
             last.compiled,
@@ -263,7 +263,7 @@ def figures(curve: Curve, points: list[Point]) -> list[Figure]:
     ]
 
 
-def run(*, quick: bool = False) -> list[Figure]:
+def run(*, quick: bool = False) -> list[BenchmarkFigure]:
     """All curves, and whether the tallest buildings vibrate as the closed form has it."""
     found, effort = [], QUICK if quick else FULL
     for curve in CURVES:
@@ -271,4 +271,4 @@ def run(*, quick: bool = False) -> list[Figure]:
         found += figures(curve, [point(value, curve.plan(value), effort) for value in values])
     error = max(frequency_error(storeys) for storeys in STOREYS[: effort.values])
     name = "first frequency of uniform buildings, off the closed form"
-    return [*found, Figure(name, "relative", error, error, f"≤ {SAME:g}", error <= SAME)]
+    return [*found, BenchmarkFigure(name, "relative", error, error, f"≤ {SAME:g}", error <= SAME)]

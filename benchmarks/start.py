@@ -9,7 +9,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from benchmarks.result import Figure, cost_figure
+from benchmarks.result import BenchmarkFigure, cost_figure
 from benchmarks.whole_test import ROOT, Ending, ended_early, played
 from common.link.zenoh_link import listenable
 
@@ -65,7 +65,7 @@ def high_water(pid: int) -> float:
     return sum(float(line.split()[1]) / 1024.0 for line in lines if line.startswith("VmHWM"))
 
 
-def run(*, quick: bool = False) -> list[Figure]:
+def run(*, quick: bool = False) -> list[BenchmarkFigure]:
     """Help, first tick and memory, caches warm."""
     repeats = 1 if quick else REPEATS
     with tempfile.TemporaryDirectory() as folder:
@@ -83,7 +83,7 @@ def run(*, quick: bool = False) -> list[Figure]:
     ]
 
 
-def memory_figures(sizes: dict[str, float]) -> list[Figure]:
+def memory_figures(sizes: dict[str, float]) -> list[BenchmarkFigure]:
     """The memory of each process; there is no target for the recorder's."""
     return [
         cost_figure(f"memory of the {name}", "MB", [size], most=200.0 if name != "recorder" else None)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from benchmarks.result import Figure
+from benchmarks.result import BenchmarkFigure
 from common.errors import RthsError
 from common.recording.reader import Run, read
 
@@ -49,11 +49,11 @@ def ending(code: int, said: str, path: Path) -> Ending:
     return Ending(code, lines[-1] if lines else "", run)
 
 
-def ended_early(name: str, endings: Sequence[Ending]) -> Figure:
+def ended_early(name: str, endings: Sequence[Ending]) -> BenchmarkFigure:
     """How many of several tests did not come to their end, and what each of those said."""
     early = [one for one in endings if not one.completed]
     points = [{"exit code": one.code, "said": one.said} for one in early]
     count = float(len(early))
-    return Figure(
+    return BenchmarkFigure(
         f"{name}, ended early", f"of {len(endings)} tests", count, count, "0", not early, points=points
     )

@@ -18,7 +18,7 @@ from common.roles import SLAVE as SLAVE_ROLE
 from common.roles import kind_of, latency_topic, ramp_topic
 
 
-class Kind(Enum):
+class FieldType(Enum):
     """How a signal is stored: the protobuf type of its field."""
 
     NUMBER = "double"
@@ -37,12 +37,12 @@ class Signal(NamedTuple):
     name: str
     unit: str
     text: str
-    kind: Kind = Kind.NUMBER
+    kind: FieldType = FieldType.NUMBER
     slaves: tuple[str, ...] = ()  # roles of those of which it has a value each; a scalar where it is one
 
     def count(self, storeys: int) -> int:
         """How many numbers it holds in a building of so many storeys."""
-        return storeys if self.kind is Kind.STOREYS else max(len(self.slaves), 1)
+        return storeys if self.kind is FieldType.STOREYS else max(len(self.slaves), 1)
 
 
 RATES = ("velocity", "acceleration", "jerk")  # of a target, each a signal of its own
@@ -118,24 +118,24 @@ TABLE_CHANNELS = Channels(
 )
 
 
-SEQ = Signal("seq", "", "tick number", Kind.COUNT)
+SEQ = Signal("seq", "", "tick number", FieldType.COUNT)
 TIME = Signal("t", "s", "test time of the tick")
 
 BUILDING = (
     SEQ,
     TIME,
     Signal("ground_acceleration", "m/s²", "ground acceleration"),
-    Signal("displacement", "m", "displacement relative to the ground", Kind.STOREYS),
-    Signal("velocity", "m/s", "velocity relative to the ground", Kind.STOREYS),
-    Signal("acceleration", "m/s²", "acceleration relative to the ground", Kind.STOREYS),
-    Signal("absolute_acceleration", "m/s²", "absolute acceleration", Kind.STOREYS),
+    Signal("displacement", "m", "displacement relative to the ground", FieldType.STOREYS),
+    Signal("velocity", "m/s", "velocity relative to the ground", FieldType.STOREYS),
+    Signal("acceleration", "m/s²", "acceleration relative to the ground", FieldType.STOREYS),
+    Signal("absolute_acceleration", "m/s²", "absolute acceleration", FieldType.STOREYS),
 )
 
 NUMERICAL = Signal(
     "numerical_force",
     "N",
     "restoring force of the numerical columns of the storey; of a matrix the sum of the floors' from above",
-    Kind.STOREYS,
+    FieldType.STOREYS,
 )
 
 LATENCY = (
@@ -152,32 +152,36 @@ LATENCY = (
     Signal("round_trip", "s", "from the command handed to the link to its feedback received"),
     Signal("clock_offset", "s", "slave clock minus master clock, estimated"),
     Signal("clock_offset_bound", "s", "largest possible error of that estimate"),
-    Signal("deadline_missed", "", "the tick's work or its answer came too late for the next tick", Kind.FLAG),
+    Signal(
+        "deadline_missed", "", "the tick's work or its answer came too late for the next tick", FieldType.FLAG
+    ),
     Signal("encode_time", "s", "from the command's values to its frame handed to the link"),
     Signal("slave_compute_time", "s", "of the slave's time, from the start of its tick on"),
     Signal("decode_time", "s", "from the feedback's arrival to its values, decoded and checked"),
     Signal(
         "age_at_use", "s", "age of the feedback that the tick used, from its measurement to the tick's start"
     ),
-    Signal("tick_ns", "ns", "nominal time of the tick, master clock", Kind.STAMP),
-    Signal("wake_ns", "ns", "start of the tick, master clock", Kind.STAMP),
-    Signal("command_sent_ns", "ns", "command handed to the link, master clock", Kind.STAMP),
-    Signal("command_received_ns", "ns", "command received, slave clock", Kind.STAMP),
-    Signal("slave_started_ns", "ns", "start of the slave's tick, slave clock", Kind.STAMP),
-    Signal("feedback_sent_ns", "ns", "feedback sent, slave clock", Kind.STAMP),
-    Signal("feedback_received_ns", "ns", "feedback received, master clock", Kind.STAMP),
-    Signal("feedback_used_ns", "ns", "start of the next tick, which can use it, master clock", Kind.STAMP),
+    Signal("tick_ns", "ns", "nominal time of the tick, master clock", FieldType.STAMP),
+    Signal("wake_ns", "ns", "start of the tick, master clock", FieldType.STAMP),
+    Signal("command_sent_ns", "ns", "command handed to the link, master clock", FieldType.STAMP),
+    Signal("command_received_ns", "ns", "command received, slave clock", FieldType.STAMP),
+    Signal("slave_started_ns", "ns", "start of the slave's tick, slave clock", FieldType.STAMP),
+    Signal("feedback_sent_ns", "ns", "feedback sent, slave clock", FieldType.STAMP),
+    Signal("feedback_received_ns", "ns", "feedback received, master clock", FieldType.STAMP),
+    Signal(
+        "feedback_used_ns", "ns", "start of the next tick, which can use it, master clock", FieldType.STAMP
+    ),
 )
 
-MODE = Signal("mode", "", "safety mode after the tick", Kind.TEXT)
+MODE = Signal("mode", "", "safety mode after the tick", FieldType.TEXT)
 
 EVENT = (
     TIME,
-    Signal("lab", "", "master, slave or recorder", Kind.TEXT),
-    Signal("level", "", "info, warning or error", Kind.TEXT),
-    Signal("code", "", "short name of what happened", Kind.TEXT),
-    Signal("text", "", "a sentence", Kind.TEXT),
-    Signal("values", "", "numbers that belong to it", Kind.VALUES),
+    Signal("lab", "", "master, slave or recorder", FieldType.TEXT),
+    Signal("level", "", "info, warning or error", FieldType.TEXT),
+    Signal("code", "", "short name of what happened", FieldType.TEXT),
+    Signal("text", "", "a sentence", FieldType.TEXT),
+    Signal("values", "", "numbers that belong to it", FieldType.VALUES),
 )
 
 TICK_TOPICS = ("master", "slave", "latency")
@@ -245,7 +249,7 @@ def _used(force: str) -> tuple[Signal, ...]:
     device = words.removesuffix(" force") if words.endswith(" force") else "laboratory"
     return (
         Signal(f"{force}_used", "N", f"{words} used, at the {device}'s own scale"),
-        Signal(f"{force}_seq", "", "tick at which that force was measured, -1 for none yet", Kind.INDEX),
+        Signal(f"{force}_seq", "", "tick at which that force was measured, -1 for none yet", FieldType.INDEX),
         Signal(f"{force}_age", "s", "its age at use"),
     )
 
@@ -260,7 +264,7 @@ def _slave(channels: Channels) -> tuple[Signal, ...]:
     """What was received, what was written, what was measured."""
     target, *effort = (row._replace(text=f"{row.text}, as received") for row in channels.driving)
     rates = (row._replace(text=f"{row.text}, as received") for row in _rates(channels))
-    seq = Signal("command_seq", "", "tick of the command in force, -1 for none yet", Kind.INDEX)
+    seq = Signal("command_seq", "", "tick of the command in force, -1 for none yet", FieldType.INDEX)
     return (SEQ, TIME, seq, target, *effort, channels.command, *channels.measured, *rates)
 
 
@@ -298,10 +302,10 @@ MEASURED = {"master": COLUMN_CHANNELS.names, "slave": TABLE_CHANNELS.names}
 OF_BUILDING = tuple(
     row.name
     for row in TOPICS["master"]
-    if row.kind is Kind.NUMBER and not row.slaves and row.name not in (TIME.name, *MEASURED["master"])
+    if row.kind is FieldType.NUMBER and not row.slaves and row.name not in (TIME.name, *MEASURED["master"])
 )
 SENT = TABLE_CHANNELS.sent
-OF_STOREYS = tuple(row.name for row in TOPICS["master"] if row.kind is Kind.STOREYS)
+OF_STOREYS = tuple(row.name for row in TOPICS["master"] if row.kind is FieldType.STOREYS)
 
 
 def signal(topic: str, name: str) -> Signal:

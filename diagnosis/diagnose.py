@@ -20,9 +20,9 @@ from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import Searcher
 from diagnosis.recorded import link
 from diagnosis.recorded.ground import Ground
-from diagnosis.recorded.laboratory import Recorded
-from diagnosis.recorded.link import Finding
-from diagnosis.recorded.parts import Building, ColumnAlone, Laboratory, Part
+from diagnosis.recorded.laboratory import RecordedLaboratory
+from diagnosis.recorded.link import LinkFinding
+from diagnosis.recorded.parts import Building, ColumnAlone, LaboratoryPart, Part
 from diagnosis.recorded.record import LEAST_TICKS, Record
 from diagnosis.report.records import Report
 from models.system import System
@@ -96,7 +96,7 @@ def examine(record: Record, tell: Tell = untold) -> Diagnosis:
     )
 
 
-def exchanged(record: Record) -> list[Finding]:
+def exchanged(record: Record) -> list[LinkFinding]:
     """What the messages' numbers and stamps say of the exchange, where both ends were recorded."""
     if not (record.run.has("master") and record.run.has("slave")):
         return []
@@ -148,7 +148,7 @@ def parts_of(record: Record) -> list[Part]:
         parts.append(Building(record))
     for lab in record.labs:
         if driven(record, lab):
-            parts.append(Laboratory(record, lab))
+            parts.append(LaboratoryPart(record, lab))
         elif lab.kind.name == COLUMN and record.has(*lab.measured):
             parts.append(ColumnAlone(record, lab))
     return [part for part in parts if np.any(part.measured)]
@@ -161,7 +161,7 @@ def used(record: Record) -> list[str]:
     return names + ([f"{other.kind.channels.force}_used"] if other else [])
 
 
-def driven(record: Record, lab: Recorded) -> bool:
+def driven(record: Record, lab: RecordedLaboratory) -> bool:
     """Whether a command of a laboratory was recorded with a reading of it."""
     return any(map(record.has, lab.commands)) and any(map(record.has, lab.measured))
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from common.plan import patience
 from common.plan.plan import Plan, parse
-from common.plan.tables import Limits, Preflight, Safety
+from common.plan.tables import Limits, Preflight, SafetyTable
 from common.rig import ColumnMeasurement, TableCommand, TableMeasurement
 from common.safety.modes import MEANING, TURNS, mermaid
 from common.signals import OF_STOREYS, SENT, TOPICS
@@ -45,7 +45,7 @@ def parts() -> dict[str, dict[str, str]]:
             "modes": f"```mermaid\n{mermaid()}\n```\n",
             "turns": turns(),
             "patience": patient(parse("", Path())),
-            "watchdog and ramp": keys(Safety),
+            "watchdog and ramp": keys(SafetyTable),
             "motion": motion(Plan()),
             "limits": limits(),
             "pre-flight": keys(Preflight),

@@ -39,7 +39,7 @@ PLAN = Plan()
 ITEMS = {lab: Items(PLAN, lab) for lab in ("master", "slave")}
 
 
-class Wire:
+class SilentLink:
     """A link on which nothing is sent."""
 
     def send(self, channel: str, frame: bytes, to: str = "") -> None:
@@ -54,7 +54,7 @@ class Wire:
 
 def listening(session: int) -> endpoint.FrameEndpoint:
     """An endpoint in a session."""
-    wire: Transport = Wire()
+    wire: Transport = SilentLink()
     found = endpoint.FrameEndpoint(wire, "plan")
     found.enter(session)
     return found

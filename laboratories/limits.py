@@ -6,12 +6,12 @@ from collections.abc import Callable
 from operator import itemgetter
 from typing import Any, NamedTuple
 
-from common.plan.limits import Change, Frozen, Guard, Lasting, Standstill, Violation
+from common.plan.limits import Change, Frozen, Guard, Lasting, LimitViolation, Standstill
 from common.plan.plan import Plan
 from laboratories.kind import Kind, Sensed
 
 
-class Part(NamedTuple):
+class SensorPart(NamedTuple):
     """Sensors of one part of a rig: which readings are theirs, and the command that moves them."""
 
     readings: Callable[[Any], Any]
@@ -48,26 +48,26 @@ class LaboratoryLimits:
         self._parts = [self._part(sensed, channels.names, noise) for sensed in kind.sensed]
         self._wrote: tuple[float, ...] = (0.0,) * len(channels.drives)
 
-    def _part(self, sensed: Sensed, names: tuple[str, ...], noise: dict[str, float]) -> Part:
+    def _part(self, sensed: Sensed, names: tuple[str, ...], noise: dict[str, float]) -> SensorPart:
         first, *rest = (names.index(name) for name in sensed.channels)
         frozen = Frozen(noise, sensed.channels, sensed.moved, self._plan.safety.frozen_readings)
         picked = itemgetter(first, *rest) if rest else lambda measured: (measured[first],)
-        return Part(picked, int(sensed.by_effort), frozen)
+        return SensorPart(picked, int(sensed.by_effort), frozen)
 
-    def readings(self, measured: tuple[float, ...]) -> Violation | None:
+    def readings(self, measured: tuple[float, ...]) -> LimitViolation | None:
         """The first reading beyond its limit."""
         return self._measurements.violation(measured)
 
-    def commands(self, wanted: tuple[float, ...]) -> Violation | None:
+    def commands(self, wanted: tuple[float, ...]) -> LimitViolation | None:
         """The first command beyond its limit."""
         return self._commands.violation(wanted)
 
     def motion(
         self, measured: tuple[float, ...], wanted: tuple[float, ...], target: float
-    ) -> Violation | Standstill | None:
+    ) -> LimitViolation | Standstill | None:
         """The first change of a command beyond its limit, lasting error beside the `target`, or frozen sensor."""
         lasting = self._error.violation(target - measured[self._position])
-        found: Violation | Standstill | None = None
+        found: LimitViolation | Standstill | None = None
         for change, command in zip(self._changes, wanted, strict=True):
             found = found or change.violation(command)
         found = found or lasting

@@ -48,7 +48,7 @@ Index = NDArray[np.int64]
 LARGEST = float(np.finfo(np.float64).max)  # m: every command that is a finite number is below
 
 
-class Exchange(NamedTuple):
+class MessagesUsed(NamedTuple):
     """Which message each tick used: the link's whole effect on the loop."""
 
     command: Index  # (ticks,): command in force at the slave's tick, −1 for none yet
@@ -62,12 +62,12 @@ class Rollout(NamedTuple):
         str, Array
     ]  # (ticks,), of several storeys (ticks, storeys), of several slaves (ticks, slaves)
     slaves: dict[str, dict[str, Array]]  # by role, (ticks,) each: command of the transfer system, measured
-    exchange: dict[str, Exchange]  # by role of the slave
+    exchange: dict[str, MessagesUsed]  # by role of the slave
     finite: bool  # False where the loop diverged
     ticks: int  # rows of every signal
 
 
-class Own(NamedTuple):
+class MasterLaboratory(NamedTuple):
     """The master's laboratory."""
 
     site: Site
@@ -97,18 +97,18 @@ class Traffic(NamedTuple):
     feedback: Index  # (slaves, ticks)
 
 
-class Loop(NamedTuple):
+class ClosedLoop(NamedTuple):
     """Everything that moves in a closed loop, at rest."""
 
     building: Substructure
-    own: Own
+    own: MasterLaboratory
     slaves: tuple[Slave, ...]  # of any kinds
     traffic: Traffic
 
 
-def on_time(ticks: int) -> Exchange:
+def on_time(ticks: int) -> MessagesUsed:
     """Every message there in time: command k at tick k, feedback k at tick k + 1."""
-    return Exchange(np.arange(ticks), np.arange(ticks) - 1)
+    return MessagesUsed(np.arange(ticks), np.arange(ticks) - 1)
 
 
 def simulate(
@@ -119,7 +119,7 @@ def simulate(
     slaves: Mapping[str, System] | None = None,
     seed: int | None = None,
     noise: Mapping[str, Array] | None = None,
-    exchange: Mapping[str, Exchange] | None = None,
+    exchange: Mapping[str, MessagesUsed] | None = None,
     farthest: float = LARGEST,
 ) -> Rollout:
     """Closed loop of a plan: its models over the whole test, with effects laid over them where given.
@@ -172,9 +172,9 @@ def at_rest(
     master: System,
     slaves: Mapping[str, System],
     ground: Array,
-    exchange: Mapping[str, Exchange],
+    exchange: Mapping[str, MessagesUsed],
     errors: Mapping[str, Array],
-) -> Loop:
+) -> ClosedLoop:
     """The closed loop before its first tick; `slaves`, `exchange` and `errors` of the readings by role."""
     plan, count = master.plan, len(slaves)
     ticks = plan.ticks
@@ -189,14 +189,14 @@ def at_rest(
     )
     hosted = kinds_of(plan)
     followers = tuple(follower(hosted[role], system, errors[role]) for role, system in slaves.items())
-    return Loop(building, own(hosted.get(MASTER), master, errors.get(MASTER)), followers, traffic)
+    return ClosedLoop(building, own(hosted.get(MASTER), master, errors.get(MASTER)), followers, traffic)
 
 
-def own(kind: Kind | None, system: System, errors: Array | None) -> Own:
+def own(kind: Kind | None, system: System, errors: Array | None) -> MasterLaboratory:
     """The master's laboratory at rest, or none."""
     if kind is None or errors is None:
-        return Own(site.none(system.plan.ticks), 0, 0)
-    return Own(site.build(kind, system, errors), *channels(kind))
+        return MasterLaboratory(site.none(system.plan.ticks), 0, 0)
+    return MasterLaboratory(site.build(kind, system, errors), *channels(kind))
 
 
 def channels(kind: Kind) -> tuple[int, int]:
@@ -245,7 +245,7 @@ def errors(systems: Mapping[str, System], seed: int | None, given: Mapping[str, 
 
 
 @jit
-def roll(loop: Loop, farthest: float) -> int:
+def roll(loop: ClosedLoop, farthest: float) -> int:
     """Fill the rows tick by tick; return how many ticks had commands and displacements within `farthest` (m)."""
     building, own, traffic = loop.building, loop.own, loop.traffic
     interval = building.scalars[substructure.INTERVAL]
@@ -328,7 +328,7 @@ def _follow_all(slaves: types.BaseTuple, place: Any, traffic: Any, tick: Any, in
     return different
 
 
-def master_signals(plan: Plan, loop: Loop, slaves: Sequence[str], ticks: int) -> dict[str, Array]:
+def master_signals(plan: Plan, loop: ClosedLoop, slaves: Sequence[str], ticks: int) -> dict[str, Array]:
     """What the master computed, measured and used."""
     result = substructure.named(loop.traffic.outputs[:ticks], plan, slaves)
     if own_kind := kinds.own(plan):
@@ -372,7 +372,7 @@ def signals(plan: Plan, rollout: Rollout) -> dict[str, Array]:
         name = name_of(topic)
         for row in order[topic]:
             key = row.name
-            if row.kind not in (table.Kind.NUMBER, table.Kind.STOREYS) or key not in columns:
+            if row.kind not in (table.FieldType.NUMBER, table.FieldType.STOREYS) or key not in columns:
                 continue
             if name and key != table.TIME.name:
                 result[f"{name}.{key}"] = columns[key]

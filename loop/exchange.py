@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from common.link.mailbox import LinkModel, ticks_late
-from loop.closed_loop import Exchange, Index
+from loop.closed_loop import Index, MessagesUsed
 
 COMMAND, FEEDBACK = (
     ("command", 0),
@@ -13,9 +13,9 @@ COMMAND, FEEDBACK = (
 )  # direction, and ticks after its own that a message is used
 
 
-def exchange(ticks: int, interval: float, link: LinkModel) -> Exchange:
+def exchange(ticks: int, interval: float, link: LinkModel) -> MessagesUsed:
     """The exchange of a test in which no laboratory is ever late: command and feedback used at each tick."""
-    return Exchange(used(ticks, interval, link, *COMMAND), used(ticks, interval, link, *FEEDBACK))
+    return MessagesUsed(used(ticks, interval, link, *COMMAND), used(ticks, interval, link, *FEEDBACK))
 
 
 def used(ticks: int, interval: float, link: LinkModel, direction: str, nominal: int) -> Index:

@@ -6,7 +6,7 @@ import secrets
 
 from common.host.clock import unix_ns
 from common.lab.laboratory import Setting
-from common.lab.preflight import Check, Gate
+from common.lab.preflight import Gate, PreflightCheck
 from common.plan.plan import Plan
 from common.plan.reality import Reality
 from common.rig import AtRest, GuardedRig
@@ -17,13 +17,13 @@ from loop.nominal import preflight as nominal
 from loop.realised import true_system
 from master.limits import MasterLimits
 from master.loop import MasterLoop
-from master.own import Own
+from master.own import OwnLaboratory
 from master.step import MasterStep
 from models.registry import Array
 from models.system import System
 
 
-def preflight(plan: Plan) -> list[Check]:
+def preflight(plan: Plan) -> list[PreflightCheck]:
     """What nominal models say of the test before anything is built; raises InputError where they cannot be."""
     return nominal.checks(plan)
 
@@ -77,7 +77,7 @@ def build_loop(
 def warm_up(reality: Reality) -> None:
     """Compile the kernels on arrays that are thrown away."""
     plan = reality.plan
-    own = Own(plan)
+    own = OwnLaboratory(plan)
     outputs = master_step(reality)(0, 0.0, 0.0, [0.0] * len(plan.roles))
     measured = (0.0,) * (len(own.channels.names) if own.channels else 0)
     MasterLimits(plan).violation(measured, own.command(outputs), outputs)

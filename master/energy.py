@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from common.plan.limits import Violation, violated
+from common.plan.limits import LimitViolation, violated
 from common.plan.plan import Plan
 from laboratories import kinds
 from laboratories.kind import Follows, Kind
@@ -44,7 +44,7 @@ class EnergyMonitor:
         """Energy that the integration has made, over that of the ground."""
         return self._balance.sums.item(DRIFT_SHARE)
 
-    def violation(self, measured: tuple[float, ...], outputs: Outputs) -> Violation | None:
+    def violation(self, measured: tuple[float, ...], outputs: Outputs) -> LimitViolation | None:
         """Take one tick into the sums; the first of them beyond its limit."""
         balance = self._balance
         motion = balance.motion

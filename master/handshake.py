@@ -19,7 +19,7 @@ from master.partner import Partner
 LEAD_NS = 250_000_000
 
 
-class Handshake:
+class MasterHandshake:
     """From the first call for slaves to the start; `wall_ns` is the wall clock minus the laboratory's.
 
     With a `gate` the link to every slave must pass its exchanges.

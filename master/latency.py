@@ -23,7 +23,7 @@ NAN = math.nan
 
 
 @dataclass(slots=True)
-class Row:
+class LatencyRow:
     """What the master knows of a tick; `sent_ns` 0 where no command went out, `used_ns` 0 while it lasts."""
 
     tick: int
@@ -39,14 +39,14 @@ class Row:
     extra: float = 0.0  # s, of a link plug-in on the feedback
 
 
-class Account:
+class LatencyAccount:
     """Latency of the ticks in the exchange with one slave, one row each, in order, into a topic of its own."""
 
     def __init__(self, lab: Laboratory, offset: ClockOffset, topic: str) -> None:
         self._lab = lab
         self._topic = topic
         self._offset = offset
-        self._rows: dict[int, Row] = {}
+        self._rows: dict[int, LatencyRow] = {}
         self._on_the_way: deque[tuple[int, int]] = (
             deque()
         )  # commands that the slave has not heard: tick, sent_ns
@@ -59,7 +59,7 @@ class Account:
     def open(self, tick: int, wake_ns: int, ready_ns: int, sent_ns: int, used: Feedback) -> None:
         """The tick's command is out; stamps in ns, the command's 0 where none went."""
         age = (wake_ns + self._offset.at(wake_ns) - used.started_ns) * 1e-9 if used.seq >= 0 else NAN
-        self._rows[tick] = Row(tick, wake_ns, ready_ns, sent_ns, age)
+        self._rows[tick] = LatencyRow(tick, wake_ns, ready_ns, sent_ns, age)
         if sent_ns:
             self._on_the_way.append((tick, sent_ns))
 
@@ -100,7 +100,7 @@ class Account:
         self.close(tick, used_ns)
         self._write(used_ns, everything=True)
 
-    def _in_time(self, row: Row) -> bool:
+    def _in_time(self, row: LatencyRow) -> bool:
         """Whether the feedback of the tick itself answers it and is there for the next."""
         if row.feedback is None or row.feedback.seq != row.tick:
             return False
@@ -117,7 +117,7 @@ class Account:
             if self._lab.recorded:
                 self._record(row, now)
 
-    def _record(self, row: Row, now: int) -> None:
+    def _record(self, row: LatencyRow, now: int) -> None:
         lab, sent = self._lab, row.sent_ns != 0
         at, offset = lab.tick_ns(row.tick), self._offset.at(row.wake_ns)
         answered = segments(row, offset) if row.feedback is not None else UNANSWERED
@@ -146,7 +146,7 @@ class Account:
         lab.outlet.add(self._topic, log_ns, lab.epoch_ns + now - lab.start_ns, values)
 
 
-class Segments(NamedTuple):
+class TickSegments(NamedTuple):
     """What an answered tick adds to its row; times in s, stamps in ns as they were read."""
 
     command_one_way: float = NAN
@@ -163,16 +163,16 @@ class Segments(NamedTuple):
     )  # command received, slave started, feedback sent, received
 
 
-UNANSWERED = Segments()
+UNANSWERED = TickSegments()
 
 
-def segments(row: Row, offset: int) -> Segments:
+def segments(row: LatencyRow, offset: int) -> TickSegments:
     """The segments of an answered tick; `offset` (ns) is the slave's clock minus the master's."""
     feedback = row.feedback
     assert feedback is not None  # noqa: S101 - the caller has looked
     stamps = (feedback.command_received_ns, feedback.started_ns, feedback.sent_ns, row.received_ns)
     received, started, sent, back = stamps
-    return Segments(  # in the order of the fields: by their names it takes twice the time
+    return TickSegments(  # in the order of the fields: by their names it takes twice the time
         (received - offset - row.sent_ns) * 1e-9,
         (sent - received) * 1e-9,
         (sent - started) * 1e-9,

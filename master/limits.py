@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from common.plan.limits import Guard, Standstill, Violation
+from common.plan.limits import Guard, LimitViolation, Standstill
 from common.plan.plan import Plan
 from common.signals import OF_STOREYS
 from laboratories import kinds
@@ -31,7 +31,7 @@ class MasterLimits:
 
     def violation(
         self, measured: tuple[float, ...], wanted: tuple[float, ...], outputs: Outputs
-    ) -> Violation | Standstill | None:
+    ) -> LimitViolation | Standstill | None:
         """The first value beyond its limit, None where there is none; `wanted` is the command for its own rig."""
         motion = self._own.motion(measured, wanted, outputs.target)
         energy = self._energy.violation(measured, outputs)
@@ -44,7 +44,7 @@ class MasterLimits:
             or energy
         )
 
-    def _beyond(self, sent: list[Sent]) -> Violation | None:
+    def _beyond(self, sent: list[Sent]) -> LimitViolation | None:
         """The first value beyond its limit of what goes to the slaves."""
         for guard, values in zip(self._sent, sent, strict=True):
             if violation := guard.violation(values):

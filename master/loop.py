@@ -36,12 +36,12 @@ from common.protocol.messages import (
 from common.rig import GuardedRig
 from common.roles import MASTER, RECORDER
 from common.safety.modes import Turn
-from common.safety.watchdog import Finding
+from common.safety.watchdog import WatchdogFinding
 from common.signals import alike
 from laboratories import kinds
-from master.handshake import Handshake
+from master.handshake import MasterHandshake
 from master.limits import MasterLimits
-from master.own import Own
+from master.own import OwnLaboratory
 from master.partner import Partner
 from master.step import MasterStep, Outputs
 
@@ -62,7 +62,7 @@ class MasterLoop(RigLoop):
     ) -> None:
         plan, lab = setting.plan, Laboratory(MASTER, setting)
         self._limits = MasterLimits(plan)
-        self._own = Own(plan)
+        self._own = OwnLaboratory(plan)
         descent = Descent(lab, rig, self._own.ramp, self._own.zero, self._own.channels)
         super().__init__(lab, rig, descent, self._limits.standing)
         channels = {role: kinds.kind_of(plan, role).channels for role in plan.roles}
@@ -70,7 +70,7 @@ class MasterLoop(RigLoop):
         self._groups = [[self.partners[role] for role in roles] for roles in alike(channels).values()]
         lab.endpoint.expect({role: len(one.names) for role, one in channels.items()})
         self._partners = tuple(self.partners.values())
-        self._handshake = Handshake(self.lab, self._partners, rig, epoch_ns - setting.clock.now(), gate)
+        self._handshake = MasterHandshake(self.lab, self._partners, rig, epoch_ns - setting.clock.now(), gate)
         self._step = step
         self._command = self._own.zero
         self._drift = 0.0
@@ -167,13 +167,13 @@ class MasterLoop(RigLoop):
         self._measured = measured
         self._watch(tick, wake)
 
-    def _finding(self, tick: int) -> tuple[Finding, str]:
+    def _finding(self, tick: int) -> tuple[WatchdogFinding, str]:
         """What the slaves' watchdogs say, and of which slave: the first of which it is the worst."""
         findings = [partner.look(tick) for partner in self._partners]
         if not findings:
-            return Finding.FINE, ""
-        held = Finding.HOLD if Finding.HOLD in findings else findings[0]
-        worst = Finding.RAMP if Finding.RAMP in findings else held
+            return WatchdogFinding.FINE, ""
+        held = WatchdogFinding.HOLD if WatchdogFinding.HOLD in findings else findings[0]
+        worst = WatchdogFinding.RAMP if WatchdogFinding.RAMP in findings else held
         return worst, self._partners[findings.index(worst)].title
 
     def _write(self, wanted: Any, outputs: Outputs, *, held: bool) -> None:

@@ -18,7 +18,7 @@ from master.step import Outputs
 NOWHERE = (0.0, 0.0)  # position and force of a laboratory that is not there
 
 
-class AtRest:
+class NoRigAtRest:
     """The way to rest of a laboratory without a rig: it is there."""
 
     done, travel, left = True, 0.0, 0.0
@@ -32,7 +32,7 @@ class AtRest:
         return "nothing to bring to rest"
 
 
-class Own:
+class OwnLaboratory:
     """What a tick hands to the master's own laboratory, and what it takes from it and records of it."""
 
     def __init__(self, plan: Plan) -> None:
@@ -54,7 +54,7 @@ class Own:
 
     def ramp(self, last: tuple[float, ...], before: tuple[float, ...]) -> Ramp:
         """The way to rest from the last two commands."""
-        return self._kind.ramp(self._plan, last, before) if self._kind else AtRest()
+        return self._kind.ramp(self._plan, last, before) if self._kind else NoRigAtRest()
 
     def row(self, outputs: Outputs, command: Any, measured: tuple[float, ...]) -> tuple[float, ...]:
         """What is recorded of it: target, motor's force, command, readings; nothing where it is not there."""

@@ -9,9 +9,9 @@ from common.link.transport import addressed
 from common.protocol.messages import Arm, Command, Feedback, Start, Sync, SyncReply
 from common.protocol.tally import Tally
 from common.roles import latency_topic, name_of, title
-from common.safety.watchdog import Finding, Watchdog
+from common.safety.watchdog import Watchdog, WatchdogFinding
 from common.signals import Channels
-from master.latency import Account
+from master.latency import LatencyAccount
 from master.step import Sent
 
 # before the start: most exchanges wait in no queue, so that some of these show the shortest round trip
@@ -49,7 +49,7 @@ class Partner:
         self._watchdog = Watchdog(lab.plan.safety, interval)
         self._silence_ns = max(round(lab.plan.link.loss_timeout * 1e9), GIVEN_UP_NS)
         self.tally = Tally(lab.plan.ticks, lab.plan.window)
-        self.account = Account(lab, self._offset, latency_topic(role))
+        self.account = LatencyAccount(lab, self._offset, latency_topic(role))
         self.instance = 0  # the process that takes part under this role, 0 for none yet
         self.armed = False
         self.scheduled = False
@@ -171,7 +171,7 @@ class Partner:
         """The force (N) in use."""
         return self.used.measured[self._force]
 
-    def look(self, tick: int) -> Finding:
+    def look(self, tick: int) -> WatchdogFinding:
         """What the watchdog says at a tick that came in time."""
         judged = self._feedback.judged(self.used)
         return self._watchdog.look(tick - 1, judged.seq, judged.heard_seq)

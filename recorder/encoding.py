@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from common.recording.chunks import Block
-from common.signals import Kind, Signal
+from common.signals import FieldType, Signal
 from models.compiled import jit_apart
 
 Bytes = npt.NDArray[np.uint8]
@@ -28,19 +28,21 @@ VARINT, DOUBLE = 0, 1  # how a field's value is stored: the low three bits of it
 END, OF_DOUBLE, OF_COUNT, OF_INDEX, OF_STAMP, OF_FLAG = range(6)
 
 # of each kind of signal, how a row holds it and how the kernel names it
-HELD: Mapping[Kind, tuple[str, int]] = {
-    Kind.NUMBER: ("d", OF_DOUBLE),
-    Kind.STOREYS: ("d", OF_DOUBLE),
-    Kind.COUNT: ("I", OF_COUNT),
-    Kind.INDEX: ("i", OF_INDEX),
-    Kind.STAMP: ("q", OF_STAMP),
-    Kind.FLAG: ("?", OF_FLAG),
+HELD: Mapping[FieldType, tuple[str, int]] = {
+    FieldType.NUMBER: ("d", OF_DOUBLE),
+    FieldType.STOREYS: ("d", OF_DOUBLE),
+    FieldType.COUNT: ("I", OF_COUNT),
+    FieldType.INDEX: ("i", OF_INDEX),
+    FieldType.STAMP: ("q", OF_STAMP),
+    FieldType.FLAG: ("?", OF_FLAG),
 }
 
 
 def is_plain(rows: Sequence[Signal], storeys: int) -> bool:
     """Whether a topic has one number per signal, its tick first."""
-    return rows[0].kind is Kind.COUNT and all(row.kind in HELD and row.count(storeys) == 1 for row in rows)
+    return rows[0].kind is FieldType.COUNT and all(
+        row.kind in HELD and row.count(storeys) == 1 for row in rows
+    )
 
 
 def layout(rows: Sequence[Signal]) -> struct.Struct:

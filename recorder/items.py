@@ -11,7 +11,7 @@ import msgpack
 from common.lab.outlet import PIECE
 from common.plan.plan import Plan
 from common.roles import MASTER, latency_topic, ramp_topic
-from common.signals import Kind, Signal
+from common.signals import FieldType, Signal
 from laboratories import kinds
 from recorder.encoding import is_plain, layout
 
@@ -20,7 +20,11 @@ Check = Callable[[Any], bool]
 
 STAMPED = 3  # places of an item before its values: topic, log and publish time
 STAMPS = range(2**63)  # those times, ns
-INTEGERS = {Kind.COUNT: range(2**32), Kind.INDEX: range(-(2**31), 2**31), Kind.STAMP: range(-(2**63), 2**63)}
+INTEGERS = {
+    FieldType.COUNT: range(2**32),
+    FieldType.INDEX: range(-(2**31), 2**31),
+    FieldType.STAMP: range(-(2**63), 2**63),
+}
 
 
 class Items:
@@ -105,28 +109,28 @@ def is_values(value: Any) -> bool:
     )
 
 
-def integer(kind: Kind) -> Check:
+def integer(kind: FieldType) -> Check:
     """Whether a value is a whole number that its field can hold."""
-    limits: Mapping[Kind, range] = INTEGERS
+    limits: Mapping[FieldType, range] = INTEGERS
     return lambda value: type(value) is int and value in limits[kind]
 
 
-CHECKS: dict[Kind, Check] = {
-    Kind.NUMBER: is_number,
-    Kind.STOREYS: is_number,
-    Kind.COUNT: integer(Kind.COUNT),
-    Kind.INDEX: integer(Kind.INDEX),
-    Kind.STAMP: integer(Kind.STAMP),
-    Kind.FLAG: lambda value: type(value) is bool,
-    Kind.TEXT: lambda value: type(value) is str,
-    Kind.VALUES: is_values,
+CHECKS: dict[FieldType, Check] = {
+    FieldType.NUMBER: is_number,
+    FieldType.STOREYS: is_number,
+    FieldType.COUNT: integer(FieldType.COUNT),
+    FieldType.INDEX: integer(FieldType.INDEX),
+    FieldType.STAMP: integer(FieldType.STAMP),
+    FieldType.FLAG: lambda value: type(value) is bool,
+    FieldType.TEXT: lambda value: type(value) is str,
+    FieldType.VALUES: is_values,
 }
 
-TYPES: dict[Kind, type] = {
-    Kind.NUMBER: float,
-    Kind.STOREYS: float,
-    Kind.COUNT: int,
-    Kind.INDEX: int,
-    Kind.STAMP: int,
-    Kind.FLAG: bool,
+TYPES: dict[FieldType, type] = {
+    FieldType.NUMBER: float,
+    FieldType.STOREYS: float,
+    FieldType.COUNT: int,
+    FieldType.INDEX: int,
+    FieldType.STAMP: int,
+    FieldType.FLAG: bool,
 }

@@ -37,7 +37,7 @@ CONSEQUENCE = "remote_trip"  # the other laboratory's cause counts
 MISSED_AT = [row.name for row in signals.LATENCY].index("deadline_missed")
 
 
-class Hole(NamedTuple):
+class StreamHole(NamedTuple):
     """Where a stream is broken: its first missing item, since when it is that one, and when it was asked for."""
 
     first: int
@@ -58,7 +58,7 @@ class RecorderLoop:
         labs = (MASTER, *setting.plan.roles)
         most = ITEMS_PER_TICK * len(labs) * (setting.plan.ticks + SPARE_TICKS)
         self._inlets = {lab: Inlet(Items(setting.plan, lab).unpack, most) for lab in labs}
-        self._holes: dict[str, Hole] = {}
+        self._holes: dict[str, StreamHole] = {}
         self._session = 0
         self._said_ns = -REPEAT_NS
         self._heard_ns = self._polled_ns = setting.clock.now()
@@ -234,12 +234,12 @@ class RecorderLoop:
         said = {"t": t, "lab": RECORDER, "level": "error", "code": ROWS_LOST, "text": text}
         self._report("event", said | dict(values))
 
-    def _ask(self, lab: str, first: int, hole: Hole | None, now: int) -> None:
+    def _ask(self, lab: str, first: int, hole: StreamHole | None, now: int) -> None:
         """Ask for what is missing first, again at once where the last answer has come."""
         moved = hole is None or hole.first != first
         if hole is not None and now - hole.asked_ns < (ASK_NS if moved else REPEAT_NS):
             return
-        self._holes[lab] = Hole(first, now if hole is None or moved else hole.since_ns, now)
+        self._holes[lab] = StreamHole(first, now if hole is None or moved else hole.since_ns, now)
         left = BURST * PIECE  # what a laboratory sends again at once is bounded: it does so between its ticks
         for begin, end in self._inlets[lab].holes():
             last = min(end, begin + left - 1)

@@ -6,15 +6,22 @@ import shutil
 from pathlib import Path
 
 from common import signals
-from common.lab.preflight import Check
+from common.lab.preflight import PreflightCheck
 from common.plan.plan import Plan
 from common.roles import kind_of
 from common.safety.risks import Risk
-from common.signals import Kind, Signal
+from common.signals import FieldType, Signal
 from laboratories import kinds
 
 # bytes of a protobuf field: its value, with a stamp's at seven bytes of seven bits, and of flags and texts none
-VALUES = {Kind.NUMBER: 8, Kind.STOREYS: 8, Kind.COUNT: 2, Kind.INDEX: 2, Kind.STAMP: 7, Kind.FLAG: -1}
+VALUES = {
+    FieldType.NUMBER: 8,
+    FieldType.STOREYS: 8,
+    FieldType.COUNT: 2,
+    FieldType.INDEX: 2,
+    FieldType.STAMP: 7,
+    FieldType.FLAG: -1,
+}
 ONE_BYTE_TAGS = 15  # fields up to this number
 MESSAGE_HEAD = 31  # bytes before a message in a chunk
 INDEX_ENTRY = 16  # bytes of the chunk's index for a message
@@ -47,18 +54,20 @@ def field(number: int, row: Signal, storeys: int) -> int:
     return max(tag + value, 0) if count == 1 else tag + 1 + (count * value >= 128) + count * value
 
 
-def check(plan: Plan, folder: Path) -> Check:
+def check(plan: Plan, folder: Path) -> PreflightCheck:
     """Whether a folder has room for the recording of a test."""
     wanted = plan.preflight.disk_factor * need(plan)
     try:
         disk = shutil.disk_usage(folder)
     except OSError as error:
-        return Check("", Risk("disk", f"the free space of the folder {folder} is unknown: {error.strerror}"))
+        return PreflightCheck(
+            "", Risk("disk", f"the free space of the folder {folder} is unknown: {error.strerror}")
+        )
     if disk.free >= wanted or not disk.total:  # what has no size is no disk, and writing there will say so
-        return Check(
+        return PreflightCheck(
             f"The disk has {disk.free / 1e6:.0f} MB free; the recording takes {need(plan) / 1e6:.1f} MB"
         )
-    return Check(
+    return PreflightCheck(
         "",
         Risk(
             "disk",

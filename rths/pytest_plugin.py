@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING
 import pytest
 
 if TYPE_CHECKING:
-    from report.budget import Report
+    from report.budget import BudgetReport
 
-    LatencyBudget = Callable[..., Report]
+    LatencyBudget = Callable[..., BudgetReport]
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -37,13 +37,13 @@ def latency_budget(pytestconfig: pytest.Config) -> LatencyBudget:
     read, and is skipped with the figures where the machine allows no verdict.
     """
 
-    def call(recording: str | Path, budget: str | Path | None = None) -> Report:
+    def call(recording: str | Path, budget: str | Path | None = None) -> BudgetReport:
         return expect(recording, budget if budget is not None else pytestconfig.getoption("latency_budget"))
 
     return call
 
 
-def expect(recording: str | Path, budget: str | Path | None) -> Report:
+def expect(recording: str | Path, budget: str | Path | None) -> BudgetReport:
     """The report of a recording that is within its budget; ends the test otherwise."""
     __tracebackhide__ = True
     from common.errors import RthsError

@@ -14,7 +14,7 @@ from common import signals
 from common.errors import InputError, InterlockError, RigError, RthsError
 from common.host.clock import Clock, MonotonicClock, VirtualClock, unix_ns
 from common.plan.kinds import COLUMN, TABLE
-from common.plan.limits import Guard, Violation
+from common.plan.limits import Guard, LimitViolation
 from common.plan.plan import Plan
 from common.plan.reality import Reality
 from common.recording.reader import CLOCK
@@ -29,7 +29,7 @@ from laboratories.kinds import kind_of
 from loop import rigs
 from models import excitation
 from models.compensators.follower import Follower
-from models.excitation import POSITION, Programme, Reach, Segment
+from models.excitation import POSITION, Programme, ProgrammeSegment, Reach
 from recorder import files
 from recorder.sink import FileSink, Item, Sink, ThreadedSink
 
@@ -58,7 +58,7 @@ class Order(NamedTuple):
     name: str = ""  # whose laboratory it is: a slave's name, master or slave; empty for the only one that has the part
 
 
-class Result(NamedTuple):
+class BenchResult(NamedTuple):
     """What a bench test has given."""
 
     path: Path
@@ -66,7 +66,7 @@ class Result(NamedTuple):
     interval: float
     ticks: int
     late: int
-    segments: tuple[Segment, ...]
+    segments: tuple[ProgrammeSegment, ...]
     error: RthsError | None
 
 
@@ -77,7 +77,7 @@ def play(
     path: Path,
     stopping: Callable[[], str],
     tell: Tell = untold,
-) -> Result:
+) -> BenchResult:
     """Play a bench test on the plan's rig, or on the reality's, and record it.
 
     Raises:
@@ -104,7 +104,7 @@ def play(
         sink.close({"outcome": "stopped" if error else "completed", "cause": cause, "ticks": str(done)}, {})
     if sink.failure and error is None:
         error = InterlockError(f"The recording is lost: {sink.failure}")
-    return Result(path, order.part, plan.test.interval, done, late, bench.segments, error)
+    return BenchResult(path, order.part, plan.test.interval, done, late, bench.segments, error)
 
 
 def role_of(plan: Plan, part: str, name: str = "") -> str:
@@ -206,7 +206,7 @@ class Bench:
         channels = self.kind.channels
         return (SEQ, TIME, *channels.driving, channels.command, *channels.measured)
 
-    def tick(self, tick: int) -> tuple[tuple[float, ...], Violation | None]:
+    def tick(self, tick: int) -> tuple[tuple[float, ...], LimitViolation | None]:
         """Read, compute, write; the recorded values behind seq and t, and the violation of a limit."""
         measured = self.rig.read()
         if self._force is None:

@@ -7,7 +7,7 @@ from typing import cast
 
 from common.host.realtime import NOTHING
 from common.host.stopping import Stopper
-from common.lab.drive import Loop, drive
+from common.lab.drive import DrivenLoop, drive
 from common.lab.preflight import Gate
 from common.lab.surroundings import Surroundings
 from common.link.endpoint import Endpoint
@@ -28,7 +28,7 @@ class Nowhere(Surroundings):
 
 
 def driving(
-    loop: Loop,
+    loop: DrivenLoop,
     stopping: Callable[[], str],
     gate: Gate | None = None,
     rejected: Mapping[str, int] = NOTHING_REJECTED,

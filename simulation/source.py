@@ -18,7 +18,7 @@ from common.terminal.telling import Tell, untold
 OF_THE_TICK = ("seq", "t")
 
 
-class Source(NamedTuple):
+class ComparedRun(NamedTuple):
     """What there is to compare: tick numbers, signals by name, and a line on the ground motion.
 
     The signals of a named slave are called `NAME.signal`.
@@ -29,7 +29,7 @@ class Source(NamedTuple):
     motion: str
 
 
-def columns(name: str, tell: Tell = untold) -> Source:
+def columns(name: str, tell: Tell = untold) -> ComparedRun:
     """What there is in a recording, or of the simulation of a plan (.toml, or the name of one that ships).
 
     Raises:
@@ -41,7 +41,7 @@ def columns(name: str, tell: Tell = untold) -> Source:
     return recorded(read(Path(name)))
 
 
-def simulated(path: Path) -> Source:
+def simulated(path: Path) -> ComparedRun:
     """The simulation of a plan."""
     from loop import substructure
     from loop.closed_loop import signals, simulate
@@ -50,10 +50,10 @@ def simulated(path: Path) -> Source:
     record = substructure.motion(test)
     values = signals(test, simulate(test, substructure.ground_rows(test, record)))
     ticks = (values["t"] / test.test.interval).round().astype(int)
-    return Source(ticks, values, f"{record.describe()}, scaled by {test.ground_motion.scale!r}")
+    return ComparedRun(ticks, values, f"{record.describe()}, scaled by {test.ground_motion.scale!r}")
 
 
-def recorded(run: Run) -> Source:
+def recorded(run: Run) -> ComparedRun:
     """The signals of a recording on the ticks that master and slaves have in common.
 
     Raises:
@@ -73,4 +73,4 @@ def recorded(run: Run) -> Source:
                 values[f"{name_of(topic)}.{name}"] = column[chosen]
     motion = run.metadata.get("ground_motion")
     line = f"{motion['record']}, scaled by {motion['scale']}" if motion else "ground motion not recorded"
-    return Source(ticks, values, line)
+    return ComparedRun(ticks, values, line)

@@ -32,7 +32,7 @@ NO_OPERATOR = "virtual time has no operator who could reset it."
 SAME_CLOCK: Mapping[str, Drift] = {}
 
 
-class Bench(NamedTuple):
+class VirtualTest(NamedTuple):
     """A test in memory: its time, master, slaves by role, and the recorder where there is one."""
 
     world: World
@@ -61,7 +61,7 @@ def assemble(
     *,
     gate: Gate | None = None,
     drifts: Mapping[str, Drift] = SAME_CLOCK,
-) -> Bench:
+) -> VirtualTest:
     """All laboratories over a link in memory, recording into `output` where one is given.
 
     With a master's `gate` all sensors are judged as the rigs are armed, the slaves' with the same risks accepted, and
@@ -81,7 +81,7 @@ def assemble(
     }
     recorder = begin_recording(settings[RECORDER], world, output) if output is not None else None
     endpoints = {role: setting.endpoint for role, setting in settings.items()}
-    return Bench(world, master, slaves, recorder, endpoints, gates)
+    return VirtualTest(world, master, slaves, recorder, endpoints, gates)
 
 
 def begin_recording(setting: Setting, world: World, output: Path) -> RecorderLoop:
@@ -94,7 +94,7 @@ def begin_recording(setting: Setting, world: World, output: Path) -> RecorderLoo
     return recorder
 
 
-def run(bench: Bench, stopping: Callable[[], str], tell: Tell = untold) -> RthsError | None:
+def run(bench: VirtualTest, stopping: Callable[[], str], tell: Tell = untold) -> RthsError | None:
     """Play a test to its end; the error that ended it, None where it was completed.
 
     Where several laboratories end with one, that which follows another's is not the one: the cause counts, and of
@@ -110,7 +110,9 @@ def run(bench: Bench, stopping: Callable[[], str], tell: Tell = untold) -> RthsE
     return next(iter([*causes, *failed.values(), *incomplete]), None)
 
 
-def play(bench: Bench, stopping: Callable[[], str] = str, pause: Callable[[], bool] | None = None) -> None:
+def play(
+    bench: VirtualTest, stopping: Callable[[], str] = str, pause: Callable[[], bool] | None = None
+) -> None:
     """Let time pass to the test's end, or until `pause` becomes true: another call then lets it pass on.
 
     `stopping` gives the reason to end the test early, empty while there is none. What a process raises that is no
@@ -142,7 +144,7 @@ def _unattended(loop: MasterLoop | SlaveLoop, stopping: Callable[[], str]) -> Ca
     return wish
 
 
-def _listening(bench: Bench, tell: Tell) -> dict[str, str]:
+def _listening(bench: VirtualTest, tell: Tell) -> dict[str, str]:
     """Codes of the errors that end the laboratories' tests from now on, by role, as they are reported.
 
     How far the master is, `tell` is told.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import secrets
 
 from common.lab.laboratory import Setting
-from common.lab.preflight import Check, Gate
+from common.lab.preflight import Gate, PreflightCheck
 from common.plan.plan import Plan
 from common.plan.reality import Reality
 from common.rig import AtRest, GuardedRig
@@ -15,7 +15,7 @@ from slave.loop import NO_COMMAND, SlaveLoop
 from slave.step import SlaveStep
 
 
-def preflight(_plan: Plan) -> list[Check]:
+def preflight(_plan: Plan) -> list[PreflightCheck]:
     """The master judges the test as a whole; a slave its own rig, as it arms."""
     return []
 

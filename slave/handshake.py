@@ -25,7 +25,7 @@ from common.roles import name_of, title
 from common.safety.modes import STILL_LATCHED
 
 
-class Handshake:
+class SlaveHandshake:
     """From waiting for a master to the start; `instance` tells this process from others of its role."""
 
     def __init__(self, lab: Laboratory, rig: GuardedRig, instance: int) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from common.plan.limits import Standstill, Violation
+from common.plan.limits import LimitViolation, Standstill
 from common.plan.plan import Plan
 from common.protocol.messages import Command
 from laboratories.kind import Kind
@@ -26,7 +26,7 @@ class SlaveLimits:
 
     def violation(
         self, measured: tuple[float, ...], command: Command, wanted: tuple[float, ...]
-    ) -> Violation | Standstill | None:
+    ) -> LimitViolation | Standstill | None:
         """The first value beyond its limit, None where there is none."""
         self._target = command.target
         laboratory = self._laboratory

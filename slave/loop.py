@@ -33,9 +33,9 @@ from common.protocol.tally import Tally
 from common.rig import GuardedRig, command_of
 from common.roles import MASTER, SLAVE
 from common.safety.modes import Turn
-from common.safety.watchdog import Finding, Watchdog
+from common.safety.watchdog import Watchdog, WatchdogFinding
 from laboratories import kinds
-from slave.handshake import Handshake
+from slave.handshake import SlaveHandshake
 from slave.limits import SlaveLimits
 from slave.step import SlaveStep
 
@@ -58,7 +58,7 @@ class SlaveLoop(RigLoop):
         descent = Descent(lab, rig, partial(kind.ramp, plan), zero, kind.channels)
         super().__init__(lab, rig, descent, self._limits.standing)
         self._instance = instance
-        self._handshake = Handshake(self.lab, rig, instance)
+        self._handshake = SlaveHandshake(self.lab, rig, instance)
         self._commands: Mailbox[Command] = Mailbox(link, "command", setting.plan.test.interval, nominal=0)
         self._received_ns: dict[int, int] = {}
         self._heard = NOTHING_HEARD  # number and arrival of the newest command
@@ -187,7 +187,7 @@ class SlaveLoop(RigLoop):
         self.lab.rig_time.begin()
         self.lab.heard_ns = now
 
-    def _finding(self, tick: int) -> tuple[Finding, str]:
+    def _finding(self, tick: int) -> tuple[WatchdogFinding, str]:
         """What the watchdog says of the master."""
         judged = self._commands.judged(self._command)
         return self._watchdog.look(tick, judged.seq, judged.heard_seq), MASTER

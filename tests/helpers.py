@@ -11,7 +11,7 @@ from common.plan import plan
 from common.plan.plan import Plan
 from common.plan.reality import as_planned
 from simulation import virtual
-from simulation.virtual import Bench
+from simulation.virtual import VirtualTest
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -135,7 +135,7 @@ def patient(folder: Path) -> Path:
     return path
 
 
-def running(test: Plan, ticks: int) -> Bench:
+def running(test: Plan, ticks: int) -> VirtualTest:
     """A test in virtual time in which all laboratories have made so many ticks; it stands still there."""
     bench = virtual.assemble(test, as_planned(test), None)
     virtual.play(bench, pause=lambda: all(loop.ticks >= ticks for loop in bench.loops.values()))

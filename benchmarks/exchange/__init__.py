@@ -18,7 +18,7 @@ import numpy as np
 from benchmarks.cable import ADDRESSES, NoCableError, cable
 from benchmarks.exchange.transports import NAMES
 from benchmarks.load import BUSY, busy
-from benchmarks.result import Figure
+from benchmarks.result import BenchmarkFigure
 from common.host.realtime import assign
 from common.link.zenoh_link import listenable
 from rths.prepare import keys
@@ -57,7 +57,7 @@ class ExchangeError(Exception):
     """A run gave no round trips, and why."""
 
 
-def run(*, quick: bool = False) -> list[Figure]:
+def run(*, quick: bool = False) -> list[BenchmarkFigure]:
     """All scenarios, each several times."""
     scenarios, repeats = (QUICK, 1) if quick else (SCENARIOS, REPEATS)
     figures = []
@@ -65,7 +65,7 @@ def run(*, quick: bool = False) -> list[Figure]:
         try:
             runs = [once(scenario) for _ in range(repeats)]
         except (NoCableError, ExchangeError) as reason:
-            figures.append(Figure(f"{scenario.name}: {reason}", "µs", None, None))
+            figures.append(BenchmarkFigure(f"{scenario.name}: {reason}", "µs", None, None))
             continue
         figures += [figure for name, words in OURS.items() for figure in ours(scenario, name, words, runs)]
         figures += secured(scenario, runs)
@@ -78,14 +78,14 @@ def percentile(found: dict[str, Any], name: str, share: int) -> float:
     return float(np.percentile(found["trips"][name], share)) * 1e-3
 
 
-def ours(scenario: Scenario, name: str, words: str, runs: list[dict[str, Any]]) -> Iterator[Figure]:
+def ours(scenario: Scenario, name: str, words: str, runs: list[dict[str, Any]]) -> Iterator[BenchmarkFigure]:
     """Median and 99th percentile of the exchange, beside bare zenoh in the same run."""
     for share in (50, 99):
         values = [percentile(found, name, share) for found in runs]
         ratios = [percentile(found, name, share) / percentile(found, "zenoh", share) for found in runs]
         ratio, most = statistics.median(ratios), scenario.most.get(share)
         judged = most is not None and (not scenario.interval or runs[0]["granted"]["priority"] > 0)
-        yield Figure(
+        yield BenchmarkFigure(
             f"{words}, {scenario.name}, p{share}",
             "µs",
             min(values),
@@ -97,12 +97,12 @@ def ours(scenario: Scenario, name: str, words: str, runs: list[dict[str, Any]]) 
         )
 
 
-def secured(scenario: Scenario, runs: list[dict[str, Any]]) -> Iterator[Figure]:
+def secured(scenario: Scenario, runs: list[dict[str, Any]]) -> Iterator[BenchmarkFigure]:
     """Median and 99th percentile of the exchange over TLS, beside that over TCP in the same run."""
     for share in (50, 99):
         values = [percentile(found, "rths_tls", share) for found in runs]
         ratios = [percentile(found, "rths_tls", share) / percentile(found, "rths", share) for found in runs]
-        yield Figure(
+        yield BenchmarkFigure(
             f"exchange over TLS, {scenario.name}, p{share}",
             "µs",
             min(values),
@@ -112,10 +112,10 @@ def secured(scenario: Scenario, runs: list[dict[str, Any]]) -> Iterator[Figure]:
         )
 
 
-def peer(scenario: Scenario, name: str, words: str, runs: list[dict[str, Any]]) -> Figure:
+def peer(scenario: Scenario, name: str, words: str, runs: list[dict[str, Any]]) -> BenchmarkFigure:
     """Median of a bare transport."""
     values = [percentile(found, name, 50) for found in runs]
-    return Figure(f"{words}, {scenario.name}, p50", "µs", min(values), statistics.median(values))
+    return BenchmarkFigure(f"{words}, {scenario.name}, p50", "µs", min(values), statistics.median(values))
 
 
 def once(scenario: Scenario) -> dict[str, Any]:

@@ -26,7 +26,7 @@ from common.link.security import Identity
 from common.link.zenoh_link import ZenohLink
 from common.plan import reality
 from common.plan.plan import PROTOCOL_VERSION, Plan
-from common.plan.tables import Laboratory, Link, Recording, Rig, Safety, Security
+from common.plan.tables import LaboratoryTable, Link, RecordingTable, RigTable, SafetyTable, Security
 from common.protocol.messages import (
     Arm,
     Armed,
@@ -82,9 +82,9 @@ class StillTable:
 
 
 LABORATORIES = {
-    "rths": Laboratory(Rig(class_=f"{__name__}:{StillTable.__name__}")),
-    "rths_tls": Laboratory(Rig(class_=f"{__name__}:{StillTable.__name__}")),
-    "rths_lab": Laboratory(),
+    "rths": LaboratoryTable(RigTable(class_=f"{__name__}:{StillTable.__name__}")),
+    "rths_tls": LaboratoryTable(RigTable(class_=f"{__name__}:{StillTable.__name__}")),
+    "rths_lab": LaboratoryTable(),
 }
 SECURE = ("rths_tls",)
 
@@ -95,9 +95,9 @@ def bench_plan(kind: str, keys: Path) -> Plan:
         Plan(),
         test=replace(Plan().test, name=kind),
         link=Link(connect_timeout=NEVER_S, security=Security(str(keys) if kind in SECURE else "")),
-        safety=Safety(message_age=NEVER_S),
+        safety=SafetyTable(message_age=NEVER_S),
         slave=LABORATORIES[kind],
-        recording=Recording(required=False),
+        recording=RecordingTable(required=False),
     )
 
 

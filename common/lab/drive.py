@@ -26,7 +26,7 @@ RESTING_NS = (
 )
 
 
-class Loop(Protocol):
+class DrivenLoop(Protocol):
     """What the master's and the slave's loop have in common."""
 
     lab: Laboratory
@@ -99,7 +99,7 @@ class Loop(Protocol):
         """How far the rig is on its ramp to rest."""
 
 
-def drive(loop: Loop, stopping: Callable[[], str], surroundings: Surroundings) -> None:
+def drive(loop: DrivenLoop, stopping: Callable[[], str], surroundings: Surroundings) -> None:
     """Run a test to its end; `stopping` gives the reason to end it early, empty while there is none."""
     try:
         handshake(loop, stopping)
@@ -122,7 +122,7 @@ def drive(loop: Loop, stopping: Callable[[], str], surroundings: Surroundings) -
     leave(loop, over)
 
 
-def handshake(loop: Loop, stopping: Callable[[], str]) -> None:
+def handshake(loop: DrivenLoop, stopping: Callable[[], str]) -> None:
     """Until the start is agreed or the test is over."""
     lab = loop.lab
     waited = Waited(lab.clock.now())
@@ -133,7 +133,7 @@ def handshake(loop: Loop, stopping: Callable[[], str]) -> None:
         fetch(loop, lab.clock.now() + IDLE_NS)
 
 
-def run(loop: Loop, stopping: Callable[[], str]) -> int:
+def run(loop: DrivenLoop, stopping: Callable[[], str]) -> int:
     """All ticks, fewer where the test ends before the last; the one that would come next."""
     lab = loop.lab
     reported = 0
@@ -153,7 +153,7 @@ def run(loop: Loop, stopping: Callable[[], str]) -> int:
     return lab.plan.ticks
 
 
-def ramp(loop: Loop, tick: int) -> None:
+def ramp(loop: DrivenLoop, tick: int) -> None:
     """The ramp to rest from a tick on, an interval at a time; those that were missed are left out, never caught up.
 
     A tick that is late by more than a part is left out too: two commands in quick succession would be a step.
@@ -175,7 +175,7 @@ def ramp(loop: Loop, tick: int) -> None:
         tick += 1
 
 
-def stay(loop: Loop, stopping: Callable[[], str]) -> None:
+def stay(loop: DrivenLoop, stopping: Callable[[], str]) -> None:
     """Where the plan wants it, a latched laboratory stays until an operator resets it, the master until all are."""
     lab = loop.lab
     while lab.plan.safety.wait_for_reset and (lab.safety.latched or loop.needed) and not stopping():
@@ -184,7 +184,7 @@ def stay(loop: Loop, stopping: Callable[[], str]) -> None:
         lab.send_samples()
 
 
-def wait(loop: Loop, tick: int) -> None:
+def wait(loop: DrivenLoop, tick: int) -> None:
     """Sleep until the time of a tick, take what has come, and wait for its message as long as it may be waited for.
 
     A laboratory that was held up itself reports that first, before it reads how the others have reacted.
@@ -201,21 +201,21 @@ def wait(loop: Loop, tick: int) -> None:
             loop.take(received)
 
 
-def take_all(loop: Loop) -> None:
+def take_all(loop: DrivenLoop) -> None:
     """Take every message that is there."""
     receive = loop.lab.endpoint.receive
     while (received := receive()) is not None:
         loop.take(received)
 
 
-def fetch(loop: Loop, deadline: int) -> None:
+def fetch(loop: DrivenLoop, deadline: int) -> None:
     """Take one message that comes before the deadline."""
     received = loop.lab.endpoint.receive(max(deadline - loop.lab.clock.now(), 0) * 1e-9)
     if received is not None:
         loop.take(received)
 
 
-def leave(loop: Loop, over: int) -> None:
+def leave(loop: DrivenLoop, over: int) -> None:
     """Send the last words until they are received, for a bounded time; the recorder may still ask for what it lacks.
 
     A recorder that is held up is waited for as long as during the test, counted from when it was last heard, and then
@@ -237,7 +237,7 @@ def leave(loop: Loop, over: int) -> None:
     loop.leave(last=True)
 
 
-def coming_to_rest(loop: Loop, rest: int) -> bool:
+def coming_to_rest(loop: DrivenLoop, rest: int) -> bool:
     """Whether other laboratories may still be on their ramp to rest, which ends at `rest` (ns) at the latest.
 
     After a trip they repeat their reason; in an orderly end they send nothing before they are at rest.

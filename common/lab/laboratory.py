@@ -11,7 +11,7 @@ from common.errors import EmergencyStopError, InterlockError, LostError, RigErro
 from common.host.clock import Clock
 from common.lab.outlet import Outlet, kept_items, next_of
 from common.link.endpoint import Endpoint
-from common.plan.limits import Standstill, Violation
+from common.plan.limits import LimitViolation, Standstill
 from common.plan.plan import Plan
 from common.protocol.exchange import Event, Exchange, State
 from common.protocol.messages import Message, Recorder, Resend, Trip
@@ -198,7 +198,7 @@ class Laboratory:
         """An error as the cause of a latched state."""
         return Cause(code, str(error), self.tick * self.plan.test.interval, self.name)
 
-    def violated(self, violation: Violation | Standstill, tick: int) -> None:
+    def violated(self, violation: LimitViolation | Standstill, tick: int) -> None:
         """End the test because a value is beyond its limit, or a sensor is frozen."""
         error = InterlockError(str(violation))
         self.fail(Event.TRIP, error, code="limit", tick=tick, values=violation.values)

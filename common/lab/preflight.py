@@ -25,7 +25,7 @@ NO_NOISE: Mapping[str, float] = {}
 SENSORS_PASSED = "Sensor check at rest: passed"
 
 
-class Check(NamedTuple):
+class PreflightCheck(NamedTuple):
     """What was looked at, in words with its figures, and the risk that was found."""
 
     text: str
@@ -67,7 +67,7 @@ class Gate:
         self.overruled: list[Risk] = []
         self.passed: list[tuple[str, str]] = []  # code of the event, and its text
 
-    def judge(self, checks: Iterable[Check], code: str = PASSED) -> None:
+    def judge(self, checks: Iterable[PreflightCheck], code: str = PASSED) -> None:
         """Let checks pass or overrule their risks; raises RefusedError where one is not accepted."""
         made = list(checks)
         refusing, overruled = check([one.risk for one in made if one.risk], self.accepted)
@@ -115,10 +115,10 @@ def link_text(round_trips_s: Sequence[float], lost: int, plan: Plan) -> str:
     return f"Link check: {len(round_trips_s)} exchanges, {lost or 'none'} lost, {late} late, {quantiles(round_trips_s)}"
 
 
-def link_check(round_trips_s: Sequence[float], lost: int, plan: Plan) -> Check:
+def link_check(round_trips_s: Sequence[float], lost: int, plan: Plan) -> PreflightCheck:
     """The link's check, for a gate."""
     risk = link_risk(round_trips_s, lost, plan)
-    return Check("" if risk else link_text(round_trips_s, lost, plan), risk)
+    return PreflightCheck("" if risk else link_text(round_trips_s, lost, plan), risk)
 
 
 def quantiles(round_trips_s: Sequence[float]) -> str:
@@ -216,7 +216,7 @@ class SensorsAtRest:
                 self._clock.sleep_until(self._clock.now() + round(plan.test.interval * 1e9))
             readings.append(read())
         risk = sensor_risk(readings, names, self._limits, self._noise, hidden=hidden, lab=lab)
-        self._gate.judge([Check(SENSORS_PASSED, risk)], SENSORS)
+        self._gate.judge([PreflightCheck(SENSORS_PASSED, risk)], SENSORS)
 
     def skip(self, kind: str, *, hidden: bool) -> None:
         """Take note of a rig of the class `kind` that cannot be read at rest.
@@ -224,4 +224,4 @@ class SensorsAtRest:
         A hidden rig, one of a reality, is reported like one whose check passed, so that nothing tells the two apart.
         """
         skipped = f"Sensor check skipped: class {kind} does not set idle_readings = True"
-        self._gate.judge([Check(SENSORS_PASSED if hidden else skipped)], SENSORS)
+        self._gate.judge([PreflightCheck(SENSORS_PASSED if hidden else skipped)], SENSORS)

@@ -14,9 +14,9 @@ from common.host.clock import MonotonicClock
 from common.host.stopping import Stopper
 from common.host.waited import Waited
 from common.lab import lacking
-from common.lab.drive import Loop, drive
+from common.lab.drive import DrivenLoop, drive
 from common.lab.laboratory import Setting
-from common.lab.preflight import Check, Gate
+from common.lab.preflight import Gate, PreflightCheck
 from common.lab.surroundings import Surroundings
 from common.link.address import checked, loopback
 from common.link.endpoint import FrameEndpoint
@@ -38,10 +38,10 @@ class Assembly(Protocol):
     def warm_up(self, reality: Reality) -> None:
         """Compile the kernels."""
 
-    def preflight(self, plan: Plan) -> list[Check]:
+    def preflight(self, plan: Plan) -> list[PreflightCheck]:
         """What can be judged before the link opens."""
 
-    def build_loop(self, setting: Setting, reality: Reality, *, gate: Gate | None = None) -> Loop:
+    def build_loop(self, setting: Setting, reality: Reality, *, gate: Gate | None = None) -> DrivenLoop:
         """The laboratory's loop, with the gate that its rig must pass."""
 
 
@@ -106,7 +106,7 @@ def last_word(error: RthsError, report: Report) -> RthsError:
     return error
 
 
-class Search:
+class MasterSearch:
     """A wish to stop, asked for again and again while a master is looked for: says now and then how long it takes."""
 
     def __init__(self, role: str, plan: Plan, report: Report, stopping: Callable[[], str]) -> None:
@@ -124,7 +124,7 @@ class Search:
         return self._stopping()
 
 
-def answer(loop: Loop) -> str:
+def answer(loop: DrivenLoop) -> str:
     """The answer of a laboratory to a second wish to stop: what it is doing, since that wish changes nothing."""
     lab = loop.lab
     if lab.safety.mode is not Mode.RAMPING:
@@ -180,7 +180,7 @@ def join(
         listen=listen,
         connect=connect,
         patience=plan.link.connect_timeout,
-        stopping=Search(role, plan, report, stopping),
+        stopping=MasterSearch(role, plan, report, stopping),
         identity=identity,
     )
     link.watch(lambda text: warn("stranger", text))

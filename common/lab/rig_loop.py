@@ -11,7 +11,7 @@ from common.lab.laboratory import REPEAT_NS, Laboratory
 from common.protocol.exchange import Event
 from common.rig import GuardedRig
 from common.safety.modes import Turn
-from common.safety.watchdog import Finding
+from common.safety.watchdog import WatchdogFinding
 
 SAY_NS = REPEAT_NS // 2  # between two times that a laboratory says the same of its end
 
@@ -36,7 +36,7 @@ class RigLoop:
 
     # -- what the subclass says ---------------------------------------------------------------------
 
-    def _finding(self, tick: int) -> tuple[Finding, str]:
+    def _finding(self, tick: int) -> tuple[WatchdogFinding, str]:
         """What the watchdog says at a tick that came in time, and of whom."""
         raise NotImplementedError
 
@@ -59,10 +59,10 @@ class RigLoop:
         if late:  # the silence may be this loop's own
             return False
         finding, who = self._finding(tick)
-        if finding is Finding.RAMP:
+        if finding is WatchdogFinding.RAMP:
             lab.silent(who, tick)
             return True
-        lab.safety.follow(Turn.HOLD if finding is Finding.HOLD else Turn.RESUME)
+        lab.safety.follow(Turn.HOLD if finding is WatchdogFinding.HOLD else Turn.RESUME)
         return False
 
     def _rig_failed(self, error: RigError, tick: int) -> None:

@@ -14,7 +14,7 @@ NEWS_NS = 1_000_000_000
 UNTOLD = frozenset({Reject.UNREGISTERED.value})  # a process in no test hears those of others
 
 
-class Seen(NamedTuple):
+class RejectionCount(NamedTuple):
     """The rejections for one reason: when they began, the last one, and as which role its sender spoke."""
 
     first_ns: int
@@ -27,7 +27,7 @@ class Rejections:
 
     def __init__(self) -> None:
         self.counts: Counter[str] = Counter()
-        self.seen: dict[str, Seen] = {}
+        self.seen: dict[str, RejectionCount] = {}
         self._lock = threading.Lock()
         self._told: dict[str, int] = {}
         self._told_ns = -NEWS_NS
@@ -38,7 +38,7 @@ class Rejections:
         name = reason.value
         with self._lock:
             first_ns = self.seen[name].first_ns if name in self.seen else now_ns
-            self.seen[name] = Seen(first_ns, now_ns, role)
+            self.seen[name] = RejectionCount(first_ns, now_ns, role)
             self.counts[name] += 1  # last: `news` looks for who was seen
         self._fresh = self._fresh or name not in UNTOLD
 

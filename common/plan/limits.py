@@ -25,7 +25,7 @@ TRAVEL = 10.0
 NO_UNITS: Mapping[str, str] = MappingProxyType({})
 
 
-class Violation(NamedTuple):
+class LimitViolation(NamedTuple):
     """A value beyond the limit of that name."""
 
     name: str
@@ -68,12 +68,12 @@ class Standstill(NamedTuple):
         )
 
 
-def violated(limits: Mapping[str, float], **values: float) -> Violation | None:
+def violated(limits: Mapping[str, float], **values: float) -> LimitViolation | None:
     """The first of some values, by the names of their limits, that is beyond its own."""
     for name, value in values.items():
         most = limits.get(name, math.inf)
         if not abs(value) <= most:
-            return Violation(name, value, most)
+            return LimitViolation(name, value, most)
     return None
 
 
@@ -99,7 +99,7 @@ class Guard:
         self._most = [self._all[place] for place in twice]
         self._names, self._units = names, units
 
-    def violation(self, values: tuple[Any, ...]) -> Violation | None:
+    def violation(self, values: tuple[Any, ...]) -> LimitViolation | None:
         """The first value beyond its limit."""
         if all(map(le, map(abs, self._values(values)), self._most)) and not self._several:
             return None
@@ -112,9 +112,9 @@ class Guard:
                     return self._beyond(place, value)
         return None
 
-    def _beyond(self, place: int, value: float) -> Violation:
+    def _beyond(self, place: int, value: float) -> LimitViolation:
         name = self._names[place]
-        return Violation(name, value, self._all[place], self._units.get(name, ""))
+        return LimitViolation(name, value, self._all[place], self._units.get(name, ""))
 
 
 class Change:
@@ -142,7 +142,7 @@ class Change:
         self._last = 0.0
         self._change = 0.0
 
-    def violation(self, command: float) -> Violation | None:
+    def violation(self, command: float) -> LimitViolation | None:
         """The first rate beyond its limit, should this command be written."""
         change = command - self._last
         bend = change - self._change
@@ -169,13 +169,13 @@ class Lasting:
         self._name, self._most = name, limits.get(name, math.inf)
         self._beyond = 0
 
-    def violation(self, error: float) -> Violation | None:
+    def violation(self, error: float) -> LimitViolation | None:
         """The error of one more interval where it is beyond the limit for too long."""
         if abs(error) <= self._most:
             self._beyond = 0
             return None
         self._beyond += 1
-        return Violation(self._name, error, self._most) if self._beyond >= PATIENCE else None
+        return LimitViolation(self._name, error, self._most) if self._beyond >= PATIENCE else None
 
 
 class _Channel:

@@ -19,22 +19,22 @@ from common.plan.schema import fill, nearest, plain
 from common.plan.tables import (
     Actuator,
     Column,
-    Compensator,
+    CompensatorTable,
     Control,
     Damper,
-    Device,
-    GroundMotion,
-    Laboratory,
+    DeviceTable,
+    GroundMotionTable,
+    LaboratoryTable,
     Limits,
     Link,
     Preflight,
-    Recording,
-    Rig,
-    Safety,
-    Sensors,
+    RecordingTable,
+    RigTable,
+    SafetyTable,
+    SensorsTable,
+    ShakingTable,
     SlaveLaboratory,
     Structure,
-    Table,
     Test,
     Tolerances,
 )
@@ -58,24 +58,24 @@ class Plan:
     """
 
     test: Test = Test()
-    ground_motion: GroundMotion = GroundMotion()
+    ground_motion: GroundMotionTable = GroundMotionTable()
     structure: Structure = Structure()
     column: Column = Column()
     actuator: Actuator = Actuator()
-    compensator: Compensator = Compensator()
-    table: Table = Table()
+    compensator: CompensatorTable = CompensatorTable()
+    table: ShakingTable = ShakingTable()
     damper: Damper = Damper()
     control: Control = Control()
-    device: Device = Device()
-    sensors: Sensors = Sensors()
+    device: DeviceTable = DeviceTable()
+    sensors: SensorsTable = SensorsTable()
     link: Link = Link()
-    safety: Safety = Safety()
+    safety: SafetyTable = SafetyTable()
     preflight: Preflight = Preflight()
     limits: Limits = Limits()
     tolerances: Tolerances = Tolerances()
-    master: Laboratory = Laboratory()
-    slave: Laboratory = Laboratory()
-    recording: Recording = Recording()
+    master: LaboratoryTable = LaboratoryTable()
+    slave: LaboratoryTable = LaboratoryTable()
+    recording: RecordingTable = RecordingTable()
     slaves: dict[str, SlaveLaboratory] = field(default_factory=dict)
     base: Path = Path()
     follows_in: str = field(default=FOLLOWS_IN, compare=False)
@@ -141,7 +141,9 @@ class Plan:
         parts = {name: getattr(lab, name) for name in INTERFACE}
         own = lab.table.compensator != self.table.compensator
         follows_in = f"{role}.{FOLLOWS_IN}" if own else FOLLOWS_IN
-        return replace(self, slave=Laboratory(lab.rig, lab.kind), slaves={}, follows_in=follows_in, **parts)
+        return replace(
+            self, slave=LaboratoryTable(lab.rig, lab.kind), slaves={}, follows_in=follows_in, **parts
+        )
 
     def slave_role(self, name: str) -> str:
         """The role of the slave of that name, empty for the one without.
@@ -176,7 +178,7 @@ class Plan:
         for lab in (tables["master"], tables["slave"]):
             if lab.get("kind") == "":
                 del lab["kind"]
-        if self.device == Device():
+        if self.device == DeviceTable():
             del tables["device"]
         return tables
 
@@ -328,7 +330,7 @@ def slave_laboratory(plan: Plan, name: str, given: dict[str, Any]) -> SlaveLabor
         own, common = given.get(part, {}), getattr(plan, part)
         merged = plain(common) | own if isinstance(own, dict) else own
         parts[part] = fill(type(common), merged, f"{where}.{part}")
-    return SlaveLaboratory(rig=fill(Rig, given.get("rig", {}), f"{where}.rig"), kind=kind, **parts)
+    return SlaveLaboratory(rig=fill(RigTable, given.get("rig", {}), f"{where}.rig"), kind=kind, **parts)
 
 
 def check_tolerances(plan: Plan) -> None:
@@ -409,8 +411,8 @@ def ideal(plan: Plan) -> Plan:
         if not name.startswith("actuator.servo.")
     }
     return replace(
-        plan.everywhere(table=Table(frequency=float("inf"), damping_ratio=1.0, delay=0.0)),
+        plan.everywhere(table=ShakingTable(frequency=float("inf"), damping_ratio=1.0, delay=0.0)),
         actuator=Actuator(gain=1.0, delay=0.0, time_constant=0.0),
-        compensator=Compensator(kind="none", parameters={}),
+        compensator=CompensatorTable(kind="none", parameters={}),
         tolerances=replace(plan.tolerances, parameters=kept),
     )

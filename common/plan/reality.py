@@ -17,7 +17,7 @@ from common.plan.building import OF_FOPDT
 from common.plan.kinds import TABLES_OF_KIND, known_kind
 from common.plan.plan import Plan, from_tables
 from common.plan.schema import fill, nearest
-from common.plan.tables import Rig
+from common.plan.tables import RigTable
 from common.roles import MASTER, SLAVE, slave_role
 
 Entry = tuple[str, Mapping[str, float]]  # name of an effect of the catalogue, and its parameters
@@ -45,14 +45,14 @@ class Reality:
 
     plan: Plan  # with the true parameters in place of the nominal ones
     seed: int
-    master: Rig
-    slave: Rig
-    link: Rig = field(default_factory=Rig)
+    master: RigTable
+    slave: RigTable
+    link: RigTable = field(default_factory=RigTable)
     base: Path = Path()
     hidden: frozenset[str] = frozenset()  # roles whose rig no recording may name
     effects: tuple[Entry, ...] = ()  # laid over the emulated laboratories, in this order
     only: tuple[str, ...] = ()  # the role whose laboratory each effect is laid over alone, empty for all
-    slaves: dict[str, Rig] = field(default_factory=dict)  # by role, where the plan names them
+    slaves: dict[str, RigTable] = field(default_factory=dict)  # by role, where the plan names them
     role: str = SLAVE
     place: int = 0
     whole: Reality | None = None
@@ -115,8 +115,8 @@ def from_reality(tables: dict[str, Any], plan: Plan, base: Path) -> Reality:
         plan=true_plan(tables, plan),
         seed=seed,
         master=rigs.pop(MASTER),
-        slave=rigs.get(SLAVE, Rig()),
-        link=rig({"rig": tables.get("link", {})}, "link", Rig(), plan.base, base),
+        slave=rigs.get(SLAVE, RigTable()),
+        link=rig({"rig": tables.get("link", {})}, "link", RigTable(), plan.base, base),
         base=base,
         hidden=frozenset(role for role, lab in labs.items() if "rig" in lab),
         effects=entries(effects),
@@ -270,11 +270,11 @@ def table_of(tables: Mapping[str, Any], name: str, where: str) -> dict[str, Any]
     return table
 
 
-def rig(entry: dict[str, Any], lab: str, planned: Rig, plan_base: Path, base: Path) -> Rig:
+def rig(entry: dict[str, Any], lab: str, planned: RigTable, plan_base: Path, base: Path) -> RigTable:
     """The rig of a laboratory, with the path of its class made absolute."""
     chosen, start = (planned, plan_base)
     if "rig" in entry:
-        chosen, start = fill(Rig, entry["rig"], f"{lab}.rig"), base
+        chosen, start = fill(RigTable, entry["rig"], f"{lab}.rig"), base
     if ".py:" in chosen.class_:
-        return Rig(class_=str(start.resolve() / chosen.class_), options=chosen.options)
+        return RigTable(class_=str(start.resolve() / chosen.class_), options=chosen.options)
     return chosen

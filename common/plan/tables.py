@@ -21,7 +21,7 @@ class Test:
 
 
 @dataclass(frozen=True)
-class GroundMotion:
+class GroundMotionTable:
     """The earthquake."""
 
     record: str = key(
@@ -40,7 +40,7 @@ class GroundMotion:
 
 
 @dataclass(frozen=True)
-class NumericalColumns:
+class NumericalColumnsTable:
     """Force-deformation model of the numerical columns of every storey."""
 
     model: str = key("name of a specimen model", default="linear")
@@ -81,8 +81,8 @@ class Structure:
     )
     integrator: str = key("integration method", default="newmark_explicit")
     rho_infinity: float = key("KR-α: spectral radius at infinity", default=0.5, least=0.0, most=1.0)
-    columns: NumericalColumns = field(
-        default_factory=NumericalColumns, metadata={"table": NumericalColumns, "more": False}
+    columns: NumericalColumnsTable = field(
+        default_factory=NumericalColumnsTable, metadata={"table": NumericalColumnsTable, "more": False}
     )
     experimental: Experimental | None = field(default=None, metadata={"table": Experimental, "more": False})
 
@@ -164,7 +164,7 @@ class ForceCorrection:
 
 
 @dataclass(frozen=True)
-class Compensator:
+class CompensatorTable:
     """Compensation of the actuator's delay."""
 
     kind: str = key("name of a compensator", default="pid_taylor")
@@ -183,7 +183,7 @@ class TableCompensator:
 
 
 @dataclass(frozen=True)
-class Table:
+class ShakingTable:
     """Nominal second-order model with dead time of the shaking table."""
 
     frequency: float = key(
@@ -221,7 +221,7 @@ class Control:
 
 
 @dataclass(frozen=True)
-class Sensors:
+class SensorsTable:
     """White noise of each reading, rms."""
 
     column_displacement: float = key("specimen deformation", default=5e-6, unit="m", least=0.0)
@@ -256,7 +256,7 @@ class Link:
 
 
 @dataclass(frozen=True)
-class Safety:
+class SafetyTable:
     """What a laboratory does on its own when fresh messages stay away, and how it comes to rest."""
 
     hold_after: int = key(
@@ -405,7 +405,7 @@ class Tolerances:
 
 
 @dataclass(frozen=True)
-class Rig:
+class RigTable:
     """The laboratory behind the rig interface.
 
     A class is code that runs with your rights: only run plans that you trust.
@@ -419,7 +419,7 @@ class Rig:
 
 
 @dataclass(frozen=True)
-class Device:
+class DeviceTable:
     """What a laboratory of a kind of the user's takes from the plan, beside that kind's own class."""
 
     place: int = key("storey whose drift, or floor whose motion, the device follows", default=1, least=1)
@@ -434,10 +434,10 @@ class Device:
 
 
 @dataclass(frozen=True)
-class Laboratory:
+class LaboratoryTable:
     """Master or slave: what stands in its laboratory."""
 
-    rig: Rig = field(default_factory=Rig, metadata={"table": Rig, "more": False})
+    rig: RigTable = field(default_factory=RigTable, metadata={"table": RigTable, "more": False})
     kind: str = key(
         "kind of laboratory: column, table, none, or 'file.py:Class' of one's own; empty: a master's is column, a "
         "slave's table",
@@ -453,19 +453,19 @@ class SlaveLaboratory:
     others are those of the plan's own table of that name. A compensator is taken whole.
     """
 
-    table: Table = Table()
+    table: ShakingTable = ShakingTable()
     damper: Damper = Damper()
     control: Control = Control()
-    rig: Rig = field(default_factory=Rig)
+    rig: RigTable = field(default_factory=RigTable)
     kind: str = ""
     actuator: Actuator = Actuator()
     column: Column = Column()
-    compensator: Compensator = Compensator()
-    device: Device = Device()
+    compensator: CompensatorTable = CompensatorTable()
+    device: DeviceTable = DeviceTable()
 
 
 @dataclass(frozen=True)
-class Recording:
+class RecordingTable:
     """Where recordings go, and whether a test may run without one."""
 
     folder: str = key("folder of recordings, relative to where the command is started", default="runs")

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from common.recording.salvage import Hole
+from common.recording.salvage import FileHole
 
 
 class Missing(NamedTuple):
@@ -83,7 +83,7 @@ class Recovery:
     output: Path
     size: int
     finished: bool
-    holes: list[Hole]
+    holes: list[FileHole]
     chunks: int = 0  # whole
     chunks_written: int | None = None  # by the summary of a finished file
     topics: dict[str, Topic] = field(default_factory=dict)
@@ -91,7 +91,7 @@ class Recovery:
     undefined: int = 0  # messages of a channel that nothing in the file describes any more
 
     @property
-    def lossy(self) -> list[Hole]:
+    def lossy(self) -> list[FileHole]:
         """Holes with which content may be lost."""
         return [hole for hole in self.holes if hole.lossy]
 

@@ -28,7 +28,17 @@ from common import signals
 from common.errors import InputError
 from common.recording.bounds import Bounds
 from common.recording.checksums import CHECKSUMS, fits, opened
-from common.recording.records import DAMAGE, HEAD, MESSAGE, Source, content, framed, inner, parsed, summary
+from common.recording.records import (
+    DAMAGE,
+    HEAD,
+    MESSAGE,
+    GrowingFile,
+    content,
+    framed,
+    inner,
+    parsed,
+    summary,
+)
 from common.recording.schema import message_class
 from common.recording.writer import SHARED, SIGNALS
 from common.roles import LATENCY, MASTER, SLAVE, kind_of, latency_topic, ramps_of, title
@@ -156,7 +166,7 @@ def length(path: Path) -> float:
     """Seconds from the first to the last message of a finished recording, by its summary; 0 where it has none."""
     try:
         with path.open("rb") as stream:
-            found = summary(Source(stream))
+            found = summary(GrowingFile(stream))
     except (OSError, *DAMAGE):
         return 0.0
     times = [
@@ -221,7 +231,7 @@ class Tail:
             self.open()
         try:
             if self._stream is not None:
-                self._read(Source(self._stream), most, run)
+                self._read(GrowingFile(self._stream), most, run)
         except OSError as error:
             raise InputError(f"Cannot read the recording {self.path}: {error.strerror}.") from None
         try:
@@ -238,7 +248,7 @@ class Tail:
     def _end(self, damage: str) -> None:
         self.damage, self.behind = damage, False
 
-    def _read(self, source: Source, most: float, run: Run) -> None:
+    def _read(self, source: GrowingFile, most: float, run: Run) -> None:
         self._bounds.size = source.size
         if source.size < self.place:
             self._end("it was cut off or begun anew while it was read")
@@ -252,7 +262,7 @@ class Tail:
             self._end(f"at byte {self.place}")
             self.cause = str(error) or type(error).__name__
 
-    def _begun(self, source: Source) -> bool:
+    def _begun(self, source: GrowingFile) -> bool:
         """Whether the file is written beyond the bytes with which every MCAP file begins."""
         if not self.place:
             begin = source.at(0, len(MCAP0_MAGIC))
@@ -261,7 +271,7 @@ class Tail:
             self.place = len(begin) if begin == MCAP0_MAGIC else 0
         return self.place > 0
 
-    def _wanted(self, source: Source, limit: float) -> Iterator[bytes]:
+    def _wanted(self, source: GrowingFile, limit: float) -> Iterator[bytes]:
         """Whole records that count, up to a place; each counts as read when the next one is asked for."""
         self.behind = False
         while not (self.finished or self.damage) and (frame := framed(source, self.place, source.size)):

@@ -28,7 +28,7 @@ MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 FOOTER_SIZE = HEAD.size + 20 + len(MCAP0_MAGIC)
 
 
-class Source:
+class GrowingFile:
     """A file read in pieces, as long as it is at this moment."""
 
     def __init__(self, stream: io.BufferedReader) -> None:
@@ -41,7 +41,7 @@ class Source:
         return self._stream.read(length)
 
 
-def framed(source: Source, offset: int, end: int) -> tuple[int, int] | None:
+def framed(source: GrowingFile, offset: int, end: int) -> tuple[int, int] | None:
     """Opcode and end of the record at a place; None where it does not end before `end`.
 
     Raises:
@@ -122,14 +122,14 @@ def inner(data: bytes) -> Iterator[tuple[int, bytes]]:
         yield opcode, data[begin:place]
 
 
-class Summary(NamedTuple):
+class RecordingSummary(NamedTuple):
     """The end of a finished recording, where its checksum is right."""
 
     start: int
     records: list[Any]
 
 
-def summary(source: Source) -> Summary | None:
+def summary(source: GrowingFile) -> RecordingSummary | None:
     """The summary of a finished recording; None where there is none, or a damaged one."""
     tail = source.at(max(source.size - FOOTER_SIZE, 0), FOOTER_SIZE)
     if len(tail) < FOOTER_SIZE or not tail.endswith(MCAP0_MAGIC) or tail[0] != Opcode.FOOTER:
@@ -141,4 +141,4 @@ def summary(source: Source) -> Summary | None:
     data = source.at(start, limit - start)
     if zlib.crc32(tail[: HEAD.size + 16], zlib.crc32(data)) != crc:
         return None
-    return Summary(start, [as_written(record) for _, record in inner(data)])
+    return RecordingSummary(start, [as_written(record) for _, record in inner(data)])

@@ -17,8 +17,8 @@ from common.errors import InputError
 from common.recording.account import Recovery, Topic
 from common.recording.bounds import Bounds
 from common.recording.checksums import CHECKSUMS, checksum, fits, opened, sealed
-from common.recording.records import HEAD, MESSAGE, Source, inner, parsed, summary, written
-from common.recording.salvage import Hole, WholeRecord, judge, survey
+from common.recording.records import HEAD, MESSAGE, GrowingFile, inner, parsed, summary, written
+from common.recording.salvage import FileHole, WholeRecord, judge, survey
 from common.recording.writer import CHUNK_SIZE
 from common.roles import ramps_of
 from common.terminal import outputs
@@ -49,10 +49,10 @@ class Definitions:
 class Survey:
     """What a file holds: the places of what is whole, the holes, and all that describes its messages."""
 
-    def __init__(self, path: Path, source: Source) -> None:
+    def __init__(self, path: Path, source: GrowingFile) -> None:
         self.definitions = Definitions()
         self.places: list[tuple[int, int, int]] = []  # opcode, begin and end of what is copied
-        self.holes: list[Hole] = []
+        self.holes: list[FileHole] = []
         self.header = Header("", "rths")
         self.checksums: dict[str, str] = {}
         self.statistics: Statistics | None = None
@@ -63,7 +63,7 @@ class Survey:
         for record in end.records if end else []:
             self._take_summary(record)
         for found in survey(source, end.start if end else source.size):
-            if isinstance(found, Hole):
+            if isinstance(found, FileHole):
                 self.holes.append(found)
             else:
                 self._take(found)
@@ -111,7 +111,7 @@ def recover(path: Path, output: Path, *, force: bool = False) -> Recovery:
     outputs.checked(output, force, [path])
     try:
         with path.open("rb") as stream:
-            source = Source(stream)
+            source = GrowingFile(stream)
             found = Survey(path, source)
             account = Recovery(path, output, source.size, found.finished, found.holes)
             account.chunks = [opcode for opcode, _, _ in found.places].count(Opcode.CHUNK)
@@ -130,7 +130,9 @@ def recover(path: Path, output: Path, *, force: bool = False) -> Recovery:
 class Copy:
     """The output being written; what becomes of each topic goes into the account."""
 
-    def __init__(self, source: Source, found: Survey, account: Recovery, stream: io.BufferedWriter) -> None:
+    def __init__(
+        self, source: GrowingFile, found: Survey, account: Recovery, stream: io.BufferedWriter
+    ) -> None:
         self._source, self._survey, self._account, self._stream = source, found, account, stream
         self._channels: dict[int, tuple[int, Topic]] = {}  # by the number in the damaged file
         self._checksums: dict[str, str] = {}

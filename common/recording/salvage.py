@@ -16,7 +16,16 @@ from mcap.opcode import Opcode
 from mcap.records import Chunk
 from mcap.writer import MCAP0_MAGIC
 
-from common.recording.records import DAMAGE, HEAD, RECORD_LIMIT, Source, as_written, content, framed, inner
+from common.recording.records import (
+    DAMAGE,
+    HEAD,
+    RECORD_LIMIT,
+    GrowingFile,
+    as_written,
+    content,
+    framed,
+    inner,
+)
 
 WINDOW = 1 << 20  # bytes that are searched at a time
 ANCHORS = (Opcode.CHUNK, Opcode.ATTACHMENT, Opcode.METADATA, Opcode.SCHEMA, Opcode.CHANNEL)
@@ -36,7 +45,7 @@ class WholeRecord(NamedTuple):
     content: bytes
 
 
-class Hole(NamedTuple):
+class FileHole(NamedTuple):
     """Bytes that are no whole record, how many chunks began in them, and whether content may have been lost with them.
 
     Nothing is lost with the index of a chunk or with the summary at the end, which are made anew. Where a chunk
@@ -49,7 +58,7 @@ class Hole(NamedTuple):
     lossy: bool
 
 
-def judge(source: Source, offset: int, end: int) -> WholeRecord | None:
+def judge(source: GrowingFile, offset: int, end: int) -> WholeRecord | None:
     """The whole record at a place, None where there is none before `end`."""
     record, data = None, b""
     try:
@@ -79,7 +88,7 @@ def check_index(head: bytes) -> None:
         raise ValueError("length of the index")
 
 
-def overruns(source: Source, offset: int, after: int, end: int) -> bool:
+def overruns(source: GrowingFile, offset: int, after: int, end: int) -> bool:
     """Whether a whole chunk begins in a record without a checksum, which goes from `offset` to `after`."""
     # with the head of a chunk that begins at its very end
     data = source.at(offset, after - offset + HEAD.size - 1)
@@ -87,7 +96,7 @@ def overruns(source: Source, offset: int, after: int, end: int) -> bool:
     return any(chunk_end(source, place) and judge(source, place, end) for place in places)
 
 
-def chunk_end(source: Source, offset: int) -> int:
+def chunk_end(source: GrowingFile, offset: int) -> int:
     """The end of a chunk with a whole head, whatever its content and what follows it; 0 if there is none."""
     head = source.at(offset, HEAD.size + 40)
     if len(head) < HEAD.size + 40:
@@ -102,7 +111,7 @@ def chunk_end(source: Source, offset: int) -> int:
     return offset + HEAD.size + length if length == 40 + name + data else 0
 
 
-def survey(source: Source, end: int) -> Iterator[WholeRecord | Hole]:
+def survey(source: GrowingFile, end: int) -> Iterator[WholeRecord | FileHole]:
     """Every whole record before `end`, and the holes between them, in order."""
     offset = len(MCAP0_MAGIC) if source.at(0, len(MCAP0_MAGIC)) == MCAP0_MAGIC else 0
     index_end, ended = 0, False
@@ -111,7 +120,7 @@ def survey(source: Source, end: int) -> Iterator[WholeRecord | Hole]:
         if found is None:
             resumed, chunks = resume(source, offset, end)
             lossy = chunks > 0 or not (ended or resumed <= index_end)
-            yield Hole(offset, resumed, chunks, lossy)
+            yield FileHole(offset, resumed, chunks, lossy)
             offset = resumed
             continue
         yield found
@@ -127,7 +136,7 @@ def index_size(data: bytes) -> int:
     return INDEX_HEAD * len(set(channels)) + INDEX_ENTRY * len(channels)
 
 
-def resume(source: Source, offset: int, end: int) -> tuple[int, int]:
+def resume(source: GrowingFile, offset: int, end: int) -> tuple[int, int]:
     """Where the next whole record begins behind damage at `offset`, and the heads of chunks passed on the way."""
     chunks = 0
     while offset < end:
@@ -141,7 +150,7 @@ def resume(source: Source, offset: int, end: int) -> tuple[int, int]:
     return min(offset, end), chunks
 
 
-def anchor(source: Source, offset: int, end: int) -> int:
+def anchor(source: GrowingFile, offset: int, end: int) -> int:
     """The next place before `end` that looks like the beginning of an anchor, else `end`."""
     while offset < end:
         found = ANCHOR.search(source.at(offset, min(WINDOW, end - offset)))

@@ -7,17 +7,17 @@ from typing import Any, cast
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 
 from common.roles import kind_of
-from common.signals import Kind, Signal
+from common.signals import FieldType, Signal
 
 _FIELD = descriptor_pb2.FieldDescriptorProto
 _TYPES = {
-    Kind.NUMBER: _FIELD.TYPE_DOUBLE,
-    Kind.STOREYS: _FIELD.TYPE_DOUBLE,
-    Kind.COUNT: _FIELD.TYPE_UINT32,
-    Kind.INDEX: _FIELD.TYPE_INT32,
-    Kind.STAMP: _FIELD.TYPE_INT64,
-    Kind.FLAG: _FIELD.TYPE_BOOL,
-    Kind.TEXT: _FIELD.TYPE_STRING,
+    FieldType.NUMBER: _FIELD.TYPE_DOUBLE,
+    FieldType.STOREYS: _FIELD.TYPE_DOUBLE,
+    FieldType.COUNT: _FIELD.TYPE_UINT32,
+    FieldType.INDEX: _FIELD.TYPE_INT32,
+    FieldType.STAMP: _FIELD.TYPE_INT64,
+    FieldType.FLAG: _FIELD.TYPE_BOOL,
+    FieldType.TEXT: _FIELD.TYPE_STRING,
 }
 
 
@@ -39,7 +39,7 @@ def schema_file(
     )
     message = file.message_type.add(name=name)
     for number, row in enumerate(rows, start=1):
-        if row.kind is Kind.VALUES:
+        if row.kind is FieldType.VALUES:
             entry = message.nested_type.add(name="ValuesEntry")
             entry.options.map_entry = True
             entry.field.add(name="key", number=1, type=_FIELD.TYPE_STRING, label=_FIELD.LABEL_OPTIONAL)

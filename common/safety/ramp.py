@@ -6,7 +6,7 @@ import math
 from enum import Enum, auto
 from typing import Any, Protocol
 
-from common.plan.tables import Safety
+from common.plan.tables import SafetyTable
 from common.safety.speed_change import SpeedChange
 
 UNLOADED = 0.01  # of the force at the hold: below it the specimen counts as unloaded
@@ -54,7 +54,7 @@ class MotionRamp:
     """
 
     def __init__(
-        self, safety: Safety, interval: float, position: float, velocity: float, *, unload: bool
+        self, safety: SafetyTable, interval: float, position: float, velocity: float, *, unload: bool
     ) -> None:
         self._safety = safety
         self._interval = interval
@@ -144,7 +144,7 @@ class MotionRamp:
 class ForceRelease:
     """The damper's motor force from its last command (N) to zero, in equal parts."""
 
-    def __init__(self, safety: Safety, interval: float, force: float) -> None:
+    def __init__(self, safety: SafetyTable, interval: float, force: float) -> None:
         self._interval = interval
         self._left = max(math.ceil(safety.release / interval - 1e-9), 1)
         self._part = force / self._left

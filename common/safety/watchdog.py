@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from enum import Enum
 
-from common.plan.tables import Safety
+from common.plan.tables import SafetyTable
 
 
-class Finding(Enum):
+class WatchdogFinding(Enum):
     """What the watchdog wants at a tick."""
 
     FINE = "fine"
@@ -30,7 +30,7 @@ class Watchdog:
     is for those.
     """
 
-    def __init__(self, safety: Safety, interval: float) -> None:
+    def __init__(self, safety: SafetyTable, interval: float) -> None:
         self._hold, self._ramp = safety.hold_after, safety.ramp_after
         self._age = max(round(safety.message_age / interval), 1)
         self._seq = self._echo = -1
@@ -42,7 +42,7 @@ class Watchdog:
         unanswered = self._unechoed - ROUND_TRIP
         return unanswered if unanswered > self._unheard else self._unheard
 
-    def look(self, tick: int, seq: int, echo: int) -> Finding:
+    def look(self, tick: int, seq: int, echo: int) -> WatchdogFinding:
         """One interval: the tick whose message is due, the newest one's own number, and the one it echoes.
 
         Until the first message has come, it may be as late as a message may be old: the delay of a link is not
@@ -55,5 +55,5 @@ class Watchdog:
             self._seq, self._echo = seq, max(echo, self._echo)
         begun, missed = self._seq >= 0 and self._echo >= 0, self.missed
         if missed >= (self._ramp if begun else max(self._ramp, self._age)):
-            return Finding.RAMP
-        return Finding.HOLD if missed >= self._hold and begun else Finding.FINE
+            return WatchdogFinding.RAMP
+        return WatchdogFinding.HOLD if missed >= self._hold and begun else WatchdogFinding.FINE

@@ -9,7 +9,7 @@ from diagnosis.findings import where
 from diagnosis.findings.found import Diagnosis
 from diagnosis.fits import fitting
 from diagnosis.fits.search import Search, gaps
-from diagnosis.recorded.parts import Laboratory
+from diagnosis.recorded.parts import LaboratoryPart
 from diagnosis.report.evidence import Ceiling, Coordinate, Dependence, Unknown
 from diagnosis.signals import windows
 from diagnosis.signals.ceiling import ceiling, depends_on
@@ -34,7 +34,7 @@ def inputs_of(found: Diagnosis, search: Search) -> dict[str, Array]:
     """Commands of a part, and its readings as predicted without effects."""
     part = search.data.part
     result: dict[str, Array] = {}
-    if isinstance(part, Laboratory):
+    if isinstance(part, LaboratoryPart):
         result |= {name: values for name, values in part.inputs.items() if np.ptp(values) > 0.0}
     predicted = part.predict(fitting.lay(search.data, search.chosen.z, {}))
     for name, values in zip(part.signals, predicted.T, strict=True):

@@ -11,10 +11,10 @@ from diagnosis.findings import where
 from diagnosis.findings.ceilings import ceilings, unknown
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.how_far import Response
-from diagnosis.findings.next_test import Choice
+from diagnosis.findings.next_test import ChosenTest
 from diagnosis.findings.series import numbers, strongest
-from diagnosis.findings.verdict import Verdict
-from diagnosis.findings.where import Trace
+from diagnosis.findings.verdict import PartVerdict
+from diagnosis.findings.where import SiteTrace
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data, Fit
 from diagnosis.fits.search import remaining
@@ -23,10 +23,10 @@ from diagnosis.recorded.paths import force_path, paths
 from diagnosis.recorded.record import Record
 from diagnosis.report.evidence import (
     Abscissa,
-    Curve,
     Details,
     Evidence,
     Left,
+    NaturalCurve,
     NextTest,
     Ordinate,
     OverAmplitude,
@@ -47,7 +47,9 @@ CLASSES = 8  # of amplitude
 MUCH = 0.3  # of the noise, from which on what a candidate leaves speaks against it
 
 
-def details(found: Diagnosis, far: Response, which: Sequence[Candidate], tests: Sequence[Choice]) -> Details:
+def details(
+    found: Diagnosis, far: Response, which: Sequence[Candidate], tests: Sequence[ChosenTest]
+) -> Details:
     """Everything that a page shows beside the report itself."""
     record = found.record
     return Details(
@@ -109,7 +111,7 @@ def nominal_signals(found: Diagnosis) -> dict[str, Array] | None:
     return simulated(record, record.systems, record.ground)
 
 
-def part(found: Diagnosis, trace: Trace) -> PartSeen:
+def part(found: Diagnosis, trace: SiteTrace) -> PartSeen:
     """Signals of the part that shows a site, measured and predicted, and its residual over time and frequency."""
     interval = found.record.plan.test.interval
     verdict = next(item for item in found.verdicts if trace.signal in item.search.data.part.signals)
@@ -132,7 +134,7 @@ def part(found: Diagnosis, trace: Trace) -> PartSeen:
     )
 
 
-def reading(record: Record, data: Data, fit: Fit, trace: Trace) -> Reading:
+def reading(record: Record, data: Data, fit: Fit, trace: SiteTrace) -> Reading:
     """The signal that shows a trace, measured and predicted, in its strongest seconds."""
     place = data.part.signals.index(trace.signal)
     shown = strongest(trace.series, record.plan.test.interval)
@@ -179,7 +181,7 @@ def candidate(found: Diagnosis, entry: Candidate) -> Evidence:
     )
 
 
-def curves(found: Diagnosis, verdict: Verdict) -> list[Curve]:
+def curves(found: Diagnosis, verdict: PartVerdict) -> list[NaturalCurve]:
     """Hysteresis or scatter of each site found, in its natural coordinates."""
     data, fit = verdict.search.data, verdict.search.chosen
     result = []
@@ -195,7 +197,7 @@ def curves(found: Diagnosis, verdict: Verdict) -> list[Curve]:
     return result
 
 
-def curve(record: Record, data: Data, fit: Fit, trace: Trace, pair: tuple[str, str]) -> Curve:
+def curve(record: Record, data: Data, fit: Fit, trace: SiteTrace, pair: tuple[str, str]) -> NaturalCurve:
     """One signal of a pair over the other, measured, and predicted without and with the effects of a site."""
     place = data.part.signals.index(pair[1])
     shown = strongest(trace.series, record.plan.test.interval)
@@ -203,7 +205,7 @@ def curve(record: Record, data: Data, fit: Fit, trace: Trace, pair: tuple[str, s
     before = data.part.predict(fitting.lay(data, fit.z, own))[:, place]
     after = data.part.predict(fitting.lay(data, fit.z, fit.values))[:, place]
     x, y = (name.replace("_", " ") for name in pair)
-    return Curve(
+    return NaturalCurve(
         title=f"{trace.site}: {y} over {x}",
         x=Abscissa(label=f"{x} ({record.unit(pair[0])})", values=numbers(record.signals[pair[0]][shown])),
         y=Ordinate(label=f"{y} ({record.unit(pair[1])})"),

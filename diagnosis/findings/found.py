@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from common.plan.plan import Plan
-from diagnosis.findings.readings import Reading
-from diagnosis.findings.verdict import Verdict
+from diagnosis.findings.readings import SensorFinding
+from diagnosis.findings.verdict import PartVerdict
 from diagnosis.fits.fitting import Values
-from diagnosis.recorded.link import Finding
+from diagnosis.recorded.link import LinkFinding
 from diagnosis.recorded.record import Record
 from models.system import System
 
@@ -19,9 +19,9 @@ class Diagnosis:
     """Everything that was found in a recording."""
 
     record: Record
-    verdicts: Sequence[Verdict] = ()
-    readings: Sequence[Reading] = ()
-    link: Sequence[Finding] = ()
+    verdicts: Sequence[PartVerdict] = ()
+    readings: Sequence[SensorFinding] = ()
+    link: Sequence[LinkFinding] = ()
     held: Mapping[str, float] = field(default_factory=dict)  # sensors that repeat samples, and how many
     white: Mapping[str, float] = field(default_factory=dict)  # rms of each reading's noise
     warnings: Sequence[str] = ()
@@ -61,7 +61,7 @@ class Diagnosis:
         return systems
 
 
-def laid(system: System, verdict: Verdict, values: Values) -> System:
+def laid(system: System, verdict: PartVerdict, values: Values) -> System:
     """A system with a part's parameters moved and some of its effects laid over it."""
     part, z = verdict.search.data.part, verdict.search.chosen.z
     for nuisance, place in zip(part.nuisances, z, strict=True):

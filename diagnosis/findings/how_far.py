@@ -11,10 +11,10 @@ import numpy as np
 from diagnosis.findings import where
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.series import numbers, strongest
-from diagnosis.findings.where import Trace
+from diagnosis.findings.where import SiteTrace
 from diagnosis.fits import fitting
 from diagnosis.recorded import link, loop
-from diagnosis.recorded.loop import Loop, closed_share, overall
+from diagnosis.recorded.loop import RecordedLoop, closed_share, overall
 from diagnosis.recorded.record import Record
 from diagnosis.report.evidence import History, LoopShare, Step
 from diagnosis.report.records import Gap, HowFar, SignalGap
@@ -38,7 +38,7 @@ class Response:
 
     gap: Gap
     how_far: HowFar
-    traces: list[Trace]
+    traces: list[SiteTrace]
     shares: dict[str, tuple[float, float, float]]
     loop_shares: tuple[LoopShare, ...]
     waterfall: tuple[Step, ...]
@@ -52,10 +52,10 @@ class Judge:
     def __init__(self, found: Diagnosis, record: Record, mask: Mask) -> None:
         self.found, self.record, self.mask = found, record, mask
         names = tuple(name for name in record.responses if record.has(name))
-        self.loop: Loop | None = None
+        self.loop: RecordedLoop | None = None
         if record.ground is not None and record.has("displacement", *record.targets) and names:
             exchange = link.exchange_of(record.run, record.ticks) if found.link else None
-            self.loop = Loop(record, record.ground, exchange, names)
+            self.loop = RecordedLoop(record, record.ground, exchange, names)
 
     def signals(self, sites: frozenset[str] | None) -> Mapping[str, Array] | None:
         """Simulated response with the effects of some sites, of all where None."""
@@ -147,7 +147,7 @@ def judge(found: Diagnosis, validation: Sequence[Record]) -> Response:
     )
 
 
-def waterfall(own: Judge, traces: Sequence[Trace], summary: HowFar) -> tuple[Step, ...]:
+def waterfall(own: Judge, traces: Sequence[SiteTrace], summary: HowFar) -> tuple[Step, ...]:
     """The overall gap on withheld time after each step: nominal, tolerances, site by site, noise."""
     steps = [
         Step(label="nominal models", value=summary.nominal),
@@ -287,9 +287,9 @@ def validated(found: Diagnosis, validation: Sequence[Record], own: HowFar) -> Ho
     )
 
 
-def all_traces(found: Diagnosis) -> list[Trace]:
+def all_traces(found: Diagnosis) -> list[SiteTrace]:
     """What every site with a gap does, in σ."""
-    result: list[Trace] = []
+    result: list[SiteTrace] = []
     for verdict in found.verdicts:
         result += where.traces(verdict.search.data, verdict.search.chosen)
         if verdict.outcome in ("unknown", "partly"):
@@ -299,7 +299,7 @@ def all_traces(found: Diagnosis) -> list[Trace]:
         site = found.record.catalogue[reading.effect].site
         result = [
             *(item for item in result if item.site != site),
-            Trace(site, np.zeros(0), reading.ratio, "", 1.0),
+            SiteTrace(site, np.zeros(0), reading.ratio, "", 1.0),
         ]
     for name, share in found.held.items():
         lab = next(lab for lab in found.record.labs if name in lab.measured)
@@ -307,15 +307,15 @@ def all_traces(found: Diagnosis) -> list[Trace]:
         gone = {site, *(one.site(place) for one in found.record.labs for place in LIKE_MISSED)}
         result = [
             *(item for item in result if item.site not in gone),
-            Trace(site, np.zeros(0), share, "", 1.0),
+            SiteTrace(site, np.zeros(0), share, "", 1.0),
         ]
     if found.link:
-        result.append(Trace("link", np.zeros(0), max(item.z for item in found.link), "", 1.0))
+        result.append(SiteTrace("link", np.zeros(0), max(item.z for item in found.link), "", 1.0))
     return result
 
 
 def shares(
-    own: Judge, traces: Sequence[Trace]
+    own: Judge, traces: Sequence[SiteTrace]
 ) -> tuple[dict[str, tuple[float, float, float]], tuple[LoopShare, ...]]:
     """Share of the response gap each site is responsible for, with an interval from thirds of the time.
 
@@ -353,7 +353,9 @@ def shares(
     return result, rows
 
 
-def normalised(found: Mapping[str, tuple[float, float, float]], traces: Sequence[Trace]) -> dict[str, float]:
+def normalised(
+    found: Mapping[str, tuple[float, float, float]], traces: Sequence[SiteTrace]
+) -> dict[str, float]:
     """Shares that sum to one; where the response does not show a site, its trace in its own part decides."""
     sizes = {site: max(share, 0.0) for site, (share, _, _) in found.items()}
     ratios = {trace.site: trace.ratio for trace in traces}

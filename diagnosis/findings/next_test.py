@@ -19,7 +19,7 @@ from diagnosis.findings.found import Diagnosis
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data, Fit, Problem
 from diagnosis.fits.search import Search, exchanged_pair
-from diagnosis.recorded.parts import Laboratory
+from diagnosis.recorded.parts import LaboratoryPart
 from models.registry import Array
 
 SECONDS = 10.0  # length of a test
@@ -28,7 +28,7 @@ STEEPEST = 8.0  # largest velocity of a test, of what the recording reached
 MOST = 3  # pairs looked at
 
 
-class Choice(NamedTuple):
+class ChosenTest(NamedTuple):
     """A test, and how well it separates a pair."""
 
     test: str
@@ -36,12 +36,12 @@ class Choice(NamedTuple):
     pair: tuple[str, str]
 
 
-def choices(found: Diagnosis) -> list[Choice]:
+def choices(found: Diagnosis) -> list[ChosenTest]:
     """Tests for the pairs that are still open, the one that separates best first."""
-    result: list[Choice] = []
+    result: list[ChosenTest] = []
     for verdict in found.verdicts:
         search = verdict.search
-        if not isinstance(search.data.part, Laboratory) or not search.chosen.names:
+        if not isinstance(search.data.part, LaboratoryPart) or not search.chosen.names:
             continue
         for other in search.alternatives[:MOST]:
             pair = exchanged_pair(search.chosen, other)
@@ -49,7 +49,7 @@ def choices(found: Diagnosis) -> list[Choice]:
                 1.0, search.chosen.chi / search.chosen.reduced.size
             )
             if pair is not None and close:
-                result += [Choice(name, value, pair) for name, value in separations(search, other)]
+                result += [ChosenTest(name, value, pair) for name, value in separations(search, other)]
     return sorted(result, key=lambda item: -item.separation)
 
 
@@ -83,7 +83,7 @@ def separation(data: Data, one: Fit, other: Fit) -> float:
 def played(data: Data, truth: Array) -> Data:
     """The data of a test that has given `truth`."""
     part = data.part
-    if isinstance(part, Laboratory):
+    if isinstance(part, LaboratoryPart):
         read = np.broadcast_to(part.present.any(axis=0), truth.shape).copy()
         part = part.replaced(measured=np.where(read, truth, 0.0), present=read)
     return replace(data, part=part)
@@ -92,7 +92,7 @@ def played(data: Data, truth: Array) -> Data:
 def menu(data: Data) -> list[tuple[str, Data]]:
     """Tests at hand in the part's laboratory: the same motion at other scales, sines, steps."""
     part = data.part
-    if not isinstance(part, Laboratory):
+    if not isinstance(part, LaboratoryPart):
         return []
     interval = data.system.plan.test.interval
     ticks = round(SECONDS / interval)
@@ -121,7 +121,7 @@ def menu(data: Data) -> list[tuple[str, Data]]:
     return [(name, replace(data, part=part.replaced(inputs=inputs))) for name, inputs in tests]
 
 
-def sentence(found: list[Choice], describe: Callable[[str], str] = str) -> str:
+def sentence(found: list[ChosenTest], describe: Callable[[str], str] = str) -> str:
     """The advice in one sentence, empty where nothing is open."""
     if not found:
         return ""

@@ -16,7 +16,7 @@ REPEATED, STOOD = 1e-3, 0.5  # share of repeated samples: missed by the sensor, 
 LEAST = 2.0  # noise over the plan's, whatever the others do
 
 
-class Reading(NamedTuple):
+class SensorFinding(NamedTuple):
     """What was found on one sensor."""
 
     effect: str
@@ -77,7 +77,7 @@ def levels(searches: list[Data]) -> dict[str, float]:
     }
 
 
-def findings(record: Record, white: dict[str, float], rounded: dict[str, float]) -> list[Reading]:
+def findings(record: Record, white: dict[str, float], rounded: dict[str, float]) -> list[SensorFinding]:
     """Sensors that round coarsely, or are far noisier than planned and than the others."""
     planned = {name: level for lab in record.labs for name, level in lab.noise.items() if level > 0.0}
     plain = [name for name in white if name in planned and name not in rounded]
@@ -88,7 +88,9 @@ def findings(record: Record, white: dict[str, float], rounded: dict[str, float])
         noise = planned.get(name, 0.0) * usual
         if step > noise:
             size = step / np.sqrt(12.0) / noise if noise > 0.0 else 0.0
-            result.append(Reading(effect_on(record, name, "quantization"), "step", step, (step, step), size))
+            result.append(
+                SensorFinding(effect_on(record, name, "quantization"), "step", step, (step, step), size)
+            )
     if not record.has("displacement"):  # the plan's sensors may be another laboratory's
         return result
     for name, ratio in ratios.items():
@@ -97,5 +99,7 @@ def findings(record: Record, white: dict[str, float], rounded: dict[str, float])
         if ratio > LOUDER * max(expected, 0.4) and ratio > LEAST:
             value = float(np.sqrt(max(white[name] ** 2 - (expected * planned[name]) ** 2, 0.0)))
             bounds = (0.97 * value, 1.03 * value)
-            result.append(Reading(effect_on(record, name, "noise"), "rms", value, bounds, ratio / expected))
+            result.append(
+                SensorFinding(effect_on(record, name, "noise"), "rms", value, bounds, ratio / expected)
+            )
     return result

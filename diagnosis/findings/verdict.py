@@ -40,7 +40,7 @@ class Interval:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class PartVerdict:
     """What one part says."""
 
     search: Search
@@ -55,11 +55,11 @@ class Verdict:
         return self.search.chosen.names
 
 
-def judge(search: Search) -> Verdict:
+def judge(search: Search) -> PartVerdict:
     """The verdict on a part."""
     if not search.chosen.names:
         outcome: Outcome = "unknown" if search.left > MISSED else "none"
-        return Verdict(search, outcome, 1.0, (), ())
+        return PartVerdict(search, outcome, 1.0, (), ())
     outcome = how_well(search)
     if outcome == "unknown":
         return unnamed(search)
@@ -78,10 +78,10 @@ def judge(search: Search) -> Verdict:
         for other, value, yes in zip(search.alternatives, odds, same, strict=True)
         if not yes
     )
-    return Verdict(search, outcome, sure * named, others, equivalents(search))
+    return PartVerdict(search, outcome, sure * named, others, equivalents(search))
 
 
-def unnamed(search: Search) -> Verdict:
+def unnamed(search: Search) -> PartVerdict:
     """A gap that no effect explains by half: nothing is named, the nearest are listed."""
     near = (search.chosen, *search.alternatives)
     costs = np.array([fit.cost for fit in near])
@@ -94,7 +94,9 @@ def unnamed(search: Search) -> Verdict:
     )
     chances = (1.0 - DOUBT["unknown"]) * odds / odds.sum()
     bare = replace(search, chosen=search.commissioned)
-    return Verdict(bare, "unknown", DOUBT["unknown"], tuple(zip(near, map(float, chances), strict=True)), ())
+    return PartVerdict(
+        bare, "unknown", DOUBT["unknown"], tuple(zip(near, map(float, chances), strict=True)), ()
+    )
 
 
 MISSED = 0.3  # systematic residual over noise that is unknown where no effect was found

@@ -13,7 +13,7 @@ from common.plan.kinds import COLUMN, TABLE
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data, Fit
 from diagnosis.fits.search import gap
-from diagnosis.recorded.parts import ColumnAlone, Laboratory
+from diagnosis.recorded.parts import ColumnAlone, LaboratoryPart
 from diagnosis.recorded.record import Record
 from diagnosis.signals import windows
 from models.registry import Array
@@ -23,7 +23,7 @@ CONSISTENT = 0.35  # share of a residual that another signal's must show to have
 
 
 @dataclass(frozen=True)
-class Trace:
+class SiteTrace:
     """What one site does to a part's signals, in σ."""
 
     site: str
@@ -33,7 +33,7 @@ class Trace:
     sigma: float
 
 
-def traces(data: Data, fit: Fit) -> list[Trace]:
+def traces(data: Data, fit: Fit) -> list[SiteTrace]:
     """What each site's effects do to the signals: the prediction with all effects against that without them."""
     whole = data.part.predict(fitting.lay(data, fit.z, fit.values))
     sites: dict[str, list[str]] = {}
@@ -48,22 +48,22 @@ def traces(data: Data, fit: Fit) -> list[Trace]:
     return result
 
 
-def shown(site: str, data: Data, change: Array) -> Trace:
+def shown(site: str, data: Data, change: Array) -> SiteTrace:
     """The trace of a site from changes (ticks, signals) in σ."""
     ratios = np.sqrt(np.mean(change**2, axis=0))
     place = int(np.argmax(ratios))
-    return Trace(
+    return SiteTrace(
         site, change[:, place], float(ratios[place]), data.part.signals[place], float(data.sigma[place])
     )
 
 
-def unexplained(data: Data, fit: Fit) -> Trace:
+def unexplained(data: Data, fit: Fit) -> SiteTrace:
     """What a fit leaves, at the site where it most likely arises."""
     residual = data.residual(fitting.lay(data, fit.z, fit.values)) / data.sigma
     left = [gap(column, data.group).ratio for column in fit.reduced.T]
     site = culprit(data, residual, left)
     kept = residual[:, int(np.argmax(left))]
-    return Trace(
+    return SiteTrace(
         site,
         kept,
         max(left),
@@ -75,7 +75,7 @@ def unexplained(data: Data, fit: Fit) -> Trace:
 def culprit(data: Data, residual: Array, left: Sequence[float]) -> str:
     """The site that residuals (ticks, signals) in σ speak for, by which signals show them and which do not."""
     part = data.part
-    if not isinstance(part, Laboratory):
+    if not isinstance(part, LaboratoryPart):
         return part.lab.site(part.name) if isinstance(part, ColumnAlone) else part.name
     amount = dict(zip(part.lab.kind.channels.names, left, strict=True))
     culprits = {TABLE: culprit_b, COLUMN: culprit_a}
@@ -85,7 +85,7 @@ def culprit(data: Data, residual: Array, left: Sequence[float]) -> str:
 def culprit_of_device(data: Data, _residual: Array, amount: dict[str, float]) -> str:
     """A laboratory of a user's kind: its device, of which nothing more is known."""
     part = data.part
-    return part.lab.kind.sites[0] if isinstance(part, Laboratory) else next(iter(amount))
+    return part.lab.kind.sites[0] if isinstance(part, LaboratoryPart) else next(iter(amount))
 
 
 def culprit_a(data: Data, residual: Array, amount: dict[str, float]) -> str:
@@ -166,7 +166,7 @@ def shapley(
     return result
 
 
-def when(trace: Trace, record: Record, threshold: float = 1.0) -> tuple[tuple[float, float], ...]:
+def when(trace: SiteTrace, record: Record, threshold: float = 1.0) -> tuple[tuple[float, float], ...]:
     """Windows of time in which a site's trace stands out of the noise."""
     parts = windows.windows(trace.series, 1.0, record.plan.test.interval)
     level = max(threshold, 0.25 * float(np.max(parts.ratio, initial=0.0)))
@@ -174,6 +174,6 @@ def when(trace: Trace, record: Record, threshold: float = 1.0) -> tuple[tuple[fl
     return tuple((begin, end) for begin, end in spans)
 
 
-def frequencies(trace: Trace, record: Record) -> tuple[float, float]:
+def frequencies(trace: SiteTrace, record: Record) -> tuple[float, float]:
     """Band that holds most of a site's trace, Hz."""
     return windows.band(trace.series, 0.0, record.plan.test.interval)

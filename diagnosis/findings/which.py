@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from diagnosis.findings.found import Diagnosis
-from diagnosis.findings.verdict import Interval, Verdict, intervals
+from diagnosis.findings.verdict import Interval, PartVerdict, intervals
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.search import MATERIAL, PRIOR_GAIN, gaps
 from diagnosis.report.records import Candidate
@@ -77,7 +77,7 @@ def seen(found: Diagnosis) -> dict[str, dict[str, Value]]:
 
 
 def alternatives(
-    verdict: Verdict, effects: list[str], parameters: Parameters, probability: float
+    verdict: PartVerdict, effects: list[str], parameters: Parameters, probability: float
 ) -> list[Candidate]:
     """Entries in which one part's effects are others."""
     rest = [name for name in effects if name not in verdict.effects]

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from common.plan.plan import Plan
-from diagnosis.recorded.laboratory import Recorded
+from diagnosis.recorded.laboratory import RecordedLaboratory
 from diagnosis.recorded.record import Record
 from laboratories.effects import readings_of
 from laboratories.effects.effect import Effect, Parameter
@@ -136,7 +136,7 @@ class Scales:
         return result
 
 
-def sized(lab: Recorded) -> dict[str, tuple[str, ...]]:
+def sized(lab: RecordedLaboratory) -> dict[str, tuple[str, ...]]:
     """The signals that tell how large effects may be, by site: a machine's, and of a reading those of its machine."""
     machines = lab.kind.machines(lab.plan)
     result = {lab.site(item.site): tuple(map(lab.signal, item.sized)) for item in machines}

@@ -20,7 +20,7 @@ WORKERS = 2  # threads: kernels release the interpreter's lock
 
 
 @dataclass(frozen=True)
-class Candidate:
+class ScreenedEffect:
     """An effect at the size where it promises most, over a present hypothesis."""
 
     effect: Effect
@@ -73,7 +73,7 @@ class Plane:
         return 2.0 * float(found.cost) + off, float(found.x[-1])
 
 
-def screen(fit: Fit, effects: Iterable[Effect], scales: Scales) -> list[Candidate]:
+def screen(fit: Fit, effects: Iterable[Effect], scales: Scales) -> list[ScreenedEffect]:
     """What each effect could gain over a fit, best first."""
     plane = Plane(fit)
 
@@ -84,15 +84,15 @@ def screen(fit: Fit, effects: Iterable[Effect], scales: Scales) -> list[Candidat
     return sorted(found, key=lambda item: -item.gain)
 
 
-def look(effect: Effect, plane: Plane, scales: Scales) -> list[Candidate]:
+def look(effect: Effect, plane: Plane, scales: Scales) -> list[ScreenedEffect]:
     """For every form of an effect the size with the largest expected gain; effects already laid are left out."""
     fit = plane.fit
     if effect.name in fit.names:
         return []
-    best: dict[tuple[float, ...], Candidate] = {}
+    best: dict[tuple[float, ...], ScreenedEffect] = {}
     for form, values in scales.starts(effect):
         moved = fit.data.reduced(fitting.lay(fit.data, fit.z, fit.values | {effect.name: values}))
         gain, share = plane.gain((moved - fit.reduced).ravel(), scales.stretch(effect))
         if form not in best or gain > best[form].gain:
-            best[form] = Candidate(effect, scales.stretched(effect, values, share), gain)
+            best[form] = ScreenedEffect(effect, scales.stretched(effect, values, share), gain)
     return list(best.values())

@@ -16,7 +16,7 @@ import numpy as np
 from diagnosis.fits import contact, fitting
 from diagnosis.fits.fitting import Data, Fit, Values, excess
 from diagnosis.fits.scales import Scales
-from diagnosis.fits.screening import WORKERS, Candidate, screen
+from diagnosis.fits.screening import WORKERS, ScreenedEffect, screen
 from models.registry import Array
 
 # The figures below were set on draws of `rths blind --set tune` (docs/decisions/0012-diagnosis.md), as a compromise
@@ -58,14 +58,14 @@ CANCELLED = 4.0  # times the gap that one of several effects may make: beyond it
 TIED = 9.0  # cost by which hypotheses differ that can be told apart: 3 standard deviations squared
 
 
-class Gap(NamedTuple):
+class SystematicGap(NamedTuple):
     """What is systematic in one signal's residual."""
 
     ratio: float  # rms of the systematic part over that of the noise
     significance: float  # standard deviations above white noise
 
 
-def gap(reduced: Array, group: int) -> Gap:
+def gap(reduced: Array, group: int) -> SystematicGap:
     """Systematic part of averaged residuals (groups,) in σ: what their sums over time exceed noise by."""
     ratio, significance = 0.0, 0.0
     for level in LEVELS:
@@ -76,10 +76,10 @@ def gap(reduced: Array, group: int) -> Gap:
         excess, error = float(np.mean(sums**2)) - 1.0, math.sqrt(2.0 / count)
         significance = max(significance, excess / error)
         ratio = max(ratio, math.sqrt(max(0.0, excess - 3.0 * error) / (level * group)))
-    return Gap(ratio, significance)
+    return SystematicGap(ratio, significance)
 
 
-def gaps(fit: Fit, group: int) -> list[Gap]:
+def gaps(fit: Fit, group: int) -> list[SystematicGap]:
     """The systematic part of the residual of every signal."""
     return [gap(column, group) for column in fit.reduced.T]
 
@@ -193,7 +193,7 @@ class Searcher:
         promising = screen(near, self.data.part.candidates, self.scales)[:count]
         slopes = near.jacobian[:, : fit.z.size]
 
-        def rough(candidate: Candidate) -> Fit:
+        def rough(candidate: ScreenedEffect) -> Fit:
             start: Values = {**fit.values, candidate.effect.name: candidate.values}
             return fitting.fit(near.data, start, near.z, ROUGH, slopes, rounds=1)
 

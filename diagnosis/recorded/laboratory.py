@@ -20,7 +20,7 @@ from laboratories.kinds import kind_of
 
 
 @dataclass(frozen=True)
-class Recorded:
+class RecordedLaboratory:
     """One laboratory that a record shows."""
 
     role: str
@@ -100,7 +100,7 @@ class Recorded:
         return replace(parameter, follows=self.signal(parameter.follows))
 
 
-def recorded(plan: Plan, plans: Mapping[str, Plan]) -> tuple[Recorded, ...]:
+def recorded(plan: Plan, plans: Mapping[str, Plan]) -> tuple[RecordedLaboratory, ...]:
     """The laboratories of a record of a plan's test, of the master and of one slave at most; `plans` as each sees it.
 
     Raises:
@@ -111,6 +111,6 @@ def recorded(plan: Plan, plans: Mapping[str, Plan]) -> tuple[Recorded, ...]:
     alike = len(names) > 1 and bool(names[0] & names[1])
     before = {role: f"{role}." if alike else "" for role in kinds}
     return tuple(
-        Recorded(role, kind, plans[role], before[role], before[role] if role != MASTER else "")
+        RecordedLaboratory(role, kind, plans[role], before[role], before[role] if role != MASTER else "")
         for role, kind in kinds.items()
     )

@@ -23,7 +23,7 @@ from scipy.stats import beta
 from common.recording.reader import Run
 from diagnosis.recorded.record import laid_out
 from diagnosis.signals.mask import Mask
-from loop.closed_loop import Exchange
+from loop.closed_loop import MessagesUsed
 from models.registry import Array
 
 Index = NDArray[np.int64]
@@ -94,7 +94,7 @@ class LinkAccount(NamedTuple):
         return [item for item in (self.command, self.feedback) if item is not None]
 
 
-class Finding(NamedTuple):
+class LinkFinding(NamedTuple):
     """An effect of the link."""
 
     effect: str
@@ -261,7 +261,7 @@ def overtaken(ticks: Ticks) -> int:
 # -- findings -------------------------------------------------------------------------------------
 
 
-def findings(found: LinkAccount, interval: float) -> list[Finding]:
+def findings(found: LinkAccount, interval: float) -> list[LinkFinding]:
     """Effects of the link with their parameters and intervals, none where it did what the plan says."""
     if found.stamped and found.feedback is not None:
         result = [delayed(found, interval), jittered(found, interval), lossy(found)]
@@ -294,7 +294,7 @@ def constant(times: Array) -> tuple[float, float]:
     return float(times.min()) - spread / times.size, 4.0 * spread / times.size
 
 
-def delayed(found: LinkAccount, interval: float) -> Finding | None:
+def delayed(found: LinkAccount, interval: float) -> LinkFinding | None:
     """A constant part of the one-way times that no link of the plan has."""
     parts = [constant(item) for item in known(found)]
     if not parts:
@@ -316,7 +316,7 @@ def delayed(found: LinkAccount, interval: float) -> Finding | None:
     )
     each = " and ".join(f"{1e3 * part:.3f} ms" for part, _ in parts)
     text = f"no message takes less than {each} one way ({', '.join(ways(found))})"
-    return Finding("link.delay", {"delay": (value, bounds)}, text, certainty(value, error / 2.0))
+    return LinkFinding("link.delay", {"delay": (value, bounds)}, text, certainty(value, error / 2.0))
 
 
 def ways(found: LinkAccount) -> list[str]:
@@ -329,7 +329,7 @@ def ways(found: LinkAccount) -> list[str]:
     ]
 
 
-def jittered(found: LinkAccount, interval: float) -> Finding | None:
+def jittered(found: LinkAccount, interval: float) -> LinkFinding | None:
     """Scatter of the one-way times."""
     groups = [item - item.mean() for item in whole(found)]
     centred = np.concatenate(groups or [np.zeros(1)])
@@ -347,10 +347,10 @@ def jittered(found: LinkAccount, interval: float) -> Finding | None:
     bounds = (max(value - 1.96 * error, 0.0), value + 1.96 * error)
     late = sum(item.overtaken for item in found.directions)
     text = f"one-way times scatter by {1e3 * value:.3f} ms, {late} feedbacks came after a later one"
-    return Finding("link.jitter", {"std": (value, bounds)}, text, certainty(value, error))
+    return LinkFinding("link.jitter", {"std": (value, bounds)}, text, certainty(value, error))
 
 
-def aged(found: LinkAccount, interval: float) -> Finding | None:
+def aged(found: LinkAccount, interval: float) -> LinkFinding | None:
     """A delay of which only the ticks are known."""
     usual = [item.usual for item in found.directions]
     if not usual or max(usual) == 0:
@@ -359,10 +359,10 @@ def aged(found: LinkAccount, interval: float) -> Finding | None:
     text = (
         f"messages are used {' and '.join(map(str, usual))} ticks after their own; no stamps tell it closer"
     )
-    return Finding("link.delay", {"delay": (sum(bounds) / 2.0, bounds)}, text, CERTAIN)
+    return LinkFinding("link.delay", {"delay": (sum(bounds) / 2.0, bounds)}, text, CERTAIN)
 
 
-def lossy(found: LinkAccount) -> Finding | None:
+def lossy(found: LinkAccount) -> LinkFinding | None:
     """Messages that never came, and their runs: a two-state chain."""
     tried = sum(item.tried.size for item in found.directions)
     lost = sum(int(item.lost.sum()) for item in found.directions)
@@ -384,7 +384,7 @@ def lossy(found: LinkAccount) -> Finding | None:
         ),
     }
     text = f"{lost} of {tried} messages never came"
-    return Finding("link.loss", values, text, certainty(math.sqrt(lost * heavy), 1.0))
+    return LinkFinding("link.loss", values, text, certainty(math.sqrt(lost * heavy), 1.0))
 
 
 def runs(item: Direction) -> tuple[int, int]:
@@ -418,7 +418,7 @@ FREE = {
 }  # places of a guess that are fitted
 
 
-def scattered(ages: Index, interval: float) -> list[Finding]:
+def scattered(ages: Index, interval: float) -> list[LinkFinding]:
     """Delay, jitter and loss from the ages alone, delay and loss only where they are needed.
 
     A message is held at the age a where it has come and none of the a newer ones has: lost each, in runs, or not
@@ -438,13 +438,15 @@ def scattered(ages: Index, interval: float) -> list[Finding]:
         value, wide = best[place], math.exp(1.96 * DEPENDENT * min(float(errors[place]), 10.0))
         return value, (value / wide, value * wide)
 
-    found = [Finding("link.jitter", {"std": told(0)}, text, certainty(1.0, DEPENDENT * errors[0]))]
+    found = [LinkFinding("link.jitter", {"std": told(0)}, text, certainty(1.0, DEPENDENT * errors[0]))]
     if 1 in FREE[name]:
-        found.append(Finding("link.delay", {"delay": told(1)}, text, certainty(1.0, DEPENDENT * errors[1])))
+        found.append(
+            LinkFinding("link.delay", {"delay": told(1)}, text, certainty(1.0, DEPENDENT * errors[1]))
+        )
     if 2 in FREE[name]:
         burst, (low, high) = told(3)
         values = {"probability": told(2), "burst": (burst, (max(low, 1.0), high))}
-        found.append(Finding("link.loss", values, text, certainty(1.0, DEPENDENT * errors[2])))
+        found.append(LinkFinding("link.loss", values, text, certainty(1.0, DEPENDENT * errors[2])))
     return found
 
 
@@ -491,11 +493,11 @@ def fitted(counts: Array, interval: float, places: tuple[int, ...]) -> tuple[Gue
 # -- exchange -------------------------------------------------------------------------------------
 
 
-def exchange_of(run: Run, ticks: int) -> Exchange:
+def exchange_of(run: Run, ticks: int) -> MessagesUsed:
     """Which message each tick used, as recorded; where a tick is missing, the one before serves on."""
     result = []
     for topic, name in (("slave", "command_seq"), ("master", answered(run))):
         values, there = laid_out(run.columns[topic][name].astype(np.float64), run.sequences[topic], ticks)
         known = np.where(there.cumsum() > 0, values, -1.0).astype(np.int64)
         result.append(np.minimum(known, np.arange(ticks)))
-    return Exchange(*result)
+    return MessagesUsed(*result)

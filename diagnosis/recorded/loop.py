@@ -14,7 +14,7 @@ from diagnosis.recorded.record import Record
 from diagnosis.signals.mask import Mask
 from laboratories.kinds import topics
 from loop import closed_loop, substructure
-from loop.closed_loop import Exchange
+from loop.closed_loop import MessagesUsed
 from models.registry import Array
 from models.system import System
 
@@ -26,12 +26,12 @@ Systems = Mapping[str, System]  # master and slave by role
 
 
 @dataclass(frozen=True)
-class Loop:
+class RecordedLoop:
     """The data that all re-simulations of one recording share."""
 
     record: Record
     ground: Array  # as believed
-    exchange: Exchange | None  # as it was, where the link was not as planned
+    exchange: MessagesUsed | None  # as it was, where the link was not as planned
     names: tuple[str, ...]  # response signals that were recorded
 
     def simulate(self, systems: Systems, *, linked: bool = True, seed: int | None = None) -> Signals | None:
@@ -81,7 +81,7 @@ def simulated(
     record: Record,
     systems: Systems,
     ground: Array,
-    exchange: Exchange | None = None,
+    exchange: MessagesUsed | None = None,
     seed: int | None = None,
 ) -> Signals | None:
     """Signals of the closed loop of a record's test by name, None where it diverges.

@@ -15,7 +15,7 @@ import numpy as np
 
 from common.plan.plan import Plan
 from common.roles import MASTER
-from diagnosis.recorded.laboratory import Recorded
+from diagnosis.recorded.laboratory import RecordedLaboratory
 from diagnosis.recorded.record import Record
 from diagnosis.signals.mask import Mask
 from laboratories.effects.effect import Effect
@@ -36,7 +36,7 @@ class Nuisance:
 
     parameter: str  # table.name of the plan
     tolerance: float
-    lab: Recorded | None = None
+    lab: RecordedLaboratory | None = None
 
     @property
     def name(self) -> str:
@@ -73,7 +73,7 @@ class Part(Protocol):
         """The piece over the first ticks only."""
 
 
-def nuisances(lab: Recorded, names: tuple[str, ...]) -> tuple[Nuisance, ...]:
+def nuisances(lab: RecordedLaboratory, names: tuple[str, ...]) -> tuple[Nuisance, ...]:
     """Those of a laboratory's parameters that can move: finite and not zero."""
     found = ((name, lab.kind.planned(lab.plan, name), lab.kind.tolerance(lab.plan, name)) for name in names)
     return tuple(
@@ -129,12 +129,12 @@ def of_sites(record: Record, sites: Collection[str], plan: Plan) -> tuple[Effect
     return tuple(effect for effect in found if not effect.in_samples)
 
 
-class Laboratory:
+class LaboratoryPart:
     """A laboratory from its recorded commands."""
 
     exact = False
 
-    def __init__(self, record: Record, lab: Recorded) -> None:
+    def __init__(self, record: Record, lab: RecordedLaboratory) -> None:
         self.lab, self.name, self.role = lab, lab.title, lab.role
         self.signals = lab.measured
         self.devices = lab.commands
@@ -193,14 +193,16 @@ class Laboratory:
             rows.append((tick, cubic[0], cubic[1]))
         return np.array(rows)
 
-    def first(self, ticks: int) -> Laboratory:
+    def first(self, ticks: int) -> LaboratoryPart:
         """The laboratory over the first ticks."""
-        result: Laboratory = cut(self, ticks, {name: values[:ticks] for name, values in self.inputs.items()})
+        result: LaboratoryPart = cut(
+            self, ticks, {name: values[:ticks] for name, values in self.inputs.items()}
+        )
         if self.anew is not None:
             result.anew = self.anew[self.anew[:, 0] < ticks]
         return result
 
-    def replaced(self, **fields: Any) -> Laboratory:
+    def replaced(self, **fields: Any) -> LaboratoryPart:
         """The same laboratory in another test: other inputs, or other readings."""
         return with_fields(self, fields)
 
@@ -211,7 +213,7 @@ class ColumnAlone:
     name = "column"
     exact = False
 
-    def __init__(self, record: Record, lab: Recorded) -> None:
+    def __init__(self, record: Record, lab: RecordedLaboratory) -> None:
         self.lab, self.role = lab, lab.role
         displacement, force = lab.kind.channels.position, lab.kind.channels.force
         self.signals: tuple[str, ...] = (lab.signal(force),)

@@ -8,7 +8,7 @@ from common.errors import InputError
 from common.plan.kinds import COLUMN
 from common.roles import MASTER
 from diagnosis.recorded.record import Record
-from diagnosis.report.evidence import ForcePath, Path, Paths
+from diagnosis.report.evidence import ForcePathEntry, LoopPath, Paths
 from loop import force_path as force
 from loop.nominal.partition import damping_lost
 from models import indicators
@@ -41,13 +41,13 @@ def paths(record: Record, nominal: dict[str, Array] | None) -> Paths:
 
 def path(
     record: Record, nominal: dict[str, Array] | None, start: str, end: str, *, damped: bool = True
-) -> Path | None:
+) -> LoopPath | None:
     """One path, None where it was not recorded; what it does to the damping only where it is `damped`."""
     here = measured(record, record.signals, start, end)
     if here is None:
         return None
     there = measured(record, nominal, start, end) if nominal else None
-    return Path(
+    return LoopPath(
         delay=here.delay,
         amplitude=here.amplitude,
         damping_points=points(record, here) if damped else None,
@@ -76,10 +76,10 @@ def measured(record: Record, signals: dict[str, Array], start: str, end: str) ->
         return None
 
 
-def force_path(record: Record) -> ForcePath | None:
+def force_path(record: Record) -> ForcePathEntry | None:
     """Delay (s) with its interval of 95 % and gain of the column force beside the plan's specimen, if known."""
     own = record.own
     if own is None or own.kind.name != COLUMN or not record.has("column_displacement", "column_force"):
         return None
     found = force.force_path(own.plan, record.signals["column_displacement"], record.signals["column_force"])
-    return None if found is None else ForcePath(**found._asdict())
+    return None if found is None else ForcePathEntry(**found._asdict())

@@ -14,7 +14,7 @@ from common.recording.reader import GROUND, Run
 from common.roles import MASTER, SLAVE, title
 from common.signals import BUILDING as OF_BUILDING
 from common.signals import shared
-from diagnosis.recorded.laboratory import Recorded, recorded
+from diagnosis.recorded.laboratory import RecordedLaboratory, recorded
 from diagnosis.signals.mask import Mask
 from laboratories import effects
 from laboratories.effects.effect import Effect
@@ -31,7 +31,7 @@ LEAST_TICKS = 50
 
 
 @dataclass(frozen=True)
-class Whole:
+class WholeTest:
     """A test with several slaves, of which a record shows one with the master."""
 
     plan: Plan
@@ -54,9 +54,9 @@ class Record:
     present: dict[str, Mask]
     ground: Array | None  # (2, ticks + 1) as the plan believes it, None where it is not known
     other_plan: bool = False  # whether the building or its control were other than this plan's
-    whole: Whole | None = None  # the test around it, where that has several slaves
+    whole: WholeTest | None = None  # the test around it, where that has several slaves
     plans: dict[str, Plan] = field(default_factory=dict)  # by role, as each sees it
-    labs: tuple[Recorded, ...] = ()  # the laboratories that it shows, the master's first
+    labs: tuple[RecordedLaboratory, ...] = ()  # the laboratories that it shows, the master's first
 
     @cached_property
     def catalogue(self) -> dict[str, Effect]:
@@ -83,12 +83,12 @@ class Record:
         return {role: System(plan) for role, plan in self.plans.items()}
 
     @property
-    def own(self) -> Recorded | None:
+    def own(self) -> RecordedLaboratory | None:
         """The master's laboratory."""
         return next((lab for lab in self.labs if lab.role == MASTER), None)
 
     @property
-    def other(self) -> Recorded | None:
+    def other(self) -> RecordedLaboratory | None:
         """The slave's laboratory."""
         return next((lab for lab in self.labs if lab.role != MASTER), None)
 
@@ -153,7 +153,7 @@ def build(run: Run, plan: Plan | None = None, *, against_ideal: bool = False, ro
     ground = believed_ground(run, chosen, ticks, known)
     around = None
     if every.slaves and whole.has(MASTER):
-        around = Whole(every, role, used_forces(whole, every, ticks))
+        around = WholeTest(every, role, used_forces(whole, every, ticks))
     return Record(chosen, run, ticks, signals, present, ground, other, around, plans, labs)
 
 
@@ -169,7 +169,7 @@ def used_forces(run: Run, plan: Plan, ticks: int) -> Array:
 
 
 def on_ticks(
-    run: Run, topics: list[str], ticks: int, labs: tuple[Recorded, ...]
+    run: Run, topics: list[str], ticks: int, labs: tuple[RecordedLaboratory, ...]
 ) -> tuple[dict[str, Array], dict[str, Mask]]:
     """The topics' numbers on their ticks, and where they are there.
 
@@ -193,7 +193,9 @@ def on_ticks(
     return signals, present
 
 
-def commanded(signals: dict[str, Array], present: dict[str, Mask], labs: tuple[Recorded, ...]) -> None:
+def commanded(
+    signals: dict[str, Array], present: dict[str, Mask], labs: tuple[RecordedLaboratory, ...]
+) -> None:
     """Put the targets in place of the commands of transfer systems that a plan says to be ideal."""
     for lab in labs:
         channels = lab.kind.channels

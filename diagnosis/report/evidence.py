@@ -79,7 +79,7 @@ class PartSeen(Entry):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Path(Entry):
+class LoopPath(Entry):
     """What one path of the loop costs, as recorded and in the simulation with nominal models."""
 
     delay: Number = noted("Delay", unit="s", default=None)
@@ -99,19 +99,19 @@ class Path(Entry):
 class Paths(Entry):
     """The three paths of the loop, those that were recorded."""
 
-    command: Path | None = noted(
+    command: LoopPath | None = noted(
         "From the building's drift to the specimen's deformation", default=None, absent=Absent.LEFT_OUT
     )
-    force: Path | None = noted(
+    force: LoopPath | None = noted(
         "From the deformation to the force that the master used", default=None, absent=Absent.LEFT_OUT
     )
-    exchange: Path | None = noted(
+    exchange: LoopPath | None = noted(
         "From the damper's force in its laboratory to its use", default=None, absent=Absent.LEFT_OUT
     )
 
 
 @dataclass(frozen=True, kw_only=True)
-class ForcePath(Entry):
+class ForcePathEntry(Entry):
     """The measured column force against that of the plan's specimen at the measured displacement."""
 
     delay: float = noted("Delay of the measured force", unit="s")
@@ -173,7 +173,7 @@ class Ordinate(Entry):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Curve(Entry):
+class NaturalCurve(Entry):
     """A relation in the natural coordinates of a site."""
 
     title: str = noted("What it shows", default="")
@@ -221,7 +221,7 @@ class Unknown(Entry):
     frequency: Number = noted("Frequency at which it is strongest", unit="Hz", default=None)
     amplitude: Number = noted("Its size, rms times √2", default=None)
     unit: str = noted("Unit of the size", default="")
-    curve: Curve | None = noted("The relation that is left over", default=None, absent=Absent.LEFT_OUT)
+    curve: NaturalCurve | None = noted("The relation that is left over", default=None, absent=Absent.LEFT_OUT)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -259,7 +259,7 @@ class Details(Entry):
     test: TestFacts = noted("What was tested", default=TestFacts)
     parts: tuple[PartSeen, ...] = noted("Sites with their residuals", default=())
     paths: Paths = noted("What the paths of the loop cost", default=Paths)
-    force_path: ForcePath | None = noted(
+    force_path: ForcePathEntry | None = noted(
         "The measured column force beside that of the plan's specimen", default=None
     )
     loop_shares: tuple[LoopShare, ...] = noted(
@@ -267,7 +267,7 @@ class Details(Entry):
     )
     candidates: tuple[Evidence, ...] = noted("The candidates with evidence", default=())
     ceiling: tuple[Ceiling, ...] = noted("What could be explained at all, by part", default=())
-    curves: tuple[Curve, ...] = noted("Relations in natural coordinates", default=())
+    curves: tuple[NaturalCurve, ...] = noted("Relations in natural coordinates", default=())
     waterfall: tuple[Step, ...] = noted("The overall gap, step by step", default=())
     histories: tuple[History, ...] = noted("Response signals before and after", default=())
     unknown: Unknown | None = noted(

@@ -19,7 +19,7 @@ class Absent(enum.Enum):
 
 
 @dataclasses.dataclass(frozen=True)
-class Rule:
+class FieldRule:
     """What a value must fulfil beside its type."""
 
     least: float | None = None
@@ -31,11 +31,11 @@ class Rule:
 Number = float | None  # None: not determined
 Ends = tuple[Number, Number]  # of an interval, lower and upper
 Series = tuple[Number, ...]
-Share = Annotated[Number, Rule(least=0.0, most=1.0)]
+Share = Annotated[Number, FieldRule(least=0.0, most=1.0)]
 PLACE = r"ground|structure|actuator|column|link|table|damper|device|sensor\.[a-z][a-z0-9_]*"
 # the laboratory stands before it where two of a report have that site
-Site = Annotated[str, Rule(pattern=rf"^((master|slave(\.[a-z][a-z0-9_]*)?)\.)?({PLACE})$")]
-EffectName = Annotated[str, Rule(pattern=r"^[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)+$")]
+Site = Annotated[str, FieldRule(pattern=rf"^((master|slave(\.[a-z][a-z0-9_]*)?)\.)?({PLACE})$")]
+EffectName = Annotated[str, FieldRule(pattern=r"^[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)+$")]
 
 
 def noted(
@@ -97,7 +97,7 @@ class Shape:
     length: int | None = None  # of a list, None: any
     entry: Any = None  # the class of an entry
     choices: tuple[Any, ...] = ()
-    rule: Rule = Rule()
+    rule: FieldRule = FieldRule()
 
 
 PLAIN: dict[Any, Literal["number", "integer", "string"]] = {float: "number", int: "integer", str: "string"}

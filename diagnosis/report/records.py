@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from diagnosis.report.evidence import Details
-from diagnosis.report.fields import Absent, EffectName, Ends, Entry, Number, Rule, Share, Site, noted
+from diagnosis.report.fields import Absent, EffectName, Ends, Entry, FieldRule, Number, Share, Site, noted
 from diagnosis.report.values import Parameters
 
 Status = Literal["no_gap", "explained", "partly_explained", "ambiguous", "unknown_effect", "not_enough_data"]
@@ -89,7 +89,7 @@ class Report(Entry):
     gap: Gap = noted("The gap between the recording and the simulation with nominal models")
     where: tuple[Place, ...] = noted("Sites with a gap, the largest share first")
     which: tuple[Candidate, ...] = noted("The verdict first, then the others by probability")
-    equivalent: tuple[Annotated[tuple[EffectName, ...], Rule(fewest=2)], ...] = noted(
+    equivalent: tuple[Annotated[tuple[EffectName, ...], FieldRule(fewest=2)], ...] = noted(
         "Sets of effects that these signals cannot tell apart: naming one of a set is naming all"
     )
     how_far: HowFar = noted("How far the gap closes once the effects are added")

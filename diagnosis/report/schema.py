@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from diagnosis.report.fields import Absent, Rule, Shape, fields, key, required, shapes
+from diagnosis.report.fields import Absent, FieldRule, Shape, fields, key, required, shapes
 from diagnosis.report.records import Report
 
 PUBLISHED = Path(__file__).with_name("schema.json")
@@ -85,7 +85,7 @@ def sizes(shape: Shape) -> dict[str, int]:
     return {"minItems": shape.rule.fewest} if shape.rule.fewest else {}
 
 
-def bounds(rule: Rule) -> dict[str, Any]:
+def bounds(rule: FieldRule) -> dict[str, Any]:
     """The rule of a number or a text."""
     found = {"minimum": rule.least, "maximum": rule.most, "pattern": rule.pattern or None}
     return {name: value for name, value in found.items() if value is not None}

@@ -18,7 +18,7 @@ from common.plan.schema import Rule, nearest
 from common.roles import MASTER
 from laboratories.effects import reading, sites
 from laboratories.effects.effect import Effect, Parameter
-from laboratories.effects.reading import SIGNALS, Fault
+from laboratories.effects.reading import SIGNALS, ReadingFault
 from laboratories.effects.sites import OF_TEST, SITES
 from laboratories.kind import Kind
 from laboratories.kinds import kind_of
@@ -38,7 +38,7 @@ def modules() -> Iterator[dict[str, Any]]:
 
 
 FILES = tuple(modules())
-FAULTS: tuple[Fault, ...] = tuple(file["FAULT"] for file in FILES if "FAULT" in file)
+FAULTS: tuple[ReadingFault, ...] = tuple(file["FAULT"] for file in FILES if "FAULT" in file)
 """What can be wrong with any reading."""
 
 
@@ -74,7 +74,7 @@ def of_kind(kind: Kind, plan: Plan) -> dict[str, Effect]:
     return dict(sorted(found.items(), key=lambda item: places.index(item[1].site)))
 
 
-def readings_of(kind: Kind, plan: Plan) -> dict[str, reading.Signal]:
+def readings_of(kind: Kind, plan: Plan) -> dict[str, reading.SensorSignal]:
     """How large the measured channels of a kind are, by name; `plan` as the role that hosts it sees it."""
     limits = kind.limits(plan)
     return {

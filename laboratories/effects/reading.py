@@ -16,7 +16,7 @@ from models.system import SensorEffects, System
 
 
 @dataclass(frozen=True)
-class Signal:
+class SensorSignal:
     """One reading of a laboratory."""
 
     unit: str
@@ -25,12 +25,12 @@ class Signal:
 
 
 SIGNALS = {
-    "column_displacement": Signal("m", 2e-3, 5e-6),
-    "column_force": Signal("N", 30e3, 100.0),
-    "table_displacement": Signal("m", 20e-3, 10e-6),
-    "table_acceleration": Signal("m/s²", 1.0, 0.01),
-    "damper_stroke": Signal("m", 50e-3, 2e-6),
-    "damper_force": Signal("N", 80.0, 0.2),
+    "column_displacement": SensorSignal("m", 2e-3, 5e-6),
+    "column_force": SensorSignal("N", 30e3, 100.0),
+    "table_displacement": SensorSignal("m", 20e-3, 10e-6),
+    "table_acceleration": SensorSignal("m/s²", 1.0, 0.01),
+    "damper_stroke": SensorSignal("m", 50e-3, 2e-6),
+    "damper_force": SensorSignal("N", 80.0, 0.2),
 }
 TYPICAL = {
     "m": 20e-3,
@@ -42,17 +42,17 @@ QUIET = 1e-3  # noise over that, likewise
 
 
 @dataclass(frozen=True)
-class Fault:
+class ReadingFault:
     """What can be wrong with any reading: the effects `sensor.<signal>.<name>` with one parameter each."""
 
     name: str  # the field of `SensorEffects` that the parameter sets
-    parameter: Callable[[Signal], Parameter]  # the parameter for a signal, with its unit and sizes
+    parameter: Callable[[SensorSignal], Parameter]  # the parameter for a signal, with its unit and sizes
     says: str  # what the effect is, in a few words
     reference: str  # a source or an equation
     in_samples: bool = False  # it is told from single samples, no fit looks for it
     random: bool = False  # it is noise
 
-    def on(self, name: str, signal: Signal) -> Effect:
+    def on(self, name: str, signal: SensorSignal) -> Effect:
         """The effect on the reading of that name."""
         return Effect(
             name=f"sensor.{name}.{self.name}",
@@ -69,11 +69,11 @@ class Fault:
         )
 
 
-def channel(name: str, unit: str, limit: float, noise: float) -> Signal:
+def channel(name: str, unit: str, limit: float, noise: float) -> SensorSignal:
     """A reading of a kind of a user's, sized by its limit or else by its unit; `limit` and `noise` may be 0."""
     usable = limit if 0.0 < limit < math.inf else 0.0
     typical = usable or TYPICAL.get(unit, 1.0)
-    return SIGNALS.get(name) or Signal(unit, typical, noise or QUIET * typical)
+    return SIGNALS.get(name) or SensorSignal(unit, typical, noise or QUIET * typical)
 
 
 def sized(size: float, *shares: float) -> tuple[float, ...]:

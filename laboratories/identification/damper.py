@@ -45,7 +45,7 @@ class DamperFit:
         return self.parameters[name]
 
 
-class Record(NamedTuple):
+class DamperRecord(NamedTuple):
     """Tick by tick what moves a damper, and what it answers; (n,) each."""
 
     command: Array  # N, of the motor
@@ -55,7 +55,9 @@ class Record(NamedTuple):
 
 
 @jit
-def respond(p: Array, interval: float, substeps: int, record: Record, begin: tuple[float, float]) -> None:
+def respond(
+    p: Array, interval: float, substeps: int, record: DamperRecord, begin: tuple[float, float]
+) -> None:
     """Fill stroke (m) and force (N) of a record; `p` in the order of NAMES, `begin` the stroke and its rate (m/s).
 
     Runge-Kutta of fourth order; the motor's lag is exact for its held command, the table's acceleration a
@@ -99,7 +101,7 @@ def response(
     """Stroke (m) and force (N), each (n,), for parameters (6,) in the order of NAMES."""
     stroke, force = np.empty(command.size), np.empty(command.size)
     substeps = max(int(np.ceil(interval / SUBSTEP - 1e-9)), 1)
-    respond(values, interval, substeps, Record(command, ground, stroke, force), (start, rate))
+    respond(values, interval, substeps, DamperRecord(command, ground, stroke, force), (start, rate))
     return stroke, force
 
 

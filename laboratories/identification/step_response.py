@@ -39,7 +39,7 @@ class StepResponse(NamedTuple):
     gain: Estimate  # K
 
 
-class Curve(NamedTuple):
+class RiseCurve(NamedTuple):
     """The smoothed rise: times in s from the ramp's middle, heights as share of the rise."""
 
     base: float  # time of the window's first sample
@@ -162,7 +162,7 @@ def checked_step(command: Array, begin: int) -> float:
     return float(command[begin] - command[begin - 1])
 
 
-def smooth(times: Array, share: Array, noise: float, interval: float, guard: int) -> Curve:
+def smooth(times: Array, share: Array, noise: float, interval: float, guard: int) -> RiseCurve:
     """Fit of the first window behind the onset that the curve follows within the noise, `guard` ticks on."""
     passed = [int(np.argmax(share >= level)) for level in LEVELS]
     crossed = [
@@ -184,7 +184,9 @@ def smooth(times: Array, share: Array, noise: float, interval: float, guard: int
     variance = float(misfit @ misfit) / max(misfit.size - ORDER - 1, 1)
     covariance = np.asarray(np.linalg.pinv(base.T @ base) * variance, dtype=np.float64)
     begin = float(times[first + guard])
-    return Curve(begin, begin - BACK * interval, begin + misfit.size * interval, fade, weights, covariance)
+    return RiseCurve(
+        begin, begin - BACK * interval, begin + misfit.size * interval, fade, weights, covariance
+    )
 
 
 def fit(times: Array, share: Array, first: int, count: int, fade: float) -> tuple[Array, Array, Array]:
@@ -195,7 +197,7 @@ def fit(times: Array, share: Array, first: int, count: int, fade: float) -> tupl
     return weights, base @ weights - share[window], base
 
 
-def heights(curve: Curve, weights: Array, time: Array) -> tuple[Array, Array]:
+def heights(curve: RiseCurve, weights: Array, time: Array) -> tuple[Array, Array]:
     """Height and slope (1/s) of the smoothed rise."""
     x = np.exp(-(time - curve.base) / curve.fade)
     powers = np.arange(ORDER + 1)
@@ -203,7 +205,7 @@ def heights(curve: Curve, weights: Array, time: Array) -> tuple[Array, Array]:
     return table @ weights, -(table * powers) @ weights / curve.fade
 
 
-def draw(curve: Curve, weights: Array) -> Array:
+def draw(curve: RiseCurve, weights: Array) -> Array:
     """L and T of the tangent at the steepest place, sought back to the start level; (2,)."""
     grid = np.linspace(curve.earliest, curve.end, 1500)
     height, slope = heights(curve, weights, grid)
@@ -218,7 +220,7 @@ def draw(curve: Curve, weights: Array) -> Array:
     return np.array([grid[place] - height[place] / steepest, 1.0 / steepest])
 
 
-def read(curve: Curve) -> tuple[float, float, Array]:
+def read(curve: RiseCurve) -> tuple[float, float, Array]:
     """L, T and their gradient by the curve's weights (2, ORDER + 1)."""
     middle = draw(curve, curve.weights)
     gradient = np.empty((2, ORDER + 1))

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from common.errors import InputError
-from common.plan.tables import Damper, Table
+from common.plan.tables import Damper, ShakingTable
 from laboratories.identification import checks, estimate
 from laboratories.identification.estimate import Estimate
 from laboratories.table import model as table_lab
@@ -60,7 +60,7 @@ def respond(lab: table_lab.TableLab, command: Array, result: Array) -> None:
         result[k + 1] = table_lab.advance(lab, command[k], 0.0)[0]
 
 
-def response(command: Array, interval: float, table: Table) -> Array:
+def response(command: Array, interval: float, table: ShakingTable) -> Array:
     """Exact displacement (n,) of the table model to a ramped command that was zero before."""
     lab = table_lab.build(interval, table, Damper())
     result = np.empty(command.size)
@@ -92,7 +92,9 @@ def least_squares(command: Array, displacement: Array, interval: float) -> Table
     spread = float(np.std(displacement))
 
     def model(x: Array) -> Array:
-        table = Table(frequency=float(np.exp(x[0])), damping_ratio=float(np.exp(x[1])), delay=float(x[2]))
+        table = ShakingTable(
+            frequency=float(np.exp(x[0])), damping_ratio=float(np.exp(x[1])), delay=float(x[2])
+        )
         return response(moved, interval, table) + x[3] * spread
 
     def residual(x: Array) -> Array:

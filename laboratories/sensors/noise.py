@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from common.plan.tables import Sensors
+from common.plan.tables import SensorsTable
 from models.registry import Array
 
 LAB_A, LAB_B = 1, 2
@@ -18,7 +18,7 @@ def lab_seed(seed: int, lab: int) -> int:
     return int(np.random.SeedSequence([seed, lab]).generate_state(1)[0])
 
 
-def levels(sensors: Sensors, names: Sequence[str]) -> Array:
+def levels(sensors: SensorsTable, names: Sequence[str]) -> Array:
     """Rms noise that the plan gives the named readings, each in its signal's unit."""
     return np.array([getattr(sensors, name) for name in names])
 

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from common.errors import InputError
-from common.plan.tables import Damper, Table
+from common.plan.tables import Damper, ShakingTable
 from laboratories.column.model import substeps
 from models.compiled import jit
 from models.registry import Array
@@ -51,7 +51,7 @@ class TableLab(NamedTuple):
 
 def build(
     interval: float,
-    table: Table,
+    table: ShakingTable,
     damper: Damper,
     table_effects: TableEffects | None = None,
     damper_effects: DamperEffects | None = None,
@@ -86,7 +86,7 @@ def build(
     )
 
 
-def propagation(length: float, table: Table, damper: Damper, effects: TableEffects) -> Array:
+def propagation(length: float, table: ShakingTable, damper: Damper, effects: TableEffects) -> Array:
     """Propagation over one segment; shape (n, n + 5)."""
     if not math.isinf(table.frequency):
         return lagging_matrix(length, table, damper, effects)
@@ -198,7 +198,7 @@ def damper_rows(a: Array, b: Array, damper: Damper) -> None:
         b[MOTOR, PUSH] = 1.0 / damper.motor_time_constant
 
 
-def lagging_matrix(length: float, table: Table, damper: Damper, effects: TableEffects) -> Array:
+def lagging_matrix(length: float, table: ShakingTable, damper: Damper, effects: TableEffects) -> Array:
     """Propagation over one segment of `length` s behind a table of second order; shape (n, n + 5).
 
     Under the damper's force F the table gives way as if its command were moved by compliance·F.

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from common.plan.plan import Plan
-from common.plan.tables import Sensors
+from common.plan.tables import SensorsTable
 from laboratories.kinds import kinds_of
 from loop.closed_loop import by_role, simulate
 from loop.nominal.partition import matrices
@@ -27,7 +27,7 @@ PULSE = 0.1  # of the first period
 PUSH = 1e-3  # m/s², of the pulse: so small that a specimen keeps its first stiffness
 MOST_TICKS = 200_000  # of the watched motion: 400 s at 2 ms, computed in some hundredths of a second
 METRES = "m"
-SILENT = Sensors(*[0.0] * len(Sensors.__dataclass_fields__))
+SILENT = SensorsTable(*[0.0] * len(SensorsTable.__dataclass_fields__))
 
 
 def unstable(plan: Plan) -> bool:

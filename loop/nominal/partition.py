@@ -22,7 +22,7 @@ from common.roles import MASTER
 from laboratories.kind import Coupling, Follows
 from laboratories.kinds import kind_of, kinds_of
 from loop.nominal import critical
-from loop.nominal.path import NO_PATH, Path, path_at
+from loop.nominal.path import NO_PATH, TransferPath, path_at
 from models import indicators
 from models.registry import Array
 from models.structures import shear_building
@@ -190,7 +190,9 @@ def critical_delay_of(plan: Plan) -> float:
     return critical.critical_delay(*numerical(plan), directions, specimens)
 
 
-def damping_lost(plan: Plan, path: indicators.FrequencyEvaluation | Path, role: str = MASTER) -> float:
+def damping_lost(
+    plan: Plan, path: indicators.FrequencyEvaluation | TransferPath, role: str = MASTER
+) -> float:
     """Damping ratio of the building's first mode that an amplitude and a delay of a specimen's path cost.
 
     Of a specimen `k + jω·c − ω²·m` behind a path `A·e^(−jωd)`: what the spring and the mass lose, as damping
@@ -217,7 +219,7 @@ class Partition(NamedTuple):
     damping_points: float  # damping ratio that the paths cost the first mode, inf where the loop is unstable
     stable: bool = True  # whether every compensated transfer system comes to rest by itself
     role: str = MASTER  # whose path is the latest, the first that is unstable where one is
-    paths: Mapping[str, Path] = {}  # of every laboratory that follows a drift, by role
+    paths: Mapping[str, TransferPath] = {}  # of every laboratory that follows a drift, by role
 
     @property
     def unstable(self) -> bool:

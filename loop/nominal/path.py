@@ -38,7 +38,7 @@ LOWEST = 0.2  # Hz, below which a transfer system is late by as much as there
 FARTHEST = 1e6  # m, from where on the motion has diverged: no laboratory is as large
 
 
-class Path(NamedTuple):
+class TransferPath(NamedTuple):
     """What the path makes of a motion at one frequency."""
 
     amplitude: float  # achieved over target, –
@@ -46,11 +46,11 @@ class Path(NamedTuple):
     stable: bool  # whether the transfer system comes to rest under its compensator, without the building
 
 
-NO_PATH = Path(1.0, 0.0, stable=True)
-UNSTABLE = Path(math.inf, math.inf, stable=False)
+NO_PATH = TransferPath(1.0, 0.0, stable=True)
+UNSTABLE = TransferPath(math.inf, math.inf, stable=False)
 
 
-def path_at(plan: Plan, frequency: float, role: str = MASTER) -> Path:
+def path_at(plan: Plan, frequency: float, role: str = MASTER) -> TransferPath:
     """Amplitude and delay of the path of a role's laboratory for a sine of that frequency (Hz).
 
     The path is the compensated nominal transfer system, the interval that the force of a slave takes to the master, and
@@ -70,7 +70,7 @@ def path_at(plan: Plan, frequency: float, role: str = MASTER) -> Path:
     found = indicators.frequency_evaluation_index(*follow(plan, join([piece], interval), role), interval)
     turns = round((whole - found.delay) * found.frequency)
     delay = found.delay + turns / found.frequency
-    return Path(found.amplitude, delay + interval * waits, stable=True)
+    return TransferPath(found.amplitude, delay + interval * waits, stable=True)
 
 
 def watched(plan: Plan, frequency: float) -> float:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from common.lab.preflight import Check
+from common.lab.preflight import PreflightCheck
 from common.plan import patience
 from common.plan.kinds import TABLE
 from common.plan.plan import Plan
@@ -39,7 +39,7 @@ class Findings(NamedTuple):
     partition: Partition
     peaks: Peaks | None  # None where the simulated loop has no finite command
     unstable: bool  # whether the simulated loop is, so that no peak means anything
-    checks: list[Check]
+    checks: list[PreflightCheck]
 
 
 def findings(plan: Plan) -> Findings:
@@ -53,7 +53,7 @@ def findings(plan: Plan) -> Findings:
     return Findings(found, top, unstable, [partition_check(plan, found), check])
 
 
-def checks(plan: Plan) -> list[Check]:
+def checks(plan: Plan) -> list[PreflightCheck]:
     """Partition and peaks of a plan, for a gate; raises InputError where a model or parameter cannot be."""
     return findings(plan).checks
 
@@ -69,9 +69,9 @@ def expected_delay(plan: Plan, found: Partition) -> float:
     return found.delay + plan.test.interval if found.paths else 0.0
 
 
-def partition_check(plan: Plan, found: Partition) -> Check:
+def partition_check(plan: Plan, found: Partition) -> PreflightCheck:
     """The partition's check, for a gate."""
-    return Check(partition_text(plan, found), partition_risk(plan, found))
+    return PreflightCheck(partition_text(plan, found), partition_risk(plan, found))
 
 
 def partition_risk(plan: Plan, found: Partition) -> Risk | None:
@@ -223,12 +223,12 @@ class Peaks(NamedTuple):
     units: dict[str, str]  # of each
 
 
-def peaks_check(plan: Plan) -> Check:
+def peaks_check(plan: Plan) -> PreflightCheck:
     """The check of the simulated peaks, for a gate."""
     return simulated_peaks(plan)[2]
 
 
-def simulated_peaks(plan: Plan, *, known_unstable: bool = False) -> tuple[Peaks | None, bool, Check]:
+def simulated_peaks(plan: Plan, *, known_unstable: bool = False) -> tuple[Peaks | None, bool, PreflightCheck]:
     """Peaks of the simulated test, whether its loop is unstable, and the check of both.
 
     Of a loop that is `known_unstable`, which another check refuses, only peaks beyond their share are refused.
@@ -237,18 +237,18 @@ def simulated_peaks(plan: Plan, *, known_unstable: bool = False) -> tuple[Peaks 
     columns, finite = simulated(short)
     if not columns[MASTER]["displacement"].size:
         risk = Risk("peaks", "the simulated test has no finite command at all, so look at [structure]")
-        return None, True, Check("", risk)
+        return None, True, PreflightCheck("", risk)
     found = peaks(short, columns)
     grows = not finite or free_motion.unstable(plan)
     if grows and (found.first or not finite or not known_unstable):
         return (
             found,
             True,
-            Check(
+            PreflightCheck(
                 "The peaks are not known, because the simulated loop is unstable", unstable_risk(plan, found)
             ),
         )
-    return found, grows, Check(peaks_text(plan, found, short.ticks), peaks_risk(plan, found))
+    return found, grows, PreflightCheck(peaks_text(plan, found, short.ticks), peaks_risk(plan, found))
 
 
 def simulated(plan: Plan) -> tuple[dict[str, dict[str, Array]], bool]:

@@ -15,7 +15,7 @@ from models.integrators.state import NEXT_DISPLACEMENT
 from models.registry import Array
 
 
-class Whole(NamedTuple):
+class WholeBuilding(NamedTuple):
     """The whole building with its memories, which `march` moves on."""
 
     code: int  # of the integrator
@@ -47,13 +47,15 @@ def response(plan: Plan, ground: Array) -> Array:
     mass = np.diag(M).copy()
     result = np.zeros((plan.ticks, n))
     state = method.start(np.zeros(n), np.zeros(n), -mass * ground[0, 0])
-    numerical = Whole(method.code, method.coefficients, np.ascontiguousarray(K), mass, state, np.zeros(n))
+    numerical = WholeBuilding(
+        method.code, method.coefficients, np.ascontiguousarray(K), mass, state, np.zeros(n)
+    )
     march(numerical, ground, plan.test.interval, result)
     return result
 
 
 @jit
-def march(whole: Whole, ground: Array, interval: float, result: Array) -> None:
+def march(whole: WholeBuilding, ground: Array, interval: float, result: Array) -> None:
     """Fill `result` (ticks, n) m from the ground's acceleration."""
     K, mass, state, balance = whole.K, whole.mass, whole.state, whole.balance
     n = mass.size

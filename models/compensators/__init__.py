@@ -58,17 +58,19 @@ class Compensator:
 
 
 COMPENSATORS = {
-    "none": Compensator(0, none.Params, none.RULES),
-    "pid": Compensator(1, pid.Params, pid.RULES, pid.state),
-    "taylor": Compensator(2, taylor.Params, taylor.RULES),
-    "pid_taylor": Compensator(3, pid_taylor.Params, pid_taylor.RULES, pid.state),
-    "horiuchi": Compensator(4, horiuchi.Params, horiuchi.RULES, horiuchi.state, horiuchi.pack),
-    "inverse": Compensator(5, inverse.Params, inverse.RULES, pack=inverse.pack),
-    "pid_inverse": Compensator(6, pid_inverse.Params, pid_inverse.RULES, pid.state, pid_inverse.pack),
-    "ats": Compensator(7, ats.Params, ats.RULES, ats.state, ats.pack),
-    "pi_lead": Compensator(8, pi_lead.Params, pi_lead.RULES, pi_lead.state, pi_lead.pack),
-    "series": Compensator(9, series.Params, series.RULES),
-    "amb": Compensator(10, amb.Params, amb.RULES, amb.state, amb.pack),
+    "none": Compensator(0, none.NoParams, none.RULES),
+    "pid": Compensator(1, pid.PidParams, pid.RULES, pid.state),
+    "taylor": Compensator(2, taylor.TaylorParams, taylor.RULES),
+    "pid_taylor": Compensator(3, pid_taylor.PidTaylorParams, pid_taylor.RULES, pid.state),
+    "horiuchi": Compensator(4, horiuchi.HoriuchiParams, horiuchi.RULES, horiuchi.state, horiuchi.pack),
+    "inverse": Compensator(5, inverse.InverseParams, inverse.RULES, pack=inverse.pack),
+    "pid_inverse": Compensator(
+        6, pid_inverse.PidInverseParams, pid_inverse.RULES, pid.state, pid_inverse.pack
+    ),
+    "ats": Compensator(7, ats.AtsParams, ats.RULES, ats.state, ats.pack),
+    "pi_lead": Compensator(8, pi_lead.PiLeadParams, pi_lead.RULES, pi_lead.state, pi_lead.pack),
+    "series": Compensator(9, series.SeriesParams, series.RULES),
+    "amb": Compensator(10, amb.AmbParams, amb.RULES, amb.state, amb.pack),
 }
 
 

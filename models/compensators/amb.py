@@ -34,7 +34,7 @@ from models.compiled import jit, jit_apart
 from models.registry import Array
 
 
-class Params(NamedTuple):
+class AmbParams(NamedTuple):
     """Start of the coefficients, exponents of the adaptive gains, and what they learn from."""
 
     a0: float = 0.99254  # –

@@ -36,7 +36,7 @@ from models.compiled import jit
 from models.registry import Array
 
 
-class Params(NamedTuple):
+class AtsParams(NamedTuple):
     """Start of the coefficients, what they learn from, and the bounds they keep."""
 
     lead: float = 0.044  # s; without a lag a₁ starts there, a₂ at lead²/2

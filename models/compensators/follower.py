@@ -10,7 +10,7 @@ from models.compiled import plain
 from models.excitation import ACCELERATION, JERK, POSITION, RATE, Programme
 
 
-class Choice(Protocol):
+class ChosenCompensator(Protocol):
     """A compensator that a plan chooses."""
 
     @property
@@ -27,7 +27,7 @@ class Follower:
 
     def __init__(
         self,
-        chosen: Choice,
+        chosen: ChosenCompensator,
         programme: Programme,
         interval: float,
         table: str = "compensator",

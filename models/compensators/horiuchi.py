@@ -22,7 +22,7 @@ from models.compiled import jit
 from models.registry import Array
 
 
-class Params(NamedTuple):
+class HoriuchiParams(NamedTuple):
     """How far the target is predicted, and by a polynomial of which order."""
 
     delay: float  # τ, s

@@ -21,7 +21,7 @@ from models.compiled import jit
 from models.registry import Array
 
 
-class Params(NamedTuple):
+class InverseParams(NamedTuple):
     """The actuator that is inverted, and the terms kept of its inverse."""
 
     delay: float  # L, s

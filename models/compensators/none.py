@@ -10,7 +10,7 @@ from typing import NamedTuple
 from common.plan.schema import Rule
 
 
-class Params(NamedTuple):
+class NoParams(NamedTuple):
     """No parameters."""
 
 

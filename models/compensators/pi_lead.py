@@ -19,7 +19,7 @@ from models.compiled import jit
 from models.registry import Array
 
 
-class Params(NamedTuple):
+class PiLeadParams(NamedTuple):
     """Gains of the loop, and the lead filter before its summing junction."""
 
     proportional: float = 2.0  # P, –

@@ -18,7 +18,7 @@ from models.registry import Array
 INTEGRAL, PREVIOUS_ERROR = 0, 1
 
 
-class Params(NamedTuple):
+class PidParams(NamedTuple):
     """Gains of the loop."""
 
     proportional: float  # P, –

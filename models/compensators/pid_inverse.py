@@ -17,7 +17,7 @@ from models.compiled import jit
 from models.registry import Array
 
 
-class Params(NamedTuple):
+class PidInverseParams(NamedTuple):
     """Gains of the loop and the actuator inverted; the gains stand first, as `pid` reads them."""
 
     proportional: float  # P, –

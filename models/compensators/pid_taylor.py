@@ -14,7 +14,7 @@ from models.compiled import jit
 from models.registry import Array
 
 
-class Params(NamedTuple):
+class PidTaylorParams(NamedTuple):
     """Gains of the loop and the lead of the feedforward; the gains stand first, as `pid` reads them."""
 
     proportional: float  # P, –

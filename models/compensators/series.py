@@ -19,7 +19,7 @@ from models.compiled import jit
 from models.registry import Array
 
 
-class Params(NamedTuple):
+class SeriesParams(NamedTuple):
     """Factors of the target and of its derivatives."""
 
     a0: float = 0.99254  # –

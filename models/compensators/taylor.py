@@ -15,7 +15,7 @@ from models.compiled import jit
 from models.registry import Array
 
 
-class Params(NamedTuple):
+class TaylorParams(NamedTuple):
     """How far the target is predicted, and by how many terms."""
 
     lead: float  # τ, s

@@ -17,8 +17,8 @@ __all__ = [
     "PARTS",
     "Piece",
     "Programme",
+    "ProgrammeSegment",
     "Reach",
-    "Segment",
     "join",
     "programme",
     "target",
@@ -28,7 +28,7 @@ STILL = 0.5  # s, between pieces
 POSITION, RATE, ACCELERATION, JERK = range(4)
 
 
-class Segment(NamedTuple):
+class ProgrammeSegment(NamedTuple):
     """Where a piece lies: ticks `begin` to `end`, the latter excluded, and what it was made with."""
 
     name: str
@@ -41,7 +41,7 @@ class Programme(NamedTuple):
     """What is asked at every tick."""
 
     motion: Array  # (4, ticks + 1): value (m or N) and its first three derivatives in time
-    segments: tuple[Segment, ...]
+    segments: tuple[ProgrammeSegment, ...]
 
 
 def join(pieces: Sequence[Piece], interval: float, *, still: float = STILL) -> Programme:
@@ -56,7 +56,7 @@ def join(pieces: Sequence[Piece], interval: float, *, still: float = STILL) -> P
             for order in range(1, 4):
                 motion[order] = np.gradient(motion[order - 1], interval)
         parts += [motion, span]
-        segments.append(Segment(piece.name, at, at + count, piece.made_with))
+        segments.append(ProgrammeSegment(piece.name, at, at + count, piece.made_with))
         at += count + span.shape[1]
     return Programme(np.concatenate([*parts, span[:, :1]], axis=1), tuple(segments))
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from common.errors import InputError
 from models.ground_motion.record import STANDARD_GRAVITY, GroundMotion
-from models.ground_motion.source import Source, number, numbers, read_source
+from models.ground_motion.source import MotionFile, number, numbers, read_source
 
 HEADER = 4  # lines
 TITLE, UNITS, SAMPLING = 1, 2, 3  # their indices
@@ -49,7 +49,7 @@ def read_at2(path: Path) -> GroundMotion:
     return GroundMotion(name, source.version, interval, STANDARD_GRAVITY * values)
 
 
-def sampling(source: Source) -> tuple[int, float]:
+def sampling(source: MotionFile) -> tuple[int, float]:
     """Number of points and interval (s) of the fourth line; raises InputError where they are missing or wrong."""
     line, where = source.lines[SAMPLING], source.at(SAMPLING)
     first = VALUES_FIRST.match(line)

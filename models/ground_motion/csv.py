@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from common.errors import InputError
 from models.ground_motion.header import EXAMPLE, UNITS, Header, columns
 from models.ground_motion.record import GroundMotion
-from models.ground_motion.source import Source, number, read_source
+from models.ground_motion.source import MotionFile, number, read_source
 
 UNEVEN = 0.02  # of the interval; times are often written with few digits
 COMMENTS = ("#", "%", "//")
@@ -26,7 +26,7 @@ COMMAS = "write numbers with a decimal point, not with a comma"
 KINDS = {1: "acceleration alone", 2: "time and acceleration"}
 
 
-class Row(NamedTuple):
+class CsvLine(NamedTuple):
     """One line of a file, split into cells."""
 
     line: int  # from 0
@@ -57,7 +57,7 @@ def read_csv(path: Path, dt: float = 0.0, unit: str = "") -> GroundMotion:
     )
 
 
-def parted(source: Source) -> list[Row]:
+def parted(source: MotionFile) -> list[CsvLine]:
     """The lines that hold something, each in its cells; raises InputError where the file holds none."""
     kept = [
         (index, line.strip())
@@ -67,7 +67,7 @@ def parted(source: Source) -> list[Row]:
     if not kept:
         raise InputError(f"{source.path} is empty: {EXAMPLE}.")
     mark = separator([line for _, line in kept])
-    return [Row(index, parts(line, mark)) for index, line in kept]
+    return [CsvLine(index, parts(line, mark)) for index, line in kept]
 
 
 def separator(lines: list[str]) -> str:
@@ -87,7 +87,7 @@ def numeric(cells: list[str]) -> bool:
     return any(NUMBER.fullmatch(cell) or DECIMAL_COMMA.fullmatch(cell) for cell in cells)
 
 
-def split(source: Source, rows: list[Row]) -> tuple[Header, list[Row]]:
+def split(source: MotionFile, rows: list[CsvLine]) -> tuple[Header, list[CsvLine]]:
     """What the header says, and the lines of data, which all have as many cells; a file may do without a header.
 
     Raises:
@@ -121,7 +121,7 @@ def header_cells(line: str, count: int) -> list[str]:
     return [line.strip()]
 
 
-def checked(source: Source, row: Row, count: int) -> None:
+def checked(source: MotionFile, row: CsvLine, count: int) -> None:
     """Raise InputError where a line of data has not its one or two cells, or has decimal commas."""
     place, cells = source.at(row.line), row.cells
     if any(DECIMAL_COMMA.fullmatch(cell) for cell in cells):
@@ -138,7 +138,7 @@ def checked(source: Source, row: Row, count: int) -> None:
     )
 
 
-def agreed_unit(source: Source, header: Header, unit: str) -> str:
+def agreed_unit(source: MotionFile, header: Header, unit: str) -> str:
     """The unit of the acceleration; raises InputError where file and plan say two."""
     if header.unit and unit and UNITS[header.unit] != UNITS[unit]:
         raise InputError(
@@ -149,7 +149,7 @@ def agreed_unit(source: Source, header: Header, unit: str) -> str:
 
 
 def interval_of(
-    source: Source, header: Header, data: list[Row], values: NDArray[np.float64], dt: float
+    source: MotionFile, header: Header, data: list[CsvLine], values: NDArray[np.float64], dt: float
 ) -> float:
     """Interval (s) of a record; raises InputError where nothing says it, or two things say two."""
     if header.time is None:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from common.errors import InputError
 from models.ground_motion.record import GAL, GroundMotion
-from models.ground_motion.source import Source, number, numbers, read_source
+from models.ground_motion.source import MotionFile, number, numbers, read_source
 
 HEADER = 17  # lines
 ORIGIN, STATION = "Origin Time", "Station Code"
@@ -64,7 +64,7 @@ def announced(points: float) -> int:
     return round(points) if math.isfinite(points) else -1
 
 
-def field(source: Source, name: str) -> str:
+def field(source: MotionFile, name: str) -> str:
     """Value of one header line; raises InputError where the line is not the one of that name."""
     index = LINES[name]
     line = source.lines[index] if index < len(source.lines) else ""
@@ -76,7 +76,7 @@ def field(source: Source, name: str) -> str:
     return line.removeprefix(name).strip()
 
 
-def positive(source: Source, name: str, match: re.Match[str] | None) -> list[float]:
+def positive(source: MotionFile, name: str, match: re.Match[str] | None) -> list[float]:
     """The numbers of a matched header value; raises InputError where nothing matched or one is not above 0."""
     where = source.at(LINES[name])
     values = [number(word, where) for word in match.groups()] if match else [0.0]

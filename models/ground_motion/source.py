@@ -14,7 +14,7 @@ from common.errors import InputError
 
 
 @dataclass(frozen=True)
-class Source:
+class MotionFile:
     """The lines of a file and a digest of its content."""
 
     path: Path
@@ -31,7 +31,7 @@ class Source:
         return f"{self.path}:{index + 1}"
 
 
-def read_source(path: Path) -> Source:
+def read_source(path: Path) -> MotionFile:
     """The file's lines; a byte order mark is dropped and bytes that are not UTF-8 are replaced.
 
     Raises:
@@ -43,7 +43,7 @@ def read_source(path: Path) -> Source:
         raise InputError(f"Cannot read ground motion {path}: {error.strerror}; check the path.") from None
     text = content.decode("utf-8-sig", errors="replace")
     digest = hashlib.blake2b(content, digest_size=4).hexdigest()
-    return Source(path, tuple(text.splitlines()), digest)
+    return MotionFile(path, tuple(text.splitlines()), digest)
 
 
 def printable(text: str) -> str:
@@ -66,7 +66,7 @@ def number(word: str, where: str) -> float:
     return value
 
 
-def numbers(source: Source, start: int) -> NDArray[np.float64]:
+def numbers(source: MotionFile, start: int) -> NDArray[np.float64]:
     """All values, separated by blanks, in the lines from index `start` on.
 
     Raises:

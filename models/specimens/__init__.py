@@ -26,7 +26,7 @@ def no_fault(_params: Any) -> str:
 
 
 @dataclass(frozen=True)
-class Specimen:
+class SpecimenModel:
     """One model: its code in `step`, its parameters with their ranges, the length of its memory."""
 
     name: str
@@ -40,11 +40,13 @@ class Specimen:
 SPECIMENS = {
     model.name: model
     for model in (
-        Specimen("linear", 0, linear.Params, linear.RULES, linear.STATE_SIZE),
-        Specimen("bilinear", 1, bilinear.Params, bilinear.RULES, bilinear.STATE_SIZE),
-        Specimen("bouc_wen", 2, bouc_wen.Params, bouc_wen.RULES, bouc_wen.STATE_SIZE, bouc_wen.fault),
-        Specimen("clough", 3, clough.Params, clough.RULES, clough.STATE_SIZE, clough.fault),
-        Specimen("bwbn", 4, bwbn.Params, bwbn.RULES, bwbn.STATE_SIZE, bwbn.fault),
+        SpecimenModel("linear", 0, linear.LinearParams, linear.RULES, linear.STATE_SIZE),
+        SpecimenModel("bilinear", 1, bilinear.BilinearParams, bilinear.RULES, bilinear.STATE_SIZE),
+        SpecimenModel(
+            "bouc_wen", 2, bouc_wen.BoucWenParams, bouc_wen.RULES, bouc_wen.STATE_SIZE, bouc_wen.fault
+        ),
+        SpecimenModel("clough", 3, clough.CloughParams, clough.RULES, clough.STATE_SIZE, clough.fault),
+        SpecimenModel("bwbn", 4, bwbn.BwbnParams, bwbn.RULES, bwbn.STATE_SIZE, bwbn.fault),
     )
 }
 STATE_SIZE = max(model.state_size for model in SPECIMENS.values())

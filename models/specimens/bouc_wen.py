@@ -24,7 +24,7 @@ from models.compiled import jit
 from models.registry import Array
 
 
-class Params(NamedTuple):
+class BoucWenParams(NamedTuple):
     """Parameters, in the order of the kernel's array."""
 
     stiffness: float  # k, N/m
@@ -52,7 +52,7 @@ STEEPNESS = 0.05  # longest substep times the steepest slope; global error of z 
 SETTLED = 1e-16  # change per substep from which on z has reached its bound
 
 
-def fault(p: Params) -> str:
+def fault(p: BoucWenParams) -> str:
     """What is wrong with parameters that are each in their range, or nothing."""
     if p.beta + p.gamma <= 0.0:
         return f"beta + gamma is {p.beta + p.gamma:g}, but must be above 0, or the force has no bound"

@@ -29,7 +29,7 @@ from models.compiled import jit
 from models.registry import Array
 
 
-class Params(NamedTuple):
+class BwbnParams(NamedTuple):
     """Parameters, in the order of the kernel's array."""
 
     stiffness: float  # k, N/m
@@ -74,7 +74,7 @@ STEEPNESS = 0.05  # longest substep times the steepest slope; global error of z 
 MOST = 4000  # substeps of one increment
 
 
-def fault(p: Params) -> str:
+def fault(p: BwbnParams) -> str:
     """What is wrong with parameters that are each in their range, or nothing."""
     if p.beta + p.gamma <= 0.0:
         return f"beta + gamma is {p.beta + p.gamma:g}, but must be above 0, or the force has no bound"

@@ -28,7 +28,7 @@ from models.compiled import jit
 from models.registry import Array
 
 
-class Params(NamedTuple):
+class CloughParams(NamedTuple):
     """Parameters, in the order of the kernel's array."""
 
     stiffness: float  # k, N/m
@@ -53,7 +53,7 @@ DEFORMATION, HYSTERETIC, TOP, BOTTOM = range(4)  # δ (m), h (N) and both peaks 
 STATE_SIZE = 4
 
 
-def fault(p: Params) -> str:
+def fault(p: CloughParams) -> str:
     """What is wrong with parameters that are each in their range, or nothing."""
     if p.closing > 0.0 and p.crack_displacement <= 0.0:
         return "closing is above 0, so crack_displacement must be, too"

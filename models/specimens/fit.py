@@ -39,7 +39,7 @@ WIDEST = 50.0  # bound on the logarithm of a factor between estimate and interva
 
 
 @dataclass(frozen=True)
-class Range:
+class SearchRange:
     """Where a parameter is sought, and from which values; `unit` is what they are multiples of."""
 
     low: float
@@ -50,7 +50,7 @@ class Range:
 
 
 @dataclass(frozen=True)
-class Fit:
+class SpecimenFit:
     """A fitted model: parameters, misfit `rms(f − f̂)/rms(f)`, and their 95 % intervals."""
 
     model: str
@@ -59,11 +59,11 @@ class Fit:
     intervals: dict[str, tuple[float, float]]
 
 
-STIFFNESS = Range(0.2, 100.0, (1.2, 3.0), "secant")
-YIELDING = Range(0.002, 5.0, (0.25, 0.6), "reach")
-HARDENING = Range(0.0, 0.95, (0.05, 0.3), log=False)
-SHARPNESS = Range(1.0, 20.0, (1.5,))
-SHARE = Range(0.005, 3.0, (0.1, 0.5))
+STIFFNESS = SearchRange(0.2, 100.0, (1.2, 3.0), "secant")
+YIELDING = SearchRange(0.002, 5.0, (0.25, 0.6), "reach")
+HARDENING = SearchRange(0.0, 0.95, (0.05, 0.3), log=False)
+SHARPNESS = SearchRange(1.0, 20.0, (1.5,))
+SHARE = SearchRange(0.005, 3.0, (0.1, 0.5))
 ROUND = {
     "stiffness": STIFFNESS,
     "yield_displacement": YIELDING,
@@ -71,7 +71,7 @@ ROUND = {
     "n": SHARPNESS,
     "beta": SHARE,
 }
-FREE: dict[str, dict[str, Range]] = {
+FREE: dict[str, dict[str, SearchRange]] = {
     "linear": {"stiffness": STIFFNESS},
     "bilinear": {"stiffness": STIFFNESS, "yield_displacement": YIELDING, "hardening": HARDENING},
     "bouc_wen": ROUND,
@@ -79,20 +79,20 @@ FREE: dict[str, dict[str, Range]] = {
         "stiffness": STIFFNESS,
         "yield_displacement": YIELDING,
         "hardening": HARDENING,
-        "unloading": Range(0.0, 1.0, (0.2, 0.6), log=False),
-        "crack_displacement": Range(0.002, 1.0, (0.1, 0.2), "reach"),
-        "closing": Range(0.0, 0.95, (0.05, 0.3), log=False),
+        "unloading": SearchRange(0.0, 1.0, (0.2, 0.6), log=False),
+        "crack_displacement": SearchRange(0.002, 1.0, (0.1, 0.2), "reach"),
+        "closing": SearchRange(0.0, 0.95, (0.05, 0.3), log=False),
     },
     "bwbn": ROUND
     | {
-        "delta_nu": Range(1e-5, 10.0, (0.003, 0.1)),
-        "delta_eta": Range(1e-5, 10.0, (0.003, 0.1)),
-        "zeta_s": Range(0.0, 0.99, (0.3,), log=False),
-        "q": Range(-1.0, 1.0, (0.1,), log=False),
-        "p": Range(1e-4, 50.0, (0.1,)),
-        "psi": Range(0.02, 5.0, (0.3,)),
-        "delta_psi": Range(1e-6, 5.0, (0.005,)),
-        "lambda_": Range(0.01, 5.0, (0.5,)),
+        "delta_nu": SearchRange(1e-5, 10.0, (0.003, 0.1)),
+        "delta_eta": SearchRange(1e-5, 10.0, (0.003, 0.1)),
+        "zeta_s": SearchRange(0.0, 0.99, (0.3,), log=False),
+        "q": SearchRange(-1.0, 1.0, (0.1,), log=False),
+        "p": SearchRange(1e-4, 50.0, (0.1,)),
+        "psi": SearchRange(0.02, 5.0, (0.3,)),
+        "delta_psi": SearchRange(1e-6, 5.0, (0.005,)),
+        "lambda_": SearchRange(0.01, 5.0, (0.5,)),
     },
 }
 
@@ -112,7 +112,9 @@ def forces(model: str, parameters: Mapping[str, float], path: Array) -> Array:
     return force
 
 
-def fit(model: str, deformation: Array, force: Array, start: Mapping[str, float] | None = None) -> Fit:
+def fit(
+    model: str, deformation: Array, force: Array, start: Mapping[str, float] | None = None
+) -> SpecimenFit:
     """Parameters of `model` with which it follows a path of deformation (m) and force (N) from rest.
 
     `start` are parameters to start from instead of the fixed points, by name; what it leaves out is theirs.
@@ -144,7 +146,7 @@ def fit(model: str, deformation: Array, force: Array, start: Mapping[str, float]
     best = min(found, key=lambda solution: float(solution.cost))
     values = parameters(model, best.x, units)
     gap = forces(model, values, path) - measured
-    return Fit(
+    return SpecimenFit(
         model,
         values,
         math.sqrt(float(np.mean(gap**2))) / rms,
@@ -190,7 +192,7 @@ def thinned(path: Array, most: int) -> NDArray[np.intp]:
     return np.unique([0, path.size - 1, *np.ravel(pairs)]).astype(np.intp)
 
 
-def bounds(ranges: Mapping[str, Range]) -> tuple[Array, Array]:
+def bounds(ranges: Mapping[str, SearchRange]) -> tuple[Array, Array]:
     """Lowest and highest of what is sought."""
     low = [math.log(item.low) if item.log else item.low for item in ranges.values()]
     high = [math.log(item.high) if item.log else item.high for item in ranges.values()]

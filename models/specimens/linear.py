@@ -9,7 +9,7 @@ from models.compiled import jit
 from models.registry import Array
 
 
-class Params(NamedTuple):
+class LinearParams(NamedTuple):
     """Parameters, in the order of the kernel's array."""
 
     stiffness: float  # N/m

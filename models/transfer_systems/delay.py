@@ -20,7 +20,7 @@ from models.compiled import jit
 from models.registry import Array
 
 
-class Segments(NamedTuple):
+class DelaySegments(NamedTuple):
     """How an interval is split, and the delayed command at each border."""
 
     lengths: Array  # (m,) s
@@ -28,7 +28,7 @@ class Segments(NamedTuple):
     memory: int  # length of that history
 
 
-def split(interval: float, delay: float, substeps: int = 1, *, held: bool = False) -> Segments:
+def split(interval: float, delay: float, substeps: int = 1, *, held: bool = False) -> DelaySegments:
     """Segments of one interval (s) for a dead time (s), with the borders of equal substeps among them.
 
     History index 0 is the command written at the present tick, reached at the interval's end. At the
@@ -45,7 +45,7 @@ def split(interval: float, delay: float, substeps: int = 1, *, held: bool = Fals
     if held:
         middles = [0.5 * (early + late) for early, late in pairwise(shares)]
         steps = [max(math.ceil(whole + (rest if rest > 1e-9 else 0.0) - share), 0) for share in middles]
-        return Segments(
+        return DelaySegments(
             np.diff(shares) * interval, np.array([(index, 0.0) for index in (steps[0], *steps)]), whole + 3
         )
     places = [1.0 + lag - share for share in shares]
@@ -53,7 +53,7 @@ def split(interval: float, delay: float, substeps: int = 1, *, held: bool = Fals
         places = [1.0 + whole - share for share in shares]
     taps = [(min(math.floor(place + 1e-12), whole + 1), place) for place in places]
     table = np.array([(index, max(place - index, 0.0)) for index, place in taps])
-    return Segments(np.diff(shares) * interval, table, whole + 3)
+    return DelaySegments(np.diff(shares) * interval, table, whole + 3)
 
 
 @jit

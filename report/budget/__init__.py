@@ -9,13 +9,13 @@ from pathlib import Path
 
 from common.recording.reader import read
 from report.budget.figures import figures
-from report.budget.judge import Report, judge
+from report.budget.judge import BudgetReport, judge
 from report.budget.limits import load
 
-__all__ = ["Report", "assess"]
+__all__ = ["BudgetReport", "assess"]
 
 
-def assess(recording: str | Path, budget: str | Path | None = None) -> Report:
+def assess(recording: str | Path, budget: str | Path | None = None) -> BudgetReport:
     """The verdict on a recording, by the budget that ships where none is given.
 
     Raises:

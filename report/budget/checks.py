@@ -13,8 +13,8 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from report.budget.figures import Bare, Exchange, measured
-from report.budget.limits import PERCENTILES, WAITS, Budget, Late, Machine
+from report.budget.figures import Bare, ExchangeTicks, measured
+from report.budget.limits import PERCENTILES, WAITS, Budget, LateLimits, MachineLimits
 
 OK, OVER, DOUBT, SHORT = "ok", "over", "doubt", "short"
 WAKE, SUM = "wake_lateness", "round_trip"
@@ -24,7 +24,7 @@ EPSILON = 1e-9  # s or values: rounding is no excess
 
 
 @dataclass(frozen=True)
-class Check:
+class BudgetCheck:
     """One limit and what was found: s, a share or ticks; `bare` is the bare loop's own, None where none ran.
 
     `calm` says that, over its limit, it was judged without the ticks in which the master stood still.
@@ -40,7 +40,7 @@ class Check:
     calm: bool = False
 
 
-def checks_of(item: Exchange, budget: Budget, bare: Bare | None) -> Iterator[Check]:
+def checks_of(item: ExchangeTicks, budget: Budget, bare: Bare | None) -> Iterator[BudgetCheck]:
     """The checks of the master's ticks with one slave."""
     for segment, limits in budget.segments.items():
         if segment in item.segments:
@@ -49,7 +49,9 @@ def checks_of(item: Exchange, budget: Budget, bare: Bare | None) -> Iterator[Che
     yield from late_checks(item, budget.late, bare, budget.machine)
 
 
-def late_checks(item: Exchange, late: Late, bare: Bare | None, machine: Machine) -> Iterator[Check]:
+def late_checks(
+    item: ExchangeTicks, late: LateLimits, bare: Bare | None, machine: MachineLimits
+) -> Iterator[BudgetCheck]:
     """The checks of late and missed ticks; what was not recorded is not judged.
 
     Two waits of half an interval make a tick late, one of an interval makes the master miss it.
@@ -64,12 +66,12 @@ def late_checks(item: Exchange, late: Late, bare: Bare | None, machine: Machine)
         gap, stall = longest_run(item.late), bare.longest_gap if bare else None
         allowed = late.longest_gap + (stall or 0)
         verdict = OVER if gap > allowed else OK
-        yield Check(item.label("longest gap"), "ticks", gap, stall, late.longest_gap, allowed, verdict)
+        yield BudgetCheck(item.label("longest gap"), "ticks", gap, stall, late.longest_gap, allowed, verdict)
 
 
 def percentile_check(
-    item: Exchange, segment: str, name: str, limit: float, bare: Bare | None, machine: Machine
-) -> Check:
+    item: ExchangeTicks, segment: str, name: str, limit: float, bare: Bare | None, machine: MachineLimits
+) -> BudgetCheck:
     """A percentile of one segment against its limit, with what the bare loop adds for its waits."""
     values = measured(item.segments[segment])
     value, admitted = float(np.percentile(values, PERCENTILES[name])), 1.0 - PERCENTILES[name] / 100.0
@@ -81,11 +83,11 @@ def percentile_check(
     elif value > allowed + EPSILON:
         verdict = DOUBT if bare and explained(item, segment, limit, allowed, admitted, bare) else OVER
     calm = bare is not None and segment != WAKE
-    return Check(item.label(f"{segment} {name}"), "s", value, own, limit, allowed, verdict, calm)
+    return BudgetCheck(item.label(f"{segment} {name}"), "s", value, own, limit, allowed, verdict, calm)
 
 
 def explained(
-    item: Exchange, segment: str, limit: float, allowed: float, admitted: float, bare: Bare
+    item: ExchangeTicks, segment: str, limit: float, allowed: float, admitted: float, bare: Bare
 ) -> bool:
     """Whether the machine may have taken so many ticks beyond what is allowed that the rest are no more than admitted.
 
@@ -106,15 +108,15 @@ def explained(
 
 
 def share_check(
-    label: str, flags: NDArray[np.bool_], limit: float, own: float | None, waits: int, machine: Machine
-) -> Iterator[Check]:
+    label: str, flags: NDArray[np.bool_], limit: float, own: float | None, waits: int, machine: MachineLimits
+) -> Iterator[BudgetCheck]:
     """A share of ticks against its limit, with the bare loop's own share per wait; no check where there is no limit."""
     if not np.isfinite(limit):
         return
     value, noise = float(np.mean(flags)), waits * (own or 0.0)
     allowed = limit + min(noise, machine.share)
     verdict = OK if value <= allowed else DOUBT if value <= limit + noise else OVER
-    yield Check(label, "share", value, own, limit, allowed, verdict)
+    yield BudgetCheck(label, "share", value, own, limit, allowed, verdict)
 
 
 def longest_run(flags: NDArray[np.bool_]) -> int:

@@ -73,7 +73,7 @@ class Bare:
 
 
 @dataclass(frozen=True)
-class Exchange:
+class ExchangeTicks:
     """The ticks of the master with one slave; `name` is empty where there is only one.
 
     A tick without a row of latency counts as late, for nothing shows that it had an answer.
@@ -110,7 +110,7 @@ class Figures:
     """All of a recording that a budget is about; `stolen` and `schedulers` by laboratory."""
 
     recording: str
-    exchanges: list[Exchange]
+    exchanges: list[ExchangeTicks]
     bare: Bare | None = None
     stolen: dict[str, float] = field(default_factory=dict)
     schedulers: dict[str, str] = field(default_factory=dict)
@@ -181,7 +181,7 @@ def expected(run: Run, topic: str, ticks: Values) -> Values:
     return due
 
 
-def exchange(run: Run, topic: str, ticks: Values) -> Exchange:
+def exchange(run: Run, topic: str, ticks: Values) -> ExchangeTicks:
     """The latency of one topic, its rows in order, with those of `ticks` (rising) that it lacks."""
     columns = run.columns[topic] if run.has(topic) else {}
     found = numbers(run, topic)
@@ -194,7 +194,7 @@ def exchange(run: Run, topic: str, ticks: Values) -> Exchange:
 
     segments = {name: per_tick(name, np.nan) for name in WAITS if name in columns}
     late = per_tick("deadline_missed", True).astype(bool) if "deadline_missed" in columns else None
-    return Exchange(
+    return ExchangeTicks(
         name=name_of(topic),
         ticks=order.size,
         unrecorded=absent.size,
@@ -231,7 +231,7 @@ def bare_loop(record: Mapping[str, str]) -> Bare | None:
     return Bare(int(known["ticks"]), int(known["late"]), known["interval"], percentiles, known["max"])
 
 
-def warnings(run: Run, ticks: Values, exchanges: list[Exchange]) -> list[str]:
+def warnings(run: Run, ticks: Values, exchanges: list[ExchangeTicks]) -> list[str]:
     """Why the figures are not those of the whole test, a sentence each; `ticks` have a row of the master's."""
     found = [] if run.finished else ["The recording was cut off before its end: judged as far as it goes."]
     if clock_of(run) == VIRTUAL:

@@ -13,22 +13,22 @@ from typing import Any
 import numpy as np
 
 from common.errors import InputError
-from report.budget.checks import DOUBT, LEAST_BEYOND, OK, OVER, SHORT, Check, checks_of, longest_run
-from report.budget.figures import Exchange, Figures, measured
-from report.budget.limits import PERCENTILES, Budget, Machine
+from report.budget.checks import DOUBT, LEAST_BEYOND, OK, OVER, SHORT, BudgetCheck, checks_of, longest_run
+from report.budget.figures import ExchangeTicks, Figures, measured
+from report.budget.limits import PERCENTILES, Budget, MachineLimits
 from report.text.formats import percent
 
 WITHIN, NOT_JUDGED = "within", "not_judged"
 
 
 @dataclass(frozen=True)
-class Report:
+class BudgetReport:
     """A recording judged; `str()` is the table, `plain()` what `--json` writes."""
 
     status: str
     figures: Figures
     budget: Budget
-    checks: list[Check]
+    checks: list[BudgetCheck]
     doubts: list[str]
     warnings: list[str]
 
@@ -62,7 +62,7 @@ class Report:
         }
 
 
-def judge(found: Figures, budget: Budget) -> Report:
+def judge(found: Figures, budget: Budget) -> BudgetReport:
     """Judge figures against a budget.
 
     Raises:
@@ -81,19 +81,21 @@ def judge(found: Figures, budget: Budget) -> Report:
     verdicts = {check.verdict for check in checks}
     unknown = DOUBT in verdicts or verdicts == {SHORT}
     status = OVER if OVER in verdicts else NOT_JUDGED if unknown else WITHIN
-    return Report(status, found, budget, checks, doubts, found.warnings + remarks(found, budget, checks))
+    return BudgetReport(
+        status, found, budget, checks, doubts, found.warnings + remarks(found, budget, checks)
+    )
 
 
-def excused(check: Check, *, unfit: bool) -> Check:
+def excused(check: BudgetCheck, *, unfit: bool) -> BudgetCheck:
     """The check on an unsteady machine, where those of messages alone stand, or on an unfit one, where none does."""
     stands = check.verdict != OVER or (check.calm and not unfit)
     return check if stands else replace(check, verdict=DOUBT)
 
 
-def silence(item: Exchange) -> Check:
+def silence(item: ExchangeTicks) -> BudgetCheck:
     """The check that a slave without a row of latency fails: no tick may be without where all are."""
     ticks = float(item.ticks)
-    return Check(item.label("ticks without latency"), "ticks", ticks, None, 0.0, 0.0, OVER)
+    return BudgetCheck(item.label("ticks without latency"), "ticks", ticks, None, 0.0, 0.0, OVER)
 
 
 def limited(budget: Budget) -> list[str]:
@@ -101,7 +103,7 @@ def limited(budget: Budget) -> list[str]:
     return [*budget.segments, *budget.plain()["late"]]
 
 
-def unfitness(found: Figures, machine: Machine) -> list[str]:
+def unfitness(found: Figures, machine: MachineLimits) -> list[str]:
     """Why nothing over its limit is judged, a sentence each; none where the machine is fit."""
     said = [
         f"The host took {percent(share, 1)} of the processors' time of the {lab}: "
@@ -117,7 +119,7 @@ def unfitness(found: Figures, machine: Machine) -> list[str]:
     return said
 
 
-def unsteadiness(found: Figures, machine: Machine) -> list[str]:
+def unsteadiness(found: Figures, machine: MachineLimits) -> list[str]:
     """A sentence if the bare loop was held up too often to judge the master's wake-ups, else none."""
     if late_share(found) <= machine.standstill_share:
         return []
@@ -132,7 +134,7 @@ def late_share(found: Figures) -> float:
     return found.bare.late_share if found.bare else 0.0
 
 
-def percentiles(item: Exchange) -> dict[str, dict[str, float | int]]:
+def percentiles(item: ExchangeTicks) -> dict[str, dict[str, float | int]]:
     """Percentiles, maximum (s) and count of every segment that was measured."""
     return {
         item.label(name): {key: float(np.percentile(values, rank)) for key, rank in PERCENTILES.items()}
@@ -141,7 +143,7 @@ def percentiles(item: Exchange) -> dict[str, dict[str, float | int]]:
     }
 
 
-def counts(item: Exchange) -> dict[str, float | int]:
+def counts(item: ExchangeTicks) -> dict[str, float | int]:
     """Late and missed ticks, their shares, and the longest run of late ones; what was not recorded is left out."""
     found: dict[str, float | int] = {"ticks": item.ticks}
     if item.late is not None:
@@ -155,7 +157,7 @@ def counts(item: Exchange) -> dict[str, float | int]:
     return found
 
 
-def remarks(found: Figures, budget: Budget, checks: list[Check]) -> list[str]:
+def remarks(found: Figures, budget: Budget, checks: list[BudgetCheck]) -> list[str]:
     """What was not judged, or judged with less data than the budget assumes, a sentence each."""
     said = []
     if gone := [name for item in found.exchanges if not item.silent for name in absent(item, budget)]:
@@ -167,7 +169,7 @@ def remarks(found: Figures, budget: Budget, checks: list[Check]) -> list[str]:
     return said
 
 
-def absent(item: Exchange, budget: Budget) -> list[str]:
+def absent(item: ExchangeTicks, budget: Budget) -> list[str]:
     """What the budget limits and no tick has a value of."""
     late = budget.late
     names = [name for name in budget.segments if name not in item.segments]

@@ -29,14 +29,14 @@ WAITS = {  # segments, in the order of a tick, and for how many threads each wai
 
 
 @dataclass(frozen=True)
-class Segment:
+class SegmentLimits:
     """Limits on percentiles of one segment, s."""
 
     percentiles: dict[str, float] = key("limits by percentile", default={}, more=True)
 
 
 @dataclass(frozen=True)
-class Late:
+class LateLimits:
     """Limits on ticks that were late; inf for none."""
 
     share: float = key("share of late ticks", default=math.inf, least=0.0, most=1.0, infinite=True)
@@ -47,7 +47,7 @@ class Late:
 
 
 @dataclass(frozen=True)
-class Machine:
+class MachineLimits:
     """What is attributed to the machine, not to the test."""
 
     lateness: float = key("most that the bare loop adds to a limit", default=0.3e-3, unit="s", least=0.0)
@@ -65,8 +65,8 @@ class Budget:
 
     name: str = "default"
     segments: dict[str, dict[str, float]] = field(default_factory=dict)
-    late: Late = Late()
-    machine: Machine = Machine()
+    late: LateLimits = LateLimits()
+    machine: MachineLimits = MachineLimits()
 
     def plain(self) -> dict[str, Any]:
         """The budget as plain values, without the limits that it does not set."""
@@ -74,7 +74,7 @@ class Budget:
         return {"name": self.name, **self.segments, "late": late, "machine": values(self.machine)}
 
 
-def values(table: Late | Machine) -> dict[str, float]:
+def values(table: LateLimits | MachineLimits) -> dict[str, float]:
     """The numbers of a table by name."""
     return {field.name: getattr(table, field.name) for field in table_fields(table)}
 
@@ -111,8 +111,8 @@ def from_tables(tables: Mapping[str, Any], name: str = "of the caller") -> Budge
     budget = Budget(
         name,
         {segment: percentiles(tables[segment], segment) for segment in WAITS if segment in tables},
-        fill(Late, tables.get("late", {}), "late"),
-        fill(Machine, tables.get("machine", {}), "machine"),
+        fill(LateLimits, tables.get("late", {}), "late"),
+        fill(MachineLimits, tables.get("machine", {}), "machine"),
     )
     limited = any(budget.segments.values()) or any(map(math.isfinite, values(budget.late).values()))
     if not limited:
@@ -124,7 +124,7 @@ def percentiles(table: object, segment: str) -> dict[str, float]:
     """The limits of one segment, by percentile in rising order; raises PlanError."""
     if isinstance(table, Mapping) and isinstance(table.get("p99"), Mapping):
         raise PlanError(f'p99.9 in [{segment}] must be written in quotes: "p99.9" = 1e-3.')
-    given = fill(Segment, table, segment).percentiles
+    given = fill(SegmentLimits, table, segment).percentiles
     for name, value in given.items():
         if name not in PERCENTILES:
             raise PlanError(f"Unknown key '{name}' in [{segment}]: {nearest(name, PERCENTILES)}")

@@ -5,8 +5,8 @@ from __future__ import annotations
 import io
 
 from common.terminal.printable import shown
-from report.budget.checks import DOUBT, OVER, Check
-from report.budget.judge import NOT_JUDGED, WITHIN, Report, counts, percentiles
+from report.budget.checks import DOUBT, OVER, BudgetCheck
+from report.budget.judge import NOT_JUDGED, WITHIN, BudgetReport, counts, percentiles
 from report.budget.limits import PERCENTILES
 from report.facts.circumstances import NO_LATENCY
 from report.text.formats import percent
@@ -19,7 +19,7 @@ ENDS = {
 }
 
 
-def text(report: Report) -> str:
+def text(report: BudgetReport) -> str:
     """Figures, checks, remarks and the verdict, for a terminal; a sentence where nothing was measured and all fits."""
     if report.figures.virtual and report.status == WITHIN:
         return shown(unmeasured(report)) + "\n"
@@ -45,7 +45,7 @@ def text(report: Report) -> str:
     return stream.getvalue()
 
 
-def unmeasured(report: Report) -> str:
+def unmeasured(report: BudgetReport) -> str:
     """What a recording in virtual time says of its budget."""
     return (
         f"{NO_LATENCY}; by the interval and the link's model alone {report.figures.recording} "
@@ -53,19 +53,19 @@ def unmeasured(report: Report) -> str:
     )
 
 
-def verdict(report: Report) -> str:
+def verdict(report: BudgetReport) -> str:
     """The verdict in one line, with what is over, else in doubt."""
     wanted = OVER if report.status == OVER else DOUBT
     named = [check.name for check in report.checks if check.verdict == wanted]
     return ENDS[report.status] + (f": {', '.join(named)}" if named else "")
 
 
-def ticks(report: Report) -> str:
+def ticks(report: BudgetReport) -> str:
     """How many ticks were judged."""
     return ", ".join(item.label(f"{item.ticks} ticks") for item in report.figures.exchanges)
 
 
-def figure_rows(report: Report) -> list[list[str]]:
+def figure_rows(report: BudgetReport) -> list[list[str]]:
     """Percentiles of the segments and of the bare loop, µs."""
     columns = [*PERCENTILES, "max"]
     rows = [["latency, µs", *columns]]
@@ -82,7 +82,7 @@ def micro(values: object) -> list[str]:
     return [f"{value * 1e6:.0f}" for value in values]  # type: ignore[attr-defined]
 
 
-def check_rows(checks: list[Check]) -> list[list[str]]:
+def check_rows(checks: list[BudgetCheck]) -> list[list[str]]:
     """The checks."""
     rows = [["check", "value", "bare loop", "limit", "allowed", ""]]
     for check in checks:
@@ -101,7 +101,7 @@ def amount(value: float, unit: str) -> str:
     return f"{value:g} tick{'s' * (value != 1)}"
 
 
-def late(report: Report) -> str:
+def late(report: BudgetReport) -> str:
     """Late ticks of the test and of the bare loop, a line."""
     parts = []
     for item in report.figures.exchanges:

@@ -17,7 +17,7 @@ from common.roles import MASTER, SLAVE
 from report.facts.laboratories import laboratories
 
 
-class Account(NamedTuple):
+class MessageAccount(NamedTuple):
     """Messages of one direction: those of the sender by their fate, and at least how many others came."""
 
     sent: int
@@ -27,7 +27,7 @@ class Account(NamedTuple):
     foreign: int
 
 
-def account(sent: int, used: int, rejected: int, beyond: int, extra: int) -> Account:
+def account(sent: int, used: int, rejected: int, beyond: int, extra: int) -> MessageAccount:
     """The account of what a sender has sent and a receiver reports as used and rejected.
 
     `beyond` of the numbers used were higher than any sent, and `extra` frames came under a number that was known
@@ -36,7 +36,7 @@ def account(sent: int, used: int, rejected: int, beyond: int, extra: int) -> Acc
     """
     own = min(max(used - beyond, 0), sent)
     late = min(rejected, sent - own)
-    return Account(sent, own, late, sent - own - late, (used - own) + (rejected - late) + extra)
+    return MessageAccount(sent, own, late, sent - own - late, (used - own) + (rejected - late) + extra)
 
 
 def accounts(run: Run) -> dict[str, dict[str, int]]:

@@ -15,7 +15,7 @@ from common.roles import kind_of, name_of
 from laboratories.device import Device
 from laboratories.identification import actuator, column, damper, device, step_response, table
 from laboratories.identification.estimate import Estimate
-from models.excitation import Segment
+from models.excitation import ProgrammeSegment
 from models.registry import Array
 from report.facts.laboratories import plan_of
 
@@ -35,10 +35,10 @@ def part_of(run: Run) -> str:
     return run.metadata.get("bench", {}).get("part", "")
 
 
-def segments(run: Run) -> list[Segment]:
+def segments(run: Run) -> list[ProgrammeSegment]:
     """The pieces of a bench recording, none in any other."""
     text = run.metadata.get("bench", {}).get("segments", "[]")
-    return [Segment(**item) for item in json.loads(text)]
+    return [ProgrammeSegment(**item) for item in json.loads(text)]
 
 
 def possible(run: Run) -> list[str]:
@@ -124,7 +124,7 @@ def of_actuator(run: Run, interval: float) -> dict[str, Any]:
     return result
 
 
-def step_ticks(command: Array, segment: Segment) -> list[int]:
+def step_ticks(command: Array, segment: ProgrammeSegment) -> list[int]:
     """Ticks at which the command of a segment jumps; it is written one tick ahead of the target."""
     jumps = np.diff(command[segment.begin - 2 : segment.end])
     height = segment.values["height"]

@@ -25,7 +25,7 @@ LETTERS = {MASTER: " A", SLAVE: " B"}
 BEFORE = {MASTER: "absolute_acceleration", SLAVE: "command_seq"}  # the row before a laboratory's own
 
 
-class Laboratory(NamedTuple):
+class LaboratoryFacts(NamedTuple):
     """A laboratory as a recording shows it."""
 
     role: str
@@ -78,7 +78,7 @@ def views(run: Run) -> dict[str, Run]:
     return {role: run.of(role) for role in run.roles} or {MASTER: run}
 
 
-def laboratories(run: Run) -> list[Laboratory]:
+def laboratories(run: Run) -> list[LaboratoryFacts]:
     """The laboratories of a recording, the master's first; raises PlanError as `whole_plan`."""
     plan = whole_plan(run)
     found = [
@@ -91,7 +91,7 @@ def laboratories(run: Run) -> list[Laboratory]:
     return lettered([lab for lab in found if lab is not None])
 
 
-def lettered(labs: list[Laboratory]) -> list[Laboratory]:
+def lettered(labs: list[LaboratoryFacts]) -> list[LaboratoryFacts]:
     """The laboratories with a letter where the master's and a slave's would have one name."""
     names = {lab.pictured.name for lab in labs if lab.topic == MASTER}
     alike = names & {lab.pictured.name for lab in labs if lab.topic != MASTER}
@@ -101,16 +101,16 @@ def lettered(labs: list[Laboratory]) -> list[Laboratory]:
     ]
 
 
-def laboratory(role: str, topic: str, plan: Plan | None, units: Mapping[str, str]) -> Laboratory | None:
+def laboratory(role: str, topic: str, plan: Plan | None, units: Mapping[str, str]) -> LaboratoryFacts | None:
     """The laboratory of a role whose topic holds signals of these units; None where it has none or none is told."""
     kind = planned(kind_of(role), "") if plan is None else plan.kinds.get(role, "")
     part = plan.of(role) if plan is not None and kind else None
     if kind in SHIPPED:
         known = SHIPPED[kind]
         coupling = known.coupling(part) if part is not None else None
-        return Laboratory(role, topic, known.channels, known.pictured, part, coupling)
+        return LaboratoryFacts(role, topic, known.channels, known.pictured, part, coupling)
     channels = told(topic, units) if kind else None
-    return None if channels is None else Laboratory(role, topic, channels, usual(channels), part)
+    return None if channels is None else LaboratoryFacts(role, topic, channels, usual(channels), part)
 
 
 def told(topic: str, units: Mapping[str, str]) -> Channels | None:

@@ -13,12 +13,12 @@ from common.roles import MASTER
 from laboratories.kind import Follows
 from loop.nominal.partition import matrices
 from models.structures import shear_building
-from report.facts.laboratories import Laboratory
+from report.facts.laboratories import LaboratoryFacts
 
 UNITS = {"drift": "m", "displacement": "m", "absolute_acceleration": "m/s²", "shear": "N"}
 
 
-def storeys(run: Run, plan: Plan, labs: list[Laboratory]) -> list[dict[str, Any]]:
+def storeys(run: Run, plan: Plan, labs: list[LaboratoryFacts]) -> list[dict[str, Any]]:
     """Peaks of every storey from the lowest up, each with its time; of quantities without signals nothing.
 
     The drift is that between a storey's two floors, displacement and absolute acceleration are of the floor above it.
@@ -37,7 +37,7 @@ def storeys(run: Run, plan: Plan, labs: list[Laboratory]) -> list[dict[str, Any]
     ]
 
 
-def quantities(run: Run, plan: Plan, labs: list[Laboratory]) -> dict[str, Values]:
+def quantities(run: Run, plan: Plan, labs: list[LaboratoryFacts]) -> dict[str, Values]:
     """Each quantity over time and storeys, (n, storeys)."""
     columns = run.columns[MASTER]
     shape = (columns["t"].size, plan.storeys)
@@ -55,12 +55,12 @@ def quantities(run: Run, plan: Plan, labs: list[Laboratory]) -> dict[str, Values
     return found
 
 
-def follows_drift(lab: Laboratory) -> bool:
+def follows_drift(lab: LaboratoryFacts) -> bool:
     """Whether a laboratory's force is part of a storey's shear."""
     return lab.coupling is not None and lab.coupling.follows is Follows.DRIFT
 
 
-def resisting(run: Run, lab: Laboratory) -> tuple[int, Values] | None:
+def resisting(run: Run, lab: LaboratoryFacts) -> tuple[int, Values] | None:
     """The storey of a laboratory and the force (n,) N with which it resists there; None where it is not recorded."""
     columns, coupling = run.columns[MASTER], lab.coupling
     force = lab.channels.force if lab.topic == MASTER else f"{lab.channels.force}_used"

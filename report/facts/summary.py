@@ -19,7 +19,7 @@ from report.facts import circumstances, storeys
 from report.facts import late as lateness
 from report.facts.accounts import accounts
 from report.facts.due import due
-from report.facts.laboratories import Laboratory, laboratories, plan_of
+from report.facts.laboratories import LaboratoryFacts, laboratories, plan_of
 
 Result = TypeVar("Result")
 PERCENTILES = (50, 90, 99, 99.9)
@@ -112,7 +112,7 @@ def units_of(run: Run, topic: str) -> dict[str, str]:
     return {name: unit for name, unit in run.units.get(topic, {}).items() if unit not in ("", "s", "ns")}
 
 
-def tracking(run: Run, labs: list[Laboratory]) -> dict[str, dict[str, Any]]:
+def tracking(run: Run, labs: list[LaboratoryFacts]) -> dict[str, dict[str, Any]]:
     """How the transfer systems followed their targets: delay (s) two ways, amplitude, NRMSE, peak error.
 
     By system; that of a named slave is `table.NAME`, that of a slave without a name whose master has a system of the
@@ -137,7 +137,7 @@ def tracking(run: Run, labs: list[Laboratory]) -> dict[str, dict[str, Any]]:
     return result
 
 
-def system(lab: Laboratory, labs: list[Laboratory]) -> str:
+def system(lab: LaboratoryFacts, labs: list[LaboratoryFacts]) -> str:
     """What tables call a laboratory's transfer system: no two have one name."""
     name = name_of(lab.topic)
     first = next(other for other in labs if other.pictured.system == lab.pictured.system)
@@ -146,18 +146,18 @@ def system(lab: Laboratory, labs: list[Laboratory]) -> str:
     )
 
 
-def whereabouts(lab: Laboratory) -> str:
+def whereabouts(lab: LaboratoryFacts) -> str:
     """A laboratory by what stands in it, in a sentence: `the column`, or `column A` of two."""
     return lab.name if lab.letter else f"the {lab.name}"
 
 
-def force_paths(run: Run, labs: list[Laboratory]) -> dict[str, dict[str, Any]]:
+def force_paths(run: Run, labs: list[LaboratoryFacts]) -> dict[str, dict[str, Any]]:
     """Delay (s) with its interval and gain of each column's force, which tracking does not show, by its system."""
     found = ((system(lab, labs), force_path(run, lab)) for lab in labs if lab.channels == COLUMN.channels)
     return {name: facts for name, facts in found if facts is not None}
 
 
-def force_path(run: Run, lab: Laboratory) -> dict[str, Any] | None:
+def force_path(run: Run, lab: LaboratoryFacts) -> dict[str, Any] | None:
     """That of one laboratory; None where it is unknown."""
     columns, position, force = run.columns[lab.topic], lab.channels.position, lab.channels.force
     if lab.plan is None or not {position, force} <= columns.keys():
@@ -169,7 +169,7 @@ def force_path(run: Run, lab: Laboratory) -> dict[str, Any] | None:
     return None if found is None else {**found._asdict(), "interval": list(found.interval)}
 
 
-def error_energy(run: Run, labs: list[Laboratory]) -> float | None:
+def error_energy(run: Run, labs: list[LaboratoryFacts]) -> float | None:
     """Largest share of energy that tracking errors put in or took out in laboratory A; None without its signals."""
     lab = next((one for one in labs if one.topic == MASTER), None)
     coupling = lab.coupling if lab is not None else None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from diagnosis.report.evidence import Path
+from diagnosis.report.evidence import LoopPath
 from diagnosis.report.records import Report
 from report.gap import pictures, wording
 from report.gap.blocks import Drawing, Rows, bar, code, drawings, strong
@@ -65,7 +65,7 @@ def paths(report: Report) -> Rows:
     return Rows(("path", "delay", "nominal", "gain", "damping, points", "nominal"), rows)
 
 
-def costs(item: Path) -> list[str]:
+def costs(item: LoopPath) -> list[str]:
     """What a path costs, cell by cell."""
     return [
         quantity(item.delay, "s"),

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.report.evidence import Curve, History, PartSeen, Reading, Step
+from diagnosis.report.evidence import History, NaturalCurve, PartSeen, Reading, Step
 from diagnosis.report.fields import Series
 from diagnosis.report.records import Tolerance
 from report.gap import wording
@@ -263,7 +263,7 @@ def finish_errors(axis: Any, factor: float, unit: str, noise: float | None, erro
     axis.set_ylabel(literal(f"left over\n{unit}"))
 
 
-def curve(item: Curve, names: tuple[str, str] = ("without the effect", "with the effect")) -> str:
+def curve(item: NaturalCurve, names: tuple[str, str] = ("without the effect", "with the effect")) -> str:
     """A relation in its natural coordinates: measured, before, after; empty where nothing is measured."""
     x = values(item.x.values)
     series = [

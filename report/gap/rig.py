@@ -11,7 +11,7 @@ from report.text.formats import percent
 STRONGEST = 0.7  # opacity of a site that holds the whole gap; text stays readable on it
 
 
-class Sensor(NamedTuple):
+class DrawnSensor(NamedTuple):
     """A reading on the diagram; its label stands at `anchor` of the point beside the circle."""
 
     x: int
@@ -43,12 +43,12 @@ ARROWS = (
     ("M424 277 V214 H264", "damper force back", 342, 230, "middle"),
 )
 SENSORS = {
-    "column_displacement": Sensor(424, 98, "displacement", -12, 4, "end"),
-    "column_force": Sensor(374, 158, "force", -8, 20, "end"),
-    "table_displacement": Sensor(160, 294, "displacement", -12, 4, "end"),
-    "table_acceleration": Sensor(160, 316, "acceleration", -12, 4, "end"),
-    "damper_stroke": Sensor(402, 331, "stroke", -8, 17, "middle"),
-    "damper_force": Sensor(446, 331, "force", 6, 17, "middle"),
+    "column_displacement": DrawnSensor(424, 98, "displacement", -12, 4, "end"),
+    "column_force": DrawnSensor(374, 158, "force", -8, 20, "end"),
+    "table_displacement": DrawnSensor(160, 294, "displacement", -12, 4, "end"),
+    "table_acceleration": DrawnSensor(160, 316, "acceleration", -12, 4, "end"),
+    "damper_stroke": DrawnSensor(402, 331, "stroke", -8, 17, "middle"),
+    "damper_force": DrawnSensor(446, 331, "force", 6, 17, "middle"),
 }
 
 
@@ -65,7 +65,7 @@ class Box(NamedTuple):
 class Circle(NamedTuple):
     """A sensor; one with a share of the gap is larger and says it."""
 
-    sensor: Sensor
+    sensor: DrawnSensor
     share: str
     opacity: str
 

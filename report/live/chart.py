@@ -15,7 +15,7 @@ TOOLS = "pan,box_zoom,reset,save"
 Scale = Literal["linear", "log"]
 
 
-class Curve(NamedTuple):
+class ChartCurve(NamedTuple):
     """A signal in a plot: what the legend calls it, its colour, and how its line is drawn."""
 
     signal: str
@@ -49,7 +49,7 @@ def history(
     title: str,
     up: str,
     stream: Stream,
-    curves: tuple[Curve, ...],
+    curves: tuple[ChartCurve, ...],
     window: float | None,
     *,
     scale: Scale = "linear",
@@ -63,7 +63,7 @@ def history(
     return found
 
 
-def draw(where: Any, stream: Stream, over: str, curves: tuple[Curve, ...]) -> None:
+def draw(where: Any, stream: Stream, over: str, curves: tuple[ChartCurve, ...]) -> None:
     """Draw the curves of a stream over one of its signals, with a legend above where there are several."""
     items = [
         LegendItem(

@@ -19,7 +19,7 @@ from common.recording.outcome import outcome
 from common.recording.reader import Run, Tail, Values
 from common.roles import LATENCY, MASTER, SLAVE, kind_of, latency_topic
 from common.safety.modes import Mode
-from report.facts.laboratories import Laboratory, laboratories
+from report.facts.laboratories import LaboratoryFacts, laboratories
 from report.live.standing import Standing
 from report.live.trace import Trace, extremes, largest
 from report.pictures.curves import labs_of
@@ -33,7 +33,7 @@ TIMED = ("t", "round_trip", "wake_lateness")  # of the latency
 DEFAULT = laboratories(Run(Path(), columns={MASTER: {}, SLAVE: {}}))
 
 
-def names_of(labs: Iterable[Laboratory], kind: str) -> tuple[str, ...]:
+def names_of(labs: Iterable[LaboratoryFacts], kind: str) -> tuple[str, ...]:
     """The signals that the views show of a kind of topic; of slaves those of all of them."""
     if kind == LATENCY:
         return TIMED

@@ -8,7 +8,7 @@ import numpy as np
 from bokeh.models import ColumnDataSource, Range1d
 from bokeh.models.annotations import Span
 
-from report.live.chart import Curve, history, plot
+from report.live.chart import ChartCurve, history, plot
 from report.live.feed import EDGES, Feed, Timing
 from report.live.stream import Streams
 from report.pictures.figure import COLOURS
@@ -22,7 +22,7 @@ class Latency:
     """A plot over time and a histogram, the control interval marked in both."""
 
     def __init__(self, streams: Streams, window: float | None) -> None:
-        curve = Curve("round_trip", "round trip", COLOURS[0], width=1.0)
+        curve = ChartCurve("round_trip", "round trip", COLOURS[0], width=1.0)
         trips = history(
             "longest round trips (dashed: interval)",
             LABEL,

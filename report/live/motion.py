@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 from common.roles import MASTER
 from laboratories.kind import Hysteresis
-from report.facts.laboratories import Laboratory
-from report.live.chart import Curve, draw, history, plot
+from report.facts.laboratories import LaboratoryFacts
+from report.live.chart import ChartCurve, draw, history, plot
 from report.live.stream import Stream, Streams
 from report.pictures.figure import COLOURS
 
@@ -16,11 +16,11 @@ from report.pictures.figure import COLOURS
 class Plot(NamedTuple):
     """A plot of a laboratory."""
 
-    lab: Laboratory
+    lab: LaboratoryFacts
     figure: Any
 
 
-def motions(streams: Streams, labs: Iterable[Laboratory], window: float | None) -> dict[str, Plot]:
+def motions(streams: Streams, labs: Iterable[LaboratoryFacts], window: float | None) -> dict[str, Plot]:
     """The plots of the laboratories by name, of the last `window` s, or of the whole test.
 
     Slaves whose laboratories have the same signals share their plots. What deforms by the motion that the laboratory
@@ -37,50 +37,50 @@ def motions(streams: Streams, labs: Iterable[Laboratory], window: float | None) 
             if loop.motion == lab.channels.position:
                 add(found, f"hysteresis{lab.letter}", lab, hysteresis(stream, name, loop, window))
                 continue
-            stroke = (Curve(loop.motion, "measured", COLOURS[2]),)
-            force = (Curve(loop.force, "measured", COLOURS[3]),)
+            stroke = (ChartCurve(loop.motion, "measured", COLOURS[2]),)
+            force = (ChartCurve(loop.force, "measured", COLOURS[3]),)
             title = f"{name}: {loop.across}"
             add(found, loop.across, lab, history(title, f"{loop.across}, mm", stream, stroke, window))
             add(found, "force", lab, history(f"{name}: force", up, stream, force, window))
         for signal in lab.channels.measured:
             if signal.name in lab.pictured.also:
                 unit = "mm" if signal.unit == "m" else signal.unit
-                curve = (Curve(signal.name, "measured", COLOURS[4]),)
+                curve = (ChartCurve(signal.name, "measured", COLOURS[4]),)
                 title = signal.name.replace("_", " ") + lab.letter
                 add(found, signal.name, lab, history(title, unit, stream, curve, window))
     return found
 
 
-def apart(labs: Iterable[Laboratory]) -> list[Laboratory]:
+def apart(labs: Iterable[LaboratoryFacts]) -> list[LaboratoryFacts]:
     """The laboratories without those slaves' whose signals another slave's has as well."""
-    found: dict[Any, Laboratory] = {}
+    found: dict[Any, LaboratoryFacts] = {}
     for lab in labs:
         found.setdefault((lab.topic == MASTER, lab.channels, lab.letter), lab)
     return list(found.values())
 
 
-def looks(labs: Iterable[Laboratory]) -> list[Any]:
+def looks(labs: Iterable[LaboratoryFacts]) -> list[Any]:
     """What makes the plots of laboratories differ from those of others."""
     return [(lab.topic == MASTER, lab.channels, lab.letter) for lab in apart(labs)]
 
 
-def add(found: dict[str, Plot], name: str, lab: Laboratory, figure: Any) -> None:
+def add(found: dict[str, Plot], name: str, lab: LaboratoryFacts, figure: Any) -> None:
     """Add a plot under a name that no other has."""
     while name in found:
         name = f"{name} of {lab.name}"
     found[name] = Plot(lab, figure)
 
 
-def stream_of(streams: Streams, lab: Laboratory) -> Stream:
+def stream_of(streams: Streams, lab: LaboratoryFacts) -> Stream:
     """Where a laboratory's signals come from."""
     return streams.master if lab.topic == MASTER else streams.slave
 
 
-def beside_target(streams: Streams, lab: Laboratory, window: float | None) -> Any:
+def beside_target(streams: Streams, lab: LaboratoryFacts, window: float | None) -> Any:
     """A measured motion and its target, told apart by more than their colours."""
     curves = (
-        Curve(lab.channels.target.name, "target", COLOURS[1], "dashed", 2.0),
-        Curve(lab.channels.position, "measured", COLOURS[0]),
+        ChartCurve(lab.channels.target.name, "target", COLOURS[1], "dashed", 2.0),
+        ChartCurve(lab.channels.position, "measured", COLOURS[0]),
     )
     title, up = f"{lab.name}: target and measured", f"{lab.pictured.position}, mm"
     return history(title, up, stream_of(streams, lab), curves, window)
@@ -92,5 +92,5 @@ def hysteresis(stream: Stream, name: str, loop: Hysteresis, window: float | None
     found = plot(
         f"{name}: hysteresis{part}", f"{loop.across}, mm", f"force, {loop.unit}", ("linear", "linear")
     )
-    draw(found, stream, loop.motion, (Curve(loop.force, "measured", COLOURS[0], width=1.0),))
+    draw(found, stream, loop.motion, (ChartCurve(loop.force, "measured", COLOURS[0], width=1.0),))
     return found

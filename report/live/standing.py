@@ -24,7 +24,7 @@ GRAVEST = (  # the first of these modes that a laboratory is in says how the tes
 )
 
 
-class Stop(NamedTuple):
+class StopCause(NamedTuple):
     """Why a laboratory stopped the test, and when (test time, s)."""
 
     lab: str
@@ -43,7 +43,9 @@ class Standing:
 
     def __init__(self, clock: Clock) -> None:
         self.modes: dict[str, str] = {}
-        self.stops: list[Stop] = []  # causes of their own; where there are none, those that followed another
+        self.stops: list[
+            StopCause
+        ] = []  # causes of their own; where there are none, those that followed another
         self._clock = clock
         self._t: dict[str, float] = {}  # newest time of each laboratory
         self._shift = math.inf  # s
@@ -61,7 +63,7 @@ class Standing:
         if event["code"] == "mode" and 0 <= values.get("mode", -1) < len(MODES):
             self.modes[lab] = MODES[int(values["mode"])]
         if event["level"] == "error" and lab != RECORDER:
-            self.stops.append(Stop(lab, t, str(event["code"]), str(event["text"])))
+            self.stops.append(StopCause(lab, t, str(event["code"]), str(event["text"])))
             own = [stop for stop in self.stops if stop.code != CONSEQUENCE]
             self.stops = own or self.stops
 

@@ -111,7 +111,7 @@ def standing(feed: Feed, lab: str) -> tuple[str, str, str]:
     return said, colour if colour == RED else ORANGE, f"no news for {age:.0f} s, since t = {t:.2f} s"
 
 
-class Line(NamedTuple):
+class EventLine(NamedTuple):
     """An event as the page lists it."""
 
     t: str
@@ -127,11 +127,11 @@ def listing(feed: Feed) -> str:
     return str(block_of("live.html", "listing", [line(event) for event in newest]))
 
 
-def line(event: Mapping[str, Any]) -> Line:
+def line(event: Mapping[str, Any]) -> EventLine:
     """One event."""
     level = str(event["level"])
     plain = level == "info"
     colour = "#1a1a1a" if plain else AT_LEVEL.get(level, GREY)
-    return Line(
+    return EventLine(
         f"{event['t']:.2f}", title(str(event["lab"])), "" if plain else level, str(event["text"]), colour
     )

@@ -8,14 +8,14 @@ from typing import Any
 from bokeh.models import ColumnDataSource
 
 from common.roles import LATENCY, MASTER, SLAVE, latency_topic
-from report.facts.laboratories import Laboratory
+from report.facts.laboratories import LaboratoryFacts
 from report.live.feed import Feed
 from report.live.trace import Trace
 
 MICROSECONDS = {"round_trip": 1e6}
 
 
-def factors(labs: Iterable[Laboratory]) -> dict[str, float]:
+def factors(labs: Iterable[LaboratoryFacts]) -> dict[str, float]:
     """From SI to the unit of the axes by signal: mm, kN where a kind of laboratory wants it; 1 where there is none."""
     found = dict(MICROSECONDS)
     for lab in labs:

@@ -13,7 +13,7 @@ from common.recording.reader import Run
 from report.text.formats import milliseconds
 
 if TYPE_CHECKING:
-    from report.facts.laboratories import Laboratory
+    from report.facts.laboratories import LaboratoryFacts
 
 Values = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ class Pair(NamedTuple):
 
     label: str
     word: str  # what was asked: the target, or the command where no target is recorded
-    lab: Laboratory
+    lab: LaboratoryFacts
     t: Values  # (n,) s, of the measurement
     wanted: Values  # (n,) m
     got: Values  # (n,) m
@@ -76,7 +76,7 @@ def pairs(recording: Run) -> list[Pair]:
     return found
 
 
-def matched(recording: Run, lab: Laboratory, asked: tuple[str, str, int]) -> Pair | None:
+def matched(recording: Run, lab: LaboratoryFacts, asked: tuple[str, str, int]) -> Pair | None:
     """A laboratory's position beside what was asked of it so many ticks before; None where one is lacking or still."""
     topic, measured = lab.topic, lab.channels.position
     columns, (name, word, late) = recording.columns.get(topic, {}), asked
@@ -122,7 +122,7 @@ def planned(recording: Run) -> Any:
         return None
 
 
-def labs_of(recording: Run) -> list[Laboratory]:
+def labs_of(recording: Run) -> list[LaboratoryFacts]:
     """The laboratories of a recording; those of the default test where its plan cannot be read."""
     from report.facts.laboratories import laboratories
 

@@ -15,7 +15,7 @@ from report.text.formats import axis_scale, fixed, scale
 
 if TYPE_CHECKING:
     from laboratories.kind import Hysteresis
-    from report.facts.laboratories import Laboratory
+    from report.facts.laboratories import LaboratoryFacts
 
 
 LEAST = 10  # ticks
@@ -82,7 +82,7 @@ def noise(values: Values) -> float:
     return float(np.std(np.diff(values, 2))) / math.sqrt(6.0) if values.size > LEAST else 0.0
 
 
-def stiffness_of(lab: Laboratory, loop: Hysteresis) -> float:
+def stiffness_of(lab: LaboratoryFacts, loop: Hysteresis) -> float:
     """The planned elastic stiffness (N/m) of what makes a loop; 0 where it has none or none is known."""
     felt, whole = lab.coupling, (lab.channels.position, lab.channels.force) == (loop.motion, loop.force)
     return felt.stiffness / (felt.ratio * felt.scale) if felt is not None and felt.scale and whole else 0.0

@@ -18,7 +18,7 @@ from report.pictures.figure import COLOURS
 from report.pictures.layout import bound, decades, legend_above, shrink
 
 if TYPE_CHECKING:
-    from report.facts.laboratories import Laboratory
+    from report.facts.laboratories import LaboratoryFacts
 
 SEGMENT = 10.0  # s: lines 0.1 Hz apart, half the width of a peak at 2 Hz with 5 % of damping
 LEAST = 64  # ticks
@@ -30,7 +30,7 @@ DASHED = (0, (4, 2))
 DOTTED = (0, (1, 1))
 
 
-class Line(NamedTuple):
+class SpectrumLine(NamedTuple):
     """One spectrum and how it looks."""
 
     label: str
@@ -63,7 +63,7 @@ def draw(recording: Run, canvas: Any) -> bool:
     return True
 
 
-def accelerations(recording: Run) -> list[Line]:
+def accelerations(recording: Run) -> list[SpectrumLine]:
     """Spectra of the ground's acceleration and of those measured in the laboratories."""
     found = [("ground", moving(recording, MASTER, "ground_acceleration"), COLOURS[0], "-")]
     for lab in labs_of(recording):
@@ -72,27 +72,27 @@ def accelerations(recording: Run) -> list[Line]:
             label = lab.name if len(measured) == 1 else name.replace("_", " ") + lab.letter
             found.append((label, moving(recording, lab.topic, name), *drawn(lab)))
     return [
-        Line(label, item, 1.0, colour, style)
+        SpectrumLine(label, item, 1.0, colour, style)
         for label, item, colour, style in found
         if item is not None and long_enough(item)
     ]
 
 
-def displacements(recording: Run) -> list[Line]:
+def displacements(recording: Run) -> list[SpectrumLine]:
     """As measured and, dotted in the same colour, by how much they missed what was wanted."""
     lines = []
     for lab in labs_of(recording):
         item = moving(recording, lab.topic, lab.channels.position)
         if item is not None and long_enough(item):
-            lines.append(Line(lab.name, item, 1e3, *drawn(lab)))
+            lines.append(SpectrumLine(lab.name, item, 1e3, *drawn(lab)))
     for pair in pairs(recording):
         error = Curve(pair.t, pair.error)
         if long_enough(error) and np.nanmax(np.abs(pair.error)) > 0.0:
-            lines.append(Line(f"error of {pair.lab.name}", error, 1e3, drawn(pair.lab)[0], DOTTED))
+            lines.append(SpectrumLine(f"error of {pair.lab.name}", error, 1e3, drawn(pair.lab)[0], DOTTED))
     return lines
 
 
-def drawn(lab: Laboratory) -> tuple[str, Any]:
+def drawn(lab: LaboratoryFacts) -> tuple[str, Any]:
     """Colour and style of a laboratory's lines."""
     return (COLOURS[0], "-") if lab.topic == MASTER else (COLOURS[1], DASHED)
 
@@ -102,7 +102,7 @@ def long_enough(item: Curve) -> bool:
     return bool(np.isfinite(item.values).sum() >= LEAST)
 
 
-def densities(axis: Any, lines: list[Line]) -> None:
+def densities(axis: Any, lines: list[SpectrumLine]) -> None:
     """The spectra of an axis, over as many decades as mean something."""
     top = 0.0
     for line in lines:

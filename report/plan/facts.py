@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from common.lab.preflight import Check
+from common.lab.preflight import PreflightCheck
 from common.plan.kinds import COLUMN, TABLE
 from common.plan.plan import Plan
 from common.roles import MASTER
@@ -45,7 +45,7 @@ def facts(plan: Plan, file: Path) -> dict[str, Any]:
     }
 
 
-def risk(check: Check) -> dict[str, str]:
+def risk(check: PreflightCheck) -> dict[str, str]:
     """A risk for which pre-flight would refuse."""
     return check.risk._asdict() if check.risk else {}
 

@@ -16,7 +16,7 @@ INCH = 96  # CSS pixels
 WIDE = ("histories",)  # their time is the whole test's, which two columns show better where there is room
 
 
-class Drawn(NamedTuple):
+class DrawnPicture(NamedTuple):
     """A picture: an address that holds it, its CSS pixels, what it shows; `wide` for two columns, or empty."""
 
     name: str
@@ -27,7 +27,7 @@ class Drawn(NamedTuple):
     wide: str = ""
 
 
-Pictures = dict[str, list[Drawn]]  # by the role of the slave that they concern
+Pictures = dict[str, list[DrawnPicture]]  # by the role of the slave that they concern
 
 
 def draw_all(run: Run, tell: Tell) -> tuple[Pictures, dict[str, str]]:
@@ -43,14 +43,14 @@ def draw_all(run: Run, tell: Tell) -> tuple[Pictures, dict[str, str]]:
     return found, {name: needs(run, picture) for name, picture in PICTURES.items() if name not in names}
 
 
-def draw(part: Run, role: str, picture: Picture) -> Drawn | None:
+def draw(part: Run, role: str, picture: Picture) -> DrawnPicture | None:
     """One picture of the part of a recording that concerns a slave; None where it lacks the picture's signals."""
     narrow = png(part, picture, picture.size)
     if narrow is None:
         return None
     wide = png(part, picture, picture.double) if picture.name in WIDE else None
     of = f" of the {title(role)}" if name_of(role) else ""
-    return Drawn(
+    return DrawnPicture(
         picture.name,
         data_uri(narrow[0]),
         narrow[1],

@@ -20,7 +20,7 @@ EVENTS = 400  # rows of the page; JSON of rths inspect has all
 SHOWN = ("plan", CLOCK, GROUND, MACHINES)  # metadata that have a place of their own
 
 
-class Table(NamedTuple):
+class TitledTable(NamedTuple):
     """A table with what stands over it."""
 
     title: str
@@ -65,13 +65,13 @@ def date(run: Run) -> str:
 COUNTS = ("expected", "recorded", "missing", "repeated")
 
 
-def completeness(summary: Summary) -> Table:
+def completeness(summary: Summary) -> TitledTable:
     """Ticks expected, recorded, missing."""
     rows = [
         [topic, *(str(found[name]) for name in COUNTS), holes(found)]
         for topic, found in summary["topics"].items()
     ]
-    return Table("", ("topic", *COUNTS, "holes (ticks)"), rows)
+    return TitledTable("", ("topic", *COUNTS, "holes (ticks)"), rows)
 
 
 def holes(found: Mapping[str, Any]) -> str:
@@ -79,7 +79,7 @@ def holes(found: Mapping[str, Any]) -> str:
     return ", ".join(f"{first}…{last}" for first, last in found["holes"]) or "none"
 
 
-def exchange(summary: Summary) -> Table:
+def exchange(summary: Summary) -> TitledTable:
     """The account of every message: sent = used + rejected + lost, and what came beside them where anything did."""
     columns = {"sent": "sent", "used": "= used", "rejected": "+ rejected", "lost": "+ lost"}
     if any(counts["foreign"] for counts in summary["exchange"].values()):
@@ -88,34 +88,34 @@ def exchange(summary: Summary) -> Table:
         [name.replace("/", ", "), *(str(counts[key]) for key in columns)]
         for name, counts in summary["exchange"].items()
     ]
-    return Table("", ("messages", *columns.values()), rows)
+    return TitledTable("", ("messages", *columns.values()), rows)
 
 
-def rejected(summary: Summary) -> Table:
+def rejected(summary: Summary) -> TitledTable:
     """Frames that were rejected, by laboratory and reason."""
     rows = [
         [lab, reason, str(count)]
         for lab, counts in summary["rejected"].items()
         for reason, count in counts.items()
     ]
-    return Table("Frames rejected", ("by", "reason", "frames"), rows)
+    return TitledTable("Frames rejected", ("by", "reason", "frames"), rows)
 
 
-def peaks(summary: Summary) -> Table:
+def peaks(summary: Summary) -> TitledTable:
     """Largest magnitudes."""
     rows = [
         [breakable(name), reading(found["peak"], found["unit"]), seconds(found["t"])]
         for name, found in summary["peaks"].items()
     ]
-    return Table("", ("signal", "peak", "at"), rows)
+    return TitledTable("", ("signal", "peak", "at"), rows)
 
 
-def storeys(summary: Summary) -> Table:
+def storeys(summary: Summary) -> TitledTable:
     """Peaks of every storey."""
     if not summary["storeys"]:
-        return Table("", (), [])
+        return TitledTable("", (), [])
     head, *rows = storey_rows(summary["storeys"])
-    return Table("Building", tuple(head), rows)
+    return TitledTable("Building", tuple(head), rows)
 
 
 def seconds(t: float | None) -> str:
@@ -123,23 +123,23 @@ def seconds(t: float | None) -> str:
     return MISSING if t is None else f"{t:.3f} s"
 
 
-def limits(found: list[Margin]) -> Table:
+def limits(found: list[Margin]) -> TitledTable:
     """How near recorded signals came to the limits of the plan."""
     rows = []
     for item in found:
         peak, limit = reading(item.peak, item.unit), reading(item.limit, item.unit)
         rows.append([breakable(item.signal), peak, limit, f"{100.0 * item.share:.1f} %"])
-    return Table("", ("signal", "peak", "limit", "share"), rows)
+    return TitledTable("", ("signal", "peak", "limit", "share"), rows)
 
 
-def tracking(summary: Summary) -> Table:
+def tracking(summary: Summary) -> TitledTable:
     """How the transfer systems followed their targets."""
     rows = [[part, *tracked(found)] for part, found in summary["tracking"].items()]
     head = ("part", "delay", "by correlation", "amplitude", "at", "NRMSE", "peak error")
-    return Table("", head, rows)
+    return TitledTable("", head, rows)
 
 
-def force_path(summary: Summary) -> Table:
+def force_path(summary: Summary) -> TitledTable:
     """The force of each column against the plan's specimen at the measured displacement."""
     paths = summary["force_paths"]
     rows = [
@@ -154,26 +154,26 @@ def force_path(summary: Summary) -> Table:
     ]
     head = ("column of", "delay", "95 %", "gain", "at")
     first = 0 if len(paths) > 1 else 1
-    return Table("Force path", head[first:], [row[first:] for row in rows])
+    return TitledTable("Force path", head[first:], [row[first:] for row in rows])
 
 
-def latency(summary: Summary) -> list[Table]:
+def latency(summary: Summary) -> list[TitledTable]:
     """Percentiles of the parts of a tick, a table per named slave."""
     tables = summary["latency"] if summary["slaves"] else {"": summary["latency"]}
     return [latency_of(name, segments) for name, segments in tables.items() if segments]
 
 
-def latency_of(slave: str, segments: Mapping[str, Mapping[str, float]]) -> Table:
+def latency_of(slave: str, segments: Mapping[str, Mapping[str, float]]) -> TitledTable:
     """Percentiles in the exchange with one slave, µs."""
     names = list(next(iter(segments.values())))
     rows = [
         [breakable(segment), *(f"{found[name] * 1e6:.0f}" for name in names)]
         for segment, found in segments.items()
     ]
-    return Table(f"Slave {slave}" if slave else "", ("µs", *names), rows)
+    return TitledTable(f"Slave {slave}" if slave else "", ("µs", *names), rows)
 
 
-def machines(run: Run) -> Table:
+def machines(run: Run) -> TitledTable:
     """Real-time shape and load of the laboratories' machines, and the bare timing loop beside the test."""
     recorded = run.metadata.get(MACHINES, {})
     labs = (MASTER, *run.roles, "bare_loop")
@@ -186,7 +186,7 @@ def machines(run: Run) -> Table:
     kept = {lab: values for lab, values in found.items() if values}
     names = dict.fromkeys(name for values in kept.values() for name in values)
     rows = [[breakable(name), *(shortened(kept[lab].get(name, MISSING)) for lab in kept)] for name in names]
-    return Table("", ("", *(lab.replace("_", " ") for lab in kept)), rows)
+    return TitledTable("", ("", *(lab.replace("_", " ") for lab in kept)), rows)
 
 
 def shortened(text: str) -> str:
@@ -197,13 +197,13 @@ def shortened(text: str) -> str:
         return text
 
 
-def events(run: Run, *codes: str) -> Table:
+def events(run: Run, *codes: str) -> TitledTable:
     """What happened, in the order in which it was recorded: of these codes, or all."""
     chosen = [event for event in run.events if not codes or event["code"] in codes]
     rows = [[f"{event['t']:.3f} s", event["lab"], event["level"], event["text"]] for event in chosen[:EVENTS]]
     if len(chosen) > EVENTS:
         rows.append(["", "", "", f"and {len(chosen) - EVENTS} more: rths inspect --json lists all"])
-    return Table("", ("time", "from", "level", "what"), rows)
+    return TitledTable("", ("time", "from", "level", "what"), rows)
 
 
 def provenance(run: Run, summary: Summary) -> list[tuple[str, str]]:

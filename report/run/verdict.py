@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from common.plan.plan import Plan
 from common.recording.reader import Run
 from common.roles import LATENCY, MASTER, SLAVE, kind_of, name_of, title
-from report.facts.laboratories import Laboratory, laboratories, whole_plan
+from report.facts.laboratories import LaboratoryFacts, laboratories, whole_plan
 from report.text.force_path import sentence as force_sentence
 from report.text.formats import apart, milliseconds, quantity
 
@@ -203,7 +203,7 @@ def margins(run: Run, summary: Summary) -> list[Margin]:
     return sorted(found, key=lambda item: -item.share)
 
 
-def limits(plan: Plan, lab: Laboratory | None) -> Mapping[str, float]:
+def limits(plan: Plan, lab: LaboratoryFacts | None) -> Mapping[str, float]:
     """The limits that the plan says by signal; of a kind of the user's those of `[device.limits]`."""
     own: Mapping[str, Any] = lab.plan.device.limits if lab and lab.plan and lab.coupling is None else {}
     return vars(plan.limits) | {name: value for name, value in own.items() if isinstance(value, int | float)}

@@ -31,7 +31,7 @@ class Span(NamedTuple):
     colour: str = ""
 
 
-class Row(NamedTuple):
+class BoardRow(NamedTuple):
     """A signal of the reports: its label, the factor from SI to its unit, and how its value is written."""
 
     signal: str
@@ -44,20 +44,20 @@ class Row(NamedTuple):
 KNOWN = {
     row.signal: row
     for row in (
-        Row("drift", "drift", 1e3, "mm", "+9.3f"),
-        Row("column_force", "column force", 1e-3, "kN", "+9.3f"),
-        Row("column_force_used", "slave's column", 1e-3, "kN", "+9.3f"),
-        Row("damper_force", "damper force", 1.0, "N", "+9.1f"),
-        Row("round_trip", "round trip", 1e6, "µs", "9.0f"),
+        BoardRow("drift", "drift", 1e3, "mm", "+9.3f"),
+        BoardRow("column_force", "column force", 1e-3, "kN", "+9.3f"),
+        BoardRow("column_force_used", "slave's column", 1e-3, "kN", "+9.3f"),
+        BoardRow("damper_force", "damper force", 1.0, "N", "+9.1f"),
+        BoardRow("round_trip", "round trip", 1e6, "µs", "9.0f"),
     )
 }
 BESIDE = ("tick", "t", "missed")  # of a report: no row of its own
 LABEL = len("column force")  # columns at least
 
 
-def row_of(name: str) -> Row:
+def row_of(name: str) -> BoardRow:
     """The row of a signal: what is not known is the force of a laboratory of a user's."""
-    return KNOWN.get(name, Row(name, name.replace("_", " "), 1.0, "N", "+9.1f"))
+    return KNOWN.get(name, BoardRow(name, name.replace("_", " "), 1.0, "N", "+9.1f"))
 
 
 class Board:
@@ -92,7 +92,7 @@ class Board:
             Span("·" * (BAR - filled)),
         ]
 
-    def _row(self, row: Row, label: int, width: int) -> list[Span]:
+    def _row(self, row: BoardRow, label: int, width: int) -> list[Span]:
         values = [row.factor * value for value in self._values[row.signal]]
         newest = "–".rjust(9) if math.isnan(values[-1]) else format(values[-1], row.style)
         beside = Span(f"{row.label:<{label}} {newest} {row.unit:<2}  ")

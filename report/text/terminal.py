@@ -26,7 +26,7 @@ def table(rows: Sequence[Sequence[str]], stream: TextIO | None = None) -> None:
         (stream or sys.stdout).write("  ".join(cells).rstrip() + "\n")
 
 
-class Progress:
+class RunProgress:
     """Progress of a test: a bar and sparklines on a terminal, plain lines now and then elsewhere (default: stderr).
 
     A terminal that is closed, or a pipe whose reader has gone, does not end a test.

@@ -18,7 +18,7 @@ STOLEN_SHARE = 0.01  # of the processors' time; above it the check measures the 
 TIMING = ("wake-up", "wake-up + round trip", "late exchanges", "clock")
 
 
-class Check(NamedTuple):
+class PlanCheck(NamedTuple):
     """One thing that a test needs."""
 
     name: str
@@ -28,7 +28,7 @@ class Check(NamedTuple):
     advice: str  # a sentence, for where it failed
 
 
-class Verdict(NamedTuple):
+class CheckVerdict(NamedTuple):
     """All checks in one sentence."""
 
     state: str  # holds, mostly, fails, not judged
@@ -36,9 +36,9 @@ class Verdict(NamedTuple):
     passed: bool
 
 
-def checks(report: dict[str, Any]) -> list[Check]:
+def checks(report: dict[str, Any]) -> list[PlanCheck]:
     """Every check whose part could be measured, or failed to be."""
-    parts: tuple[Callable[[dict[str, Any]], Iterator[Check]], ...] = (
+    parts: tuple[Callable[[dict[str, Any]], Iterator[PlanCheck]], ...] = (
         of_realtime,
         of_wake_up,
         of_round_trip,
@@ -49,11 +49,11 @@ def checks(report: dict[str, Any]) -> list[Check]:
     return [check for part in parts for check in part(report)]
 
 
-def of_realtime(report: dict[str, Any]) -> Iterator[Check]:
+def of_realtime(report: dict[str, Any]) -> Iterator[PlanCheck]:
     """Whether everything that `--rt on` asks for was granted."""
     missing = report["realtime"].get("missing", [])
     if report["rt"] == "on":
-        yield Check("real time", f"{len(missing)} missing", "all", not missing, " ".join(missing))
+        yield PlanCheck("real time", f"{len(missing)} missing", "all", not missing, " ".join(missing))
 
 
 def judged(report: dict[str, Any]) -> tuple[str, dict[str, float]]:
@@ -76,16 +76,16 @@ def remedy(report: dict[str, Any]) -> str:
     return text
 
 
-def of_wake_up(report: dict[str, Any]) -> Iterator[Check]:
+def of_wake_up(report: dict[str, Any]) -> Iterator[PlanCheck]:
     """How many intervals a process that does nothing else misses."""
     name, found = judged(report)
     if not found:
-        yield Check(
+        yield PlanCheck(
             "wake-up", "none", "a loop", False, "The bare timing loop failed: see whether python runs."
         )
         return
     share = found["late"] / max(found["ticks"] + found["late"], 1)
-    yield Check(
+    yield PlanCheck(
         "wake-up",
         f"{share * 100:.3f} % late ({name})",
         f"< {LATE_SHARE * 100:g} %",
@@ -94,19 +94,19 @@ def of_wake_up(report: dict[str, Any]) -> Iterator[Check]:
     )
 
 
-def of_round_trip(report: dict[str, Any]) -> Iterator[Check]:
+def of_round_trip(report: dict[str, Any]) -> Iterator[PlanCheck]:
     """Whether command and feedback fit into the interval."""
     found, interval = report["round_trip"], report["interval"]
     if "error" in found or not found["round_trip"]:
         reason = found.get("error", "no command was answered").rstrip(".")
-        yield Check(
+        yield PlanCheck(
             "late exchanges", "none", "an exchange", False, f"The exchange over zenoh failed: {reason}."
         )
         return
     _, loop = judged(report)
     if loop:
         together = loop["p99.9"] + found["round_trip"]["p99.9"]
-        yield Check(
+        yield PlanCheck(
             "wake-up + round trip",
             f"{together * 1e3:.3f} ms (p99.9)",
             f"< {ROOM * interval * 1e3:g} ms",
@@ -114,7 +114,7 @@ def of_round_trip(report: dict[str, Any]) -> Iterator[Check]:
             remedy(report),
         )
     share = found["late"] / max(found["exchanges"], 1)
-    yield Check(
+    yield PlanCheck(
         "late exchanges",
         f"{found['late']} of {found['exchanges']}",
         f"< {LATE_SHARE * 100:g} %",
@@ -123,11 +123,11 @@ def of_round_trip(report: dict[str, Any]) -> Iterator[Check]:
     )
 
 
-def of_clock(report: dict[str, Any]) -> Iterator[Check]:
+def of_clock(report: dict[str, Any]) -> Iterator[PlanCheck]:
     """Whether the clock can tell the times that matter."""
     step = max(report["clock"]["resolution"], report["clock"]["read_time"])
     source = report["facts"].get("clocksource", "unknown")
-    yield Check(
+    yield PlanCheck(
         "clock",
         f"{step * 1e9:.0f} ns ({source})",
         f"< {CLOCK_STEP * report['interval'] * 1e6:g} µs",
@@ -136,29 +136,29 @@ def of_clock(report: dict[str, Any]) -> Iterator[Check]:
     )
 
 
-def of_disk(report: dict[str, Any]) -> Iterator[Check]:
+def of_disk(report: dict[str, Any]) -> Iterator[PlanCheck]:
     """Whether a recording can be kept where it is to go."""
     found = report["disk"]
     folder = found["folder"]
     if "error" in found:
         advice = f"Nothing can be written to '{folder}' ({found['error']}): choose another folder with -o."
-        yield Check("disk", found["error"], "to be written", False, advice)
+        yield PlanCheck("disk", found["error"], "to be written", False, advice)
     else:
         slow = f"The disk of '{folder}' is too slow: choose another folder with -o, on a local disk."
         worst, rate = found["worst_sync"], found["rate"]
-        yield Check("disk, worst sync", f"{worst:.3f} s", f"< {WORST_SYNC:g} s", worst < WORST_SYNC, slow)
-        yield Check("disk, rate", f"{rate / 1e6:.1f} MB/s", f"> {RATE / 1e6:g} MB/s", rate > RATE, slow)
+        yield PlanCheck("disk, worst sync", f"{worst:.3f} s", f"< {WORST_SYNC:g} s", worst < WORST_SYNC, slow)
+        yield PlanCheck("disk, rate", f"{rate / 1e6:.1f} MB/s", f"> {RATE / 1e6:g} MB/s", rate > RATE, slow)
     if "free" in found:
         full = f"The disk of '{folder}' is nearly full: free some of it, or choose another folder with -o."
         free = found["free"]
-        yield Check("disk, free", f"{free / 1e9:.1f} GB", f"> {FREE / 1e9:g} GB", free > FREE, full)
+        yield PlanCheck("disk, free", f"{free / 1e9:.1f} GB", f"> {FREE / 1e9:g} GB", free > FREE, full)
 
 
-def of_host(report: dict[str, Any]) -> Iterator[Check]:
+def of_host(report: dict[str, Any]) -> Iterator[PlanCheck]:
     """Whether the processors were this machine's own while the check ran."""
     share = report["machine"].get("stolen_share")
     if share is not None:
-        yield Check(
+        yield PlanCheck(
             "stolen time",
             f"{share * 100:.2f} %",
             f"< {STOLEN_SHARE * 100:g} %",
@@ -187,7 +187,7 @@ def notes(report: dict[str, Any]) -> list[str]:
     return found
 
 
-def verdict(report: dict[str, Any], found: list[Check]) -> Verdict:
+def verdict(report: dict[str, Any], found: list[PlanCheck]) -> CheckVerdict:
     """One sentence for all checks."""
     name = f"{report['interval'] * 1e3:g} ms"
     failed = [check for check in found if not check.passed]
@@ -195,18 +195,18 @@ def verdict(report: dict[str, Any], found: list[Check]) -> Verdict:
     if any(check.name == "stolen time" for check in failed):
         share = report["machine"]["stolen_share"] * 100
         anyway = "was not kept" if timing else "was kept all the same"
-        return Verdict(
+        return CheckVerdict(
             "not judged",
             f"{name} is not judged: the host took {share:.1f} % of the processors' time, and the interval {anyway}.",
             False,
         )
     if timing:
         what = "; ".join(f"{check.name} {check.found}, needed {check.needed}" for check in timing)
-        return Verdict("fails", f"{name} will not hold here: {what}.", False)
+        return CheckVerdict("fails", f"{name} will not hold here: {what}.", False)
     state, reason = outlook(report)
     held = "will hold" if state == "holds" else "will mostly hold"
     but = f"; but {failed[0].name} failed: {failed[0].found}, needed {failed[0].needed}" if failed else ""
-    return Verdict(state, f"{name} {held} here: {reason}{but}.", not failed)
+    return CheckVerdict(state, f"{name} {held} here: {reason}{but}.", not failed)
 
 
 def outlook(report: dict[str, Any]) -> tuple[str, str]:

@@ -13,7 +13,7 @@ from common.terminal.printable import shown
 from report.text.progress import Progress
 
 if TYPE_CHECKING:
-    from simulation.source import Source
+    from simulation.source import ComparedRun
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
     return 1 if beyond else 0
 
 
-def compare(a: Source, b: Source) -> dict[str, Any]:
+def compare(a: ComparedRun, b: ComparedRun) -> dict[str, Any]:
     """Differences of every signal that both have, on the ticks that both have.
 
     NRMSE is rms(a − b)/rms(a); `equal` says that all values agree to the last bit.

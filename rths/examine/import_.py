@@ -15,7 +15,7 @@ from common.plan import plan as plans
 from common.plan.plan import Plan
 from common.plan.schema import fill, key, nearest
 from common.roles import MASTER, name_of
-from common.signals import Kind, Signal
+from common.signals import FieldType, Signal
 from common.terminal import cli, outputs
 from report.text.progress import Progress
 
@@ -35,7 +35,7 @@ def lab_signals(plan: Plan) -> Known:
     own = (kind.channels.target.name, *kind.channels.drives, *kind.channels.names) if kind else ()
     for topic, rows in kinds.topics(plan).items():
         for row in rows if topic in (MASTER, *plan.roles) else ():
-            if row.kind in (Kind.NUMBER, Kind.STOREYS) and row is not signals.TIME:
+            if row.kind in (FieldType.NUMBER, FieldType.STOREYS) and row is not signals.TIME:
                 name = prefix(topic) + row.name
                 found[f"{topic}.{name}" if topic != MASTER and name in own else name] = topic, row
     return found
@@ -47,7 +47,7 @@ def prefix(topic: str) -> str:
 
 
 @dataclass(frozen=True)
-class Source:
+class SignalSource:
     """Where one of our signals comes from: ours = scale · theirs + offset, or a known value."""
 
     column: str = key("name of a column in the data", default="")
@@ -61,7 +61,7 @@ class Mapping:
     """A map file: nominal models, time base, and our signals."""
 
     plan: Plan
-    signals: dict[str, Source]
+    signals: dict[str, SignalSource]
     time: str
     rate: float
 
@@ -131,7 +131,7 @@ def load_map(path: Path) -> Mapping:
     sources = {name: source(path, name, entry, known_signals) for name, entry in tables["signals"].items()}
     for name in sources:
         _, row = known_signals[name]
-        per = "storey" if plan.storeys > 1 and row.kind is Kind.STOREYS else ""
+        per = "storey" if plan.storeys > 1 and row.kind is FieldType.STOREYS else ""
         per = "slave" if len(plan.roles) > 1 and row.slaves else per
         if per:
             raise InputError(
@@ -140,21 +140,21 @@ def load_map(path: Path) -> Mapping:
     return Mapping(plan, sources, str(tables.get("time", "")), float(tables.get("rate", 0.0)))
 
 
-def source(path: Path, name: str, entry: dict[str, Any], known_signals: Known) -> Source:
+def source(path: Path, name: str, entry: dict[str, Any], known_signals: Known) -> SignalSource:
     """One row of [signals]."""
     if name not in known_signals:
         raise InputError(f"Unknown signal '{name}' in {path}: {nearest(name, known_signals)}")
     try:
         values = dict(entry)
         known = values.pop("value", None)
-        row = fill(Source, values, f"signals.{name}")
+        row = fill(SignalSource, values, f"signals.{name}")
     except (PlanError, TypeError, ValueError) as error:
         raise InputError(f"{path}: {error}") from None
     if known is not None and (isinstance(known, bool) or not isinstance(known, int | float)):
         raise InputError(f"{path}: value of '{name}' in [signals] must be a number, not {known!r}.")
     if (known is None) == (not row.column):
         raise InputError(f"{path}: '{name}' in [signals] must have either a column or a value.")
-    return Source(row.column, row.scale, row.offset, None if known is None else float(known))
+    return SignalSource(row.column, row.scale, row.offset, None if known is None else float(known))
 
 
 def resampled(mapping: Mapping, columns: dict[str, Any], data: Path) -> tuple[Any, dict[str, Any]]:

@@ -18,7 +18,7 @@ from common.terminal.printable import shown
 if TYPE_CHECKING:
     from common.recording.reader import Run
     from laboratories.kind import Hysteresis
-    from report.facts.laboratories import Laboratory
+    from report.facts.laboratories import LaboratoryFacts
 
 EVENT = "event"
 SCRIPT_TOPICS = "/studio_script/rths_"  # the viewers give scripts topics of this beginning only
@@ -77,7 +77,7 @@ class Subject:
     interval: float
     last: int
     fields: dict[str, frozenset[str]]
-    labs: Sequence[Laboratory]
+    labs: Sequence[LaboratoryFacts]
 
     def topics(self, kind: str) -> list[str]:
         """Its topics of a kind: one, or one per slave."""
@@ -251,16 +251,16 @@ def unlike(name: str, others: Iterable[str]) -> str:
     return unlike(f"{name}'", others) if name in others else name
 
 
-def alike(labs: Iterable[Laboratory]) -> list[list[Laboratory]]:
+def alike(labs: Iterable[LaboratoryFacts]) -> list[list[LaboratoryFacts]]:
     """The laboratories, those of slaves with the same signals together."""
-    found: dict[Any, list[Laboratory]] = {}
+    found: dict[Any, list[LaboratoryFacts]] = {}
     for lab in labs:
         found.setdefault((lab.topic == MASTER, lab.channels), []).append(lab)
     return list(found.values())
 
 
 def over_time(
-    subject: Subject, title: str, labs: Iterable[Laboratory], names: Sequence[str]
+    subject: Subject, title: str, labs: Iterable[LaboratoryFacts], names: Sequence[str]
 ) -> dict[str, Any]:
     """Signals of laboratories over time."""
     return plot(title, lines(subject, (lab.topic for lab in labs), names))
@@ -284,7 +284,7 @@ def round_trips(subject: Subject) -> dict[str, Any]:
     return plot("Latency: round trip and interval (s)", found)
 
 
-def hysteresis(subject: Subject, title: str, lab: Laboratory, loop: Hysteresis) -> dict[str, Any]:
+def hysteresis(subject: Subject, title: str, lab: LaboratoryFacts, loop: Hysteresis) -> dict[str, Any]:
     """A laboratory's force over its motion."""
     if not {loop.force, loop.motion} <= subject.fields.get(lab.topic, frozenset()):
         return {}

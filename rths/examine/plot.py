@@ -23,7 +23,7 @@ OTHER_FORMATS = {".jpg", ".jpeg", ".gif", ".eps", ".ps", ".tif", ".tiff", ".bmp"
 WIDTHS = ("single", "double")
 
 
-class Place(NamedTuple):
+class PictureTarget(NamedTuple):
     """Where pictures go: each under its name into a folder, or the only one into a file."""
 
     folder: Path
@@ -87,7 +87,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def draw_all(
-    recording: Run, chosen: list[Picture], place: Place, width: str
+    recording: Run, chosen: list[Picture], place: PictureTarget, width: str
 ) -> tuple[list[str], dict[str, str]]:
     """Files of the pictures that were drawn, and what the others lack."""
     from report.facts.laboratories import views
@@ -134,7 +134,7 @@ def complain(args: argparse.Namespace, made: list[str], left_out: dict[str, str]
         raise InputError(f"{args.file} has no signals for any picture: see rths inspect {args.file}.")
 
 
-def place_of(args: argparse.Namespace) -> Place:
+def place_of(args: argparse.Namespace) -> PictureTarget:
     """Where the command line wants its pictures.
 
     Raises:
@@ -146,14 +146,14 @@ def place_of(args: argparse.Namespace) -> Place:
     if folder or ending.removeprefix(".") not in FORMATS:
         if ending in OTHER_FORMATS and not folder:
             raise InputError(f"Cannot write {path}: give a file that ends in .{', .'.join(FORMATS)}.")
-        return Place(path, args.format or FORMATS[0], force=args.force)
+        return PictureTarget(path, args.format or FORMATS[0], force=args.force)
     if len(set(args.names)) != 1:
         raise InputError(f"{path} is one file: name the one picture that shall be in it, or give a folder.")
     if args.format not in (None, ending[1:]):
         raise InputError(
             f"{path} is no {args.format} file: leave --format away or end the file's name in it."
         )
-    return Place(path.parent, ending[1:], path.stem, args.force)
+    return PictureTarget(path.parent, ending[1:], path.stem, args.force)
 
 
 def is_folder(path: Path) -> bool:

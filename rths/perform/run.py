@@ -15,7 +15,7 @@ from common.errors import InputError, RthsError
 from common.host import running
 from common.host.realtime import assign, freeze
 from common.host.stopping import Stopper, Stopping
-from common.lab.preflight import PASSED, Check, Gate
+from common.lab.preflight import PASSED, Gate, PreflightCheck
 from common.plan.plan import Plan
 from common.plan.reality import Reality
 from common.protocol.exchange import State
@@ -23,7 +23,7 @@ from common.roles import MASTER, RECORDER, title
 from common.safety.modes import Mode
 from common.terminal import cli
 from report.text.progress import Progress as Working
-from report.text.terminal import Progress
+from report.text.terminal import RunProgress
 
 if TYPE_CHECKING:
     from rths.perform.ending import Ending
@@ -126,7 +126,7 @@ def before_the_start(plan: Plan, output: Path, gate: Gate) -> list[str]:
     return [f"pre-flight: {text}." for text in said]
 
 
-def checks(plan: Plan, output: Path) -> list[Check]:
+def checks(plan: Plan, output: Path) -> list[PreflightCheck]:
     """What is judged before anything starts."""
     from loop.nominal import preflight
     from recorder import space
@@ -151,7 +151,7 @@ def in_real_time(
 
     check(reality)
     processes = Processes()
-    progress = Progress(plan.test.duration)
+    progress = RunProgress(plan.test.duration)
     endpoint = listenable()
     view = None
     ending = Ending(plan)
@@ -209,7 +209,7 @@ def check(reality: Reality) -> None:
         link_model(reality.of(role))
 
 
-def warm_up(progress: Progress) -> None:
+def warm_up(progress: RunProgress) -> None:
     """Compile the kernels before the processes start, where this machine has not done so yet."""
     from models import cache
 
@@ -249,7 +249,7 @@ def real_time_words(mode: str, processor: int | None) -> list[str]:
 def follow(
     processes: Processes,
     ending: Ending,
-    progress: Progress,
+    progress: RunProgress,
     stopping: Stopping,
     view: View | None = None,
 ) -> None:
@@ -317,7 +317,7 @@ def end_all(processes: Processes, ending: Ending) -> None:
         stop(processes, ending, "this program failed.")
 
 
-def tell(said: Said, progress: Progress) -> None:
+def tell(said: Said, progress: RunProgress) -> None:
     """Show one report, where it is for the user."""
     match said.data:
         case {"kind": "progress"} if said.process == MASTER:

@@ -14,7 +14,7 @@ from common.terminal.telling import untold
 from report.text.progress import Progress
 
 if TYPE_CHECKING:
-    from simulation.benches import Result
+    from simulation.benches import BenchResult
 
 PARTS = ("column", "actuator", "table", "damper", "target")
 
@@ -87,7 +87,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def summary(result: Result) -> dict[str, Any]:
+def summary(result: BenchResult) -> dict[str, Any]:
     """What was done, as plain values."""
     return {
         "file": str(result.path),
@@ -98,7 +98,7 @@ def summary(result: Result) -> dict[str, Any]:
     }
 
 
-def show(result: Result, more: str) -> None:
+def show(result: BenchResult, more: str) -> None:
     """What was done, as text; `more` options of the next command."""
     from report.text.terminal import table
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 from common.errors import InputError
 from common.plan.plan import Plan, ideal
-from common.plan.tables import Compensator, Control
+from common.plan.tables import CompensatorTable, Control
 from common.roles import MASTER
 from common.terminal import cli, outputs
 from report.text.progress import Progress
@@ -113,7 +113,7 @@ def adapted(plan: Plan, args: argparse.Namespace) -> Plan:
     if args.ideal:
         plan = ideal(plan)
     if args.uncompensated:
-        plan = replace(plan, compensator=Compensator("none", {}))
+        plan = replace(plan, compensator=CompensatorTable("none", {}))
     if args.no_amd:
         plan = plan.everywhere(control=Control(amd=False, gain=plan.control.gain))
     return plan

@@ -14,7 +14,7 @@ from common.terminal import cli, outputs
 from report.text.progress import Progress
 
 if TYPE_CHECKING:
-    from common.plan.tables import Compensator
+    from common.plan.tables import CompensatorTable
 
 MOST_PLANTS = 1000
 PROCESSORS = len(os.sched_getaffinity(0))
@@ -113,7 +113,7 @@ def check(args: argparse.Namespace) -> None:
             raise InputError(f"{name} is {value}, but must be {wanted}.")
 
 
-def chosen(only: list[str] | None) -> dict[str, Compensator]:
+def chosen(only: list[str] | None) -> dict[str, CompensatorTable]:
     """The settings of these names, all of them where none are asked for; raises InputError for an unknown one."""
     from validation.benchmark2020.problem import SETTINGS
 
@@ -122,7 +122,7 @@ def chosen(only: list[str] | None) -> dict[str, Compensator]:
     return {name: setting(name) for name in only or SETTINGS}
 
 
-def setting(name: str) -> Compensator:
+def setting(name: str) -> CompensatorTable:
     """A setting by its name; raises InputError where there is none."""
     from common.plan.schema import nearest
     from validation.benchmark2020.problem import SETTINGS

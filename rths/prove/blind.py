@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from validation.blind.draw import Case
     from validation.blind.measures import Measure
-    from validation.blind.record import Recorded
+    from validation.blind.record import RecordedCase
     from validation.blind.scoring import Outcome
 
 
@@ -127,11 +127,11 @@ def check(args: argparse.Namespace) -> None:
             diagnose_all(Path(folder), diagnosis=args.diagnosis)
 
 
-def record_cases(cases: Sequence[Case], folder: Path, jobs: int, tell: Tell) -> dict[int, Recorded]:
+def record_cases(cases: Sequence[Case], folder: Path, jobs: int, tell: Tell) -> dict[int, RecordedCase]:
     """Recordings by the number of the case."""
     from validation.blind.record import record_all
 
-    recorded: dict[int, Recorded] = {}
+    recorded: dict[int, RecordedCase] = {}
     tell("recorded", 0, len(cases))
     for item in record_all(cases, folder, jobs):
         recorded[item.index] = item
@@ -152,7 +152,7 @@ def diagnose_cases(folder: Path, total: int, args: argparse.Namespace, tell: Tel
     return dict(diagnose_all(folder, jobs=args.jobs, dask=args.dask, diagnosis=args.diagnosis, done=done))
 
 
-def keep(cases: Iterable[Case], recorded: dict[int, Recorded], place: Path, folder: Path) -> None:
+def keep(cases: Iterable[Case], recorded: dict[int, RecordedCase], place: Path, folder: Path) -> None:
     """Recordings, plans and realities of all cases, once every diagnosis is done."""
     import shutil
 

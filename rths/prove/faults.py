@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from validation.faults.schedule import Schedule
-    from validation.faults.trial import Result
+    from validation.faults.trial import TrialResult
 
 MANY = 100
 
@@ -93,7 +93,7 @@ def reproduction(args: argparse.Namespace) -> str:
     return "rths faults" + length + (" --recorded" if args.recorded else "") + " --seed {seed}"
 
 
-def summary(results: Sequence[Result], spent: float, again: str) -> dict[str, Any]:
+def summary(results: Sequence[TrialResult], spent: float, again: str) -> dict[str, Any]:
     """Counts, times (s) and violations as plain values."""
     from collections import Counter
 
@@ -120,7 +120,7 @@ def summary(results: Sequence[Result], spent: float, again: str) -> dict[str, An
     }
 
 
-def show(found: dict[str, Any], results: Sequence[Result]) -> None:
+def show(found: dict[str, Any], results: Sequence[TrialResult]) -> None:
     """The counts; of a single schedule its course; then what does not hold and how to see it again."""
     if len(results) == 1:
         sys.stdout.write(f"{results[0].schedule}\n")

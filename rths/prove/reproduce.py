@@ -13,7 +13,7 @@ from common.terminal import cli, outputs
 from report.text.progress import Progress
 
 if TYPE_CHECKING:
-    from validation.paper.rows import Row
+    from validation.paper.rows import PaperRow
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
     return 0 if all(row.passed for row in table) else 1
 
 
-def show(table: list[Row]) -> None:
+def show(table: list[PaperRow]) -> None:
     """The table as text, one block per row."""
     for row in table:
         verdict = "pass" if row.passed else "FAIL"

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from benchmarks import closed_loop, opensees_peer
-from benchmarks.opensees_peer import PYTHON, Answer, Case
+from benchmarks.opensees_peer import PYTHON, PeerAnswer, PeerCase
 from common.plan.plan import Plan
 from loop import substructure
 from loop.closed_loop import signals, simulate
 
-CASE = Case(160e3, 25e6, 200e3, 0.002, [0.0, 1.0, 0.5, 0.0], repeats=2)
+CASE = PeerCase(160e3, 25e6, 200e3, 0.002, [0.0, 1.0, 0.5, 0.0], repeats=2)
 
 STUB = """
 class Silent:
@@ -48,7 +48,7 @@ def test_the_peer_answers_through_whatever_it_prints(tmp_path: Path, monkeypatch
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     monkeypatch.delenv(PYTHON, raising=False)
     answer = opensees_peer.ask(CASE)
-    assert isinstance(answer, Answer)
+    assert isinstance(answer, PeerAnswer)
     assert answer.version == "0.0"
     assert answer.displacement == [0.25] * 4
     assert len(answer.at_once) == len(answer.by_step) == 2

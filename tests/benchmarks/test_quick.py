@@ -10,14 +10,14 @@ import pytest
 
 from benchmarks import BENCHMARKS, live, real_time
 from benchmarks.exchange import transports
-from benchmarks.result import Figure
+from benchmarks.result import BenchmarkFigure
 from benchmarks.whole_test import Ending, ended_early, ending
-from common.plan.tables import Safety
+from common.plan.tables import SafetyTable
 
 IN_REAL_TIME = {"exchange", "real_time", "live", "start", "recorder"}  # tests/system/test_benchmarks.py
 
 
-def plain(figures: list[Figure]) -> list[dict[str, Any]]:
+def plain(figures: list[BenchmarkFigure]) -> list[dict[str, Any]]:
     """What a benchmark writes, once it is shown that there are figures, each under a name of its own."""
     assert figures
     assert len({figure.name for figure in figures}) == len(figures)
@@ -57,4 +57,4 @@ def test_a_test_that_ends_early_is_a_figure(tmp_path: Path, monkeypatch: pytest.
 def test_the_exchanges_start_is_one_that_the_slave_takes() -> None:
     plan = transports.bench_plan("rths", Path("any"))
     assert plan.link.connect_timeout > transports.LEAD_S
-    assert plan.window * plan.test.interval > transports.LEAD_S > Safety().message_age
+    assert plan.window * plan.test.interval > transports.LEAD_S > SafetyTable().message_age

@@ -19,7 +19,7 @@ from common.recording.reader import Tail, read
 from common.recording.records import HEAD, MESSAGE
 from common.recording.recovery import recover
 from common.recording.writer import Recording
-from common.signals import TOPICS, Kind
+from common.signals import TOPICS, FieldType
 
 MAGIC = b"\x89MCAP0\r\n"
 EMPTY_MESSAGE = HEAD.pack(5, MESSAGE.size) + MESSAGE.pack(1, 0, 0, 0)
@@ -89,7 +89,7 @@ def test_a_building_at_rest_keeps_far_within_the_bounds(storeys: int, tmp_path: 
     for tick in range(ticks):
         for topic, rows in topics.items():
             values: dict[str, Any] = {"seq": tick, "t": tick * 0.002}
-            rest = ([0.0] * storeys if row.kind is Kind.STOREYS and storeys > 1 else 0 for row in rows)
+            rest = ([0.0] * storeys if row.kind is FieldType.STOREYS and storeys > 1 else 0 for row in rows)
             row = [values.get(row.name, value) for row, value in zip(rows, rest, strict=True)]
             recording.add(topic, tick * 2_000_000, tick * 2_000_000, row)
     recording.close({})

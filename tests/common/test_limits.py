@@ -14,8 +14,8 @@ from common.plan.limits import (
     Frozen,
     Guard,
     Lasting,
+    LimitViolation,
     Standstill,
-    Violation,
     violated,
 )
 from common.plan.plan import Plan
@@ -35,23 +35,25 @@ def actuator(**most: float) -> Change:
     ("violation", "sentence"),
     [
         (
-            Violation("actuator_velocity", 0.612, 0.5),
+            LimitViolation("actuator_velocity", 0.612, 0.5),
             "actuator_velocity is 0.612, beyond its limit of 0.5 m/s.",
         ),
-        (Violation("error_energy", 1.25, 1.0), "error_energy is 1.25, beyond its limit of 1."),
+        (LimitViolation("error_energy", 1.25, 1.0), "error_energy is 1.25, beyond its limit of 1."),
         (
-            Violation("column_force", math.nan, 4e5),
+            LimitViolation("column_force", math.nan, 4e5),
             "column_force is nan, beyond its limit of 400000 N.",
         ),
     ],
 )
-def test_a_violation_is_a_sentence_with_the_unit_of_the_plan(violation: Violation, sentence: str) -> None:
+def test_a_violation_is_a_sentence_with_the_unit_of_the_plan(
+    violation: LimitViolation, sentence: str
+) -> None:
     assert str(violation) == violation.sentence == sentence
 
 
 def test_the_first_command_is_a_change_from_rest_in_zero() -> None:
     assert actuator(actuator_step=1e-3).violation(1e-3) is None
-    assert actuator(actuator_step=1e-3).violation(-1.01e-3) == Violation("actuator_step", -1.01e-3, 1e-3)
+    assert actuator(actuator_step=1e-3).violation(-1.01e-3) == LimitViolation("actuator_step", -1.01e-3, 1e-3)
     for name, most, value in (
         ("actuator_velocity", 0.5, 0.55),
         ("actuator_acceleration", 250.0, 275.0),
@@ -89,7 +91,7 @@ def test_an_acceleration_is_the_second_difference() -> None:
 def test_a_quantity_without_a_limit_of_that_kind_has_none() -> None:
     motor = Change(vars(Limits(damper_step=10.0)), INTERVAL, step="damper_step")
     assert motor.violation(10.0) is None
-    assert motor.violation(10.1) == Violation("damper_step", 10.1, 10.0)
+    assert motor.violation(10.1) == LimitViolation("damper_step", 10.1, 10.0)
 
 
 def test_an_error_trips_when_it_lasts() -> None:
@@ -97,7 +99,7 @@ def test_an_error_trips_when_it_lasts() -> None:
     errors = [0.011, -0.02, 0.01, 0.011, -0.011, 0.012, 0.013]
     found = [lasting.violation(error) for error in errors]
     assert [violation is not None for violation in found] == [False] * 5 + [True] * 2
-    assert found[5] == Violation("column_error", 0.012, 0.01)
+    assert found[5] == LimitViolation("column_error", 0.012, 0.01)
 
 
 def test_nan_is_beyond_any_limit_and_nothing_else_beyond_an_infinite_one() -> None:

@@ -13,7 +13,7 @@ from common.errors import InputError, RigError
 from common.host.clock import VirtualClock
 from common.lab import preflight
 from common.lab.laboratory import Laboratory, Setting
-from common.lab.preflight import Check, Gate, RefusedError, SensorsAtRest, link_risk, sensor_risk
+from common.lab.preflight import Gate, PreflightCheck, RefusedError, SensorsAtRest, link_risk, sensor_risk
 from common.link.memory_link import MemoryHub
 from common.plan.patience import strict
 from common.plan.plan import Plan
@@ -38,7 +38,13 @@ def test_a_risk_refuses_unless_its_name_is_accepted() -> None:
 
 def test_a_refusal_is_one_sentence_that_says_how_to_overrule_it() -> None:
     with pytest.raises(RefusedError) as error:
-        Gate(["link"]).judge([Check("", PEAKS), Check("", LINK), Check("", PEAKS._replace(sentence="again"))])
+        Gate(["link"]).judge(
+            [
+                PreflightCheck("", PEAKS),
+                PreflightCheck("", LINK),
+                PreflightCheck("", PEAKS._replace(sentence="again")),
+            ]
+        )
     assert str(error.value) == (
         "Pre-flight refuses the test: too high, so lower it; again; "
         "to run it all the same, give --accept-risk peaks."
@@ -51,7 +57,7 @@ def test_a_gate_tells_the_recording_once_what_was_passed_and_what_was_overruled(
     clock = VirtualClock()
     lab = Laboratory("master", Setting(Plan(), MemoryHub().join("master", clock), clock))
     gate = Gate(["peaks"])
-    gate.judge([Check("link good"), Check("", PEAKS)])
+    gate.judge([PreflightCheck("link good"), PreflightCheck("", PEAKS)])
     for _ in range(2):
         gate.note(lab)
     assert [tuple(item[5:8]) for item in lab.outlet._pending] == [

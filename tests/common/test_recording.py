@@ -16,17 +16,17 @@ from common.errors import InputError
 from common.recording import chunks, index
 from common.recording.reader import read
 from common.recording.writer import Recording
-from common.signals import TOPICS, Kind
+from common.signals import TOPICS, FieldType
 
-VALUES: dict[Kind, Any] = {
-    Kind.NUMBER: 0.1,
-    Kind.STOREYS: 0.2,
-    Kind.COUNT: 3,
-    Kind.INDEX: -1,
-    Kind.STAMP: 2**60,
-    Kind.FLAG: True,
-    Kind.TEXT: "text",
-    Kind.VALUES: {"a": 1.5},
+VALUES: dict[FieldType, Any] = {
+    FieldType.NUMBER: 0.1,
+    FieldType.STOREYS: 0.2,
+    FieldType.COUNT: 3,
+    FieldType.INDEX: -1,
+    FieldType.STAMP: 2**60,
+    FieldType.FLAG: True,
+    FieldType.TEXT: "text",
+    FieldType.VALUES: {"a": 1.5},
 }
 
 
@@ -34,7 +34,7 @@ def example(topic: str, seq: int, storeys: int = 1) -> tuple[Any, ...]:
     row = []
     for signal in TOPICS[topic]:
         value = VALUES[signal.kind]
-        if signal.kind is Kind.STOREYS and storeys > 1:
+        if signal.kind is FieldType.STOREYS and storeys > 1:
             value = [0.1 * storey for storey in range(storeys)]
         row.append(seq if signal.name == "seq" else value)
     return tuple(row)
@@ -94,7 +94,11 @@ def test_the_public_reader_decodes_every_field_with_the_schema_in_the_file(tmp_p
         for signal, value in zip(TOPICS[topic], example(topic, message.sequence, 2), strict=True):
             got = getattr(decoded, signal.name)
             assert (
-                dict(got) if signal.kind is Kind.VALUES else list(got) if isinstance(value, list) else got
+                dict(got)
+                if signal.kind is FieldType.VALUES
+                else list(got)
+                if isinstance(value, list)
+                else got
             ) == value
         assert channel.message_encoding == schema.encoding == "protobuf"
         assert message.log_time <= message.publish_time

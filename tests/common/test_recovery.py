@@ -24,7 +24,7 @@ from common.recording.reader import read
 from common.recording.records import HEAD
 from common.recording.recovery import recover
 from common.recording.writer import REPEAT_BYTES, Recording
-from common.signals import TICK_TOPICS, TOPICS, Kind
+from common.signals import TICK_TOPICS, TOPICS, FieldType
 from rths.examine.recover import write_account
 
 TICKS = 600
@@ -34,7 +34,12 @@ Key = tuple[int, int, int, int, bytes]
 Spot = tuple[str, int, int, Any]  # kind of a record, its place, its end, the record
 
 TIMES = slice(HEAD.size, HEAD.size + 16)  # of a chunk's first and last message, which no checksum covers
-DEFAULTS: dict[Kind, Any] = {Kind.FLAG: False, Kind.INDEX: 3, Kind.STAMP: 2**44, Kind.TEXT: "ramping"}
+DEFAULTS: dict[FieldType, Any] = {
+    FieldType.FLAG: False,
+    FieldType.INDEX: 3,
+    FieldType.STAMP: 2**44,
+    FieldType.TEXT: "ramping",
+}
 
 
 def values(topic: str, seq: int, noise: random.Random) -> list[Any]:

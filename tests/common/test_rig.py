@@ -165,7 +165,7 @@ def test_a_link_without_fate_is_refused(short_plan: Plan, tmp_path: Path) -> Non
     (tmp_path / "net.py").write_text(
         "class Net:\n    def __init__(self, seed): pass\n    def fate(self, seq): pass\n"
     )
-    real = replace(as_planned(short_plan), link=tables.Rig("net.py:Net"), base=tmp_path)
+    real = replace(as_planned(short_plan), link=tables.RigTable("net.py:Net"), base=tmp_path)
     with pytest.raises(
         InputError, match=r"Net \(net.py\) named in \[link\] .* must have fate\(direction, seq, t\)"
     ):

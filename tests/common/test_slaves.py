@@ -255,7 +255,7 @@ def test_a_recording_has_a_topic_per_slave_and_an_array_per_command(tmp_path: Pa
     labs = ["master", "slave.roof", "slave.cellar", "latency.roof", "latency.cellar"]
     assert list(table) == [*labs, "master_ramp", "slave_ramp.roof", "slave_ramp.cellar", "event"]
     recording = Recording(path, "trial", 1, table, slaves)
-    kinds = {signals.Kind.INDEX: [1, 2]}
+    kinds = {signals.FieldType.INDEX: [1, 2]}
     values = [kinds.get(row.kind, [1.0, 2.0]) if row.slaves else 0 for row in table["master"]]
     recording.add("master", 0, 0, values)
     recording.close({})

@@ -14,7 +14,7 @@ from common.plan.plan import Plan
 from common.recording.reader import read
 from common.terminal import cli
 from diagnosis.recorded import record
-from diagnosis.recorded.parts import Laboratory
+from diagnosis.recorded.parts import LaboratoryPart
 from diagnosis.recorded.record import Record
 from laboratories.effects import CATALOGUE
 from models.registry import Array
@@ -65,16 +65,16 @@ def play(base: Plan, given: Mapping[str, Any], path: Path) -> RthsError | None:
     return virtual.run(virtual.assemble(base, true, path), lambda: "")
 
 
-def lab_a(whole: Record) -> Laboratory:
+def lab_a(whole: Record) -> LaboratoryPart:
     """The master's laboratory of a record as a part."""
     assert whole.own is not None
-    return Laboratory(whole, whole.own)
+    return LaboratoryPart(whole, whole.own)
 
 
-def lab_b(whole: Record) -> Laboratory:
+def lab_b(whole: Record) -> LaboratoryPart:
     """The slave's laboratory of a record as a part."""
     assert whole.other is not None
-    return Laboratory(whole, whole.other)
+    return LaboratoryPart(whole, whole.other)
 
 
 class Cases:

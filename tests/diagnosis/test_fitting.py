@@ -17,7 +17,7 @@ from common.recording.reader import read
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data, Fit
 from diagnosis.recorded import record
-from diagnosis.recorded.parts import MODEL_ERROR, Building, Laboratory, Part
+from diagnosis.recorded.parts import MODEL_ERROR, Building, LaboratoryPart, Part
 from diagnosis.recorded.record import Record
 from laboratories.effects import CATALOGUE
 from models.registry import Array
@@ -109,7 +109,7 @@ def test_noise_of_white_noise_over_anything_smooth() -> None:
 def test_residuals_of_white_noise_have_unit_variance(cases: Cases) -> None:
     data = data_of(cases, "b")
     part = data.part
-    assert isinstance(part, Laboratory)
+    assert isinstance(part, LaboratoryPart)
     noisy = part.predict(data.system) + data.sigma * white(3, *part.measured.shape)
     again = dataclasses.replace(data, part=part.replaced(measured=noisy))
     reduced = again.reduced(data.system)
@@ -119,7 +119,7 @@ def test_residuals_of_white_noise_have_unit_variance(cases: Cases) -> None:
 def test_what_is_missing_does_not_count(cases: Cases) -> None:
     data = data_of(cases, "a")
     part = data.part
-    assert isinstance(part, Laboratory)
+    assert isinstance(part, LaboratoryPart)
     present = part.present.copy()
     present[1000:2000, 1] = False
     spoilt = part.measured.copy()

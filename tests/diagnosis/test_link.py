@@ -13,9 +13,9 @@ import pytest
 from common.link.mailbox import LinkModel
 from common.plan import reality
 from common.plan.plan import Plan
-from common.plan.tables import Rig
+from common.plan.tables import RigTable
 from common.recording.reader import Run, read
-from diagnosis.recorded.link import Finding, account, exchange_of, findings
+from diagnosis.recorded.link import LinkFinding, account, exchange_of, findings
 from loop.closed_loop import on_time
 from loop.exchange import exchange
 from models.link.impaired import ImpairedLink
@@ -61,7 +61,7 @@ def rows(command: Any, link: LinkModel) -> dict[str, Any]:
     }
 
 
-def found_in(run: Run) -> dict[str, Finding]:
+def found_in(run: Run) -> dict[str, LinkFinding]:
     return {item.effect: item for item in findings(account(run, DT), DT)}
 
 
@@ -71,7 +71,9 @@ def values(run: Run) -> dict[str, tuple[float, tuple[float, float]]]:
 
 def played(plan: Plan, path: Path, **options: float) -> Run:
     """The short test in virtual time over an impaired link."""
-    real = dataclasses.replace(reality.as_planned(plan), link=Rig(NETWORK, options) if options else Rig())
+    real = dataclasses.replace(
+        reality.as_planned(plan), link=RigTable(NETWORK, options) if options else RigTable()
+    )
     assert virtual.run(virtual.assemble(plan, real, path), lambda: "") is None
     return read(path)
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from diagnosis.findings import next_test
-from diagnosis.findings.next_test import Choice
+from diagnosis.findings.next_test import ChosenTest
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data, Values
-from diagnosis.recorded.parts import Laboratory
+from diagnosis.recorded.parts import LaboratoryPart
 from laboratories.effects import CATALOGUE, checked
 from tests.diagnosis.cases import Cases, lab_a
 
@@ -31,7 +31,7 @@ def hypothesis(data: Data, effect: str, **given: float) -> fitting.Fit:
 def scaled(data: Data, factor: float) -> Data:
     """The same motion at another scale."""
     part = data.part
-    assert isinstance(part, Laboratory)
+    assert isinstance(part, LaboratoryPart)
     inputs = {name: factor * values for name, values in part.inputs.items()}
     return dataclasses.replace(data, part=part.replaced(inputs=inputs))
 
@@ -62,13 +62,13 @@ def test_a_hypothesis_is_not_separated_from_itself(cases: Cases) -> None:
 def test_the_menu_stays_within_what_was_reached_or_says_so(cases: Cases) -> None:
     data = laboratory(cases)
     part = data.part
-    assert isinstance(part, Laboratory)
+    assert isinstance(part, LaboratoryPart)
     largest = float(np.max(np.abs(part.inputs["actuator_command"])))
     tests = next_test.menu(data)
     names = [name for name, _ in tests]
     assert len(set(names)) == len(names) == 6
     for _, item in tests:
-        assert isinstance(item.part, Laboratory)
+        assert isinstance(item.part, LaboratoryPart)
         assert float(np.max(np.abs(item.part.inputs["actuator_command"]))) <= 2.0 * largest * (1 + 1e-9)
     assert part.inputs["actuator_command"] is not None  # the recording's own are as they were
 
@@ -89,8 +89,8 @@ def test_what_no_motion_separates_asks_for_a_look_at_the_sensor(cases: Cases) ->
 
 def test_the_advice_in_words() -> None:
     assert next_test.sentence([]) == ""
-    best = Choice("a sine", 12.4, ("column.slip", "column.pinching"))
-    other = Choice("slow cycles", 2.0, ("column.slip", "column.friction"))
+    best = ChosenTest("a sine", 12.4, ("column.slip", "column.pinching"))
+    other = ChosenTest("slow cycles", 2.0, ("column.slip", "column.friction"))
     assert next_test.sentence([best, other]) == (
         "Run a sine: it separates column.slip from column.pinching by 12 standard deviations of the noise."
     )

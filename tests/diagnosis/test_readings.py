@@ -7,14 +7,14 @@ import pytest
 
 from common.recording.reader import read
 from diagnosis.findings import readings
-from diagnosis.findings.readings import Reading
+from diagnosis.findings.readings import SensorFinding
 from diagnosis.fits import fitting
 from diagnosis.recorded import record
 from diagnosis.recorded.record import Record
 from tests.diagnosis.cases import Cases, lab_a, lab_b, named
 
 
-def found_in(whole: Record) -> list[Reading]:
+def found_in(whole: Record) -> list[SensorFinding]:
     """Findings as a diagnosis makes them."""
     steps = readings.steps(whole)
     datas = [fitting.prepare(kind(whole), whole, steps) for kind in (lab_a, lab_b)]

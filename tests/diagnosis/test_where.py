@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from diagnosis.findings import where
-from diagnosis.findings.where import Trace
+from diagnosis.findings.where import SiteTrace
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data
 from diagnosis.recorded.parts import Building, Part
@@ -129,7 +129,7 @@ def test_when_and_at_which_frequency(cases: Cases) -> None:
     whole = cases.record(duration=8.0)
     t = whole.time
     burst: Array = np.where((t >= 2.0) & (t < 5.0), 10.0, 0.0) * np.sin(2.0 * np.pi * 4.0 * t)
-    trace = Trace("damper", burst, 6.0, "damper_force", 1.0)
+    trace = SiteTrace("damper", burst, 6.0, "damper_force", 1.0)
     assert where.when(trace, whole) == ((2.0, 5.0),)
     low, high = where.frequencies(trace, whole)
     assert 3.0 < low < 4.0 < high < 5.0

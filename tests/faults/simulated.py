@@ -25,7 +25,7 @@ from validation.faults.invariants import judge, last_valid, seen
 from validation.faults.lab import SESSION, Simulation, Surrounding
 from validation.faults.rigs import COMPUTED
 from validation.faults.schedule import Schedule
-from validation.faults.wire import DROPS, INSIDER, Conditions, Direction, Letter
+from validation.faults.wire import DROPS, INSIDER, Conditions, Letter, WireRoute
 
 AT = 860  # the tick of a fault: the building moves, and so do all commands
 DURATION = 2.4  # s of a test
@@ -76,7 +76,7 @@ class Scene:
         process = self.simulation.world.processes[MASTER]
         return process.reached(lab.start_ns) + round(tick * lab.interval_ns)
 
-    def route(self, hearer: str, channel: str = TICK) -> Direction:
+    def route(self, hearer: str, channel: str = TICK) -> WireRoute:
         """The way to a laboratory from the other one."""
         there = self.simulation.wire.between(*BETWEEN[hearer])
         return next(one for one in there if one.route.channel == channel)
@@ -104,7 +104,7 @@ class Scene:
         out = self.simulation.ports[sender].out
         for key, ways in out.items():
             out[key] = [
-                cast("Direction", Relay(route, changed, self.plan)) if way is route else way for way in ways
+                cast("WireRoute", Relay(route, changed, self.plan)) if way is route else way for way in ways
             ]
 
     def play(self) -> Course:
@@ -121,7 +121,7 @@ class Relay:
     """Stands on a route and hands on other frames than those that come."""
 
     def __init__(
-        self, route: Direction, changed: Callable[[Any], Message | bytes | None], plan: Plan
+        self, route: WireRoute, changed: Callable[[Any], Message | bytes | None], plan: Plan
     ) -> None:
         self._route, self._changed = route, changed
         self._keys = [codec.session_key(session, plan.digest()) for session in (SESSION, 0)]

@@ -17,7 +17,7 @@ from scipy.integrate import quad, solve_ivp, trapezoid
 
 from common.errors import InputError
 from common.plan.plan import Plan
-from common.plan.tables import Actuator, Column, Damper, Table
+from common.plan.tables import Actuator, Column, Damper, ShakingTable
 from common.rig import ColumnCommand, TableCommand
 from common.roles import SLAVE
 from laboratories.column import model as column_lab
@@ -506,14 +506,16 @@ STILL = Damper(mass=16.0, stiffness=0.0, damping=0.0)
 def run_b(
     command: Array,
     motor: Array | None = None,
-    table: Table | None = None,
+    table: ShakingTable | None = None,
     damper: Damper | None = None,
     table_effects: TableEffects | None = None,
     damper_effects: DamperEffects | None = None,
     interval: float = DT,
 ) -> Array:
     """Table displacement, acceleration, stroke, force, and both velocities at the ends of the intervals."""
-    lab = table_lab.build(interval, table or Table(), damper or Damper(), table_effects, damper_effects)
+    lab = table_lab.build(
+        interval, table or ShakingTable(), damper or Damper(), table_effects, damper_effects
+    )
     pushes = np.zeros(command.size) if motor is None else motor
     rows = []
     for value, push in zip(command.tolist(), pushes.tolist(), strict=True):
@@ -580,7 +582,7 @@ def test_at_rest_the_damper_does_not_move_the_table_and_in_motion_by_its_force(c
 @pytest.mark.parametrize("oil", [math.inf, 16.0])
 def test_the_payload_solves_the_coupled_equations(motor_lag: float, oil: float) -> None:
     ticks, compliance = 300, 2.5e-5
-    table, damper = Table(), Damper(motor_time_constant=motor_lag)
+    table, damper = ShakingTable(), Damper(motor_time_constant=motor_lag)
     command, motor = tones(ticks, size=5e-3), tones(ticks, seed=2, size=30.0)
     more = TableEffects(compliance=compliance, oil_frequency=oil, oil_damping=0.1)
     got = run_b(command, motor, table, damper, more)
@@ -612,10 +614,10 @@ def test_the_payload_solves_the_coupled_equations(motor_lag: float, oil: float) 
 
 def test_the_tables_play_is_its_dead_travel() -> None:
     width, command = 1.5e-3, there_and_back(0.02, 0.01, 4000)
-    got = run_b(command, damper=STILL, table=Table(delay=0.0), table_effects=TableEffects(backlash=width))[
-        :, Y
-    ]
-    plain = run_b(command, damper=STILL, table=Table(delay=0.0))[:, Y]
+    got = run_b(
+        command, damper=STILL, table=ShakingTable(delay=0.0), table_effects=TableEffects(backlash=width)
+    )[:, Y]
+    plain = run_b(command, damper=STILL, table=ShakingTable(delay=0.0))[:, Y]
     assert plain[3900] - got[3900] == pytest.approx(width / 2, rel=1e-6)
     assert plain[-1] - got[-1] == pytest.approx(-width / 2, rel=1e-6)
     turn = 3999
@@ -641,7 +643,7 @@ def test_table_friction_loses_its_force_times_the_way(oil: float) -> None:
     friction, frequency, omega = 0.3, 2.0, 2.0 * math.pi * 15.0
     t = np.arange(1, 8001) * SHORT
     command = 0.02 * np.sin(2.0 * np.pi * frequency * t)
-    table = Table(delay=0.0)
+    table = ShakingTable(delay=0.0)
     more = TableEffects(friction=friction, oil_frequency=oil)
     lab = table_lab.build(SHORT, table, STILL, more)
     place, rate = (
@@ -661,7 +663,7 @@ def test_table_friction_loses_its_force_times_the_way(oil: float) -> None:
 def test_table_friction_falls_off_with_its_velocity() -> None:
     more = TableEffects(friction=0.5, friction_velocity=0.05)
     omega, ramp = 2.0 * math.pi * 15.0, 0.02 * DT * np.arange(1, 1001)
-    got = run_b(ramp, table=Table(delay=0.0), damper=STILL, table_effects=more)
+    got = run_b(ramp, table=ShakingTable(delay=0.0), damper=STILL, table_effects=more)
     # steady: ω²(u − y) = 2ζω·v + a·tanh(v/v0)
     behind = (1.4 * omega * 0.02 + 0.5 * math.tanh(0.02 / 0.05)) / omega**2
     assert ramp[-1] - got[-1, Y] == pytest.approx(behind, rel=1e-6)
@@ -677,14 +679,14 @@ def test_table_friction_falls_off_with_its_velocity() -> None:
 )
 def test_an_ideal_table_refuses_what_it_cannot_have(name: str, effects: TableEffects) -> None:
     with pytest.raises(InputError, match=r"ideal table .*cannot have the effect") as caught:
-        table_lab.build(DT, Table(frequency=math.inf, delay=0.0), Damper(), effects)
+        table_lab.build(DT, ShakingTable(frequency=math.inf, delay=0.0), Damper(), effects)
     assert name in str(caught.value)
     assert str(caught.value).count("\n") == 0
 
 
 def test_an_ideal_table_may_have_gain_and_play() -> None:
     command = there_and_back(0.02, 0.01, 500)
-    table = Table(frequency=math.inf, delay=0.0)
+    table = ShakingTable(frequency=math.inf, delay=0.0)
     got = run_b(command, table=table, damper=STILL, table_effects=TableEffects(gain=1.1, backlash=1e-3))[:, Y]
     assert got[498] == pytest.approx(1.1 * 0.02 - 0.5e-3)
     assert got[-1] == pytest.approx(1.1 * 0.01 + 0.5e-3)
@@ -697,7 +699,7 @@ def released(
     damper: Damper, effects: DamperEffects, seconds: float, stroke: float = 0.0, rate: float = 0.0
 ) -> Array:
     """Stroke, its velocity and the force of a damper let go on a standing table, at every tick."""
-    lab = table_lab.build(DT, Table(), damper, None, effects)
+    lab = table_lab.build(DT, ShakingTable(), damper, None, effects)
     lab.state[table_lab.STROKE], lab.state[table_lab.STROKE_RATE] = stroke, rate
     rows = []
     for _ in range(round(seconds / DT)):
@@ -877,7 +879,7 @@ def test_the_force_balances_the_motion_with_every_effect(
     """m·Δ(ṡ + ẏ) = −∫F dt over any stretch: what the damper gains in momentum the table's reading says."""
     t = np.arange(1, 8001) * SHORT
     command, motor = 0.01 * np.sin(12.0 * t), 60.0 * np.sin(12.5 * t + 1.0)
-    table = Table(delay=0.0)
+    table = ShakingTable(delay=0.0)
     got = run_b(command, motor, table, Damper(), table_effects, damper_effects, interval=SHORT)
     if math.isfinite(damper_effects.stop_stroke):
         assert np.max(np.abs(got[:, STROKE])) > damper_effects.stop_stroke
@@ -891,7 +893,11 @@ def test_the_platform_s_reading_of_acceleration_is_its_velocitys_slope() -> None
     t = np.arange(1, 4001) * SHORT
     command = 0.01 * np.sin(12.0 * t)
     got = run_b(
-        command, table=Table(delay=0.0), table_effects=ALL_TABLE, damper_effects=ALL_DAMPER, interval=SHORT
+        command,
+        table=ShakingTable(delay=0.0),
+        table_effects=ALL_TABLE,
+        damper_effects=ALL_DAMPER,
+        interval=SHORT,
     )
     change = np.cumsum(0.5 * (got[1:, ACCELERATION] + got[:-1, ACCELERATION])) * SHORT
     assert np.max(np.abs(got[1:, RATE] - got[0, RATE] - change)) < 0.003 * np.max(np.abs(got[:, RATE]))

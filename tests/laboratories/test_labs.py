@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from common.plan.tables import Actuator, Column, Damper, Sensors, Table
+from common.plan.tables import Actuator, Column, Damper, SensorsTable, ShakingTable
 from laboratories.column import model as column_lab
 from laboratories.sensors import noise
 from laboratories.table import model as table_lab
@@ -136,7 +136,10 @@ def test_an_ideal_actuator_reaches_its_command_at_the_intervals_end() -> None:
 @pytest.mark.parametrize("motor", [0.003, 0.0])
 def test_table_and_damper_solve_their_equations(lag: float, motor: float) -> None:
     ticks = 400
-    table, damper = Table(frequency=15.0, damping_ratio=0.7, delay=lag), Damper(motor_time_constant=motor)
+    table, damper = (
+        ShakingTable(frequency=15.0, damping_ratio=0.7, delay=lag),
+        Damper(motor_time_constant=motor),
+    )
     wanted, force = commands(ticks), 40.0 * commands(ticks, seed=2) / 0.003
     lab = table_lab.build(DT, table, damper)
     got = np.array([table_lab.advance(lab, u, f) for u, f in zip(wanted, force, strict=True)])
@@ -170,7 +173,7 @@ def test_table_and_damper_solve_their_equations(lag: float, motor: float) -> Non
 
 
 def test_an_ideal_table_follows_at_once_and_carries_the_damper_along() -> None:
-    table, damper = Table(frequency=math.inf, delay=0.0), Damper(stiffness=0.0, damping=0.0)
+    table, damper = ShakingTable(frequency=math.inf, delay=0.0), Damper(stiffness=0.0, damping=0.0)
     wanted = commands(500)
     lab = table_lab.build(DT, table, damper)
     got = np.array([table_lab.advance(lab, u, 0.0) for u in wanted])
@@ -182,7 +185,7 @@ def test_an_ideal_table_follows_at_once_and_carries_the_damper_along() -> None:
 
 
 def test_the_dampers_force_balances_its_motion() -> None:
-    lab = table_lab.build(DT, Table(), Damper())
+    lab = table_lab.build(DT, ShakingTable(), Damper())
     wanted = commands(1000)
     got = np.array([table_lab.advance(lab, u, 20.0 * u / 0.003) for u in wanted])
     absolute = np.diff(got[:, 0] + got[:, 2], 2) / DT**2
@@ -192,7 +195,7 @@ def test_the_dampers_force_balances_its_motion() -> None:
 
 
 def test_noise_is_the_same_one_by_one_and_at_once() -> None:
-    levels = noise.levels(Sensors(), TABLE.channels.names)
+    levels = noise.levels(SensorsTable(), TABLE.channels.names)
     single, whole = noise.Noise(3, levels), noise.Noise(3, levels)
     rows = whole.rows(2500)
     assert np.array_equal(rows, [single.row() for _ in range(2500)])

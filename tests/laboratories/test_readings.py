@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from common.plan.plan import Plan
-from common.plan.tables import Sensors
+from common.plan.tables import SensorsTable
 from common.rig import ColumnCommand, TableCommand
 from laboratories.column.kind import COLUMN
 from laboratories.effects import CATALOGUE, lay
@@ -153,7 +153,7 @@ def test_quantisation_errors_are_those_of_widrow() -> None:
 @pytest.mark.parametrize("name", [*COLUMN.channels.names, *TABLE.channels.names])
 def test_levels_add_as_independent_noises_do(name: str) -> None:
     names = COLUMN.channels.names if name in COLUMN.channels.names else TABLE.channels.names
-    nominal = noise.levels(Sensors(), names)
+    nominal = noise.levels(SensorsTable(), names)
     found = readings.levels(names, nominal, {name: SensorEffects(noise=3.0)})
     for place, other in enumerate(names):
         squared = nominal[place] ** 2 + (9.0 if other == name else 0.0)
@@ -163,7 +163,7 @@ def test_levels_add_as_independent_noises_do(name: str) -> None:
 
 def test_the_noise_of_a_reading_has_the_level_of_both() -> None:
     force = SensorEffects(noise=300.0)
-    loud = Plan(sensors=Sensors(column_force=400.0))
+    loud = Plan(sensors=SensorsTable(column_force=400.0))
     lab = EmulatedLab(COLUMN, System(loud, Effects(sensors={"column_force": force})), 3)
     got = np.array([lab.read() for _ in range(8000)])
     assert got[:, 1].std() == pytest.approx(500.0, rel=0.03)
@@ -185,7 +185,7 @@ def test_the_rigs_falsify_the_reading_named_and_the_truth_stays(name: str, kind:
     effect = CATALOGUE[f"sensor.{name}.{kind}"]
     size = SIZES[kind] * (1.0 if kind in ("gain", "lag", "delay") else min(effect.parameters[0].most, 1.0))
     system = lay(System(Plan()), [(effect.name, {effect.parameters[0].name: size})])
-    quiet = Plan(sensors=Sensors(**dict.fromkeys((*COLUMN.channels.names, *TABLE.channels.names), 0.0)))
+    quiet = Plan(sensors=SensorsTable(**dict.fromkeys((*COLUMN.channels.names, *TABLE.channels.names), 0.0)))
     rows: list[list[tuple[float, ...]]] = []
     for effects in (Effects(), system.effects):
         lab_a, lab_b = (EmulatedLab(kind, System(quiet, effects), 1) for kind in (COLUMN, TABLE))

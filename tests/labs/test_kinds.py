@@ -35,7 +35,7 @@ def plan_of(name: str) -> Plan:
     return plans.parse(PLANS[name], Path(), name)
 
 
-def played(plan: Plan, path: Path, *, completed: bool = True) -> tuple[virtual.Bench, Run]:
+def played(plan: Plan, path: Path, *, completed: bool = True) -> tuple[virtual.VirtualTest, Run]:
     bench = virtual.assemble(plan, as_planned(plan), path)
     error = virtual.run(bench, str)
     assert (error is None) == completed, error

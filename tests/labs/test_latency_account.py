@@ -15,7 +15,7 @@ from common.lab.laboratory import Laboratory, Setting
 from common.link.memory_link import MemoryHub
 from common.plan.plan import Plan
 from common.protocol.messages import Feedback, Recorder
-from master.latency import Account
+from master.latency import LatencyAccount
 from master.partner import NO_FEEDBACK, OFFSET_BLOCK, OFFSET_BLOCKS
 
 INTERVAL = 2_000_000
@@ -46,7 +46,7 @@ class Trial:
         self.lab.enter(1)
         self.lab.recorder = Recorder(1, "recording", "", "", b"")
         self.offset = ClockOffset(length=OFFSET_BLOCK, blocks=OFFSET_BLOCKS)
-        self.account = Account(self.lab, self.offset, "latency")
+        self.account = LatencyAccount(self.lab, self.offset, "latency")
         self.truth: list[tuple[int, int]] = []
         self.lab.start_ns = master(SECOND)
 

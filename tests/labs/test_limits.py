@@ -24,7 +24,7 @@ from loop import substructure
 from loop.closed_loop import signals, simulate
 from models import integrators
 from simulation import virtual
-from simulation.virtual import Bench
+from simulation.virtual import VirtualTest
 from tests.helpers import largest, running, with_table, without_recorder
 
 NO_LIMITS = dict.fromkeys(("error_energy", "numerical_drift", "column_error"), math.inf)
@@ -68,7 +68,7 @@ class Watched:
         return getattr(self._rig, name)
 
 
-def played(chosen: Plan, real: Reality | None = None) -> tuple[Bench, Any, dict[str, Watched]]:
+def played(chosen: Plan, real: Reality | None = None) -> tuple[VirtualTest, Any, dict[str, Watched]]:
     """A test without recorder whose rigs are watched, to its end."""
     chosen = without_recorder(chosen)
     real = dataclasses.replace(real, plan=without_recorder(real.plan)) if real else reality.as_planned(chosen)

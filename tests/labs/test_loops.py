@@ -15,7 +15,7 @@ from common.link.endpoint import Received
 from common.plan import reality
 from common.plan.plan import PROTOCOL_VERSION, Plan, from_tables
 from common.plan.reality import Reality
-from common.plan.tables import Rig
+from common.plan.tables import RigTable
 from common.protocol.exchange import State
 from common.protocol.messages import Command, Feedback, Register, Stop, SyncReply, Trip
 from common.recording.reader import Run, read
@@ -25,12 +25,12 @@ from loop import substructure
 from loop.closed_loop import rows, signals, simulate
 from rths.examine.replay import replay_master, replay_slave
 from simulation import virtual
-from simulation.virtual import Bench
+from simulation.virtual import VirtualTest
 from simulation.world import Drift
 from tests.helpers import running, with_table, without_recorder
 
 
-def run(plan: Plan, path: Path, real: Reality | None = None) -> tuple[Run, Any, Bench]:
+def run(plan: Plan, path: Path, real: Reality | None = None) -> tuple[Run, Any, VirtualTest]:
     bench = virtual.assemble(plan, real or reality.as_planned(plan), path)
     error = virtual.run(bench, lambda: "")
     return read(path), error, bench
@@ -175,7 +175,7 @@ class BrokenLab:
 
 def broken(plan: Plan, how: str) -> Reality:
     planned = reality.as_planned(plan)
-    return dataclasses.replace(planned, master=Rig(f"{__name__}:BrokenLab", {"how": how}))
+    return dataclasses.replace(planned, master=RigTable(f"{__name__}:BrokenLab", {"how": how}))
 
 
 @pytest.mark.parametrize(
@@ -211,7 +211,7 @@ def test_a_slaves_rig_that_fails_stops_the_master_too(
 ) -> None:
     monkeypatch.setattr("loop.rigs.find", lambda *_: BrokenLab)
     real = dataclasses.replace(
-        reality.as_planned(short_plan), slave=Rig("x:BrokenLab", {"how": "raise", "at": 0})
+        reality.as_planned(short_plan), slave=RigTable("x:BrokenLab", {"how": "raise", "at": 0})
     )
     found, error, bench = run(short_plan, tmp_path / "broken.mcap", real)
     assert isinstance(error, RigError)  # the cause, not what the master made of it
@@ -290,11 +290,11 @@ def test_a_missing_recorder_is_said(short_plan: Plan) -> None:
 
 
 @pytest.fixture
-def bench(short_plan: Plan) -> Bench:
+def bench(short_plan: Plan) -> VirtualTest:
     return running(without_recorder(short_plan), 100)
 
 
-def test_a_silent_slave_is_lost_and_nothing_more_moves(bench: Bench) -> None:
+def test_a_silent_slave_is_lost_and_nothing_more_moves(bench: VirtualTest) -> None:
     for tick in range(100, 100 + 501):
         bench.world.time = bench.master.lab.tick_ns(tick)
         bench.master.tick(tick)
@@ -310,7 +310,7 @@ def test_a_silent_slave_is_lost_and_nothing_more_moves(bench: Bench) -> None:
 
 @pytest.mark.parametrize(("done", "completed"), [(1000, True), (999, False)])
 def test_a_slave_that_has_fallen_behind_knows_a_test_that_the_master_completed(
-    done: int, completed: bool, bench: Bench
+    done: int, completed: bool, bench: VirtualTest
 ) -> None:
     assert not bench.slave.completed
     plan, session = bench.slave.lab.plan, bench.slave.lab.exchange.session
@@ -334,7 +334,7 @@ def test_an_exchange_that_was_asked_again_and_answered_twice_is_not_lost(short_p
 
 
 def test_a_slave_without_commands_keeps_the_last_one_and_goes_on_measuring_until_it_ramps(
-    bench: Bench,
+    bench: VirtualTest,
 ) -> None:
     before = bench.slave._command
     for tick in range(100, 105):
@@ -349,7 +349,7 @@ def test_a_slave_without_commands_keeps_the_last_one_and_goes_on_measuring_until
     assert bench.slave.lab.safety.mode is Mode.RAMPING
 
 
-def test_a_tick_that_comes_a_whole_interval_late_moves_nothing_and_sends_nothing(bench: Bench) -> None:
+def test_a_tick_that_comes_a_whole_interval_late_moves_nothing_and_sends_nothing(bench: VirtualTest) -> None:
     command = bench.master._command
     while bench.endpoints["slave"].receive() is not None:
         pass
@@ -366,7 +366,7 @@ def test_a_tick_that_comes_a_whole_interval_late_moves_nothing_and_sends_nothing
     assert heard.message.seq == 103
 
 
-def test_repeated_and_outdated_feedback_is_not_used(bench: Bench) -> None:
+def test_repeated_and_outdated_feedback_is_not_used(bench: VirtualTest) -> None:
     session = bench.master.lab.exchange.session
     used = bench.master.partners["slave"].used
     for seq in (used.seq, used.seq - 5):
@@ -378,7 +378,7 @@ def test_repeated_and_outdated_feedback_is_not_used(bench: Bench) -> None:
     assert bench.master.partners["slave"].force != 999.0
 
 
-def test_feedback_of_another_session_is_not_used(bench: Bench) -> None:
+def test_feedback_of_another_session_is_not_used(bench: VirtualTest) -> None:
     bench.master.take(Received(Feedback(12345, 99, 99, 0, -1, 0, 0, 0, (0.0, 0.0, 0.0, 999.0)), "slave"))
     bench.world.time = bench.master.lab.tick_ns(100)
     bench.master.tick(100)
@@ -397,7 +397,7 @@ class SlowLink:
 
 def test_a_link_plug_in_delays_and_loses_messages(short_plan: Plan, tmp_path: Path, monkeypatch: Any) -> None:
     monkeypatch.setattr("loop.links.find", lambda *_: SlowLink)
-    real = dataclasses.replace(reality.as_planned(short_plan), link=Rig("x:SlowLink"))
+    real = dataclasses.replace(reality.as_planned(short_plan), link=RigTable("x:SlowLink"))
     found, error, _ = run(short_plan, tmp_path / "slow.mcap", real)
     assert error is None
     used = found.columns["master"]["damper_force_seq"]
@@ -440,7 +440,7 @@ def test_a_plug_ins_delay_is_in_the_stamps_and_not_in_the_clocks_offset(
     short_plan: Plan, tmp_path: Path, monkeypatch: Any
 ) -> None:
     monkeypatch.setattr("loop.links.find", lambda *_: OneWay)
-    real = dataclasses.replace(reality.as_planned(short_plan), link=Rig("x:OneWay"))
+    real = dataclasses.replace(reality.as_planned(short_plan), link=RigTable("x:OneWay"))
     path = tmp_path / "one_way.mcap"
     bench = virtual.assemble(short_plan, real, path, drifts={"slave": Drift(1_000_000_000)})
     assert virtual.run(bench, lambda: "") is None

@@ -18,14 +18,14 @@ from common.recording.reader import Run, read
 from common.safety.modes import Mode
 from report.facts.accounts import accounts
 from simulation import virtual
-from simulation.virtual import Bench
+from simulation.virtual import VirtualTest
 from tests.faults.rows import motion_after, motion_bound
 from tests.helpers import with_table, without_recorder
 
 TRIP = 300  # tick
 
 
-def played(plan: Plan, path: Path, upset: Any = None) -> tuple[Bench, Run]:
+def played(plan: Plan, path: Path, upset: Any = None) -> tuple[VirtualTest, Run]:
     """A test in virtual time; `upset` is told of every tick before it."""
     bench = virtual.assemble(plan, reality.as_planned(plan), path)
     if upset is not None:
@@ -106,7 +106,7 @@ def test_the_ramp_begins_where_the_last_command_was_without_a_step(short_plan: P
 
 
 def test_a_rig_that_fails_comes_to_rest_blind(short_plan: Plan, tmp_path: Path) -> None:
-    def fail(bench: Bench, tick: int) -> None:
+    def fail(bench: VirtualTest, tick: int) -> None:
         if tick == TRIP:
             bench.master._rig.read = broken  # type: ignore[method-assign]
 
@@ -125,7 +125,7 @@ def test_an_emergency_stop_of_a_rig_stops_it_at_once_and_the_other_by_its_ramp(
 ) -> None:
     disarmed: list[int] = []
 
-    def press(bench: Bench, tick: int) -> None:
+    def press(bench: VirtualTest, tick: int) -> None:
         if tick == TRIP:
             bench.slave._rig.read = button  # type: ignore[method-assign]
             bench.slave._rig.disarm = disarm  # type: ignore[method-assign]
@@ -148,7 +148,7 @@ def test_an_emergency_stop_of_a_rig_stops_it_at_once_and_the_other_by_its_ramp(
 
 
 @pytest.fixture
-def latched(short_plan: Plan) -> Bench:
+def latched(short_plan: Plan) -> VirtualTest:
     """Both laboratories at rest after a limit, still there."""
     plan = without_recorder(replace(short_plan, limits=replace(short_plan.limits, column_force=12e3)))
     bench = virtual.assemble(plan, reality.as_planned(plan), None)
@@ -162,7 +162,7 @@ def latched(short_plan: Plan) -> Bench:
     return bench
 
 
-def pressed(bench: Bench, word: str, press: int, lab: str = "master") -> Answer:
+def pressed(bench: VirtualTest, word: str, press: int, lab: str = "master") -> Answer:
     loop = bench.loops[lab]
     sent: list[Any] = []
 
@@ -176,7 +176,7 @@ def pressed(bench: Bench, word: str, press: int, lab: str = "master") -> Answer:
     return next(message for message in sent if isinstance(message, Answer))
 
 
-def test_a_reset_needs_the_cause_to_be_gone_and_a_new_press(latched: Bench, monkeypatch: Any) -> None:
+def test_a_reset_needs_the_cause_to_be_gone_and_a_new_press(latched: VirtualTest, monkeypatch: Any) -> None:
     loop = latched.master
     monkeypatch.setattr(loop, "standing", lambda: "column_force is beyond its limit.")
     refused = pressed(latched, "reset", 1)
@@ -197,13 +197,13 @@ def test_a_press_before_the_trip_resets_nothing(short_plan: Plan) -> None:
     assert "nothing to reset" in answer.text
 
 
-def test_an_operator_of_another_plan_is_not_heard(latched: Bench) -> None:
+def test_an_operator_of_another_plan_is_not_heard(latched: VirtualTest) -> None:
     wish = Operator(0, "another", "reset", 3, "")
     latched.master.take(Received(wish, "operator", latched.world.time))
     assert latched.master.lab.safety.latched
 
 
-def test_an_emergency_stop_works_at_rest_too(latched: Bench) -> None:
+def test_an_emergency_stop_works_at_rest_too(latched: VirtualTest) -> None:
     assert pressed(latched, "emergency", 4).accepted
     assert latched.master.lab.safety.mode is Mode.EMERGENCY_STOP
 

@@ -16,7 +16,7 @@ from common.plan import plan, reality
 from common.plan.patience import strict
 from common.plan.plan import PROTOCOL_VERSION, Plan, from_tables
 from common.plan.reality import Reality
-from common.plan.tables import Rig
+from common.plan.tables import RigTable
 from common.protocol.exchange import State
 from common.protocol.messages import Arm, Feedback, Recorder, Register, Start, Sync, Waiting
 from common.recording.reader import Run, read
@@ -25,7 +25,7 @@ from loop import substructure
 from loop.closed_loop import signals, simulate
 from rths.examine.replay import replay_master, replay_slave
 from simulation import virtual
-from simulation.virtual import Bench
+from simulation.virtual import VirtualTest
 from slave.assembly import build_loop as build_slave
 from tests.helpers import largest, running, without_recorder
 
@@ -52,7 +52,7 @@ def tall(*names: str, duration: float = 2.0) -> Plan:
 TWO = tall("roof", "middle")
 
 
-def run(chosen: Plan, path: Path, real: Reality | None = None) -> tuple[Run, Any, Bench]:
+def run(chosen: Plan, path: Path, real: Reality | None = None) -> tuple[Run, Any, VirtualTest]:
     bench = virtual.assemble(chosen, real or reality.as_planned(chosen), path)
     error = virtual.run(bench, lambda: "")
     return read(path), error, bench
@@ -144,7 +144,7 @@ class LateRoof:
 
 def test_late_messages_of_one_slave_affect_that_one_alone(tmp_path: Path, monkeypatch: Any) -> None:
     monkeypatch.setattr("loop.links.find", lambda *_: LateRoof)
-    real = dataclasses.replace(reality.as_planned(TWO), link=Rig("x:LateRoof"))
+    real = dataclasses.replace(reality.as_planned(TWO), link=RigTable("x:LateRoof"))
     found, error, _ = run(TWO, tmp_path / "late.mcap", real)
     assert error is None
     used = found.columns["master"]["damper_force_seq"]
@@ -207,7 +207,7 @@ def test_a_slave_that_trips_ends_the_test_for_all_and_the_sentence_names_it(
     real = reality.as_planned(TWO)
     real = dataclasses.replace(
         real,
-        slaves=real.slaves | {"slave.middle": Rig("x:BrokenTable")},
+        slaves=real.slaves | {"slave.middle": RigTable("x:BrokenTable")},
         hidden=frozenset({"slave.middle"} if hidden else ()),
     )
     found, error, bench = run(TWO, tmp_path / "a.mcap", real)

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from common.plan.plan import Plan, from_tables, ideal
-from common.plan.tables import Actuator, Compensator, Control
+from common.plan.tables import Actuator, CompensatorTable, Control
 from common.roles import SLAVE
 from common.signals import TOPICS
 from laboratories.column.kind import COLUMN
 from loop import substructure
-from loop.closed_loop import Exchange, on_time, rows, signals, simulate
+from loop.closed_loop import MessagesUsed, on_time, rows, signals, simulate
 from models.structures import shear_building
 from tests.helpers import largest, with_table
 
@@ -55,7 +55,7 @@ def growth(plan: Plan, delay: float, seconds: float = 30.0) -> float:
     plan = dataclasses.replace(
         without_damper(plan).with_test(duration=seconds),
         actuator=Actuator(gain=1.0, delay=delay, time_constant=0.0),
-        compensator=Compensator("none", {}),
+        compensator=CompensatorTable("none", {}),
     )
     shock = np.zeros((2, plan.ticks + 1))
     shock[0, 1:6] = 1.0
@@ -85,7 +85,7 @@ def test_each_millisecond_costs_the_damping_of_theory(
 
 
 def test_the_uncompensated_test_diverges(default_plan: Plan) -> None:
-    plan = without_damper(dataclasses.replace(default_plan, compensator=Compensator("none", {})))
+    plan = without_damper(dataclasses.replace(default_plan, compensator=CompensatorTable("none", {})))
     found = signals(plan, simulate(plan, ground(plan)))
     assert largest(found["column_displacement"]) > plan.limits.column_displacement
     assert largest(found["displacement"][-2000:]) > largest(found["displacement"][8000:10000]) * 2.0
@@ -93,7 +93,7 @@ def test_the_uncompensated_test_diverges(default_plan: Plan) -> None:
 
 def test_what_diverges_to_infinity_is_cut_there(default_plan: Plan) -> None:
     plan = dataclasses.replace(
-        with_table(default_plan, "actuator", gain=200.0), compensator=Compensator("none", {})
+        with_table(default_plan, "actuator", gain=200.0), compensator=CompensatorTable("none", {})
     )
     rollout = simulate(plan, ground(plan))
     assert not rollout.finite
@@ -126,7 +126,7 @@ def test_a_lost_message_is_bridged_by_the_one_before(short_plan: Plan) -> None:
     nominal = on_time(short_plan.ticks)
     command, feedback = nominal.command.copy(), nominal.feedback.copy()
     command[500], feedback[700] = 499, 698
-    exchange = {SLAVE: Exchange(command, feedback)}
+    exchange = {SLAVE: MessagesUsed(command, feedback)}
     found = signals(short_plan, simulate(short_plan, ground(short_plan), exchange=exchange))
     assert found["damper_force_used"][700] == found["damper_force"][698]
     assert found["damper_force_used"][701] == found["damper_force"][700]

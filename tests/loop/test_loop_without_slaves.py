@@ -14,7 +14,7 @@ import pytest
 from common.errors import InputError
 from common.plan import plan as plans
 from common.plan.plan import Plan, ideal, parse
-from common.plan.tables import Compensator
+from common.plan.tables import CompensatorTable
 from common.roles import MASTER
 from common.signals import OF_BUILDING, OF_STOREYS
 from laboratories import effects
@@ -95,7 +95,7 @@ def test_a_plan_with_a_damper_is_refused(default_plan: Plan) -> None:
 
 def test_a_loop_that_diverges_ends_where_its_command_leaves_all_bounds(plan: Plan) -> None:
     parameters = {"proportional": 40.0, "integral": 0.0, "derivative": 0.0}
-    wild = replace(plan, compensator=Compensator("pid", parameters))
+    wild = replace(plan, compensator=CompensatorTable("pid", parameters))
     found = alone(wild, ground_of(wild), farthest=1e6)
     assert not found.finite
     assert 0 < found.ticks < wild.ticks

@@ -14,7 +14,7 @@ from hypothesis import strategies as some
 
 from common.plan import plan as plans
 from common.plan.plan import Plan
-from common.plan.tables import Compensator
+from common.plan.tables import CompensatorTable
 from loop.nominal import partition, preflight
 from loop.nominal.path import path_at
 from tests.helpers import with_table
@@ -29,9 +29,9 @@ def led(plan: Plan, delay: float, lead: float, proportional: float = 0.0) -> Pla
     """The plan with an actuator of that dead time, and a feedforward beside proportional feedback."""
     gains = {"lead": lead, "proportional": proportional, "integral": 0.0, "derivative": 0.0}
     kind = (
-        Compensator("pid_taylor", gains)
+        CompensatorTable("pid_taylor", gains)
         if proportional
-        else Compensator("taylor", {"lead": lead, "order": 1.0})
+        else CompensatorTable("taylor", {"lead": lead, "order": 1.0})
     )
     return replace(with_table(plan, "actuator", delay=delay), compensator=kind)
 

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 from common.plan import plan as plans
 from common.plan.plan import Plan
-from common.plan.tables import Compensator, Control
+from common.plan.tables import CompensatorTable, Control
 from common.roles import MASTER, SLAVE
 from common.terminal import cli
 from loop import substructure
@@ -24,7 +24,7 @@ from tests.helpers import with_table
 
 
 def uncompensated(plan: Plan) -> Plan:
-    return dataclasses.replace(plan, compensator=Compensator("none", {}))
+    return dataclasses.replace(plan, compensator=CompensatorTable("none", {}))
 
 
 @pytest.mark.parametrize("represents", [1, 2])
@@ -94,7 +94,7 @@ def test_the_first_quantity_beyond_its_share_is_named(short_plan: Plan) -> None:
 
 def test_a_loop_that_diverges_is_unstable_and_no_limit_is_to_be_raised(default_plan: Plan) -> None:
     wild = {"proportional": 60.0, "integral": 0.0, "derivative": 0.0}
-    plan = dataclasses.replace(default_plan, compensator=Compensator("pid", wild))
+    plan = dataclasses.replace(default_plan, compensator=CompensatorTable("pid", wild))
     first, second = (one.risk for one in preflight.checks(plan))
     assert first is not None
     assert "does not come to rest under compensator 'pid' (proportional = 60" in first.sentence
@@ -118,7 +118,7 @@ def test_a_long_delay_is_unstable_and_no_peak_of_it_is_shown(default_plan: Plan)
 def test_a_lead_is_only_advised_where_it_then_serves(default_plan: Plan) -> None:
     def advice(delay: float, lead: float) -> str:
         plan = with_table(default_plan, "actuator", delay=delay)
-        plan = dataclasses.replace(plan, compensator=Compensator("taylor", {"lead": lead, "order": 1.0}))
+        plan = dataclasses.replace(plan, compensator=CompensatorTable("taylor", {"lead": lead, "order": 1.0}))
         risk = partition_check(plan, assess(plan)).risk
         return risk.sentence if risk else ""
 

@@ -19,7 +19,7 @@ from common.signals import TOPICS
 from laboratories.effects import CATALOGUE, lay
 from laboratories.effects.sites import holders
 from loop import substructure
-from loop.closed_loop import Exchange, rows, simulate
+from loop.closed_loop import MessagesUsed, rows, simulate
 from loop.exchange import exchange
 from loop.links import link_model
 from loop.realised import true_slaves, true_system
@@ -37,7 +37,7 @@ def real(plan: Plan, *effects: dict[str, Any], **tables: Any) -> Reality:
     return reality.from_reality({"effect": list(effects), **tables}, plan, Path())
 
 
-def used(truth: Reality) -> dict[str, Exchange]:
+def used(truth: Reality) -> dict[str, MessagesUsed]:
     """Which messages the test of a reality uses, slave by slave."""
     ticks, interval = truth.plan.ticks, truth.plan.test.interval
     return {role: exchange(ticks, interval, link_model(truth.of(role))) for role in truth.plan.roles}

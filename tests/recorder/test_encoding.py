@@ -15,7 +15,7 @@ from common.recording import chunks
 from common.recording.chunks import MESSAGE
 from common.recording.schema import message_class, message_name, schema_file
 from common.recording.writer import CHUNK_SIZE, Recording
-from common.signals import TOPICS, Kind
+from common.signals import TOPICS, FieldType
 from recorder.encoding import RowEncoder, is_plain
 
 PLAIN = ("master", "slave", "latency")
@@ -26,13 +26,13 @@ CLASSES = {
     for topic in PLAIN
 }
 DOUBLES = st.one_of(st.floats(), st.sampled_from([0.0, -0.0, 5e-324]))
-DRAWN: dict[Kind, st.SearchStrategy[Any]] = {
-    Kind.NUMBER: DOUBLES,
-    Kind.STOREYS: DOUBLES,
-    Kind.COUNT: st.one_of(st.integers(0, 2**32 - 1), st.sampled_from([0, 127, 128, 2**31])),
-    Kind.INDEX: st.one_of(st.integers(-(2**31), 2**31 - 1), st.sampled_from([-1, 0, 1])),
-    Kind.STAMP: st.one_of(st.integers(-(2**63), 2**63 - 1), st.sampled_from([0, 2**56 - 1, 2**56, -1])),
-    Kind.FLAG: st.booleans(),
+DRAWN: dict[FieldType, st.SearchStrategy[Any]] = {
+    FieldType.NUMBER: DOUBLES,
+    FieldType.STOREYS: DOUBLES,
+    FieldType.COUNT: st.one_of(st.integers(0, 2**32 - 1), st.sampled_from([0, 127, 128, 2**31])),
+    FieldType.INDEX: st.one_of(st.integers(-(2**31), 2**31 - 1), st.sampled_from([-1, 0, 1])),
+    FieldType.STAMP: st.one_of(st.integers(-(2**63), 2**63 - 1), st.sampled_from([0, 2**56 - 1, 2**56, -1])),
+    FieldType.FLAG: st.booleans(),
 }
 STAMP = st.integers(0, 2**63 - 1)
 ITEM = st.sampled_from(PLAIN).flatmap(

@@ -12,19 +12,19 @@ from common.lab.preflight import RefusedError
 from common.plan.plan import Plan
 from common.recording.reader import read
 from common.recording.schema import message_class, message_name, schema_file
-from common.signals import TICK_TOPICS, TOPICS, Kind, default_topics
+from common.signals import TICK_TOPICS, TOPICS, FieldType, default_topics
 from recorder import space
 from rths.perform.run import run
 from tests.helpers import with_table
 
 Usage = namedtuple("Usage", "total used free")
 
-VALUES: dict[Kind, Any] = {
-    Kind.NUMBER: 0.1,
-    Kind.COUNT: 9_000,
-    Kind.INDEX: 9_000,
-    Kind.STAMP: 2**45,
-    Kind.FLAG: False,
+VALUES: dict[FieldType, Any] = {
+    FieldType.NUMBER: 0.1,
+    FieldType.COUNT: 9_000,
+    FieldType.INDEX: 9_000,
+    FieldType.STAMP: 2**45,
+    FieldType.FLAG: False,
 }
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from common import signals
 from common.recording.writer import Recording
-from common.signals import Kind, Signal
+from common.signals import FieldType, Signal
 
 SLAVES = ("slave.roof", "slave.cellar")
 EXTREMES = (0.1, -0.0, 5e-324, 1.7976931348623157e308, np.nan, np.inf, -np.inf, 2.0, 1 / 3)
@@ -25,12 +25,12 @@ def value(row: Signal, tick: int) -> Any:
     if row.name == "seq":
         return tick
     found = {
-        Kind.INDEX: tick - 1,
-        Kind.STAMP: 2**63 - 1 - tick if tick % 2 else -(2**63) + tick,
-        Kind.FLAG: tick % 2 == 0,
-        Kind.NUMBER: EXTREMES[tick],
-        Kind.STOREYS: [EXTREMES[tick], EXTREMES[-tick]],
-        Kind.TEXT: "ramping",
+        FieldType.INDEX: tick - 1,
+        FieldType.STAMP: 2**63 - 1 - tick if tick % 2 else -(2**63) + tick,
+        FieldType.FLAG: tick % 2 == 0,
+        FieldType.NUMBER: EXTREMES[tick],
+        FieldType.STOREYS: [EXTREMES[tick], EXTREMES[-tick]],
+        FieldType.TEXT: "ramping",
     }[row.kind]
     return [found, found] if row.slaves else found
 

@@ -11,7 +11,7 @@ from common.plan.plan import Plan, parse
 from common.recording.reader import CLOCK
 from common.recording.writer import Recording
 from common.signals import LATENCY as LATENCY_ROWS
-from common.signals import Kind, Signal
+from common.signals import FieldType, Signal
 from laboratories import kinds
 from tests.helpers import ROOT
 
@@ -73,11 +73,11 @@ def values(rows: Iterable[Signal], tick: int, storeys: int) -> Iterable[object]:
 
 def value(row: Signal, tick: int, place: int) -> object:
     """One number: a sine as large as usual for its unit, later and smaller the farther a signal is from its target."""
-    if row.kind in (Kind.COUNT, Kind.INDEX):
+    if row.kind in (FieldType.COUNT, FieldType.INDEX):
         return tick
-    if row.kind is Kind.STAMP:
+    if row.kind is FieldType.STAMP:
         return round(tick * INTERVAL * 1e9) + 1
-    if row.kind is Kind.FLAG:
+    if row.kind is FieldType.FLAG:
         return False
     if row.name == "t":
         return tick * INTERVAL

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from common.plan.plan import Plan, from_tables
-from common.plan.tables import Laboratory, Rig
+from common.plan.tables import LaboratoryTable, RigTable
 from common.recording.reader import CLOCK, Run, read
 from report.facts import circumstances, storeys
 from report.facts.laboratories import laboratories, plan_of
@@ -64,7 +64,7 @@ def test_of_the_rigs_the_plan_alone_is_asked(
 ) -> None:
     run = read(virtual_recording)
     run.metadata[CLOCK]["kind"] = circumstances.REAL
-    plan = replace(short_plan, slave=Laboratory(Rig(rig)))
+    plan = replace(short_plan, slave=LaboratoryTable(RigTable(rig)))
     assert circumstances.sentence(run, plan).endswith(said)
 
 

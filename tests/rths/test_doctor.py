@@ -37,7 +37,7 @@ GOOD: dict[str, Any] = {
 }
 
 
-def judged(*change: tuple[str, Any]) -> tuple[verdict.Verdict, list[str]]:
+def judged(*change: tuple[str, Any]) -> tuple[verdict.CheckVerdict, list[str]]:
     """The verdict on the good findings with some changed ('part.key' and its value), and which checks failed."""
     report = copy.deepcopy(GOOD)
     for path, value in change:

@@ -26,7 +26,7 @@ from common.recording.reader import Run, read
 from common.recording.recovery import recover
 from common.recording.writer import Recording
 from common.roles import latency_topic, ramp_topic
-from common.signals import Kind
+from common.signals import FieldType
 from rths.examine import layout
 from simulation import virtual
 from tests.helpers import ROOT
@@ -170,9 +170,9 @@ def joined(told: Told) -> Told:
     """A message with the types of Python: a map is a list of pairs, a 64-bit number a text."""
     rows = {row.name: row.kind for rows in signals.TOPICS.values() for row in rows}
     for name, value in told.fields.items():
-        if rows[name] is Kind.VALUES:
+        if rows[name] is FieldType.VALUES:
             told.fields[name] = {pair["key"]: pair["value"] for pair in value}
-        elif rows[name] is Kind.STAMP:
+        elif rows[name] is FieldType.STAMP:
             told.fields[name] = int(value)
     return told
 
@@ -196,10 +196,10 @@ def rows_of(topic: str, columns: dict[str, Any]) -> list[dict[str, Any]]:
     return [dict(zip(cells, row, strict=True)) for row in zip(*cells.values(), strict=True)]
 
 
-def cell(kind: Kind, value: Any) -> Any:
+def cell(kind: FieldType, value: Any) -> Any:
     if isinstance(value, list):
         return [cell(kind, item) for item in value]
-    return bits(value) if kind in (Kind.NUMBER, Kind.STOREYS) else value
+    return bits(value) if kind in (FieldType.NUMBER, FieldType.STOREYS) else value
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -245,7 +245,7 @@ def drawn(tmp_path: Path) -> Path:
     path, draw = tmp_path / "drawn.mcap", np.random.default_rng(1)
     topics = signals.default_topics(extremes.SLAVES)
     recording = Recording(path, "drawn", 1, topics, extremes.SLAVES)
-    zero = {Kind.COUNT: 0, Kind.INDEX: 0, Kind.STAMP: 0, Kind.FLAG: False}
+    zero = {FieldType.COUNT: 0, FieldType.INDEX: 0, FieldType.STAMP: 0, FieldType.FLAG: False}
     for tick in range(500):
         for role in extremes.SLAVES:
             topic = latency_topic(role)

@@ -19,7 +19,7 @@ from diagnosis.report.read import report as read_report
 from diagnosis.report.records import Report
 from report.run import drawing
 from report.text.progress import Progress as Working
-from report.text.terminal import Progress, table
+from report.text.terminal import RunProgress, table
 from rths.__main__ import VERBS
 from rths.perform.processes import TEXT, Said
 from rths.perform.run import tell
@@ -58,7 +58,7 @@ def test_whatever_a_command_prints_is_escaped(capsys: Any) -> None:
 
 def test_what_processes_say_stays_one_line() -> None:
     stream = io.StringIO()
-    progress = Progress(1.0, stream)
+    progress = RunProgress(1.0, stream)
     for data in (
         {"kind": "event", "lab": HOSTILE, "level": "error", "code": HOSTILE, "text": HOSTILE},
         {"kind": TEXT, "text": HOSTILE},  # of a rig
@@ -74,7 +74,7 @@ def test_a_board_keeps_its_own_sequences_and_shows_those_of_others(monkeypatch: 
     monkeypatch.delenv("NO_COLOR", raising=False)
     stream = io.StringIO()
     monkeypatch.setattr(stream, "isatty", lambda: True)
-    progress = Progress(1.0, stream)
+    progress = RunProgress(1.0, stream)
     progress.mode(HOSTILE, HOSTILE)
     progress.show({"t": 0.5, "missed": 1.0})
     drawn = stream.getvalue()

@@ -10,7 +10,7 @@ import pytest
 
 from common.plan import plan as plans
 from common.plan.plan import Plan
-from common.plan.tables import Compensator
+from common.plan.tables import CompensatorTable
 from common.terminal import cli
 from loop import substructure
 from loop.closed_loop import signals, simulate
@@ -36,7 +36,7 @@ def test_the_cost_is_that_of_the_residual_delay(default_plan: Plan, lead: float,
 
 
 def test_without_compensation_the_path_is_beyond_what_the_loop_bears(default_plan: Plan) -> None:
-    found = assess(dataclasses.replace(default_plan, compensator=Compensator("none", {})))
+    found = assess(dataclasses.replace(default_plan, compensator=CompensatorTable("none", {})))
     assert found.delay > found.critical_delay
 
 

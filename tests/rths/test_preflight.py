@@ -11,7 +11,7 @@ import pytest
 from common.lab.preflight import Gate, RefusedError
 from common.plan import reality
 from common.plan.plan import Plan
-from common.plan.tables import Compensator
+from common.plan.tables import CompensatorTable
 from common.recording.reader import Run, read
 from rths.__main__ import parser_for
 from rths.perform.run import start_all
@@ -161,7 +161,7 @@ def test_accepted_risks_are_handed_to_every_process(tmp_path: Path) -> None:
 
 
 def test_the_unstable_experiment_of_the_paper_is_run_by_name_alone(default_plan: Plan) -> None:
-    plan = experiments.without_amd(experiments.compensated_by(default_plan, Compensator("none", {})))
+    plan = experiments.without_amd(experiments.compensated_by(default_plan, CompensatorTable("none", {})))
     gate = experiments.gate_of(experiments.UNSTABLE, plan)
     assert [risk.name for risk in gate.overruled] == ["partition", "peaks"]
     with pytest.raises(RefusedError):

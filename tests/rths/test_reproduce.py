@@ -16,26 +16,26 @@ from common.terminal.telling import untold
 from rths.__main__ import main
 from tests.rths.report.pages import check_alone, check_in_browser
 from validation.paper import experiments, figures
-from validation.paper.experiments import Evidence
+from validation.paper.experiments import PaperEvidence
 from validation.paper.figures import FIGURES
 from validation.paper.page import page
 from validation.paper.rows import apparent_damping, beyond, building, critical_delay, instability, rows
 
 
 @pytest.fixture(scope="module")
-def evidence(tmp_path_factory: pytest.TempPathFactory) -> Evidence:
+def evidence(tmp_path_factory: pytest.TempPathFactory) -> PaperEvidence:
     return experiments.gather(tmp_path_factory.mktemp("experiments"), untold)
 
 
 @pytest.mark.slow
-def test_every_row_is_within_its_tolerance(evidence: Evidence) -> None:
+def test_every_row_is_within_its_tolerance(evidence: PaperEvidence) -> None:
     table = rows(evidence)
     assert len(table) >= 19
     assert [f"{row.name}: {row.computed}" for row in table if not row.passed] == []
 
 
 @pytest.mark.slow
-def test_a_row_fails_where_its_number_is_wrong(evidence: Evidence) -> None:
+def test_a_row_fails_where_its_number_is_wrong(evidence: PaperEvidence) -> None:
     wrong = copy.copy(evidence)
     wrong.damping = evidence.damping | {"paper": 0.05, "ideal": 0.045, "beyond": 0.05}
     wrong.critical_delay = (0.034, 0.0341)
@@ -47,7 +47,7 @@ def test_a_row_fails_where_its_number_is_wrong(evidence: Evidence) -> None:
 
 @pytest.mark.slow
 def test_the_command_ends_with_1_where_a_row_fails(
-    evidence: Evidence, tmp_path: Path, monkeypatch: Any, capsys: Any
+    evidence: PaperEvidence, tmp_path: Path, monkeypatch: Any, capsys: Any
 ) -> None:
     wrong = copy.copy(evidence)
     wrong.critical_delay = (0.040, 0.0401)
@@ -79,7 +79,7 @@ def test_the_command_leaves_recordings_pictures_and_one_page(
 
 
 @pytest.mark.slow
-def test_the_page_stands_alone_and_in_a_browser(evidence: Evidence, tmp_path: Path) -> None:
+def test_the_page_stands_alone_and_in_a_browser(evidence: PaperEvidence, tmp_path: Path) -> None:
     table, drawn = rows(evidence), figures.draw_all(evidence, tmp_path)
     table[0] = replace(table[0], name="<b>period</b>", note="<script>")
     text = page(table, drawn, tmp_path)

@@ -21,12 +21,12 @@ from common.lab.laboratory import Setting
 from common.link.memory_link import MemoryHub
 from common.plan import reality
 from common.plan.plan import Plan
-from common.plan.tables import Rig
+from common.plan.tables import RigTable
 from common.protocol.exchange import State
 from common.safety.longest import resting
 from common.safety.ramp import MotionRamp
 from recorder.loop import RecorderLoop
-from report.text.terminal import Progress
+from report.text.terminal import RunProgress
 from rths.perform.ending import KILL_S, LEAVE_S, MARGIN_S, SILENCE_S, WRITE_S, Ending, verdict
 from rths.perform.processes import Leash, Processes, Said, understood
 from rths.perform.run import answer, follow, note
@@ -341,7 +341,7 @@ def test_virtual_time_gives_the_cause_and_not_what_followed(
 ) -> None:
     monkeypatch.setattr("loop.rigs.find", lambda *_: BrokenTable)
     real = reality.as_planned(short_plan)
-    real = dataclasses.replace(real, slaves={"slave": Rig("x:BrokenTable")})
+    real = dataclasses.replace(real, slaves={"slave": RigTable("x:BrokenTable")})
     bench = virtual.assemble(short_plan, real, tmp_path / "a.mcap")
     error = virtual.run(bench, lambda: "")
     assert isinstance(error, RigError)
@@ -412,7 +412,7 @@ def test_a_flood_of_lines_that_are_no_reports_is_read_to_its_end(
     text = "import json, os\nos.write(1, b'\\xff\\xfe\\n' + b'valve open\\n' * 20_000)\n"
     program(tmp_path, "slave", text + f"print('...' + json.dumps({EVENT!r}))\nraise SystemExit(4)\n")
     processes.start("slave", [])
-    follow(processes, Ending(short_plan), Progress(1.0), Presses())
+    follow(processes, Ending(short_plan), RunProgress(1.0), Presses())
     assert processes.ended() == {"slave": 4}
     assert processes.errors == {"slave": "lost"}
     err = capsys.readouterr().err
@@ -433,7 +433,7 @@ def test_a_pipe_that_a_grandchild_holds_keeps_nobody(
     processes.start("slave", [])
     said = processes.said(5.0)
     assert said is not None
-    follow(processes, Ending(short_plan), Progress(1.0), Presses())
+    follow(processes, Ending(short_plan), RunProgress(1.0), Presses())
     os.kill(int(said.data["text"]), signal.SIGKILL)
     assert processes.ended() == {"slave": 0}
 
@@ -457,7 +457,7 @@ def test_who_hangs_on_its_way_to_rest_is_killed_after_it_and_not_by_further_pres
         heard = processes.said(30.0)
         assert heard is not None
         note(heard, ending, {})
-    follow(processes, ending, Progress(1.0), Presses(WISH, 2))
+    follow(processes, ending, RunProgress(1.0), Presses(WISH, 2))
     err = capsys.readouterr().err
     assert time.monotonic() - begun > 0.5
     assert "already stopping" in err
@@ -490,7 +490,7 @@ def test_who_hangs_after_anothers_end_is_killed_without_a_wish(
     program(tmp_path, "recorder", DEAF)
     for name in NAMES:
         processes.start(name, [])
-    follow(processes, Ending(short_plan), Progress(1.0), Presses())
+    follow(processes, Ending(short_plan), RunProgress(1.0), Presses())
     assert processes.killed == {"slave", "recorder"}
     assert processes.ended()["master"] == 4
     assert isinstance(verdict(processes, ""), LostError)

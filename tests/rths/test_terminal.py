@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from report.text.board import BLOCKS, Board, sparkline
-from report.text.terminal import Progress
+from report.text.terminal import RunProgress
 
 REPORT = {
     "t": 5.0,
@@ -56,7 +56,7 @@ def terminal(monkeypatch: Any) -> Terminal:
 
 def test_elsewhere_it_is_a_plain_line_every_five_seconds() -> None:
     stream = io.StringIO()
-    progress = Progress(40.0, stream)
+    progress = RunProgress(40.0, stream)
     for t in (0.0, 0.2, 4.9, 5.0, 5.2):
         progress.show((STARTED if t == 0.0 else REPORT) | {"t": t})
         progress.mode("master", "running")
@@ -70,7 +70,7 @@ def test_elsewhere_it_is_a_plain_line_every_five_seconds() -> None:
 
 
 def test_on_a_terminal_the_board_stays_in_place_and_lines_go_above_it(terminal: Terminal) -> None:
-    progress = Progress(40.0, terminal)
+    progress = RunProgress(40.0, terminal)
     progress.say("starting")
     for tenth in range(30):
         progress.show({**REPORT, "t": tenth / 5, "drift": 1e-3 * math.sin(tenth)})
@@ -94,7 +94,7 @@ def test_on_a_terminal_the_board_stays_in_place_and_lines_go_above_it(terminal: 
 @pytest.mark.parametrize("columns", [1, 2, 9, 30, 200])
 def test_no_line_is_wider_than_the_terminal(columns: int, terminal: Terminal, monkeypatch: Any) -> None:
     monkeypatch.setenv("COLUMNS", str(columns))
-    progress = Progress(40.0, terminal)
+    progress = RunProgress(40.0, terminal)
     for tenth in range(300):
         progress.show({**REPORT, "t": tenth / 5})
     progress.mode("master", "running")
@@ -105,7 +105,7 @@ def test_no_line_is_wider_than_the_terminal(columns: int, terminal: Terminal, mo
 
 def test_a_low_terminal_has_what_fits(terminal: Terminal, monkeypatch: Any) -> None:
     monkeypatch.setenv("LINES", "3")
-    progress = Progress(40.0, terminal)
+    progress = RunProgress(40.0, terminal)
     for _ in range(3):
         progress.show(REPORT)
     assert len(terminal.screen()) == 2
@@ -114,7 +114,7 @@ def test_a_low_terminal_has_what_fits(terminal: Terminal, monkeypatch: Any) -> N
 @pytest.mark.parametrize(("value", "colours"), [("", True), ("1", False)])
 def test_no_color_is_honoured(value: str, colours: bool, terminal: Terminal, monkeypatch: Any) -> None:
     monkeypatch.setenv("NO_COLOR", value)
-    progress = Progress(40.0, terminal)
+    progress = RunProgress(40.0, terminal)
     progress.show(REPORT)
     progress.mode("slave", "safe")
     assert ("\x1b[31msafe\x1b[0m" in terminal.getvalue()) is colours
@@ -123,7 +123,7 @@ def test_no_color_is_honoured(value: str, colours: bool, terminal: Terminal, mon
 
 def test_a_dumb_terminal_gets_plain_lines(terminal: Terminal, monkeypatch: Any) -> None:
     monkeypatch.setenv("TERM", "dumb")
-    Progress(40.0, terminal).show(REPORT)
+    RunProgress(40.0, terminal).show(REPORT)
     assert "\x1b" not in terminal.getvalue()
 
 

@@ -11,7 +11,7 @@ from loop.closed_loop import simulate
 from loop.nominal.partition import critical_delay_of
 from models.registry import Array
 from models.system import Effects, SensorEffects
-from validation.benchmark2020.problem import CASES, EL_CENTRO, Case, planned
+from validation.benchmark2020.problem import CASES, EL_CENTRO, PartitionCase, planned
 
 FARTHEST = 1e6  # m, command from which on a loop has diverged beyond doubt
 LENGTH = 30.0  # s of free vibration after a jerk of the ground
@@ -32,7 +32,7 @@ def critical_delays() -> list[Critical]:
     return [critical_delay(case) for case in CASES]
 
 
-def critical_delay(case: Case) -> Critical:
+def critical_delay(case: PartitionCase) -> Critical:
     """A case's delay by bisection between calming and growing loops, and by the characteristic equation.
 
     The transfer system is ideal and the sensors are free of noise. A force held over a step acts half an interval
@@ -50,7 +50,7 @@ def critical_delay(case: Case) -> Critical:
     return Critical(case.number, 0.5 * (below + above) + 0.5 * plan.test.interval, equation)
 
 
-def still(case: Case) -> Plan:
+def still(case: PartitionCase) -> Plan:
     """The case with an ideal transfer system and no delay of its own in the path of the force."""
     plan = ideal(planned(case, EL_CENTRO))  # which has no unit delay of the force either
     return plan.with_ticks(round(LENGTH / plan.test.interval))

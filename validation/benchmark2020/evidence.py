@@ -6,14 +6,14 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
-from common.plan.tables import Compensator
+from common.plan.tables import CompensatorTable
 from common.terminal.telling import Tell
 from report.text.formats import percent
 from validation.benchmark2020.critical import Critical, critical_delays
-from validation.benchmark2020.late_force import SETTING, Late, late_forces
+from validation.benchmark2020.late_force import SETTING, LateForceTest, late_forces
 from validation.benchmark2020.problem import CASES, FORCE, MOTIONS, SETTINGS
 from validation.benchmark2020.published import CRITICAL_DELAYS, TABLE_3
-from validation.benchmark2020.runs import NOMINAL, Result, Stage, on_el_centro, stage, sweep
+from validation.benchmark2020.runs import NOMINAL, CellResult, Stage, on_el_centro, stage, sweep
 
 SAMPLE = "sample"
 CELL, DELAY_CELL = 0.01, 0.3e-3  # by which a cell may differ: a point, s
@@ -22,7 +22,7 @@ CRITICAL_GOAL = 0.01
 JUDGED_DELAY, DELAY_GOAL = 2e-3, 0.2e-3  # s, of the late force
 
 
-class Summary(NamedTuple):
+class SettingSummary(NamedTuple):
     """A setting over all its tests; worst values, inf where one is unstable."""
 
     setting: str
@@ -47,7 +47,7 @@ class Summary(NamedTuple):
         return not self.unstable and near and self.force <= FORCE
 
 
-class Check(NamedTuple):
+class GoalCheck(NamedTuple):
     """One goal: what was found, what is wanted."""
 
     name: str
@@ -56,19 +56,21 @@ class Check(NamedTuple):
     passed: bool
 
 
-class Evidence(NamedTuple):
+class BenchmarkEvidence(NamedTuple):
     """What the tables, the page and the verdict are made of."""
 
     plants: int
     seed: int
     stages: list[Stage]
-    results: list[Result]
-    summaries: list[Summary]
-    late: list[Late]
+    results: list[CellResult]
+    summaries: list[SettingSummary]
+    late: list[LateForceTest]
     critical: list[Critical]
 
 
-def gather(settings: Mapping[str, Compensator], plants: int, seed: int, jobs: int, tell: Tell) -> Evidence:
+def gather(
+    settings: Mapping[str, CompensatorTable], plants: int, seed: int, jobs: int, tell: Tell
+) -> BenchmarkEvidence:
     """All tests of the benchmark, `jobs` at a time."""
     tell("critical delays", 0, 0)
     critical = critical_delays()
@@ -82,10 +84,10 @@ def gather(settings: Mapping[str, Compensator], plants: int, seed: int, jobs: in
         summary(name, chosen.kind, [item for item in results if item.setting == name], stages)
         for name, chosen in settings.items()
     ]
-    return Evidence(plants, seed, stages, results, summaries, late, critical)
+    return BenchmarkEvidence(plants, seed, stages, results, summaries, late, critical)
 
 
-def summary(name: str, kind: str, results: list[Result], stages: Iterable[Stage]) -> Summary:
+def summary(name: str, kind: str, results: list[CellResult], stages: Iterable[Stage]) -> SettingSummary:
     """The worst of a setting's tests."""
     needed = {
         (on.case.number, on.motion.title, plant): force
@@ -96,7 +98,7 @@ def summary(name: str, kind: str, results: list[Result], stages: Iterable[Stage]
     drawn = [item for item in results if item.plant != NOMINAL]
     within = [item for item in results if needed[item.case, item.motion, item.plant] <= FORCE]
     stable = all(item.stable for item in nominal)
-    return Summary(
+    return SettingSummary(
         name,
         kind,
         len(results),
@@ -109,14 +111,14 @@ def summary(name: str, kind: str, results: list[Result], stages: Iterable[Stage]
     )
 
 
-def checks(evidence: Evidence) -> list[Check]:
+def checks(evidence: BenchmarkEvidence) -> list[GoalCheck]:
     """The goals that the tests made can be held to."""
     found = [critical_check(evidence.critical), late_check(evidence.late)]
     if cells := sample_cells(evidence):
         met = sum(abs(difference) <= most for difference, most in cells)
         found.insert(
             0,
-            Check(
+            GoalCheck(
                 "cells of Table 3 within 1 point, J1 within 0.3 ms",
                 f"{met} of {len(cells)}",
                 f"{len(cells)} of {len(cells)}",
@@ -128,10 +130,10 @@ def checks(evidence: Evidence) -> list[Check]:
     return found
 
 
-def compensator_check(summaries: list[Summary]) -> Check:
+def compensator_check(summaries: list[SettingSummary]) -> GoalCheck:
     """One compensator at least reaches all goals; for all settings together, not for a choice of them."""
     best = [item.setting for item in summaries if item.meets]
-    return Check(
+    return GoalCheck(
         f"a compensator with J4 ≤ {percent(NOMINAL_GOAL)} in all cases and motions, "
         f"≤ {percent(PLANTS_GOAL)} on every plant, "
         f"none unstable, force ≤ {FORCE:g} N where the reference's is",
@@ -141,7 +143,7 @@ def compensator_check(summaries: list[Summary]) -> Check:
     )
 
 
-def sample_cells(evidence: Evidence) -> list[tuple[float, float]]:
+def sample_cells(evidence: BenchmarkEvidence) -> list[tuple[float, float]]:
     """Deviation from Table 3 and the largest that is allowed, cell by cell; empty without the sample controller."""
     return [
         (ours - theirs, CELL if place else DELAY_CELL)
@@ -152,14 +154,14 @@ def sample_cells(evidence: Evidence) -> list[tuple[float, float]]:
     ]
 
 
-def critical_check(found: list[Critical]) -> Check:
+def critical_check(found: list[Critical]) -> GoalCheck:
     """Search, equation and the published delays agree."""
     worst = max(
         abs(value / CRITICAL_DELAYS[item.case] - 1.0)
         for item in found
         for value in (item.searched, item.equation)
     )
-    return Check(
+    return GoalCheck(
         "critical delays of the force as published",
         f"within {percent(worst)}",
         f"within {percent(CRITICAL_GOAL)}",
@@ -167,14 +169,14 @@ def critical_check(found: list[Critical]) -> Check:
     )
 
 
-def late_check(found: list[Late]) -> Check:
+def late_check(found: list[LateForceTest]) -> GoalCheck:
     """The indicator sees the late force that J1 does not."""
     judged = [item for item in found if item.delay == JUDGED_DELAY]
     seen = [item.path.delay for item in judged if item.path]
     quiet = all(item.result.found and item.result.found.j1 == 0.0 for item in judged)
     near = len(seen) == len(judged) and all(abs(value - JUDGED_DELAY) <= DELAY_GOAL for value in seen)
     read = ", ".join(f"{value * 1e3:.2f}" for value in seen) or "nothing"
-    return Check(
+    return GoalCheck(
         f"a force {JUDGED_DELAY * 1e3:g} ms late ({SETTING}): J1 reads 0, the indicator of the force's path that delay",
         f"J1 {'0' if quiet else 'not 0'}, force path {read} ms",
         f"J1 0, force path within {DELAY_GOAL * 1e3:g} ms",

@@ -16,7 +16,7 @@ from validation.benchmark2020.evidence import (
     DELAY_CELL,
     NOMINAL_GOAL,
     PLANTS_GOAL,
-    Evidence,
+    BenchmarkEvidence,
     sample_cells,
 )
 from validation.benchmark2020.runs import NOMINAL
@@ -24,16 +24,16 @@ from validation.benchmark2020.runs import NOMINAL
 MOST = 300.0  # per cent, of the axis: beyond it a test tells no more than that it failed
 
 
-class Figure(NamedTuple):
+class GoalFigure(NamedTuple):
     """One picture and what stands below it."""
 
     file: str
     caption: str
-    draw: Callable[[Evidence, Any], None]
+    draw: Callable[[BenchmarkEvidence, Any], None]
     height: float  # inches
 
 
-def draw_all(evidence: Evidence, folder: Path) -> list[Figure]:
+def draw_all(evidence: BenchmarkEvidence, folder: Path) -> list[GoalFigure]:
     """Draw every figure that there are tests for into a folder."""
     wanted = [item for item in FIGURES if item.draw is not table_3 or sample_cells(evidence)]
     for item in wanted:
@@ -43,7 +43,7 @@ def draw_all(evidence: Evidence, folder: Path) -> list[Figure]:
     return wanted
 
 
-def compensators(evidence: Evidence, canvas: Any) -> None:
+def compensators(evidence: BenchmarkEvidence, canvas: Any) -> None:
     """J4 of every test of every setting, the unstable ones at the axis' end."""
     order = sorted(evidence.summaries, key=lambda item: item.order, reverse=True)
     places = {item.setting: place for place, item in enumerate(order)}
@@ -69,7 +69,7 @@ def compensators(evidence: Evidence, canvas: Any) -> None:
     legend_above(axis)
 
 
-def late_force(evidence: Evidence, canvas: Any) -> None:
+def late_force(evidence: BenchmarkEvidence, canvas: Any) -> None:
     """Which criteria show a late force, and which do not."""
     upper, lower = canvas.subplots(2, 1, sharex=True)
     cases = sorted({item.result.case for item in evidence.late})
@@ -96,7 +96,7 @@ def late_force(evidence: Evidence, canvas: Any) -> None:
     legend_above(lower)
 
 
-def table_3(evidence: Evidence, canvas: Any) -> None:
+def table_3(evidence: BenchmarkEvidence, canvas: Any) -> None:
     """The deviation of every cell from the published one."""
     found = sample_cells(evidence)
     width = len(MEANINGS)
@@ -118,21 +118,21 @@ def table_3(evidence: Evidence, canvas: Any) -> None:
 
 
 FIGURES = (
-    Figure(
+    GoalFigure(
         "compensators.png",
         "J4 of every test of every setting, log scale: 4 cases × 3 motions on the nominal plant and on those drawn; "
         "dashed and dotted the goals, 5 and 6 %",
         compensators,
         3.4,
     ),
-    Figure(
+    GoalFigure(
         "late_force.png",
         "A force that comes late, with the adaptive model-based compensator: J1 and J2 hardly change, J4 grows; the "
         "indicator of the force's path reads the delay",
         late_force,
         4.2,
     ),
-    Figure(
+    GoalFigure(
         "table3.png",
         "Deviation of the 36 cells from the published Table 3, over what is allowed",
         table_3,

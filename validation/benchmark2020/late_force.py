@@ -11,21 +11,21 @@ from loop.force_path import force_path
 from models.indicators import ForcePath
 from models.system import Effects, SensorEffects
 from validation.benchmark2020.problem import EL_CENTRO, SETTINGS, with_compensator
-from validation.benchmark2020.runs import Result, Stage, play
+from validation.benchmark2020.runs import CellResult, Stage, play
 
 DELAYS = (0.0, 0.5e-3, 1e-3, 2e-3, 3e-3, 5e-3, 7e-3, 10e-3)  # s
 SETTING = "amb"
 
 
-class Late(NamedTuple):
+class LateForceTest(NamedTuple):
     """A test whose measured force is late by `delay` s."""
 
     delay: float
-    result: Result
+    result: CellResult
     path: ForcePath | None  # None where the loop is unstable or nothing can be said
 
 
-def late_forces(stages: Sequence[Stage], tell: Tell = untold) -> list[Late]:
+def late_forces(stages: Sequence[Stage], tell: Tell = untold) -> list[LateForceTest]:
     """Every delay on the nominal plant of every stage under El Centro, with the adaptive compensator."""
     asked = [(on, delay) for on in stages if on.motion is EL_CENTRO for delay in DELAYS]
     found = []
@@ -35,7 +35,7 @@ def late_forces(stages: Sequence[Stage], tell: Tell = untold) -> list[Late]:
     return found
 
 
-def late_force(on: Stage, delay: float) -> Late:
+def late_force(on: Stage, delay: float) -> LateForceTest:
     """One test."""
     plan = with_compensator(on.plants[0], SETTINGS[SETTING])
     effects = Effects(sensors={"column_force": SensorEffects(delay=delay)})
@@ -43,4 +43,4 @@ def late_force(on: Stage, delay: float) -> Late:
     path = (
         force_path(plan, *(rollout.master[name] for name in COLUMN.channels.names)) if result.stable else None
     )
-    return Late(delay, result, path)
+    return LateForceTest(delay, result, path)

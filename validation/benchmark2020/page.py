@@ -8,14 +8,16 @@ from pathlib import Path
 from report.page import frame, render
 from report.page.photo import photo
 from validation.benchmark2020.criteria import MEANINGS
-from validation.benchmark2020.evidence import Check, Evidence
-from validation.benchmark2020.figures import Figure
+from validation.benchmark2020.evidence import BenchmarkEvidence, GoalCheck
+from validation.benchmark2020.figures import GoalFigure
 from validation.benchmark2020.tables import tables
 
 TITLE = "The 2020 benchmark of real-time hybrid simulation"
 
 
-def page(evidence: Evidence, checks: Sequence[Check], figures: Sequence[Figure], folder: Path) -> str:
+def page(
+    evidence: BenchmarkEvidence, checks: Sequence[GoalCheck], figures: Sequence[GoalFigure], folder: Path
+) -> str:
     """The page's text; pictures are taken from `folder` and stand inside."""
     body = render(
         "benchmark2020.html",

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from common.plan.plan import Plan, load
-from common.plan.tables import Compensator
+from common.plan.tables import CompensatorTable
 from loop import substructure
 
 PLAN = Path(__file__).resolve().parents[2] / "rths" / "plans" / "benchmark2020.toml"
@@ -22,7 +22,7 @@ LAG = {"delay": 0.00472, "time_constant": 0.02017, "gain": 1.0 / 0.99254, "order
 
 
 @dataclass(frozen=True)
-class Case:
+class PartitionCase:
     """A partition: the reference building's floors and damping; the specimen is the same in all."""
 
     number: int
@@ -35,7 +35,12 @@ class Case:
         return f"case {self.number}"
 
 
-CASES = (Case(1, 1000.0, 0.05), Case(2, 1100.0, 0.04), Case(3, 1300.0, 0.03), Case(4, 1000.0, 0.03))
+CASES = (
+    PartitionCase(1, 1000.0, 0.05),
+    PartitionCase(2, 1100.0, 0.04),
+    PartitionCase(3, 1300.0, 0.03),
+    PartitionCase(4, 1000.0, 0.03),
+)
 
 
 @dataclass(frozen=True)
@@ -55,29 +60,31 @@ MOTIONS = (
 )
 
 SETTINGS = {
-    "none": Compensator("none", {}),
-    "sample": Compensator("pi_lead", {}),
-    "pid": Compensator("pid", {"proportional": 1.93, "integral": 0.047, "derivative": 0.0}),
-    "pid_taylor": Compensator(
+    "none": CompensatorTable("none", {}),
+    "sample": CompensatorTable("pi_lead", {}),
+    "pid": CompensatorTable("pid", {"proportional": 1.93, "integral": 0.047, "derivative": 0.0}),
+    "pid_taylor": CompensatorTable(
         "pid_taylor", {"proportional": 1.93, "integral": 0.047, "derivative": 0.0, "lead": DELAY}
     ),
-    "taylor1": Compensator("taylor", {"lead": DELAY, "order": 1.0}),
-    "taylor2": Compensator("taylor", {"lead": DELAY, "order": 2.0}),
-    "taylor3": Compensator("taylor", {"lead": DELAY, "order": 3.0}),
-    "horiuchi1": Compensator("horiuchi", {"delay": DELAY, "order": 1.0}),
-    "horiuchi2": Compensator("horiuchi", {"delay": DELAY, "order": 2.0}),
-    "horiuchi3": Compensator("horiuchi", {"delay": DELAY, "order": 3.0}),
-    "inverse": Compensator("inverse", LAG),
-    "pid_inverse": Compensator(
+    "taylor1": CompensatorTable("taylor", {"lead": DELAY, "order": 1.0}),
+    "taylor2": CompensatorTable("taylor", {"lead": DELAY, "order": 2.0}),
+    "taylor3": CompensatorTable("taylor", {"lead": DELAY, "order": 3.0}),
+    "horiuchi1": CompensatorTable("horiuchi", {"delay": DELAY, "order": 1.0}),
+    "horiuchi2": CompensatorTable("horiuchi", {"delay": DELAY, "order": 2.0}),
+    "horiuchi3": CompensatorTable("horiuchi", {"delay": DELAY, "order": 3.0}),
+    "inverse": CompensatorTable("inverse", LAG),
+    "pid_inverse": CompensatorTable(
         "pid_inverse", {"proportional": 1.0, "integral": 0.0, "derivative": 0.0} | LAG
     ),
-    "series": Compensator("series", INVERSE),
-    "ats": Compensator("ats", {"lead": LAG["delay"], "time_constant": LAG["time_constant"], "trigger": 1e-4}),
-    "amb": Compensator("amb", INVERSE),
+    "series": CompensatorTable("series", INVERSE),
+    "ats": CompensatorTable(
+        "ats", {"lead": LAG["delay"], "time_constant": LAG["time_constant"], "trigger": 1e-4}
+    ),
+    "amb": CompensatorTable("amb", INVERSE),
 }
 
 
-def planned(case: Case, motion: Motion) -> Plan:
+def planned(case: PartitionCase, motion: Motion) -> Plan:
     """The plan of one test with the sample controller: the record, then ten seconds of still ground."""
     base = load(PLAN)
     plan = replace(
@@ -90,13 +97,13 @@ def planned(case: Case, motion: Motion) -> Plan:
     return plan.with_ticks(ticks)
 
 
-def with_compensator(plan: Plan, chosen: Compensator) -> Plan:
+def with_compensator(plan: Plan, chosen: CompensatorTable) -> Plan:
     """The plan with another compensator of the actuator; what is done to the measured force stays."""
     compensator = replace(plan.compensator, kind=chosen.kind, parameters=dict(chosen.parameters))
     return replace(plan, compensator=compensator)
 
 
-class Drawn(NamedTuple):
+class DrawnSystem(NamedTuple):
     """A transfer system and specimen drawn about the nominal ones."""
 
     leakage: float
@@ -105,23 +112,23 @@ class Drawn(NamedTuple):
     stiffness: float  # N/m, of the specimen
 
 
-SPREAD = Drawn(1.3, 3.3, 3.3e3, 5e4)  # standard deviations
+SPREAD = DrawnSystem(1.3, 3.3, 3.3e3, 5e4)  # standard deviations
 
 
-def draw(plan: Plan, count: int, seed: int) -> list[Drawn]:
+def draw(plan: Plan, count: int, seed: int) -> list[DrawnSystem]:
     """`count` plants, normally distributed about the plan's; a draw that is not positive is drawn again."""
     servo = plan.actuator.servo
     middle = np.array([servo.leakage, servo.valve_damping, servo.valve_stiffness, plan.column.stiffness])
     generator = np.random.default_rng(seed)
-    found: list[Drawn] = []
+    found: list[DrawnSystem] = []
     while len(found) < count:
         values = generator.normal(middle, SPREAD)
         if np.all(values > 0.0):
-            found.append(Drawn(*values.tolist()))
+            found.append(DrawnSystem(*values.tolist()))
     return found
 
 
-def with_plant(plan: Plan, plant: Drawn) -> Plan:
+def with_plant(plan: Plan, plant: DrawnSystem) -> Plan:
     """The plan on another plant; the whole building stays, so that the numerical part leaves out what was drawn."""
     servo = replace(
         plan.actuator.servo,

@@ -11,7 +11,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from common.plan.plan import Plan
-from common.plan.tables import Compensator
+from common.plan.tables import CompensatorTable
 from common.roles import MASTER
 from common.terminal.telling import Tell, untold
 from laboratories.column import specimen
@@ -26,8 +26,8 @@ from models.system import Effects
 from validation.benchmark2020.criteria import Criteria, criteria, near, peak, rms
 from validation.benchmark2020.problem import (
     EL_CENTRO,
-    Case,
     Motion,
+    PartitionCase,
     draw,
     planned,
     with_compensator,
@@ -42,7 +42,7 @@ LEAD_MOST = 0.05  # s, of the two-sided delay
 class Stage(NamedTuple):
     """What all tests of one case under one motion share."""
 
-    case: Case
+    case: PartitionCase
     motion: Motion
     plants: Sequence[Plan]  # the nominal one first; with the sample controller
     ground: Array
@@ -51,7 +51,7 @@ class Stage(NamedTuple):
     needed: Sequence[float]  # N, largest force that the reference's motion asks of each plant's specimen
 
 
-class Result(NamedTuple):
+class CellResult(NamedTuple):
     """One test: how near the reference it came, and the peaks that have limits; inf where the loop is unstable."""
 
     setting: str
@@ -67,7 +67,7 @@ class Result(NamedTuple):
     stroke: float  # m, largest
 
 
-def stage(case: Case, motion: Motion, plants: int, seed: int) -> Stage:
+def stage(case: PartitionCase, motion: Motion, plants: int, seed: int) -> Stage:
     """A case under a motion, its reference computed, its plants and its noise drawn."""
     plan = planned(case, motion)
     ground = substructure.ground_rows(plan, substructure.motion(plan))
@@ -89,7 +89,7 @@ def specimen_force(plan: Plan, displacement: Array) -> Array:
 
 def play(
     on: Stage, setting: str, chosen: Plan, plant: int = NOMINAL, effects: Effects | None = None
-) -> tuple[Result, Rollout]:
+) -> tuple[CellResult, Rollout]:
     """One test on a stage, with the plan that has its plant and compensator."""
     first = on.reference[:, chosen.column.storey - 1]
     rollout = simulate(
@@ -100,7 +100,7 @@ def play(
     if not rollout.finite or peak(target) > RUNAWAY * peak(first):
         return unstable(on, setting, plant), rollout
     nominal, interval = plant == NOMINAL, chosen.test.interval
-    result = Result(
+    result = CellResult(
         setting,
         on.case.number,
         on.motion.title,
@@ -116,10 +116,10 @@ def play(
     return result, rollout
 
 
-def unstable(on: Stage, setting: str, plant: int) -> Result:
+def unstable(on: Stage, setting: str, plant: int) -> CellResult:
     """The result of an unstable loop."""
     none, worst = math.nan, math.inf
-    return Result(
+    return CellResult(
         setting,
         on.case.number,
         on.motion.title,
@@ -136,13 +136,13 @@ def unstable(on: Stage, setting: str, plant: int) -> Result:
 
 def sweep(
     stages: Iterable[Stage],
-    settings: Mapping[str, Compensator],
+    settings: Mapping[str, CompensatorTable],
     jobs: int,
     tell: Tell = untold,
     total: int = 0,
-) -> list[Result]:
+) -> list[CellResult]:
     """Every setting on every plant of every stage, `jobs` at once: kernels release the interpreter's lock."""
-    results: list[Result] = []
+    results: list[CellResult] = []
     with threadpool_limits(1), ThreadPoolExecutor(jobs) as pool:
         for on in stages:
             tests = [(name, plant) for plant in range(len(on.plants)) for name in settings]
@@ -152,17 +152,17 @@ def sweep(
     return results
 
 
-def one_of(on: Stage, settings: Mapping[str, Compensator]) -> Callable[[tuple[str, int]], Result]:
+def one_of(on: Stage, settings: Mapping[str, CompensatorTable]) -> Callable[[tuple[str, int]], CellResult]:
     """What plays a setting by name on a plant by number."""
 
-    def test(asked: tuple[str, int]) -> Result:
+    def test(asked: tuple[str, int]) -> CellResult:
         name, plant = asked
         return play(on, name, with_compensator(on.plants[plant], settings[name]), plant)[0]
 
     return test
 
 
-def on_el_centro(results: Iterable[Result], setting: str) -> list[Result]:
+def on_el_centro(results: Iterable[CellResult], setting: str) -> list[CellResult]:
     """The nominal tests of a setting under the motion of Table 3, by case."""
     return sorted(
         (

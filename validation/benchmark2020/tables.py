@@ -7,14 +7,14 @@ from typing import NamedTuple
 
 from report.text.formats import signed
 from validation.benchmark2020.criteria import MEANINGS
-from validation.benchmark2020.evidence import SAMPLE, Evidence
+from validation.benchmark2020.evidence import SAMPLE, BenchmarkEvidence
 from validation.benchmark2020.published import CRITICAL_DELAYS, TABLE_3
 from validation.benchmark2020.runs import NOMINAL, on_el_centro
 
 MISSING, UNSTABLE = "–", "unstable"
 
 
-class Table(NamedTuple):
+class GoalTable(NamedTuple):
     """A table and what stands above it."""
 
     title: str
@@ -22,7 +22,7 @@ class Table(NamedTuple):
     rows: list[list[str]]
 
 
-def tables(evidence: Evidence) -> list[Table]:
+def tables(evidence: BenchmarkEvidence) -> list[GoalTable]:
     """All of them; those without rows are left out."""
     found = (
         table_3(evidence),
@@ -34,7 +34,7 @@ def tables(evidence: Evidence) -> list[Table]:
     return [table for table in found if table.rows]
 
 
-def table_3(evidence: Evidence) -> Table:
+def table_3(evidence: BenchmarkEvidence) -> GoalTable:
     """The sample controller's 36 cells beside the published ones."""
     rows = []
     for item in on_el_centro(evidence.results, SAMPLE):
@@ -56,7 +56,7 @@ def table_3(evidence: Evidence) -> Table:
         "two-sided, ms",
         "J2 of noise, %",
     ]
-    return Table("Table 3: sample controller, El Centro at 0.4", head, rows)
+    return GoalTable("Table 3: sample controller, El Centro at 0.4", head, rows)
 
 
 def cells(values: tuple[float, ...]) -> list[str]:
@@ -64,7 +64,7 @@ def cells(values: tuple[float, ...]) -> list[str]:
     return [milliseconds(values[0], 1), *map(percent, values[1:])]
 
 
-def compensators(evidence: Evidence) -> Table:
+def compensators(evidence: BenchmarkEvidence) -> GoalTable:
     """Every setting at its worst, the best first."""
     rows = [
         [
@@ -90,14 +90,14 @@ def compensators(evidence: Evidence) -> Table:
         "unstable",
         "force, N",
     ]
-    return Table(
+    return GoalTable(
         f"Compensators: the worst of 4 cases × 3 motions, nominal and of {drawn} drawn",
         head,
         rows,
     )
 
 
-def by_motion(evidence: Evidence) -> Table:
+def by_motion(evidence: BenchmarkEvidence) -> GoalTable:
     """J4 of every setting that is stable somewhere, on the nominal plant, by motion and case."""
     places = [(on.motion.title, on.case.number) for on in evidence.stages]
     found = {
@@ -108,10 +108,10 @@ def by_motion(evidence: Evidence) -> Table:
         for item in sorted(evidence.summaries, key=lambda item: item.order)
         if any(found[item.setting, motion, case].stable for motion, case in places)
     ]
-    return Table("J4, %, of the nominal plant", ["setting", *(f"{m} C{c}" for m, c in places)], rows)
+    return GoalTable("J4, %, of the nominal plant", ["setting", *(f"{m} C{c}" for m, c in places)], rows)
 
 
-def late(evidence: Evidence) -> Table:
+def late(evidence: BenchmarkEvidence) -> GoalTable:
     """What the criteria and the indicator say of a force that comes late."""
     rows = []
     for item in evidence.late:
@@ -131,10 +131,10 @@ def late(evidence: Evidence) -> Table:
             ]
         )
     head = ["", "force late by, ms", "J1, ms", "J2, %", "J4, %", "force path, ms", "± (95 %), ms"]
-    return Table("A late force (amb, El Centro): J1 and J2 do not see it", head, rows)
+    return GoalTable("A late force (amb, El Centro): J1 and J2 do not see it", head, rows)
 
 
-def critical(evidence: Evidence) -> Table:
+def critical(evidence: BenchmarkEvidence) -> GoalTable:
     """Critical delays by search, by equation, and as published."""
     rows = [
         [
@@ -146,7 +146,7 @@ def critical(evidence: Evidence) -> Table:
         for item in evidence.critical
     ]
     head = ["", "by search, ms", "by the characteristic equation, ms", "published, ms"]
-    return Table("Critical delays of the force", head, rows)
+    return GoalTable("Critical delays of the force", head, rows)
 
 
 def percent(value: float) -> str:

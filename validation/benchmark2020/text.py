@@ -7,12 +7,12 @@ import sys
 from typing import Any
 
 from report.text import terminal
-from validation.benchmark2020.evidence import Check, Evidence
-from validation.benchmark2020.runs import Result
+from validation.benchmark2020.evidence import BenchmarkEvidence, GoalCheck
+from validation.benchmark2020.runs import CellResult
 from validation.benchmark2020.tables import tables
 
 
-def show(evidence: Evidence, checks: list[Check]) -> None:
+def show(evidence: BenchmarkEvidence, checks: list[GoalCheck]) -> None:
     """All tables, then the checks."""
     for table in tables(evidence):
         sys.stdout.write(f"{table.title}\n\n")
@@ -23,7 +23,7 @@ def show(evidence: Evidence, checks: list[Check]) -> None:
         sys.stdout.write(f"{verdict}  {check.name}: {check.value} (wanted: {check.goal})\n")
 
 
-def as_json(evidence: Evidence, checks: list[Check]) -> dict[str, Any]:
+def as_json(evidence: BenchmarkEvidence, checks: list[GoalCheck]) -> dict[str, Any]:
     """Everything as plain values in SI units; what is no finite number is null."""
     return {
         "plants": evidence.plants,
@@ -46,7 +46,7 @@ def as_json(evidence: Evidence, checks: list[Check]) -> dict[str, Any]:
     }
 
 
-def values_of(result: Result) -> dict[str, Any]:
+def values_of(result: CellResult) -> dict[str, Any]:
     """One test."""
     values = {name: plain(value) for name, value in result._asdict().items() if name != "found"}
     found = result.found._asdict() if result.found else {}

@@ -23,7 +23,7 @@ KEPT = ("PATH", "HOME", "LANG", "LC_ALL", "TMPDIR", "NUMBA_CACHE_DIR", "SYSTEMRO
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
-class Answer(NamedTuple):
+class DiagnosisAnswer(NamedTuple):
     """What a diagnosis said of one recording, and how long it took."""
 
     report: Report | None  # None where it failed
@@ -32,7 +32,7 @@ class Answer(NamedTuple):
 
 
 GRACE = 3.0  # s, in which an interrupted process may end those that it started
-NONE = Answer(None, float("nan"), "the diagnosis gave no answer")
+NONE = DiagnosisAnswer(None, float("nan"), "the diagnosis gave no answer")
 
 
 def diagnose_all(
@@ -42,7 +42,7 @@ def diagnose_all(
     dask: str = "",
     diagnosis: str = DIAGNOSIS,
     done: Callable[[str], None] = lambda _name: None,
-) -> dict[str, Answer]:
+) -> dict[str, DiagnosisAnswer]:
     """Answers by the name of the recording; `done` hears of every one that is finished.
 
     Raises:
@@ -98,8 +98,8 @@ def environment(jobs: int) -> dict[str, str]:
     return kept | threads | {"PYTHONPATH": str(HOME), "PYTHONHASHSEED": "0"}
 
 
-def _answer(path: Path) -> Answer:
+def _answer(path: Path) -> DiagnosisAnswer:
     data = json.loads(path.read_text(encoding="utf-8"))
     said = data.get("report")
     report = None if said is None else read.report(said, f"What the diagnosis said of {path.stem}")
-    return Answer(report, float(data["seconds"]), data.get("error", ""))
+    return DiagnosisAnswer(report, float(data["seconds"]), data.get("error", ""))

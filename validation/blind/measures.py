@@ -13,7 +13,7 @@ import numpy as np
 from diagnosis.findings.calibration import brier, clopper_pearson, expected_calibration_error, wilson
 from diagnosis.findings.calibration import reliability as stated_and_observed
 from report.text.formats import percent, quantity
-from validation.blind.scoring import NAMING, Estimate, Outcome
+from validation.blind.scoring import NAMING, JudgedEstimate, Outcome
 
 ABSTAINING = ("unknown_effect", "not_enough_data", "ambiguous")
 GOALS = 9  # judged at once
@@ -183,7 +183,7 @@ def kind(outcomes: Iterable[Outcome], name: str) -> list[Outcome]:
     return [item for item in outcomes if item.kind == name]
 
 
-def _coverage(stated: Sequence[Estimate]) -> Measure:
+def _coverage(stated: Sequence[JudgedEstimate]) -> Measure:
     hits = sum(bool(one.inside) for one in stated)
     low, high = wilson(hits, len(stated)) if stated else (math.nan, math.nan)
     value = hits / len(stated) if stated else math.nan

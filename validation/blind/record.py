@@ -19,7 +19,7 @@ from validation.spread import spread
 
 
 @dataclass(frozen=True)
-class Recorded:
+class RecordedCase:
     """Where a case was recorded, and how large what it hides is."""
 
     index: int
@@ -28,13 +28,13 @@ class Recorded:
     stopped: str  # why the test ended early, empty where it was completed
 
 
-def record_all(cases: Sequence[Case], folder: Path, jobs: int = 1) -> Iterator[Recorded]:
+def record_all(cases: Sequence[Case], folder: Path, jobs: int = 1) -> Iterator[RecordedCase]:
     """Record every case into a folder, in an order that reveals nothing."""
     order = np.random.default_rng(secrets.randbits(64)).permutation(len(cases))
     yield from spread(partial(record, folder=folder), [cases[place] for place in order], jobs)
 
 
-def record(case: Case, folder: Path) -> Recorded:
+def record(case: Case, folder: Path) -> RecordedCase:
     """Play a case in virtual time; a test that a limit stops is kept up to there."""
     from simulation import virtual
     from validation.blind.size import sizes
@@ -48,7 +48,7 @@ def record(case: Case, folder: Path) -> Recorded:
     ended = virtual.run(bench, lambda: "")
     if ended is not None and not isinstance(ended, InterlockError):
         raise InputError(f"Case {case.index} ({truth(case)}) cannot be recorded: {ended}")
-    return Recorded(case.index, path.name, sizes(case, path), str(ended or ""))
+    return RecordedCase(case.index, path.name, sizes(case, path), str(ended or ""))
 
 
 def reality(case: Case, laid: tuple[Laid, ...] | None = None, *, silent: bool = False) -> Reality:

@@ -15,8 +15,8 @@ from diagnosis.report.records import Candidate
 from diagnosis.report.values import Value
 from laboratories.effects import CATALOGUE, of_site
 from validation.blind.draw import Case, Laid
-from validation.blind.judge import NONE, Answer
-from validation.blind.record import Recorded
+from validation.blind.judge import NONE, DiagnosisAnswer
+from validation.blind.record import RecordedCase
 
 NAMING = ("explained", "partly_explained", "ambiguous")
 UNKNOWN = ("unknown_effect", "partly_explained")
@@ -26,7 +26,7 @@ STANDARD_LENGTH = 30.0  # s of test that the time of a diagnosis is scaled to
 
 
 @dataclass(frozen=True)
-class Estimate:
+class JudgedEstimate:
     """A parameter of a correctly named effect, judged."""
 
     name: str
@@ -60,7 +60,7 @@ class Outcome:
     surplus: bool  # effects are named that are not there
     right: bool
     why: str
-    estimates: list[Estimate] = field(default_factory=list)
+    estimates: list[JudgedEstimate] = field(default_factory=list)
     shrinkage: float = math.nan  # closed over what the true effects would close
     seconds: float = math.nan  # per 30 s of test
 
@@ -76,13 +76,13 @@ class Outcome:
 
 
 def judge_all(
-    cases: Sequence[Case], recorded: Mapping[int, Recorded], answers: Mapping[str, Answer]
+    cases: Sequence[Case], recorded: Mapping[int, RecordedCase], answers: Mapping[str, DiagnosisAnswer]
 ) -> list[Outcome]:
     """Every case judged; one without an answer is wrong."""
     return [judge(case, recorded[case.index], answers.get(recorded[case.index].name, NONE)) for case in cases]
 
 
-def judge(case: Case, recorded: Recorded, answer: Answer) -> Outcome:
+def judge(case: Case, recorded: RecordedCase, answer: DiagnosisAnswer) -> Outcome:
     """One case judged."""
     report = answer.report
     status = report.status if report else "error"
@@ -150,7 +150,7 @@ def sites_of(item: Laid, names: Sequence[str], sets: Iterable[set[str]]) -> set[
     return {item.site} | {CATALOGUE[name].site for name in named}
 
 
-def estimates(case: Case, verdict: Candidate) -> list[Estimate]:
+def estimates(case: Case, verdict: Candidate) -> list[JudgedEstimate]:
     """The strength parameters of the true effects that the verdict itself names."""
     found = verdict.parameters
     return [
@@ -162,7 +162,7 @@ def estimates(case: Case, verdict: Candidate) -> list[Estimate]:
     ]
 
 
-def estimate(item: Laid, name: str, said: Value | None) -> Estimate:
+def estimate(item: Laid, name: str, said: Value | None) -> JudgedEstimate:
     """One parameter; relative to its distance from the null value where that is finite."""
     true, null = item.parameters[name], item.nulls[name]
     value = number(said.value if said else None)
@@ -170,7 +170,7 @@ def estimate(item: Laid, name: str, said: Value | None) -> Estimate:
     strength = abs(true - null) if math.isfinite(null) else abs(true)
     low, high = (said.interval if said else None) or (None, None)
     inside = None if low is None or high is None else low <= true <= high
-    return Estimate(
+    return JudgedEstimate(
         f"{item.name}.{name}", true, value, miss / strength, miss / abs(true) if true else miss, inside
     )
 

@@ -18,8 +18,8 @@ from simulation.world import Drift
 from validation.faults import hostile
 from validation.faults.lab import SESSION, Simulation, Surrounding
 from validation.faults.rigs import Wrong
-from validation.faults.schedule import KINDS, PROCESS, RIG, Fault, Schedule
-from validation.faults.wire import DROPS, OPEN, QUEUES, Conditions, Direction
+from validation.faults.schedule import KINDS, PROCESS, RIG, InjectedFault, Schedule
+from validation.faults.wire import DROPS, OPEN, QUEUES, Conditions, WireRoute
 
 STATES = {"outage": DROPS, "backlog": QUEUES}
 
@@ -49,7 +49,7 @@ def simulation_of(schedule: Schedule, recording: Path | None = None) -> Simulati
     return simulation
 
 
-def lay(simulation: Simulation, fault: Fault, seed: int, place: int) -> None:
+def lay(simulation: Simulation, fault: InjectedFault, seed: int, place: int) -> None:
     """Let a fault happen; `place` tells faults of one schedule apart."""
     where = KINDS[fault.kind].where
     if where == PROCESS:
@@ -69,14 +69,14 @@ def ns(seconds: float) -> int:
     return round(seconds * 1e9)
 
 
-def directions(simulation: Simulation, where: str) -> list[Direction]:
+def directions(simulation: Simulation, where: str) -> list[WireRoute]:
     """The routes that `A>B` or `A<>B` names."""
     first, second = re.split(r"<>|>", where)
     there = simulation.wire.between(first, second)
     return there + simulation.wire.between(second, first) if "<>" in where else there
 
 
-def _befall_process(simulation: Simulation, fault: Fault) -> None:
+def _befall_process(simulation: Simulation, fault: InjectedFault) -> None:
     process, at = simulation.world.processes[fault.where], ns(fault.at)
     match fault.kind:
         case "stall":
@@ -89,21 +89,21 @@ def _befall_process(simulation: Simulation, fault: Fault) -> None:
             pass  # a clock differs from the beginning
 
 
-def _befall_rig(simulation: Simulation, fault: Fault, key: int) -> None:
+def _befall_rig(simulation: Simulation, fault: InjectedFault, key: int) -> None:
     probe, values = simulation.probes[fault.where], fault.parameters
     wrong = Wrong(fault.kind, int(values.get("place", 0)), values.get("by", 0.0))
     simulation.world.at(ns(fault.at), probe.set_wrong, key, wrong)
     simulation.world.at(ns(fault.at + fault.duration), probe.set_right, key)
 
 
-def _impair(simulation: Simulation, direction: Direction, fault: Fault, key: int) -> None:
+def _impair(simulation: Simulation, direction: WireRoute, fault: InjectedFault, key: int) -> None:
     values: dict[str, Any] = dict(fault.parameters)
     conditions = Conditions(**values, state=STATES.get(fault.kind, OPEN))
     simulation.world.at(ns(fault.at), direction.lay, key, conditions)
     simulation.world.at(ns(fault.at + fault.duration), direction.lift, key)
 
 
-def _intrude(simulation: Simulation, direction: Direction, fault: Fault, seed: int) -> None:
+def _intrude(simulation: Simulation, direction: WireRoute, fault: InjectedFault, seed: int) -> None:
     """Frames that no loop has sent now."""
     plan, count = simulation.plan, int(fault.parameters.get("count", 0))
     match fault.kind:

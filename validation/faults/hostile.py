@@ -13,7 +13,7 @@ from common.protocol import codec
 from common.protocol.messages import Arm, Command, Feedback, Message, Register, Start, Stop, Trip
 from common.roles import MASTER
 from laboratories.kinds import kind_of
-from validation.faults.wire import INSIDER, Direction, Letter
+from validation.faults.wire import INSIDER, Letter, WireRoute
 
 LONGEST = 300  # bytes of noise
 OTHER_SESSION = 77
@@ -31,7 +31,7 @@ def garbage(count: int, chance: np.random.Generator) -> list[Letter]:
     return [Letter(chance.bytes(length), "garbage", -1, 0, "injected", intact=False) for length in lengths]
 
 
-def forged(direction: Direction, plan: Plan, session: int, count: int) -> list[Letter]:
+def forged(direction: WireRoute, plan: Plan, session: int, count: int) -> list[Letter]:
     """Messages of the test's session under the key of another plan."""
     key = codec.session_key(session, plan.digest()[::-1] + "x")
     return [
@@ -39,7 +39,7 @@ def forged(direction: Direction, plan: Plan, session: int, count: int) -> list[L
     ]
 
 
-def foreign(direction: Direction, plan: Plan, count: int) -> list[Letter]:
+def foreign(direction: WireRoute, plan: Plan, count: int) -> list[Letter]:
     """Messages of another session, as of a test that ran before."""
     key = codec.session_key(OTHER_SESSION, plan.digest())
     return [
@@ -49,7 +49,7 @@ def foreign(direction: Direction, plan: Plan, count: int) -> list[Letter]:
 
 
 def tick_message(
-    direction: Direction, plan: Plan, session: int, seq: int, value: float = 0.01
+    direction: WireRoute, plan: Plan, session: int, seq: int, value: float = 0.01
 ) -> Command | Feedback:
     """A message of a tick for the direction, its first quantity of a given value."""
     if direction.route.role == MASTER:
@@ -58,7 +58,7 @@ def tick_message(
     return feedback(session, seq, value, channels=len(channels.names))
 
 
-def farthest(direction: Direction, plan: Plan) -> float:
+def farthest(direction: WireRoute, plan: Plan) -> float:
     """The limit of the target (m) of the slave at one end of a direction; 1 m where there is none."""
     role = direction.hearer.role if direction.route.role == MASTER else direction.route.role
     kind = kind_of(plan, role)
@@ -86,7 +86,7 @@ def blank(kind: type[Any]) -> dict[str, Any]:
     return {name: hint() for name, hint in get_type_hints(kind).items()}
 
 
-def insider(direction: Direction, plan: Plan, session: int, what: int) -> Letter | None:
+def insider(direction: WireRoute, plan: Plan, session: int, what: int) -> Letter | None:
     """One message of a peer who knows session and keys, as it goes on this route; None where it has no such."""
     role, on_tick = direction.route.role, direction.route.channel == TICK
     newest = max(direction.ledger.numbers["sent"], default=0)

@@ -23,7 +23,7 @@ from laboratories.kinds import kind_of
 from models.registry import Array
 from validation.faults.lab import Simulation
 from validation.faults.rigs import COMPUTED, mode_of, named
-from validation.faults.wire import CABLE, Direction
+from validation.faults.wire import CABLE, WireRoute
 
 MOTOR = 1  # place of a motor's force among the commands
 MOVING = ("RUNNING", "HOLDING")
@@ -56,7 +56,7 @@ def drives(plan: Plan, role: str) -> tuple[Drive, ...]:
     )
 
 
-class Violation(NamedTuple):
+class InvariantViolation(NamedTuple):
     """An invariant that does not hold, and what was seen."""
 
     invariant: str
@@ -66,7 +66,7 @@ class Violation(NamedTuple):
 # -- what is looked at ----------------------------------------------------------------------------
 
 
-class Seen(NamedTuple):
+class RigHistory(NamedTuple):
     """What a rig was told: world times (ns), a row of values each, names of the modes."""
 
     times: Array
@@ -78,19 +78,19 @@ class Seen(NamedTuple):
         return int(np.searchsorted(self.times, time, side="right"))
 
 
-def seen(simulation: Simulation, role: str) -> Seen:
+def seen(simulation: Simulation, role: str) -> RigHistory:
     """What the rig of a role was told."""
     log = simulation.probes[role].log
     width = len(drives(simulation.plan, role))
     names = {mode: named(mode) for mode in set(log.modes)}
-    return Seen(
+    return RigHistory(
         np.array(log.times, dtype=np.int64),
         np.array(log.commands, dtype=float).reshape(len(log.times), width),
         [names[mode] for mode in log.modes],
     )
 
 
-def tick_routes(simulation: Simulation, role: str) -> list[Direction]:
+def tick_routes(simulation: Simulation, role: str) -> list[WireRoute]:
     """The routes on which a role hears the messages of the ticks."""
     return [
         direction
@@ -99,7 +99,7 @@ def tick_routes(simulation: Simulation, role: str) -> list[Direction]:
     ]
 
 
-def fresh(simulation: Simulation, direction: Direction) -> list[int]:
+def fresh(simulation: Simulation, direction: WireRoute) -> list[int]:
     """When messages came that were intact, newer than all before and not too old, ns; a stranger's count too."""
     oldest = simulation.plan.safety.message_age * 1e9
     times, newest = [], -1
@@ -110,7 +110,7 @@ def fresh(simulation: Simulation, direction: Direction) -> list[int]:
     return times + direction.ledger.strangers
 
 
-def last_valid(simulation: Simulation, role: str, told: Seen) -> int:
+def last_valid(simulation: Simulation, role: str, told: RigHistory) -> int:
     """World time of the newest message on which a laboratory that stopped early acted, or of its stop before."""
     moving = [place for place, mode in enumerate(told.modes) if mode in MOVING]
     left = int(told.times[moving[-1]]) if moving else 0
@@ -122,7 +122,7 @@ def last_valid(simulation: Simulation, role: str, told: Seen) -> int:
     return min(newest)
 
 
-def noticed(simulation: Simulation, told: Seen, valid: int) -> int:
+def noticed(simulation: Simulation, told: RigHistory, valid: int) -> int:
     """The latest time at which a laboratory could know that messages stay away; later where it was held up itself."""
     time = valid + round(simulation.plan.safety.ramp_after * interval(simulation))
     place = told.until(time)
@@ -184,7 +184,7 @@ def steps_within_limits(simulation: Simulation) -> Iterator[str]:
                 yield f"{role}: {name} changes by {changes[bad[0]]:g} at {at(told, int(bad[0]))}."
 
 
-def at(told: Seen, place: int) -> str:
+def at(told: RigHistory, place: int) -> str:
     """The time of a write, as sentences give it."""
     return f"{told.times[place] * 1e-9:.4f} s"
 
@@ -237,7 +237,7 @@ def motion_is_bounded(simulation: Simulation) -> Iterator[str]:
         yield from _late_motion(simulation, role, told, end)
 
 
-def _late_motion(simulation: Simulation, role: str, told: Seen, end: int) -> Iterator[str]:
+def _late_motion(simulation: Simulation, role: str, told: RigHistory, end: int) -> Iterator[str]:
     after = slice(max(end - 1, 0), None)
     spans = np.maximum(np.round(np.diff(told.times[after]) / interval(simulation)), 1.0)
     most = simulation.plan.safety.velocity * simulation.plan.test.interval * spans
@@ -332,7 +332,7 @@ def not_old(simulation: Simulation, age: int) -> bool:
     return age < 0.25 * simulation.plan.safety.message_age * 1e9
 
 
-def used_numbers(simulation: Simulation, role: str, direction: Direction) -> list[int]:
+def used_numbers(simulation: Simulation, role: str, direction: WireRoute) -> list[int]:
     """Numbers of the messages of a route that were in force, tick by tick."""
     if role != MASTER:
         return [command for _, command in simulation.ports[role].answers]
@@ -388,6 +388,10 @@ INVARIANTS: tuple[Invariant, ...] = (
 )
 
 
-def judge(simulation: Simulation, invariants: tuple[Invariant, ...] = INVARIANTS) -> list[Violation]:
+def judge(simulation: Simulation, invariants: tuple[Invariant, ...] = INVARIANTS) -> list[InvariantViolation]:
     """What does not hold after a run."""
-    return [Violation(invariant.__name__, text) for invariant in invariants for text in invariant(simulation)]
+    return [
+        InvariantViolation(invariant.__name__, text)
+        for invariant in invariants
+        for text in invariant(simulation)
+    ]

@@ -13,7 +13,7 @@ from common.lab.drive import longest_leave
 from common.lab.laboratory import Setting
 from common.plan.plan import Plan
 from common.plan.reality import Reality
-from common.plan.tables import Rig
+from common.plan.tables import RigTable
 from common.reporting import Report
 from common.roles import MASTER, RECORDER
 from loop import substructure
@@ -30,7 +30,7 @@ from validation.faults.rigs import Probe, ProbedRig
 from validation.faults.wire import CABLE, Conditions, Port, Wire, WireEndpoint
 
 SESSION = 1  # simulated time knows one test, and the same test gives the same bits
-PROBED = Rig(class_=f"{ProbedRig.__module__}:{ProbedRig.__name__}")
+PROBED = RigTable(class_=f"{ProbedRig.__module__}:{ProbedRig.__name__}")
 MASTER_STARTS = 1_000_000  # ns after the others
 
 

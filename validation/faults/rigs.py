@@ -8,7 +8,7 @@ from enum import Enum
 from typing import Any, NamedTuple
 
 from common.errors import RigError
-from common.lab.drive import Loop
+from common.lab.drive import DrivenLoop
 from common.lab.laboratory import Laboratory
 from common.protocol.exchange import State
 from common.rig import GuardedRig
@@ -64,7 +64,7 @@ class Probe:
     def __init__(self, inner: GuardedRig, process: Process) -> None:
         self.inner = inner
         self.process = process
-        self.loop: Loop | None = None
+        self.loop: DrivenLoop | None = None
         self.partners: list[Any] = []  # of the master: what it knows of its slaves
         self.log = Log()
         self.wrong: dict[object, Wrong] = {}

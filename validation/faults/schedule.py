@@ -25,7 +25,7 @@ READINGS = 4  # of the laboratory that has most
 ROUTE, PROCESS, RIG = "route", "process", "rig"
 
 
-class Range(NamedTuple):
+class DrawRange(NamedTuple):
     """Where a parameter lies; drawn by its logarithm, as a whole number or evenly."""
 
     low: float
@@ -33,49 +33,51 @@ class Range(NamedTuple):
     how: str = "log"  # log, whole or even
 
 
-class Kind(NamedTuple):
+class FaultKind(NamedTuple):
     """A kind of fault: what it befalls, how long it lasts (s, None for no time at all), what describes it."""
 
     where: str
     lasts: tuple[float, float] | None
-    parameters: Mapping[str, Range] = {}
+    parameters: Mapping[str, DrawRange] = {}
 
 
-SHARE = Range(0.002, 0.3)
-COUNT = Range(1, 1000)
-PLACE = Range(0, READINGS - 1, "whole")
+SHARE = DrawRange(0.002, 0.3)
+COUNT = DrawRange(1, 1000)
+PLACE = DrawRange(0, READINGS - 1, "whole")
 SECONDS = (0.01, 10.0)
 MOMENT = (0.002, 5.0)
 
-KINDS: dict[str, Kind] = {
-    "delay": Kind(ROUTE, SECONDS, {"minimum": Range(1e-4, 0.03), "mean": Range(1e-5, 0.01)}),
-    "step": Kind(ROUTE, SECONDS, {"minimum": Range(5e-4, 0.2)}),
-    "loss": Kind(ROUTE, SECONDS, {"loss": SHARE}),
-    "burst": Kind(ROUTE, SECONDS, {"burst": SHARE, "run": Range(2, 40)}),
-    "duplicate": Kind(ROUTE, SECONDS, {"duplicate": SHARE}),
-    "reorder": Kind(ROUTE, SECONDS, {"reorder": SHARE, "hold": Range(0.001, 0.02)}),
-    "corrupt": Kind(ROUTE, SECONDS, {"corrupt": SHARE}),
-    "outage": Kind(ROUTE, MOMENT),
-    "backlog": Kind(ROUTE, MOMENT),
-    "replay": Kind(ROUTE, None, {"count": COUNT}),
-    "garbage": Kind(ROUTE, None, {"count": COUNT}),
-    "forged": Kind(ROUTE, None, {"count": COUNT}),
-    "foreign": Kind(ROUTE, None, {"count": COUNT}),
-    "insider": Kind(ROUTE, None, {"what": Range(0, 7, "whole")}),
-    "stall": Kind(PROCESS, (0.003, 3.0)),
-    "kill": Kind(PROCESS, None),
-    "stop": Kind(PROCESS, None),
-    "clock": Kind(PROCESS, None, {"offset": Range(0.0, 1000.0, "even"), "ppm": Range(-100.0, 100.0, "even")}),
-    "nan": Kind(RIG, MOMENT, {"place": PLACE}),
-    "frozen": Kind(RIG, MOMENT, {"place": PLACE}),
-    "jump": Kind(RIG, MOMENT, {"place": PLACE, "by": Range(1e-4, 1e4)}),
-    "beyond": Kind(RIG, MOMENT, {"place": PLACE, "by": Range(0.1, 1e7)}),
-    "raise": Kind(RIG, MOMENT),
+KINDS: dict[str, FaultKind] = {
+    "delay": FaultKind(ROUTE, SECONDS, {"minimum": DrawRange(1e-4, 0.03), "mean": DrawRange(1e-5, 0.01)}),
+    "step": FaultKind(ROUTE, SECONDS, {"minimum": DrawRange(5e-4, 0.2)}),
+    "loss": FaultKind(ROUTE, SECONDS, {"loss": SHARE}),
+    "burst": FaultKind(ROUTE, SECONDS, {"burst": SHARE, "run": DrawRange(2, 40)}),
+    "duplicate": FaultKind(ROUTE, SECONDS, {"duplicate": SHARE}),
+    "reorder": FaultKind(ROUTE, SECONDS, {"reorder": SHARE, "hold": DrawRange(0.001, 0.02)}),
+    "corrupt": FaultKind(ROUTE, SECONDS, {"corrupt": SHARE}),
+    "outage": FaultKind(ROUTE, MOMENT),
+    "backlog": FaultKind(ROUTE, MOMENT),
+    "replay": FaultKind(ROUTE, None, {"count": COUNT}),
+    "garbage": FaultKind(ROUTE, None, {"count": COUNT}),
+    "forged": FaultKind(ROUTE, None, {"count": COUNT}),
+    "foreign": FaultKind(ROUTE, None, {"count": COUNT}),
+    "insider": FaultKind(ROUTE, None, {"what": DrawRange(0, 7, "whole")}),
+    "stall": FaultKind(PROCESS, (0.003, 3.0)),
+    "kill": FaultKind(PROCESS, None),
+    "stop": FaultKind(PROCESS, None),
+    "clock": FaultKind(
+        PROCESS, None, {"offset": DrawRange(0.0, 1000.0, "even"), "ppm": DrawRange(-100.0, 100.0, "even")}
+    ),
+    "nan": FaultKind(RIG, MOMENT, {"place": PLACE}),
+    "frozen": FaultKind(RIG, MOMENT, {"place": PLACE}),
+    "jump": FaultKind(RIG, MOMENT, {"place": PLACE, "by": DrawRange(1e-4, 1e4)}),
+    "beyond": FaultKind(RIG, MOMENT, {"place": PLACE, "by": DrawRange(0.1, 1e7)}),
+    "raise": FaultKind(RIG, MOMENT),
 }
 
 
 @dataclass(frozen=True)
-class Fault:
+class InjectedFault:
     """One fault at a world time (s), for a while; `where` is a role, `A>B` or `A<>B`.
 
     A kind without a duration happens at once. A clock differs from the beginning, whatever `at` says.
@@ -101,7 +103,7 @@ class Schedule:
     duration: float
     slaves: int = 1
     recorded: bool = False
-    faults: tuple[Fault, ...] = ()
+    faults: tuple[InjectedFault, ...] = ()
 
     def __str__(self) -> str:
         head = f"seed={self.seed} duration={self.duration:g} slaves={self.slaves} recorded={self.recorded:d}"
@@ -127,13 +129,17 @@ def draw(seed: int, duration: float | None = None, *, recorded: bool = False) ->
     return Schedule(seed, length, slaves, recorded, tuple(sorted(faults, key=lambda one: one.at)))
 
 
-def _fault(chance: np.random.Generator, slaves: tuple[str, ...], length: float, *, recorded: bool) -> Fault:
+def _fault(
+    chance: np.random.Generator, slaves: tuple[str, ...], length: float, *, recorded: bool
+) -> InjectedFault:
     name = str(chance.choice(list(KINDS)))
     kind = KINDS[name]
     at = rounded(float(chance.uniform(0.0, length)))
-    duration = 0.0 if kind.lasts is None else value_of(chance, Range(*kind.lasts))
+    duration = 0.0 if kind.lasts is None else value_of(chance, DrawRange(*kind.lasts))
     parameters = {key: value_of(chance, span) for key, span in kind.parameters.items()}
-    return Fault(name, _where(chance, kind.where, slaves, recorded=recorded), at, duration, parameters)
+    return InjectedFault(
+        name, _where(chance, kind.where, slaves, recorded=recorded), at, duration, parameters
+    )
 
 
 def _where(chance: np.random.Generator, what: str, slaves: tuple[str, ...], *, recorded: bool) -> str:
@@ -144,7 +150,7 @@ def _where(chance: np.random.Generator, what: str, slaves: tuple[str, ...], *, r
     return one + (">" if chance.random() < ONE_WAY else "<>") + other
 
 
-def value_of(chance: np.random.Generator, span: Range) -> float:
+def value_of(chance: np.random.Generator, span: DrawRange) -> float:
     """A value of a range, short enough to be written and read without loss."""
     match span.how:
         case "whole":
@@ -177,7 +183,7 @@ def parse(line: str) -> Schedule:
         InputError: the line is none.
     """
     head: dict[str, float] = {"duration": SHORTEST, "slaves": 1, "recorded": 0}
-    faults: list[Fault] = []
+    faults: list[InjectedFault] = []
     for word in line.split():
         name, _, value = word.partition("=")
         if name in HEAD:
@@ -195,7 +201,7 @@ def parse(line: str) -> Schedule:
     )
 
 
-def parse_fault(word: str) -> Fault:
+def parse_fault(word: str) -> InjectedFault:
     """The fault in a word; raises InputError where it is none."""
     found = FAULT.fullmatch(word)
     if found is None:
@@ -208,7 +214,7 @@ def parse_fault(word: str) -> Fault:
     wanted = KINDS[kind].parameters
     if set(values) != set(wanted):
         raise InputError(f"'{word}' must give {', '.join(wanted) or 'no values'}.")
-    return Fault(
+    return InjectedFault(
         kind, found["where"], number(found["at"], word), number(found["duration"] or "0", word), values
     )
 

@@ -7,28 +7,28 @@ from pathlib import Path
 from typing import NamedTuple
 
 from validation.faults.apply import simulation_of
-from validation.faults.invariants import Violation, judge
+from validation.faults.invariants import InvariantViolation, judge
 from validation.faults.lab import Simulation
 from validation.faults.schedule import Schedule
 
 
-class Result(NamedTuple):
+class TrialResult(NamedTuple):
     """The result of a schedule; `ends` is the state of the protocol in which each laboratory ended."""
 
     schedule: Schedule
-    violations: list[Violation]
+    violations: list[InvariantViolation]
     virtual_time: float  # s
     digest: str  # of every command at every rig
     ends: dict[str, str]
     course: list[str]  # what the laboratories told, a line each
 
 
-def play(schedule: Schedule) -> Result:
+def play(schedule: Schedule) -> TrialResult:
     """Simulate a schedule and judge it; a recording is read and thrown away."""
     with tempfile.TemporaryDirectory(prefix="rths-faults-") as folder:
         simulation = simulation_of(schedule, Path(folder) / "test.mcap")
         simulation.run()
-        return Result(
+        return TrialResult(
             schedule,
             judge(simulation),
             simulation.world.time * 1e-9,

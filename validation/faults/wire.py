@@ -109,7 +109,7 @@ class Ledger:
             self.arrivals.append((time, letter.number, letter.sent_ns, letter.origin, letter.intact))
 
 
-class Direction:
+class WireRoute:
     """One route to one hearer, with its condition and its random draws."""
 
     def __init__(self, world: World, route: Route, hearer: Port, base: Conditions, seed: int) -> None:
@@ -253,8 +253,8 @@ class Port:
         self.heard: Callable[[Packet], None] = lambda _packet: None
         self.taken: Counter[str] = Counter()  # messages that its loop was given, by kind
         self.answers: list[tuple[int, int]] = []  # of a slave: tick, and the number of the command in force
-        self.out: dict[tuple[str, str], list[Direction]] = defaultdict(list)
-        self._waiting: list[tuple[Direction, Letter]] = []
+        self.out: dict[tuple[str, str], list[WireRoute]] = defaultdict(list)
+        self._waiting: list[tuple[WireRoute, Letter]] = []
         self._wire = wire
         process.when_woken(self._catch_up)
 
@@ -274,7 +274,7 @@ class Port:
     def close(self) -> None:
         """Nothing to leave."""
 
-    def keep(self, direction: Direction, letter: Letter) -> None:
+    def keep(self, direction: WireRoute, letter: Letter) -> None:
         """Hold a frame for a process that stands still."""
         if len(self._waiting) < SOCKET:
             self._waiting.append((direction, letter))
@@ -291,7 +291,7 @@ class Wire:
     """All routes between the roles of a test; every port must be there before the first frame."""
 
     def __init__(self, world: World, slaves: tuple[str, ...], base: Conditions, seed: int) -> None:
-        self.directions: list[Direction] = []
+        self.directions: list[WireRoute] = []
         self._world = world
         self._slaves = slaves
         self._base = base
@@ -311,11 +311,11 @@ class Wire:
         wanted = set(heard(hearer.role, self._slaves))
         for route in said(sender.role, self._slaves):
             if route in wanted:
-                direction = Direction(self._world, route, hearer, self._base, self._seed)
+                direction = WireRoute(self._world, route, hearer, self._base, self._seed)
                 sender.out[route.channel, route.to].append(direction)
                 self.directions.append(direction)
 
-    def between(self, sender: str, hearer: str) -> list[Direction]:
+    def between(self, sender: str, hearer: str) -> list[WireRoute]:
         """The routes from one role to another."""
         return [
             direction

@@ -13,7 +13,7 @@ from common.lab.preflight import Gate
 from common.plan import plan as plans
 from common.plan.plan import Plan, ideal
 from common.plan.reality import as_planned
-from common.plan.tables import Actuator, Compensator, Control, GroundMotion, TableCompensator
+from common.plan.tables import Actuator, CompensatorTable, Control, GroundMotionTable, TableCompensator
 from common.recording.reader import Run, read
 from common.terminal import cli
 from common.terminal.telling import Tell
@@ -27,8 +27,8 @@ from simulation import benches, virtual
 from simulation.benches import Order
 
 GAINS = {"proportional": 1.93, "integral": 0.047, "derivative": 0.0}
-PID = Compensator("pid", GAINS)
-BEYOND = Compensator("pid_inverse", {**GAINS, "delay": 0.014, "time_constant": 0.030})
+PID = CompensatorTable("pid", GAINS)
+BEYOND = CompensatorTable("pid_inverse", {**GAINS, "delay": 0.014, "time_constant": 0.030})
 TABLE_LEAD = TableCompensator("taylor", {"lead": 0.01885, "order": 2.0})
 PULSE = 0.1  # s, length of the pulse that starts a free vibration
 UNSTABLE = "uncompensated"  # run on purpose, until its limits stop it
@@ -36,7 +36,7 @@ DELAYS = np.array([0.0, 2.0, 4.0, 8.0, 12.0, 16.0]) * 1e-3
 
 
 @dataclass
-class Evidence:
+class PaperEvidence:
     """What the experiments left."""
 
     default: Plan
@@ -50,10 +50,10 @@ class Evidence:
     critical_delay: tuple[float, float] = (0.0, 0.0)  # bracket, s
 
 
-def gather(folder: Path, tell: Tell) -> Evidence:
+def gather(folder: Path, tell: Tell) -> PaperEvidence:
     """Run everything; recordings go into `folder`."""
     default, paper = (plans.load(cli.plan_path(name)) for name in ("default", "paper"))
-    evidence = Evidence(default, paper)
+    evidence = PaperEvidence(default, paper)
     run_benches(evidence, folder, tell)
     run_tests(evidence, folder, tell)
     tell("pure simulations and free vibrations", 0, 0)
@@ -75,10 +75,10 @@ def unwatched(plan: Plan) -> Plan:
 
 def at_scale(plan: Plan, scale: float) -> Plan:
     """The plan at another scale of the record."""
-    return replace(plan, ground_motion=GroundMotion(plan.ground_motion.record, scale))
+    return replace(plan, ground_motion=GroundMotionTable(plan.ground_motion.record, scale))
 
 
-def compensated_by(plan: Plan, compensator: Compensator) -> Plan:
+def compensated_by(plan: Plan, compensator: CompensatorTable) -> Plan:
     """The plan with another compensator of the actuator."""
     return replace(plan, compensator=compensator)
 
@@ -88,7 +88,7 @@ def beyond(plan: Plan) -> Plan:
     return replace(plan, compensator=BEYOND, table=replace(plan.table, compensator=TABLE_LEAD))
 
 
-def run_benches(evidence: Evidence, folder: Path, tell: Tell) -> None:
+def run_benches(evidence: PaperEvidence, folder: Path, tell: Tell) -> None:
     """Characterisation tests; noise on."""
     default, paper = evidence.default, evidence.paper
     realistic = plans.load(cli.plan_path("rc_column"))
@@ -110,11 +110,11 @@ def run_benches(evidence: Evidence, folder: Path, tell: Tell) -> None:
         evidence.benches[name] = read(path)
 
 
-def run_tests(evidence: Evidence, folder: Path, tell: Tell) -> None:
+def run_tests(evidence: PaperEvidence, folder: Path, tell: Tell) -> None:
     """Closed-loop tests of both laboratories through the real loops; an unstable one is stopped by its limits."""
     default, paper = evidence.default, evidence.paper
     cases = {
-        UNSTABLE: unwatched(without_amd(compensated_by(default, Compensator("none", {})))),
+        UNSTABLE: unwatched(without_amd(compensated_by(default, CompensatorTable("none", {})))),
         "pid": compensated_by(default, PID),
         "pid-taylor": paper,
         "beyond": beyond(default),
@@ -143,7 +143,7 @@ def never() -> str:
     return ""
 
 
-def run_simulations(evidence: Evidence) -> None:
+def run_simulations(evidence: PaperEvidence) -> None:
     """The pure simulation, and the same with what the paper's residual delay costs put into the building."""
     plan = evidence.default
     ground = substructure.ground_rows(plan, substructure.motion(plan))
@@ -195,7 +195,7 @@ def delayed(plan: Plan, delay: float) -> Plan:
     return without_amd(replace(ideal(plan), actuator=Actuator(gain=1.0, delay=delay, time_constant=0.0)))
 
 
-def free_vibrations(evidence: Evidence) -> None:
+def free_vibrations(evidence: PaperEvidence) -> None:
     """Damping from free vibration of the cases that the table needs."""
     default, paper = evidence.default, evidence.paper
     cases = {

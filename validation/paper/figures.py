@@ -10,20 +10,20 @@ from common.recording.reader import Run
 from report.facts.identification import identify, segments, step_ticks
 from report.pictures.figure import SINGLE, TEXT, figure, save
 from report.pictures.layout import legend_above
-from validation.paper.experiments import DELAYS, Evidence
+from validation.paper.experiments import DELAYS, PaperEvidence
 
 HEIGHT = 2.6  # inches
 
 
-class Figure(NamedTuple):
+class PaperFigure(NamedTuple):
     """One picture and what stands below it."""
 
     file: str
     caption: str
-    draw: Callable[[Evidence, Any], None]
+    draw: Callable[[PaperEvidence, Any], None]
 
 
-def draw_all(evidence: Evidence, folder: Path) -> list[Figure]:
+def draw_all(evidence: PaperEvidence, folder: Path) -> list[PaperFigure]:
     """Draw every figure into a folder."""
     for item in FIGURES:
         canvas = figure(SINGLE, HEIGHT)
@@ -40,7 +40,7 @@ def window(run: Run, word: str, begin: float, end: float, interval: float) -> tu
     return columns["t"] - start * interval, columns
 
 
-def hysteresis(evidence: Evidence, canvas: Any) -> None:
+def hysteresis(evidence: PaperEvidence, canvas: Any) -> None:
     """Fig. 4: force against drift angle."""
     axes = canvas.subplots(1, 2, sharey=True)
     for axis, name, title in zip(axes, ("column", "rc-column"), ("linear", "Clough, cracking"), strict=True):
@@ -51,7 +51,7 @@ def hysteresis(evidence: Evidence, canvas: Any) -> None:
     axes[0].set_ylabel("force, kN")
 
 
-def delay(evidence: Evidence, canvas: Any) -> None:
+def delay(evidence: PaperEvidence, canvas: Any) -> None:
     """Fig. 6: commanded and measured displacement without compensation."""
     t, columns = window(evidence.benches["actuator"], "sine 2 Hz", 2.0, 3.5, evidence.default.test.interval)
     axis = canvas.subplots()
@@ -61,7 +61,7 @@ def delay(evidence: Evidence, canvas: Any) -> None:
     legend_above(axis)
 
 
-def step_response(evidence: Evidence, canvas: Any) -> None:
+def step_response(evidence: PaperEvidence, canvas: Any) -> None:
     """Fig. 7: the step response and its tangent."""
     run, interval = evidence.benches["actuator"], evidence.default.test.interval
     piece = next(segment for segment in segments(run) if segment.name == "step")
@@ -87,7 +87,7 @@ def step_response(evidence: Evidence, canvas: Any) -> None:
     legend_above(axis)
 
 
-def sine(evidence: Evidence, canvas: Any) -> None:
+def sine(evidence: PaperEvidence, canvas: Any) -> None:
     """Fig. 10: a sine with and without compensation."""
     interval = evidence.default.test.interval
     t, raw = window(evidence.benches["actuator"], "sine 1 Hz", 2.0, 4.0, interval)
@@ -100,7 +100,7 @@ def sine(evidence: Evidence, canvas: Any) -> None:
     legend_above(axis)
 
 
-def random_wave(evidence: Evidence, canvas: Any) -> None:
+def random_wave(evidence: PaperEvidence, canvas: Any) -> None:
     """Fig. 11: a random wave behind PID."""
     t, columns = window(evidence.benches["actuator-pid"], "random", 5.0, 10.0, evidence.default.test.interval)
     axis = canvas.subplots()
@@ -121,7 +121,7 @@ def two_histories(canvas: Any, curves: list[tuple[str, Any, Any, Any]], end: flo
     legend_above(upper)
 
 
-def test_and_simulation(evidence: Evidence, canvas: Any) -> None:
+def test_and_simulation(evidence: PaperEvidence, canvas: Any) -> None:
     """Fig. 12: the test and the pure simulation at 10 %."""
     run, ideal = evidence.tests["pid-taylor"], evidence.simulations["ideal"]
     ratio = evidence.default.column.deformation_ratio
@@ -133,7 +133,7 @@ def test_and_simulation(evidence: Evidence, canvas: Any) -> None:
     two_histories(canvas, curves, 15.0)
 
 
-def control(evidence: Evidence, canvas: Any) -> None:
+def control(evidence: PaperEvidence, canvas: Any) -> None:
     """Fig. 13: with and without AMD at 20 %."""
     curves = []
     ratio = evidence.default.column.deformation_ratio
@@ -144,7 +144,7 @@ def control(evidence: Evidence, canvas: Any) -> None:
     two_histories(canvas, curves, 20.0)
 
 
-def instability(evidence: Evidence, canvas: Any) -> None:
+def instability(evidence: PaperEvidence, canvas: Any) -> None:
     """The uncompensated loop until its limits stop it."""
     columns = evidence.tests["uncompensated"].columns["master"]
     axis = canvas.subplots()
@@ -152,7 +152,7 @@ def instability(evidence: Evidence, canvas: Any) -> None:
     axis.set(xlabel="time, s", ylabel="storey drift, mm")
 
 
-def damping(evidence: Evidence, canvas: Any) -> None:
+def damping(evidence: PaperEvidence, canvas: Any) -> None:
     """What a delay costs."""
     axis = canvas.subplots()
     axis.plot(DELAYS * 1e3, evidence.damping_by_delay * 100.0, "o-", label="closed loop, free vibration")
@@ -162,41 +162,45 @@ def damping(evidence: Evidence, canvas: Any) -> None:
 
 
 FIGURES = (
-    Figure(
+    PaperFigure(
         "fig04-column.png",
         "Counterpart of Fig. 4: static loading of ±1.5 to ±7.5 mm, three cycles each; nominal and realistic column.",
         hysteresis,
     ),
-    Figure(
+    PaperFigure(
         "fig06-delay.png",
         "Counterpart of Fig. 6: commanded and measured displacement of the bare actuator, 2 Hz.",
         delay,
     ),
-    Figure(
+    PaperFigure(
         "fig07-step.png",
         "Counterpart of Fig. 7: step of 5 mm with the tangent at the inflection.",
         step_response,
     ),
-    Figure(
+    PaperFigure(
         "fig10-sine.png",
         "Counterpart of Fig. 10: sine of 1 Hz, with PID + Taylor (τ = 8.8 ms) and without compensation.",
         sine,
     ),
-    Figure("fig11-random.png", "Counterpart of Fig. 11: random wave below 3 Hz behind PID.", random_wave),
-    Figure(
+    PaperFigure(
+        "fig11-random.png", "Counterpart of Fig. 11: random wave below 3 Hz behind PID.", random_wave
+    ),
+    PaperFigure(
         "fig12-test-simulation.png",
         "Counterpart of Fig. 12: test and pure simulation, El Centro 10 %, AMD on, τ = 8.8 ms.",
         test_and_simulation,
     ),
-    Figure(
+    PaperFigure(
         "fig13-amd.png",
         "Counterpart of Fig. 13: test with and without AMD, El Centro 20 %, τ = 8.8 ms.",
         control,
     ),
-    Figure(
+    PaperFigure(
         "uncompensated.png",
         "Uncompensated closed loop without AMD, El Centro 10 %: it diverges until a limit stops it.",
         instability,
     ),
-    Figure("damping-delay.png", "Apparent damping against a delay in the path of the actuator.", damping),
+    PaperFigure(
+        "damping-delay.png", "Apparent damping against a delay in the path of the actuator.", damping
+    ),
 )

@@ -6,13 +6,13 @@ from pathlib import Path
 
 from report.page import frame, render
 from report.page.photo import photo
-from validation.paper.figures import Figure
-from validation.paper.rows import Row
+from validation.paper.figures import PaperFigure
+from validation.paper.rows import PaperRow
 
 TITLE = "The seed paper, reproduced"
 
 
-def page(rows: list[Row], figures: list[Figure], folder: Path) -> str:
+def page(rows: list[PaperRow], figures: list[PaperFigure], folder: Path) -> str:
     """The page's text; pictures are taken from `folder` and stand inside."""
     passed = sum(row.passed for row in rows)
     images = [photo((folder / item.file).read_bytes(), item.caption) for item in figures]

@@ -14,13 +14,13 @@ from models import indicators
 from models.registry import Array
 from report.facts.identification import identify, segments
 from report.text.formats import quantity, signed
-from validation.paper.experiments import DELAYS, Evidence
+from validation.paper.experiments import DELAYS, PaperEvidence
 
 POINT = 100.0  # damping ratio in points of per cent
 
 
 @dataclass(frozen=True)
-class Row:
+class PaperRow:
     """One number of the paper."""
 
     name: str
@@ -31,7 +31,7 @@ class Row:
     note: str = ""
 
 
-def rows(evidence: Evidence) -> list[Row]:
+def rows(evidence: PaperEvidence) -> list[PaperRow]:
     """All rows, in the paper's order."""
     makers = (
         building,
@@ -58,11 +58,11 @@ def within(value: float, middle: float, half: float) -> bool:
     return abs(value - middle) <= half
 
 
-def building(evidence: Evidence) -> list[Row]:
+def building(evidence: PaperEvidence) -> list[PaperRow]:
     """Period and damping from free vibration of the pure simulation, sensors' noise on."""
     period, damping = evidence.period, evidence.damping["ideal"] * POINT
     return [
-        Row(
+        PaperRow(
             "natural period",
             "0.5 s",
             f"{period:.4f} s",
@@ -70,11 +70,13 @@ def building(evidence: Evidence) -> list[Row]:
             within(period, 0.503, 0.001),
             "the paper rounds",
         ),
-        Row("damping ratio", "Table 3: 5.0 %", f"{damping:.2f} %", "5.0 ± 0.1 %", within(damping, 5.0, 0.1)),
+        PaperRow(
+            "damping ratio", "Table 3: 5.0 %", f"{damping:.2f} %", "5.0 ± 0.1 %", within(damping, 5.0, 0.1)
+        ),
     ]
 
 
-def stiffness(evidence: Evidence) -> list[Row]:
+def stiffness(evidence: PaperEvidence) -> list[PaperRow]:
     """Elastic stiffness of the specimen from the bench recording."""
     found = identify(evidence.benches["column"])["parameters"]["elastic_stiffness"]
     value = found["value"]
@@ -82,10 +84,12 @@ def stiffness(evidence: Evidence) -> list[Row]:
     note = (
         "half of a column of 6.25 MN/m, which is a quarter of the storey's 25 MN/m, has twice its stiffness"
     )
-    return [Row("specimen stiffness", "12.5 MN/m", text, "within 1 %", within(value, 12.5e6, 0.125e6), note)]
+    return [
+        PaperRow("specimen stiffness", "12.5 MN/m", text, "within 1 %", within(value, 12.5e6, 0.125e6), note)
+    ]
 
 
-def step_response(evidence: Evidence) -> list[Row]:
+def step_response(evidence: PaperEvidence) -> list[PaperRow]:
     """Dead time and time constant by the tangent at the inflection."""
     found = identify(evidence.benches["actuator"])["tangent"]
     result = []
@@ -93,7 +97,7 @@ def step_response(evidence: Evidence) -> list[Row]:
         value = found[name]["value"]
         text = f"{value * 1e3:.2f} ms ({found[name]['low'] * 1e3:.2f} to {found[name]['high'] * 1e3:.2f})"
         result.append(
-            Row(
+            PaperRow(
                 f"{symbol} by step response",
                 f"{paper:.3f} s",
                 text,
@@ -133,15 +137,15 @@ def listing(found: dict[str, float]) -> str:
     )
 
 
-def sine_uncompensated(evidence: Evidence) -> list[Row]:
+def sine_uncompensated(evidence: PaperEvidence) -> list[PaperRow]:
     """Delay of the bare actuator."""
     found = delays(evidence.benches["actuator"], "sine", evidence.default.test.interval)
     passed = all(0.041 <= delay <= 0.045 for delay in found.values())
     note = "L + atan(ωT)/ω falls with frequency"
-    return [Row("delay, sine, uncompensated", "0.044 s", listing(found), "41–45 ms", passed, note)]
+    return [PaperRow("delay, sine, uncompensated", "0.044 s", listing(found), "41–45 ms", passed, note)]
 
 
-def sine_compensated(evidence: Evidence) -> list[Row]:
+def sine_compensated(evidence: PaperEvidence) -> list[PaperRow]:
     """Delay behind PID and Taylor."""
     found = delays(evidence.benches["actuator-paper"], "sine", evidence.default.test.interval)
     passed = all(0.010 <= delay <= 0.014 for delay in found.values())
@@ -149,17 +153,17 @@ def sine_compensated(evidence: Evidence) -> list[Row]:
     note = (
         f"τ = {lead:g} ms: the paper prints none; this one is chosen so that (L + T − τ)/(1 + P) is its 12 ms"
     )
-    return [Row("delay, sine, compensated", "0.012 s", listing(found), "10–14 ms", passed, note)]
+    return [PaperRow("delay, sine, compensated", "0.012 s", listing(found), "10–14 ms", passed, note)]
 
 
-def random_compensated(evidence: Evidence) -> list[Row]:
+def random_compensated(evidence: PaperEvidence) -> list[PaperRow]:
     """Delay behind PID alone for a random wave."""
     interval = evidence.default.test.interval
     ((target, measured),) = pieces(evidence.benches["actuator-pid"], "random").values()
     delay = indicators.correlation_delay(target, measured, interval)
     note = "PID alone, wave below 3 Hz, by cross-correlation"
     return [
-        Row(
+        PaperRow(
             "delay, random, compensated",
             "0.016 s",
             f"{delay * 1e3:.1f} ms",
@@ -170,7 +174,7 @@ def random_compensated(evidence: Evidence) -> list[Row]:
     ]
 
 
-def reduction(evidence: Evidence) -> list[Row]:
+def reduction(evidence: PaperEvidence) -> list[PaperRow]:
     """What is left of the delay."""
     interval = evidence.default.test.interval
     before = delays(evidence.benches["actuator"], "sine", interval)
@@ -180,21 +184,23 @@ def reduction(evidence: Evidence) -> list[Row]:
         "compensated over uncompensated, worst sine",
     )
     return [
-        Row("share of the delay left", "less than a third", f"{share:.3f}", "≤ 0.33", share <= 0.33, worst)
+        PaperRow(
+            "share of the delay left", "less than a third", f"{share:.3f}", "≤ 0.33", share <= 0.33, worst
+        )
     ]
 
 
-def instability(evidence: Evidence) -> list[Row]:
+def instability(evidence: PaperEvidence) -> list[PaperRow]:
     """The uncompensated loop, stopped by the limits."""
     run = evidence.tests["uncompensated"]
     stopped = [event for event in run.events if event["level"] == "error"]
     t = float(run.columns["master"]["t"][-1])
     text = f"stopped at {t:.1f} s: {stopped[0]['text']}" if stopped else "ran to its end"
     note = "share 1/4, no AMD: with the AMD's damping it is just stable"
-    return [Row("uncompensated closed loop", "unstable", text, "diverges", bool(stopped), note)]
+    return [PaperRow("uncompensated closed loop", "unstable", text, "diverges", bool(stopped), note)]
 
 
-def critical_delay(evidence: Evidence) -> list[Row]:
+def critical_delay(evidence: PaperEvidence) -> list[PaperRow]:
     """The delay from which the closed loop is unstable, found in the loop, beside theory."""
     low, high = evidence.critical_delay
     middle = 500.0 * (low + high)
@@ -202,15 +208,15 @@ def critical_delay(evidence: Evidence) -> list[Row]:
     index = indicators.predictive_stability_indicator(theory * 1e-3)
     note = f"characteristic equation {theory:.2f} ms; predictive stability indicator {index:.2f}"
     text = f"{middle:.2f} ± {500.0 * (high - low):.2f} ms"
-    return [Row("critical delay", "–", text, "32.9 ± 0.5 ms", within(middle, 32.9, 0.5), note)]
+    return [PaperRow("critical delay", "–", text, "32.9 ± 0.5 ms", within(middle, 32.9, 0.5), note)]
 
 
-def apparent_damping(evidence: Evidence) -> list[Row]:
+def apparent_damping(evidence: PaperEvidence) -> list[PaperRow]:
     """What the paper's residual delay leaves of the damping."""
     value = evidence.damping["paper"] * POINT
     note = "free vibration of the paper's plan, AMD off"
     return [
-        Row(
+        PaperRow(
             "apparent damping at residual 12 ms",
             "–",
             f"{value:.2f} %",
@@ -221,7 +227,7 @@ def apparent_damping(evidence: Evidence) -> list[Row]:
     ]
 
 
-def cost_of_delay(evidence: Evidence) -> list[Row]:
+def cost_of_delay(evidence: PaperEvidence) -> list[PaperRow]:
     """Damping points per ms of delay."""
     slope = float(np.polyfit(DELAYS * 1e3, evidence.damping_by_delay * POINT, 1)[0])
     listed = ", ".join(
@@ -229,7 +235,7 @@ def cost_of_delay(evidence: Evidence) -> list[Row]:
         for delay, value in zip(DELAYS, evidence.damping_by_delay, strict=True)
     )
     return [
-        Row(
+        PaperRow(
             "cost of delay",
             "–",
             f"{slope:.4f} points/ms",
@@ -254,7 +260,7 @@ def comparison(run: Run, reference: dict[str, Array], interval: float) -> dict[s
     }
 
 
-def agreement(evidence: Evidence) -> list[Row]:
+def agreement(evidence: PaperEvidence) -> list[PaperRow]:
     """Test against pure simulation, and the share of the difference that the residual delay explains."""
     result, interval = [], evidence.default.test.interval
     for name, label in (("pid", "PID"), ("pid-taylor", "PID + Taylor"), ("beyond", "beyond")):
@@ -278,7 +284,9 @@ def agreement(evidence: Evidence) -> list[Row]:
                 f"NRMSE (delay, amplitude); the path's {cost(run, evidence.default)} of damping lost: with them in "
                 f"the pure simulation the drift's NRMSE is {left:.3f}"
             )
-        result.append(Row(f"test against simulation, {label}", "good agreement", text, wanted, passed, note))
+        result.append(
+            PaperRow(f"test against simulation, {label}", "good agreement", text, wanted, passed, note)
+        )
     return result
 
 
@@ -291,16 +299,18 @@ def cost(run: Run, plan: Plan) -> str:
     return f"{path.delay * 1e3:.1f} ms of delay are {damping_lost(plan, path) * POINT:.2f} points"
 
 
-def amd_damping(evidence: Evidence) -> list[Row]:
+def amd_damping(evidence: PaperEvidence) -> list[PaperRow]:
     """Damping that the AMD adds, in the test and in the pure simulation."""
     damping = {name: value * POINT for name, value in evidence.damping.items()}
     test, pure = damping["paper-amd"] - damping["paper"], damping["ideal-amd"] - damping["ideal"]
     text = f"{test:.2f} points in the test, {pure:.2f} in the pure simulation"
     passed = within(test, 3.0, 0.2) and within(pure, 3.0, 0.2)
-    return [Row("damping that the AMD adds", "about 3 %", text, "3.0 ± 0.2 points", passed, "free vibration")]
+    return [
+        PaperRow("damping that the AMD adds", "about 3 %", text, "3.0 ± 0.2 points", passed, "free vibration")
+    ]
 
 
-def amd_effect(evidence: Evidence) -> list[Row]:
+def amd_effect(evidence: PaperEvidence) -> list[PaperRow]:
     """Peaks and rms with and without the AMD at 20 %."""
     parts, passed = [], True
     for signal, word, factor, unit in (
@@ -315,7 +325,7 @@ def amd_effect(evidence: Evidence) -> list[Row]:
         passed &= peaks[0] < peaks[1] and rms[0] < rms[1]
         parts.append(f"{word} peak {peaks[0]:.2f}/{peaks[1]:.2f}, rms {rms[0]:.2f}/{rms[1]:.2f} {unit}")
     return [
-        Row(
+        PaperRow(
             "with/without AMD, El Centro 20 %",
             "effective",
             "; ".join(parts),
@@ -326,7 +336,7 @@ def amd_effect(evidence: Evidence) -> list[Row]:
     ]
 
 
-def beyond(evidence: Evidence) -> list[Row]:
+def beyond(evidence: PaperEvidence) -> list[PaperRow]:
     """A compensator that leaves less than the paper's."""
     run, interval = evidence.tests["beyond"], evidence.default.test.interval
     columns = run.columns["master"]
@@ -340,7 +350,7 @@ def beyond(evidence: Evidence) -> list[Row]:
         f"damping error {signed(error, 2)} points"
     )
     return [
-        Row(
+        PaperRow(
             "beyond the paper: pid_inverse",
             "12–16 ms left",
             text,

@@ -9,10 +9,10 @@ loop moves too.
 from __future__ import annotations
 
 from laboratories.effects.effect import Parameter
-from laboratories.effects.reading import Fault, Signal, sized
+from laboratories.effects.reading import ReadingFault, SensorSignal, sized
 
 
-def parameter(signal: Signal) -> Parameter:
+def parameter(signal: SensorSignal) -> Parameter:
     """Its one parameter, sized for a signal."""
     return Parameter(
         "offset",
@@ -24,7 +24,7 @@ def parameter(signal: Signal) -> Parameter:
     )
 
 
-FAULT = Fault(
+FAULT = ReadingFault(
     "bias",
     parameter,
     says="the reading is off by a constant",

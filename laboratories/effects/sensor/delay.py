@@ -10,9 +10,9 @@ comparison of displacements shows.
 from __future__ import annotations
 
 from laboratories.effects.effect import Parameter
-from laboratories.effects.reading import Fault
+from laboratories.effects.reading import ReadingFault
 
-FAULT = Fault(
+FAULT = ReadingFault(
     "delay",
     lambda _: Parameter(
         "delay",

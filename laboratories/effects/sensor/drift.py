@@ -8,10 +8,10 @@ Not to be confused with `sensor.<signal>.bias`, which is there from the beginnin
 from __future__ import annotations
 
 from laboratories.effects.effect import Parameter
-from laboratories.effects.reading import Fault, Signal, sized
+from laboratories.effects.reading import ReadingFault, SensorSignal, sized
 
 
-def parameter(signal: Signal) -> Parameter:
+def parameter(signal: SensorSignal) -> Parameter:
     """Its one parameter, sized for a signal."""
     return Parameter(
         "rate",
@@ -24,7 +24,7 @@ def parameter(signal: Signal) -> Parameter:
     )
 
 
-FAULT = Fault(
+FAULT = ReadingFault(
     "drift",
     parameter,
     says="the reading goes astray steadily",

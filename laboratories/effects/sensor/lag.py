@@ -9,9 +9,9 @@ on time here. A lagging column force looks like a negative `column.viscous`.
 from __future__ import annotations
 
 from laboratories.effects.effect import Parameter
-from laboratories.effects.reading import Fault
+from laboratories.effects.reading import ReadingFault
 
-FAULT = Fault(
+FAULT = ReadingFault(
     "lag",
     lambda _: Parameter(
         "time_constant",

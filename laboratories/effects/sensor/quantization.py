@@ -9,10 +9,10 @@ the readings lie on a grid.
 from __future__ import annotations
 
 from laboratories.effects.effect import Parameter
-from laboratories.effects.reading import Fault, Signal, sized
+from laboratories.effects.reading import ReadingFault, SensorSignal, sized
 
 
-def parameter(signal: Signal) -> Parameter:
+def parameter(signal: SensorSignal) -> Parameter:
     """Its one parameter, sized for a signal."""
     return Parameter(
         "step",
@@ -25,7 +25,7 @@ def parameter(signal: Signal) -> Parameter:
     )
 
 
-FAULT = Fault(
+FAULT = ReadingFault(
     "quantization",
     parameter,
     says="the reading comes in steps",

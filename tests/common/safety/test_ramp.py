@@ -6,11 +6,11 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from common.plan.tables import Safety
+from common.plan.tables import SafetyTable
 from common.safety.ramp import ForceRelease, MotionRamp
 
 INTERVAL = 0.002
-PLAN = Safety(velocity=0.05, acceleration=10.0, jerk=2000.0, release=0.02)
+PLAN = SafetyTable(velocity=0.05, acceleration=10.0, jerk=2000.0, release=0.02)
 
 
 def run(ramp: MotionRamp, force_of: float | None = None, most: int = 5000) -> list[float]:

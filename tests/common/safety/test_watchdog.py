@@ -5,49 +5,57 @@ from dataclasses import replace
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.plan.tables import Safety
-from common.safety.watchdog import Finding, Watchdog
+from common.plan.tables import SafetyTable
+from common.safety.watchdog import Watchdog, WatchdogFinding
 
-PLAN = Safety(hold_after=3, ramp_after=5)
+PLAN = SafetyTable(hold_after=3, ramp_after=5)
 
 
-def started(safety: Safety = PLAN) -> Watchdog:
+def started(safety: SafetyTable = PLAN) -> Watchdog:
     watchdog = Watchdog(safety, 0.002)
-    assert watchdog.look(0, 0, 0) is Finding.FINE
+    assert watchdog.look(0, 0, 0) is WatchdogFinding.FINE
     return watchdog
 
 
 def test_it_holds_after_three_and_ramps_after_five_intervals_of_silence() -> None:
     watchdog = started()
     found = [watchdog.look(tick, 0, 0) for tick in range(1, 6)]
-    assert found == [Finding.FINE, Finding.FINE, Finding.HOLD, Finding.HOLD, Finding.RAMP]
+    assert found == [
+        WatchdogFinding.FINE,
+        WatchdogFinding.FINE,
+        WatchdogFinding.HOLD,
+        WatchdogFinding.HOLD,
+        WatchdogFinding.RAMP,
+    ]
 
 
 def test_a_fresh_message_starts_the_count_again() -> None:
     watchdog = started()
     for tick in range(1, 5):
         watchdog.look(tick, 0, 0)
-    assert watchdog.look(5, 5, 5) is Finding.FINE
-    assert [watchdog.look(tick, 5, 5) for tick in range(6, 9)][-1] is Finding.HOLD
+    assert watchdog.look(5, 5, 5) is WatchdogFinding.FINE
+    assert [watchdog.look(tick, 5, 5) for tick in range(6, 9)][-1] is WatchdogFinding.HOLD
 
 
 def test_one_who_speaks_but_does_not_hear_is_silent() -> None:
     watchdog = started()
     found = [watchdog.look(tick, tick, 0) for tick in range(1, 8)]
-    assert found.index(Finding.HOLD) == 4
-    assert found.index(Finding.RAMP) == 6  # a round trip of two intervals later than one who says nothing
+    assert found.index(WatchdogFinding.HOLD) == 4
+    assert (
+        found.index(WatchdogFinding.RAMP) == 6
+    )  # a round trip of two intervals later than one who says nothing
 
 
 def test_a_constant_delay_within_the_age_is_no_silence() -> None:
     watchdog = Watchdog(PLAN, 0.002)
     found = [watchdog.look(tick, tick - 20, tick - 20) for tick in range(200)]
-    assert set(found) == {Finding.FINE}
+    assert set(found) == {WatchdogFinding.FINE}
 
 
 def test_messages_beyond_the_age_are_silence() -> None:
     watchdog = Watchdog(replace(PLAN, message_age=0.02), 0.002)
     found = [watchdog.look(tick, tick - 11, tick - 11) for tick in range(30)]
-    assert found.index(Finding.RAMP) == 9
+    assert found.index(WatchdogFinding.RAMP) == 9
 
 
 @given(st.lists(st.booleans(), max_size=60))
@@ -55,7 +63,7 @@ def test_it_ramps_exactly_where_five_in_a_row_are_missing(there: list[bool]) -> 
     watchdog, newest, run = started(), 0, 0
     for tick, came in enumerate(there, start=1):
         newest, run = (tick, 0) if came else (newest, run + 1)
-        assert (watchdog.look(tick, newest, newest) is Finding.RAMP) == (run >= 5)
+        assert (watchdog.look(tick, newest, newest) is WatchdogFinding.RAMP) == (run >= 5)
 
 
 @given(st.lists(st.booleans(), max_size=60))
@@ -63,4 +71,4 @@ def test_echoes_that_stand_still_for_seven_in_a_row_are_silence(heard: list[bool
     watchdog, echo, run = started(), 0, 0
     for tick, came in enumerate(heard, start=1):
         echo, run = (tick, 0) if came else (echo, run + 1)
-        assert (watchdog.look(tick, tick, echo) is Finding.RAMP) == (run >= 7)
+        assert (watchdog.look(tick, tick, echo) is WatchdogFinding.RAMP) == (run >= 7)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from common.errors import InputError
 from common.plan.plan import Plan
-from common.plan.tables import Damper, Structure, Table
+from common.plan.tables import Damper, ShakingTable, Structure
 from common.signals import TOPICS
 from laboratories import effects
 from laboratories.effects import CATALOGUE, lay, null_parameters, of_site
@@ -296,7 +296,7 @@ def test_what_is_added_never_makes_a_time_negative(table: str, name: str) -> Non
 
 def test_every_storey_and_parameters_at_their_limits_are_moved() -> None:
     structure = Structure(mass=(1.0, 2.0), stiffness=(3.0, 4.0), damping=(5.0, 6.0))
-    plan = Plan(structure=structure, table=Table(frequency=math.inf), damper=Damper(stiffness=0.0))
+    plan = Plan(structure=structure, table=ShakingTable(frequency=math.inf), damper=Damper(stiffness=0.0))
     system = System(plan)
     for name in CATALOGUE:
         assert lay(system, [(name, null_parameters(CATALOGUE[name]))]) == system

@@ -11,7 +11,7 @@ from scipy import signal
 from scipy.integrate import solve_ivp
 
 from common.errors import InputError
-from common.plan.tables import Damper, Table
+from common.plan.tables import Damper, ShakingTable
 from laboratories.identification import damper, table
 from laboratories.table import model as table_lab
 
@@ -22,9 +22,9 @@ TRUE = {"mass": 16.0, "damping": 6.0, "stiffness": 56.8, "motor_time_constant": 
 OFF = Damper(mass=18.0, damping=4.0, stiffness=40.0, motor_time_constant=0.006)
 
 
-def emulated(command: Array, motor: Array, device: Table | None = None) -> Array:
+def emulated(command: Array, motor: Array, device: ShakingTable | None = None) -> Array:
     """Table displacement and acceleration, stroke and force; (4, n)."""
-    lab = table_lab.build(DT, device or Table(), Damper())
+    lab = table_lab.build(DT, device or ShakingTable(), Damper())
     result = np.zeros((4, command.size))
     for k in range(command.size - 1):
         result[:, k + 1] = table_lab.advance(lab, float(command[k]), float(motor[k]))
@@ -52,7 +52,7 @@ def white(seed: int, size: int, rms: float) -> Array:
 )
 def test_the_table_is_found(frequency: float, ratio: float, lag: float) -> None:
     command = tones(2500, 0.5, 25.0, 0.002)
-    moved = emulated(command, np.zeros(2500), Table(frequency, ratio, lag))[0] + white(1, 2500, 1e-5)
+    moved = emulated(command, np.zeros(2500), ShakingTable(frequency, ratio, lag))[0] + white(1, 2500, 1e-5)
     fit = table.least_squares(command, moved, DT)
     assert fit["frequency"].value == pytest.approx(frequency, rel=0.01)
     assert fit["damping_ratio"].value == pytest.approx(ratio, rel=0.01)

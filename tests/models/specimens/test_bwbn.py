@@ -62,7 +62,7 @@ def test_without_degradation_and_pinching_it_is_bouc_wen(
 )
 def test_equals_an_adaptive_solver_of_order_eight(params: dict[str, float]) -> None:
     _, p, _ = specimens.pack("bwbn", **(BASE | params))
-    q = bwbn.Params(*p.tolist())
+    q = bwbn.BwbnParams(*p.tolist())
     state, expected = np.zeros(2), []
     for a, b in pairwise(CORNERS):
 

@@ -11,7 +11,7 @@ from common.errors import InputError
 from rths.__main__ import parser_for
 from rths.prove import faults
 from validation.faults import schedule, trial
-from validation.faults.invariants import Violation
+from validation.faults.invariants import InvariantViolation
 from validation.faults.lab import Simulation
 
 
@@ -39,8 +39,8 @@ def test_many_schedules_as_json(capsys: pytest.CaptureFixture[str]) -> None:
 def test_a_violation_gives_exit_1_and_the_line_that_plays_it_again(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def judge(_simulation: Simulation) -> list[Violation]:
-        return [Violation("nothing_holds", "it is wrong.")]
+    def judge(_simulation: Simulation) -> list[InvariantViolation]:
+        return [InvariantViolation("nothing_holds", "it is wrong.")]
 
     monkeypatch.setattr(trial, "judge", judge)
     assert faults.run(parsed("--seed", "7", "--duration", "1")) == 1

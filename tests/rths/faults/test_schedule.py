@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from common.errors import InputError
-from validation.faults.schedule import KINDS, Fault, Schedule, draw, parse
+from validation.faults.schedule import KINDS, InjectedFault, Schedule, draw, parse
 
 MANY = 300
 
@@ -38,8 +38,8 @@ def test_a_length_that_is_given_moves_the_faults_into_it() -> None:
 
 def test_a_line_may_be_written_by_hand() -> None:
     found = parse("seed=3 duration=2 outage@0.5+0.1:master>slave loss@1+1:master<>slave(loss=0.1)")
-    outage = Fault("outage", "master>slave", 0.5, 0.1)
-    loss = Fault("loss", "master<>slave", 1.0, 1.0, {"loss": 0.1})
+    outage = InjectedFault("outage", "master>slave", 0.5, 0.1)
+    loss = InjectedFault("loss", "master<>slave", 1.0, 1.0, {"loss": 0.1})
     assert found == Schedule(3, 2.0, faults=(outage, loss))
 
 

@@ -16,7 +16,7 @@ from simulation.world import Drift
 from tests.helpers import without_recorder
 from validation.faults import invariants
 from validation.faults.apply import simulation_of
-from validation.faults.invariants import INVARIANTS, SAFETY, Violation, judge
+from validation.faults.invariants import INVARIANTS, SAFETY, InvariantViolation, judge
 from validation.faults.lab import Simulation, Surrounding
 from validation.faults.rigs import COMPUTED, named
 from validation.faults.schedule import KINDS, parse
@@ -179,7 +179,7 @@ def test_a_laboratory_comes_to_rest_in_time(fault: str) -> None:
 # -- each invariant sees what it is for -----------------------------------------------------------
 
 
-def found(simulation: Simulation, invariant: invariants.Invariant) -> list[Violation]:
+def found(simulation: Simulation, invariant: invariants.Invariant) -> list[InvariantViolation]:
     return judge(simulation, (invariant,))
 
 

@@ -11,7 +11,7 @@ import pytest
 from common.link.transport import TICK, Packet
 from common.roles import MASTER, SLAVE
 from simulation.world import World
-from validation.faults.wire import BACKLOG, DROPS, QUEUES, SOCKET, Conditions, Direction, Letter, Wire
+from validation.faults.wire import BACKLOG, DROPS, QUEUES, SOCKET, Conditions, Letter, Wire, WireRoute
 
 MS = 1_000_000
 COUNT = 20_000
@@ -19,7 +19,7 @@ COUNT = 20_000
 
 class Line(NamedTuple):
     world: World
-    direction: Direction
+    direction: WireRoute
     packets: list[Packet]
 
     def send(self, count: int, every: int = MS) -> None:

@@ -175,7 +175,7 @@ def test_without_flags_in_the_file_ticks_without_a_row_are_late_all_the_same() -
 ROWS = (
     signals.SEQ,
     signals.Signal("feedback_one_way", "s", "feedback"),
-    signals.Signal("deadline_missed", "", "late", signals.Kind.FLAG),
+    signals.Signal("deadline_missed", "", "late", signals.FieldType.FLAG),
 )
 
 

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from common.errors import InputError
 from common.recording.reader import Run
-from report.budget.checks import Check
+from report.budget.checks import BudgetCheck
 from report.budget.figures import figures
-from report.budget.judge import Report, judge
+from report.budget.judge import BudgetReport, judge
 from report.budget.limits import from_tables, load
 from tests.rths.latency_budget import noisy
 
@@ -34,11 +34,11 @@ def record(**changed: float) -> dict[str, str]:
     return {f"bare_loop.{name}": repr(value) for name, value in values.items()}
 
 
-def verdict(run: Run, tables: dict[str, Any] | None = None) -> Report:
+def verdict(run: Run, tables: dict[str, Any] | None = None) -> BudgetReport:
     return judge(figures(run), load(None) if tables is None else from_tables(tables))
 
 
-def check(report: Report, name: str) -> Check:
+def check(report: BudgetReport, name: str) -> BudgetCheck:
     return next(item for item in report.checks if item.name == name)
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from common.plan.plan import Plan
-from report.text.terminal import Progress
+from report.text.terminal import RunProgress
 from rths.perform.ending import Ending
 from rths.perform.live_child import READY, View
 from rths.perform.run import follow
@@ -113,6 +113,6 @@ def test_a_view_that_has_crashed_does_not_end_the_test(
 ) -> None:
     processes: Any = Test()
     view: Any = Crashed()
-    follow(processes, Ending(short_plan), Progress(1.0), Unwished(), view)
+    follow(processes, Ending(short_plan), RunProgress(1.0), Unwished(), view)
     assert processes.looks == 4
     assert capsys.readouterr().err == "live view: it has ended (exit code 1)\n"

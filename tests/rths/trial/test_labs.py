@@ -29,8 +29,8 @@ from validation.blind.labs import (
     sensors,
     table_effects,
 )
-from validation.blind.labs.column_lab import ColumnLab
-from validation.blind.labs.table_lab import TableLab
+from validation.blind.labs.column_lab import TrueColumnLab
+from validation.blind.labs.table_lab import TrueTableLab
 
 DT = 0.002
 Trace = NDArray[np.float64]
@@ -52,7 +52,7 @@ def effect(name: str, formula: str = "", /, **parameters: float) -> dict[str, An
 
 
 def play_a(*effects: dict[str, Any], command: Trace = COLUMN, **options: Any) -> dict[str, Trace]:
-    lab = ColumnLab(DT, 3, **{"sensors": SILENT, "effects": list(effects)} | options)
+    lab = TrueColumnLab(DT, 3, **{"sensors": SILENT, "effects": list(effects)} | options)
     rows = []
     for value in command.tolist():
         rows.append(lab.read())
@@ -63,7 +63,7 @@ def play_a(*effects: dict[str, Any], command: Trace = COLUMN, **options: Any) ->
 def play_b(
     *effects: dict[str, Any], command: Trace = TABLE, motor: Trace = MOTOR, **options: Any
 ) -> dict[str, Trace]:
-    lab = TableLab(DT, 3, **{"sensors": SILENT, "effects": list(effects)} | options)
+    lab = TrueTableLab(DT, 3, **{"sensors": SILENT, "effects": list(effects)} | options)
     rows = []
     for pair in zip(command.tolist(), motor.tolist(), strict=True):
         rows.append(lab.read())
@@ -428,7 +428,7 @@ def test_noise_is_white_and_of_its_level_and_follows_the_seed() -> None:
         assert abs(np.corrcoef(found[name][1:], found[name][:-1])[0, 1]) < 0.06
     again = play_b(command=still, motor=still, sensors={})
     assert all(np.array_equal(values, again[name]) for name, values in found.items())
-    assert ColumnLab(DT, 4).read() != ColumnLab(DT, 5).read()
+    assert TrueColumnLab(DT, 4).read() != TrueColumnLab(DT, 5).read()
 
 
 @pytest.mark.parametrize(
@@ -447,13 +447,13 @@ def test_noise_is_white_and_of_its_level_and_follows_the_seed() -> None:
 )
 def test_what_makes_no_sense_is_refused(options: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
-        ColumnLab(DT, 1, **options)
+        TrueColumnLab(DT, 1, **options)
     with pytest.raises(InputError, match="must be finite"):
-        TableLab(DT, 1, table={"frequency": math.inf})
+        TrueTableLab(DT, 1, table={"frequency": math.inf})
 
 
 def test_a_test_of_forty_seconds_takes_a_moment() -> None:
-    lab_a, lab_b = ColumnLab(DT, 1), TableLab(DT, 1)
+    lab_a, lab_b = TrueColumnLab(DT, 1), TrueTableLab(DT, 1)
     begun = time.perf_counter()
     for value in np.tile(COLUMN, 5).tolist():
         lab_a.read()

@@ -14,7 +14,7 @@ from diagnosis.report import read
 from tests.rths.diagnosis_report.reports import bare
 from tests.rths.report.pages import check_alone, check_in_browser
 from validation.blind.draw import Case, Laid
-from validation.blind.judge import Answer
+from validation.blind.judge import DiagnosisAnswer
 from validation.blind.measures import (
     binned,
     by_size,
@@ -29,7 +29,7 @@ from validation.blind.measures import (
     results,
 )
 from validation.blind.page import page
-from validation.blind.record import Recorded
+from validation.blind.record import RecordedCase
 from validation.blind.scoring import Outcome, judge, judge_all, same
 
 SLIP = Laid("column.slip", "column", {"gap": 2e-4}, {"gap": 0.0})
@@ -71,7 +71,9 @@ def value(number: float, *interval: float) -> dict[str, Any]:
 
 def judged(what: Case, report: dict[str, Any], *sizes: float, seconds: float = 2.0) -> Outcome:
     sizes = sizes or tuple(10.0 for _ in what.laid)
-    return judge(what, Recorded(what.index, "a.mcap", sizes, ""), Answer(read.report(report), seconds))
+    return judge(
+        what, RecordedCase(what.index, "a.mcap", sizes, ""), DiagnosisAnswer(read.report(report), seconds)
+    )
 
 
 def test_the_true_effect_at_its_site_is_right() -> None:
@@ -141,10 +143,10 @@ def test_an_unknown_effect_is_said_to_be_unknown_at_its_site() -> None:
 
 
 def test_a_diagnosis_that_fails_is_wrong() -> None:
-    failed = Answer(None, 2.0, "ValueError: no")
-    outcome = judge(case("catalogue", RUB), Recorded(0, "a.mcap", (10.0,), ""), failed)
+    failed = DiagnosisAnswer(None, 2.0, "ValueError: no")
+    outcome = judge(case("catalogue", RUB), RecordedCase(0, "a.mcap", (10.0,), ""), failed)
     assert outcome.why == "ValueError: no"
-    missing = judge_all([case("clean", index=7)], {7: Recorded(7, "x.mcap", (), "")}, {})
+    missing = judge_all([case("clean", index=7)], {7: RecordedCase(7, "x.mcap", (), "")}, {})
     assert [item.status for item in missing] == ["error"]
 
 

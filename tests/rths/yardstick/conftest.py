@@ -10,15 +10,15 @@ import pytest
 
 from common.terminal.telling import untold
 from validation.benchmark2020 import evidence, figures, late_force, page, text
-from validation.benchmark2020.evidence import Evidence
+from validation.benchmark2020.evidence import BenchmarkEvidence
 from validation.benchmark2020.problem import SETTINGS
 
 
 class Played(NamedTuple):
     """What the command makes of a few settings, plants and delays."""
 
-    evidence: Evidence
-    checks: list[evidence.Check]
+    evidence: BenchmarkEvidence
+    checks: list[evidence.GoalCheck]
     json: dict[str, Any]
     page: Path
 

@@ -12,7 +12,7 @@ from validation.benchmark2020.problem import (
     CASES,
     EL_CENTRO,
     SETTINGS,
-    Case,
+    PartitionCase,
     draw,
     planned,
     with_compensator,
@@ -63,7 +63,7 @@ def test_a_setting_leaves_what_is_done_to_the_force() -> None:
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 @pytest.mark.parametrize("setting", ["sample", "amb"])
-def test_every_case_passes_the_preflight_of_its_plan(case: Case, setting: str) -> None:
+def test_every_case_passes_the_preflight_of_its_plan(case: PartitionCase, setting: str) -> None:
     plan = with_compensator(planned(case, EL_CENTRO), SETTINGS[setting])
     found = preflight.checks(plan.with_ticks(round(8.0 / plan.test.interval)))
     risks = {check.risk.name for check in found if check.risk}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from validation.blind.labs.laying import PLAIN, Entry, Values
+from validation.blind.labs.laying import PLAIN, KnownEffect, Values
 from validation.blind.labs.parts import delay, friction, specimen, valve, yielding
 
 
@@ -124,17 +124,17 @@ def asymmetry(values: Values, *, share: float) -> None:
 
 
 KNOWN = {
-    "actuator.delay": Entry(servo_delay, {"pade": 0}),
-    "actuator.time_constant": Entry(time_constant, PLAIN),
-    "actuator.gain": Entry(servo_gain, PLAIN),
-    "actuator.velocity_limit": Entry(
+    "actuator.delay": KnownEffect(servo_delay, {"pade": 0}),
+    "actuator.time_constant": KnownEffect(time_constant, PLAIN),
+    "actuator.gain": KnownEffect(servo_gain, PLAIN),
+    "actuator.velocity_limit": KnownEffect(
         velocity_limit, {"smooth": valve.SMOOTH, "orifice": valve.ORIFICE}, "limiting"
     ),
-    "actuator.backlash": Entry(backlash, {"spring": 0}),
-    "actuator.compliance": Entry(compliance, {"oil_column": 0}),
-    "actuator.deadband": Entry(deadband, {"smooth": 0}),
-    "column.stiffness": Entry(stiffness, PLAIN),
-    "column.yielding": Entry(
+    "actuator.backlash": KnownEffect(backlash, {"spring": 0}),
+    "actuator.compliance": KnownEffect(compliance, {"oil_column": 0}),
+    "actuator.deadband": KnownEffect(deadband, {"smooth": 0}),
+    "column.stiffness": KnownEffect(stiffness, PLAIN),
+    "column.yielding": KnownEffect(
         yields,
         {
             "menegotto_pinto": yielding.MENEGOTTO_PINTO,
@@ -143,20 +143,22 @@ KNOWN = {
         },
         "yielding",
     ),
-    "column.degradation": Entry(
+    "column.degradation": KnownEffect(
         degradation, {"exponential": specimen.EXPONENTIAL, "linear": specimen.LINEAR}, "degrading"
     ),
-    "column.pinching": Entry(pinching, {"lorentz": specimen.LORENTZ, "sech": specimen.SECH}, "pinching"),
-    "column.friction": Entry(
+    "column.pinching": KnownEffect(
+        pinching, {"lorentz": specimen.LORENTZ, "sech": specimen.SECH}, "pinching"
+    ),
+    "column.friction": KnownEffect(
         rubbing, {"tanh": friction.TANH, "dahl": friction.DAHL, "lugre": friction.LUGRE}, "rubbing"
     ),
-    "column.viscous": Entry(viscous, {"power": 0}),
-    "column.inertia": Entry(inertia, PLAIN),
-    "column.slip": Entry(slip, {"smooth": 0}),
-    "x.actuator.ripple": Entry(ripple, PLAIN),
-    "x.actuator.droop": Entry(droop, PLAIN),
-    "x.actuator.valve_hysteresis": Entry(valve_hysteresis, PLAIN),
-    "x.column.hardening": Entry(hardening, PLAIN),
-    "x.column.creep": Entry(creep, PLAIN),
-    "x.column.asymmetry": Entry(asymmetry, PLAIN),
+    "column.viscous": KnownEffect(viscous, {"power": 0}),
+    "column.inertia": KnownEffect(inertia, PLAIN),
+    "column.slip": KnownEffect(slip, {"smooth": 0}),
+    "x.actuator.ripple": KnownEffect(ripple, PLAIN),
+    "x.actuator.droop": KnownEffect(droop, PLAIN),
+    "x.actuator.valve_hysteresis": KnownEffect(valve_hysteresis, PLAIN),
+    "x.column.hardening": KnownEffect(hardening, PLAIN),
+    "x.column.creep": KnownEffect(creep, PLAIN),
+    "x.column.asymmetry": KnownEffect(asymmetry, PLAIN),
 }

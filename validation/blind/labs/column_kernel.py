@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from validation.blind.labs.parts import delay, filters, specimen, valve
 from validation.blind.labs.parts.compiled import Array, jit
-from validation.blind.labs.parts.specimen import Specimen
+from validation.blind.labs.parts.specimen import TrueSpecimen
 
 CONTACT = 1e4  # stiffness of the clevis over the specimen's
 GREASE = 5e-3  # s, dashpot of the clevis over the specimen's stiffness
@@ -40,7 +40,7 @@ class Servo(NamedTuple):
     ripple_frequency: float = 10.0  # Hz
 
 
-class Memory(NamedTuple):
+class ColumnMemory(NamedTuple):
     """What the laboratory remembers, which `advance` moves on."""
 
     state: Array
@@ -108,9 +108,9 @@ def clevis(p: Servo, stiffness: float, state: Array, piston: float) -> float:
 @jit
 def advance(
     p: Servo,
-    column: Specimen,
+    column: TrueSpecimen,
     lags: Array,
-    memory: Memory,
+    memory: ColumnMemory,
     command: float,
 ) -> tuple[float, float]:
     """Displacement (m) and force (N) behind their filters one interval later, the command ramped."""

@@ -11,19 +11,19 @@ import numpy as np
 from common.errors import InputError
 from common.plan import schema
 from common.plan.tables import Actuator, Column
-from common.plan.tables import Sensors as Levels
+from common.plan.tables import SensorsTable as Levels
 from common.rig import ColumnCommand, ColumnMeasurement
 from validation.blind.labs import column_kernel, laying, sensors
 from validation.blind.labs.column_effects import KNOWN
-from validation.blind.labs.column_kernel import Memory, Servo
+from validation.blind.labs.column_kernel import ColumnMemory, Servo
 from validation.blind.labs.parts import delay, filters, specimen
-from validation.blind.labs.parts.specimen import Specimen
+from validation.blind.labs.parts.specimen import TrueSpecimen
 
 STEP = 0.1e-3  # s, longest
 SIGNALS = ColumnMeasurement._fields
 
 
-class ColumnLab:
+class TrueColumnLab:
     """Servo loop, clevis and column in short steps; options are tables of true parameters, and effects.
 
     An effect is `{name, formula, parameters}`; without a formula it is the first that the effect has.
@@ -46,8 +46,8 @@ class ColumnLab:
         steps = math.ceil(interval / STEP - 1e-9)
         values |= {"step": interval / steps, "steps": float(steps)}
         self._servo = Servo(**{key: values[key] for key in Servo._fields if key in values})
-        self._column = Specimen(**{key: values[key] for key in Specimen._fields if key in values})
-        self._memory = Memory(
+        self._column = TrueSpecimen(**{key: values[key] for key in TrueSpecimen._fields if key in values})
+        self._memory = ColumnMemory(
             np.zeros(column_kernel.STATE),
             delay.ring(self._servo.delay, self._servo.step),
             np.zeros(3),
@@ -110,10 +110,10 @@ def readings(
     levels: Mapping[str, float],
     values: laying.Values,
     effects: object,
-    known: Mapping[str, laying.Entry],
-) -> tuple[sensors.Sensors, Any]:
+    known: Mapping[str, laying.KnownEffect],
+) -> tuple[sensors.TrueSensors, Any]:
     """The sensors of a laboratory and their filters; the effects are laid over `values`, too."""
     values |= sensors.true_values(names, levels)
     laying.lay(values, laying.check(effects), {**known, **sensors.known(names)})
-    read = sensors.Sensors(names, values, interval, seed)
+    read = sensors.TrueSensors(names, values, interval, seed)
     return read, filters.bank(names, read.lags)

@@ -12,7 +12,7 @@ from common.plan.schema import as_type, nearest
 Values = dict[str, float]
 
 
-class Entry(NamedTuple):
+class KnownEffect(NamedTuple):
     """An effect that a laboratory knows."""
 
     apply: Callable[..., None]  # takes the values to change and the parameters by name
@@ -37,7 +37,7 @@ def check(effects: object) -> list[dict[str, Any]]:
     return [dict(item) for item in effects]
 
 
-def lay(values: Values, effects: Iterable[Mapping[str, Any]], known: Mapping[str, Entry]) -> None:
+def lay(values: Values, effects: Iterable[Mapping[str, Any]], known: Mapping[str, KnownEffect]) -> None:
     """Change values by effects; raises InputError where a name, formula or parameter is not known."""
     for item in effects:
         name = item["name"]

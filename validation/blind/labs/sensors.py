@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from validation.blind.labs.laying import PLAIN, Entry, Values
+from validation.blind.labs.laying import PLAIN, KnownEffect, Values
 
 BLOCK = 512  # rows of noise drawn at once
 LAGS = {"butterworth": 2, "first_order": 1}
@@ -78,20 +78,20 @@ FALSIFIED: tuple[Callable[..., None], ...] = (gain, bias, drift, quantization, n
 OUTSIDE: tuple[Callable[..., None], ...] = (saturation, missing, crosstalk)
 
 
-def known(names: Sequence[str]) -> dict[str, Entry]:
+def known(names: Sequence[str]) -> dict[str, KnownEffect]:
     """The effects on a laboratory's readings."""
-    result: dict[str, Entry] = {}
+    result: dict[str, KnownEffect] = {}
     for name in names:
         for effect in FALSIFIED:
-            result[f"sensor.{name}.{effect.__name__}"] = Entry(partial(effect, signal=name), PLAIN)
-        result[f"sensor.{name}.lag"] = Entry(partial(lag, signal=name), LAGS, f"{name}.order")
+            result[f"sensor.{name}.{effect.__name__}"] = KnownEffect(partial(effect, signal=name), PLAIN)
+        result[f"sensor.{name}.lag"] = KnownEffect(partial(lag, signal=name), LAGS, f"{name}.order")
         for effect in OUTSIDE:
-            result[f"x.sensor.{name}.{effect.__name__}"] = Entry(partial(effect, signal=name), PLAIN)
+            result[f"x.sensor.{name}.{effect.__name__}"] = KnownEffect(partial(effect, signal=name), PLAIN)
     return result
 
 
 @dataclass
-class Sensor:
+class TrueSensor:
     """One sensor with effects."""
 
     values: Values
@@ -113,12 +113,12 @@ class Sensor:
         return result
 
 
-class Sensors:
+class TrueSensors:
     """The sensors of a laboratory."""
 
     def __init__(self, names: Sequence[str], values: Values, interval: float, seed: int) -> None:
         own = [{key: values[f"{name}.{key}"] for key in keys(name, values)} for name in names]
-        self._sensors = [Sensor(v, np.random.default_rng([seed, 1 + i])) for i, v in enumerate(own)]
+        self._sensors = [TrueSensor(v, np.random.default_rng([seed, 1 + i])) for i, v in enumerate(own)]
         self._changed = any(v != {**perfect(), "noise": v["noise"]} for v in own)
         self._levels = np.array([v["noise"] for v in own])
         self._noise = np.random.default_rng(seed)

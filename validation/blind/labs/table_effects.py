@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from validation.blind.labs.column_effects import lengthen
-from validation.blind.labs.laying import PLAIN, Entry, Values
+from validation.blind.labs.laying import PLAIN, KnownEffect, Values
 from validation.blind.labs.parts import friction, mechanics
 
 
@@ -115,29 +115,29 @@ def appendage(values: Values, *, mass: float, frequency: float) -> None:
 
 
 KNOWN = {
-    "table.delay": Entry(table_delay, {"pade": 0}),
-    "table.bandwidth": Entry(bandwidth, PLAIN),
-    "table.gain": Entry(table_gain, PLAIN),
-    "table.oil_column": Entry(oil_column, PLAIN),
-    "table.payload": Entry(payload, {"dynamic": 0}),
-    "table.backlash": Entry(table_backlash, {"contact": 0}),
-    "table.friction": Entry(table_friction, {"tanh": 0}),
-    "damper.friction": Entry(
+    "table.delay": KnownEffect(table_delay, {"pade": 0}),
+    "table.bandwidth": KnownEffect(bandwidth, PLAIN),
+    "table.gain": KnownEffect(table_gain, PLAIN),
+    "table.oil_column": KnownEffect(oil_column, PLAIN),
+    "table.payload": KnownEffect(payload, {"dynamic": 0}),
+    "table.backlash": KnownEffect(table_backlash, {"contact": 0}),
+    "table.friction": KnownEffect(table_friction, {"tanh": 0}),
+    "damper.friction": KnownEffect(
         rail_friction, {"tanh": friction.TANH, "dahl": friction.DAHL, "lugre": friction.LUGRE}, "rubbing"
     ),
-    "damper.viscous": Entry(dashpot, PLAIN),
-    "damper.stiffness": Entry(spring, PLAIN),
-    "damper.mass": Entry(mass, PLAIN),
-    "damper.gain": Entry(motor_gain, PLAIN),
-    "damper.motor_lag": Entry(motor_lag, PLAIN),
-    "damper.force_limit": Entry(force_limit, {"smooth": 0}),
-    "damper.stroke_stop": Entry(
+    "damper.viscous": KnownEffect(dashpot, PLAIN),
+    "damper.stiffness": KnownEffect(spring, PLAIN),
+    "damper.mass": KnownEffect(mass, PLAIN),
+    "damper.gain": KnownEffect(motor_gain, PLAIN),
+    "damper.motor_lag": KnownEffect(motor_lag, PLAIN),
+    "damper.force_limit": KnownEffect(force_limit, {"smooth": 0}),
+    "damper.stroke_stop": KnownEffect(
         stroke_stop, {"hertz": mechanics.HERTZ, "linear": mechanics.LINEAR}, "stopping"
     ),
-    "x.table.pitch": Entry(pitch, PLAIN),
-    "x.table.cam": Entry(cam, PLAIN),
-    "x.damper.cable_drag": Entry(cable_drag, PLAIN),
-    "x.damper.motor_constant": Entry(motor_constant, PLAIN),
-    "x.damper.cubic_spring": Entry(cubic_spring, PLAIN),
-    "x.damper.appendage": Entry(appendage, PLAIN),
+    "x.table.pitch": KnownEffect(pitch, PLAIN),
+    "x.table.cam": KnownEffect(cam, PLAIN),
+    "x.damper.cable_drag": KnownEffect(cable_drag, PLAIN),
+    "x.damper.motor_constant": KnownEffect(motor_constant, PLAIN),
+    "x.damper.cubic_spring": KnownEffect(cubic_spring, PLAIN),
+    "x.damper.appendage": KnownEffect(appendage, PLAIN),
 }

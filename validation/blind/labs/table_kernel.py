@@ -26,7 +26,7 @@ STATE = 13
 DISPLACEMENT, ACCELERATION, STROKE_OUT, FORCE = range(4)  # places of the readings
 
 
-class Memory(NamedTuple):
+class TableMemory(NamedTuple):
     """What the laboratory remembers, which `advance` moves on."""
 
     state: Array
@@ -36,7 +36,7 @@ class Memory(NamedTuple):
     filtered: Array  # of the readings
 
 
-class Bench(NamedTuple):
+class TrueTable(NamedTuple):
     """True parameters of table and damper; zero is none of an effect."""
 
     step: float  # s
@@ -74,7 +74,7 @@ class Bench(NamedTuple):
 
 
 @jit
-def rail(p: Bench, x: Array, bristle: float) -> float:
+def rail(p: TrueTable, x: Array, bristle: float) -> float:
     """Force (N) that guide rail, cable, spring and stops put between mass and table."""
     s, w = x[STROKE], x[STROKE_RATE]
     result = p.stiffness * s + p.dashpot * w + p.cubic * s**3 + p.drag * w * abs(w)
@@ -85,14 +85,14 @@ def rail(p: Bench, x: Array, bristle: float) -> float:
 
 
 @jit
-def asked(p: Bench, command: float) -> float:
+def asked(p: TrueTable, command: float) -> float:
     """Force (N) the motor settles at under a command."""
     wanted = p.motor_gain * command
     return mechanics.saturated(wanted, p.force_limit) if p.force_limit > 0.0 else wanted
 
 
 @jit
-def damper_force(p: Bench, x: Array, push: float, start: float, bristle: float) -> float:
+def damper_force(p: TrueTable, x: Array, push: float, start: float, bristle: float) -> float:
     """Force (N) on the table at a state; `start` is the stroke to which the bristles' deflection belongs."""
     motor = x[MOTOR] if p.motor_lag > 0.0 else push
     motor *= mechanics.motor_constant(p.motor_rise, x[STROKE])
@@ -102,13 +102,13 @@ def damper_force(p: Bench, x: Array, push: float, start: float, bristle: float) 
 
 
 @jit
-def bent(p: Bench, bristle: float, moved: float, velocity: float) -> float:
+def bent(p: TrueTable, bristle: float, moved: float, velocity: float) -> float:
     """Deflection of the rail's bristles after a move."""
     return friction.after(p.rubbing, bristle, moved, velocity, PRESLIDING, STICKING)
 
 
 @jit
-def platform(p: Bench, x: Array, loop: float) -> float:
+def platform(p: TrueTable, x: Array, loop: float) -> float:
     """Acceleration (m/s²) of the platform over the loop's, that of the loop itself where nothing is between."""
     if p.oil > 0.0:
         return mechanics.oil_column(p.oil, p.oil_damping, x[LOOP], x[PLATE], x[PLATE_RATE])
@@ -118,7 +118,9 @@ def platform(p: Bench, x: Array, loop: float) -> float:
 
 
 @jit
-def rates(p: Bench, x: Array, dx: Array, wanted: float, push: float, start: float, bristle: float) -> None:
+def rates(
+    p: TrueTable, x: Array, dx: Array, wanted: float, push: float, start: float, bristle: float
+) -> None:
     """Rates `dx` of the state under a table command (m) and the force asked of the motor (N)."""
     force = damper_force(p, x, push, start, bristle)
     loop = p.omega**2 * (wanted + p.compliance * force - x[LOOP]) - 2.0 * p.damping * p.omega * x[LOOP_RATE]
@@ -139,7 +141,9 @@ def rates(p: Bench, x: Array, dx: Array, wanted: float, push: float, start: floa
 
 
 @jit
-def move(p: Bench, state: Array, work: Array, early: float, middle: float, late: float, push: float) -> None:
+def move(
+    p: TrueTable, state: Array, work: Array, early: float, middle: float, late: float, push: float
+) -> None:
     """One step of the state under a table command at its beginning, middle and end."""
     h, start, bristle = p.step, state[STROKE], state[BRISTLE]
     rates(p, state, work[0], early, push, start, bristle)
@@ -159,7 +163,7 @@ def move(p: Bench, state: Array, work: Array, early: float, middle: float, late:
 
 
 @jit
-def observe(p: Bench, state: Array, work: Array, out: Array, wanted: float, push: float) -> None:
+def observe(p: TrueTable, state: Array, work: Array, out: Array, wanted: float, push: float) -> None:
     """What the sensors stand before."""
     rates(p, state, work[0], wanted, push, state[STROKE], state[BRISTLE])
     out[DISPLACEMENT] = state[PLATE]
@@ -169,7 +173,7 @@ def observe(p: Bench, state: Array, work: Array, out: Array, wanted: float, push
 
 
 @jit
-def told(p: Bench, value: float) -> float:
+def told(p: TrueTable, value: float) -> float:
     """Command (m) of the table's loop behind its calibration and its screw."""
     value *= p.table_gain
     return mechanics.cam(value, p.cam, p.cam_period) if p.cam > 0.0 else value
@@ -177,9 +181,9 @@ def told(p: Bench, value: float) -> float:
 
 @jit
 def advance(
-    p: Bench,
+    p: TrueTable,
     lags: Array,
-    memory: Memory,
+    memory: TableMemory,
     command: float,
     motor_command: float,
 ) -> tuple[float, float, float, float]:

@@ -10,19 +10,19 @@ import numpy as np
 
 from common.errors import InputError
 from common.plan import schema
-from common.plan.tables import Damper, Table
-from common.plan.tables import Sensors as Levels
+from common.plan.tables import Damper, ShakingTable
+from common.plan.tables import SensorsTable as Levels
 from common.rig import TableCommand, TableMeasurement
 from validation.blind.labs import laying, table_kernel
 from validation.blind.labs.column_lab import STEP, readings
 from validation.blind.labs.parts import delay
 from validation.blind.labs.table_effects import KNOWN
-from validation.blind.labs.table_kernel import Bench, Memory
+from validation.blind.labs.table_kernel import TableMemory, TrueTable
 
 SIGNALS = TableMeasurement._fields
 
 
-class TableLab:
+class TrueTableLab:
     """Table loop, platform, damper and motor in short steps; options are tables of true parameters, and effects.
 
     An effect is `{name, formula, parameters}`; without a formula it is the first that the effect has.
@@ -38,14 +38,14 @@ class TableLab:
         effects: Sequence[Mapping[str, Any]] = (),
     ) -> None:
         values = true_values(
-            schema.fill(Table, table or {}, "table"), schema.fill(Damper, damper or {}, "damper")
+            schema.fill(ShakingTable, table or {}, "table"), schema.fill(Damper, damper or {}, "damper")
         )
         levels = schema.plain(schema.fill(Levels, sensors or {}, "sensors"))
         self._sensors, self._lags = readings(interval, seed, SIGNALS, levels, values, effects, KNOWN)
         steps = math.ceil(interval / STEP - 1e-9)
         values |= {"step": interval / steps, "steps": float(steps)}
-        self._bench = Bench(**{key: values[key] for key in Bench._fields if key in values})
-        self._memory = Memory(
+        self._bench = TrueTable(**{key: values[key] for key in TrueTable._fields if key in values})
+        self._memory = TableMemory(
             np.zeros(table_kernel.STATE),
             delay.ring(self._bench.delay, self._bench.step),
             np.zeros(3),
@@ -75,7 +75,7 @@ class TableLab:
         """The table stays where it is; the motor's force is its command's."""
 
 
-def true_values(table: Table, damper: Damper) -> laying.Values:
+def true_values(table: ShakingTable, damper: Damper) -> laying.Values:
     """The kernel's values without effects; raises InputError where this laboratory has no such part."""
     if math.isinf(table.frequency):
         raise InputError("frequency in [table] must be finite in this laboratory.")

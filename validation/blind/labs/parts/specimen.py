@@ -23,7 +23,7 @@ LARGEST, BRISTLE, CREEP, INSIDE, DEFORMATION, VELOCITY = range(yielding.SIZE, yi
 SIZE = yielding.SIZE + 6
 
 
-class Specimen(NamedTuple):
+class TrueSpecimen(NamedTuple):
     """True parameters of the column; zero is none of an effect."""
 
     stiffness: float  # N/m
@@ -107,7 +107,7 @@ def power_law(coefficient: float, velocity: float) -> float:
 
 
 @jit
-def rub(p: Specimen, memory: Array, moved: float, velocity: float) -> float:
+def rub(p: TrueSpecimen, memory: Array, moved: float, velocity: float) -> float:
     """Friction (N) of the set-up after a move."""
     memory[BRISTLE] = friction.after(p.rubbing, memory[BRISTLE], moved, velocity, p.presliding, STICKING)
     scale = RUBBING if p.rubbing == friction.TANH else STICKING
@@ -116,7 +116,7 @@ def rub(p: Specimen, memory: Array, moved: float, velocity: float) -> float:
 
 
 @jit
-def restoring(p: Specimen, memory: Array, x: float) -> float:
+def restoring(p: TrueSpecimen, memory: Array, x: float) -> float:
     """Force (N) of the column itself at a deformation (m) behind the fixture's slip."""
     result = yielding.force(
         p.yielding, memory, p.stiffness, p.yield_displacement, p.hardening, p.sharpness, x
@@ -128,7 +128,7 @@ def restoring(p: Specimen, memory: Array, x: float) -> float:
 
 
 @jit
-def force(p: Specimen, memory: Array, deformation: float, step: float) -> tuple[float, float]:
+def force(p: TrueSpecimen, memory: Array, deformation: float, step: float) -> tuple[float, float]:
     """Force on the piston and reading of the load cell (N) at a deformation (m) one step later.
 
     The fixture's mass is between the two.
