@@ -14,6 +14,7 @@ from common.errors import InputError
 from common.terminal import cli, outputs
 from common.terminal.telling import Tell
 from report.text.progress import Progress
+from validation.blind.sets import SETS
 from validation.blind.worker import DIAGNOSIS
 
 if TYPE_CHECKING:
@@ -31,9 +32,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     which.add_argument("--cases", type=int, default=300, metavar="N", help="how many (default: 300)")
     which.add_argument(
         "--set",
-        choices=("judge", "tune"),
+        choices=tuple(SETS),
         default="judge",
-        help="judge: for judging only (default); tune: where thresholds are set",
+        help="; ".join(f"{name}: {chosen.text}" for name, chosen in SETS.items()),
     )
     which.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the set (default: 1)")
     which.add_argument(
@@ -181,10 +182,13 @@ def show(table: Sequence[Measure], outcomes: Sequence[Outcome]) -> None:
     """The measures, then the cases that are not right."""
     from report.text import terminal
     from validation.blind.page import hidden, number
+    from validation.blind.rows import HEAD, case_rows
 
     rows = [["measure", "value", "cases", "goal", ""]]
     rows += [[item.name, item.text, str(item.count), item.goal, item.verdict] for item in table]
     terminal.table(rows)
+    sys.stdout.write("\n")
+    terminal.table([list(HEAD), *(list(item.cells) for item in case_rows(outcomes))])
     wrong = [item for item in outcomes if not item.right]
     sys.stdout.write(f"\n{len(outcomes) - len(wrong)} of {len(outcomes)} cases right\n")
     for item in wrong:

@@ -2,8 +2,7 @@
 
 Every draw of a case has a name and a random generator of its own, hashed from seed, set, number of the case and
 that name (`lots`): a case is the same whatever the number of cases, and a catalogue that grows leaves all cases
-that hide none of the new effects as they were. The two sets share no draw: thresholds of the diagnosis are set on
-"tune", and "judge" is for judging only.
+that hide none of the new effects as they were. The sets share no draw (`sets`).
 
 The seed in a case's plan says nothing about the case: it is a draw of its own.
 """
@@ -14,7 +13,7 @@ import math
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -29,12 +28,9 @@ from models.system import Effects, System
 from validation.blind import library as libraries
 from validation.blind import lots
 from validation.blind.library import LABS, PARTS, Library, role_at
+from validation.blind.lots import Lot
+from validation.blind.sets import SETS, SHARES
 
-Lot = tuple[str | int, ...]  # seed, set and number of a case: what all of its draws are named by
-Set = Literal["judge", "tune"]
-
-# what may be wrong in a laboratory, and in how many of all cases it is
-SHARES = {"catalogue": 0.50, "formula": 0.15, "unknown": 0.10, "pair": 0.10, "clean": 0.15}
 KINDS = tuple(SHARES)
 
 UNCERTAIN = {
@@ -73,12 +69,16 @@ class Case:
     seed: int
     laid: tuple[Laid, ...] = ()
     inside: bool = False  # with its effect every parameter is still inside its tolerance: there is no gap
+    logger: str = ""  # through which it is recorded, empty where the controllers' own readings are
 
     def reality(self, laid: tuple[Laid, ...] | None = None, *, silent: bool = False) -> dict[str, Any]:
-        """The tables of the reality, with other effects or without noise where asked for."""
+        """The tables of the reality, with other effects or without noise where asked for.
+
+        The noise of a case with a logger is the logger's.
+        """
         laid = self.laid if laid is None else laid
         tables: dict[str, Any] = {"seed": self.seed, **self.truths}
-        if silent:
+        if silent or self.logger:
             tables["sensors"] = dict.fromkeys(self.truths["sensors"], 0.0)
         if self.kind in ("formula", "unknown"):
             lab = role_at(self.laid[0].site, Plan())
@@ -98,7 +98,7 @@ class Case:
 def draw(
     count: int,
     seed: int,
-    set_: Set,
+    set_: str,
     *,
     duration: float = 30.0,
     only: Collection[str] = (),
@@ -150,8 +150,7 @@ def _asked_for(
 def begin(index: int, seed: int, set_: str, library: Library) -> Beginning:
     """The kind of a case and the names of its effects."""
     lot = (seed, set_, index)
-    share = lots.generator(*lot, "kind").random()
-    kind = KINDS[int(np.searchsorted(np.cumsum(list(SHARES.values())), share, side="right"))]
+    kind = SETS[set_].kind(lot)
     match kind:
         case "catalogue":
             names: tuple[str, ...] = (of_catalogue(library, *lot, "effect"),)
@@ -185,6 +184,7 @@ def drawn(begun: Beginning, duration: float, library: Library) -> Case:
         draw_truths(lots.generator(*lot, "truths"), plan),
         int(lots.generator(*lot, "noise").integers(2**31)),
         tuple(draw_effect(lot, begun.kind, name, library) for name in begun.names),
+        logger=SETS[str(lot[1])].logger(lot),
     )
     return replace(case, inside=is_inside(case, plan, library))
 

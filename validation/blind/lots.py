@@ -10,6 +10,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
+Lot = tuple[str | int, ...]  # seed, set and number of a case: what all of its draws are named by
+
 
 def number(*words: str | int) -> int:
     """A number of 128 bits: the same for the same words on every machine, without relation for any others."""

@@ -10,10 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.findings.calibration import brier, clopper_pearson, expected_calibration_error, wilson
+from diagnosis.findings.calibration import clopper_pearson, expected_calibration_error, wilson
 from diagnosis.findings.calibration import reliability as stated_and_observed
 from report.text.formats import percent, quantity
+from validation.blind.rows import case_rows
 from validation.blind.scoring import NAMING, JudgedEstimate, Outcome
+from validation.blind.stated import brier_score, in_columns, stated_verdicts
 
 ABSTAINING = ("unknown_effect", "not_enough_data", "ambiguous")
 GOALS = 9  # judged at once
@@ -154,6 +156,7 @@ def further(outcomes: Sequence[Outcome]) -> list[Measure]:
     visible = [item for item in gaps if item.visible]
     right = [one for item in outcomes for one in item.estimates]
     stated = [one for one in right if one.inside is not None]
+    verdicts = stated_verdicts(outcomes)
     by_kind = [
         rate(f"right effect first, {name}", [i for i in kind(outcomes, name) if i.visible], lambda i: i.named)
         for name in ("catalogue", "formula")
@@ -166,7 +169,7 @@ def further(outcomes: Sequence[Outcome]) -> list[Measure]:
         *by_kind,
         rate("right effect first, all sizes", singles, lambda item: item.named),
         rate("right site first, all sizes", singles, lambda item: item.located),
-        rate("an effect named that is not there", outcomes, lambda item: item.surplus),
+        rate("an effect named that is not there", outcomes, lambda item: item.surplus > 0),
         rate("false alarm in a clean laboratory", kind(outcomes, "clean"), lambda item: not item.named),
         rate("a known effect named for an unknown one", kind(outcomes, "unknown"), lambda i: bool(i.verdict)),
         rate("inside the tolerances: no gap or its name", inside, lambda item: item.named),
@@ -174,7 +177,7 @@ def further(outcomes: Sequence[Outcome]) -> list[Measure]:
         rate("missed: no gap where there is an effect", visible, lambda item: item.status == "no_gap"),
         quantile("parameter error relative to the value, median", (i.plain_error for i in right), share=True),
         _coverage(stated),
-        Measure("Brier score", *_thrice(_brier(outcomes)), len(_stated(outcomes)), rate=False),
+        Measure("Brier score", *_thrice(brier_score(verdicts)), len(verdicts), rate=False),
     ]
 
 
@@ -190,24 +193,10 @@ def _coverage(stated: Sequence[JudgedEstimate]) -> Measure:
     return Measure("stated intervals that hold the true parameter", value, low, high, len(stated), rate=True)
 
 
-def _stated(outcomes: Iterable[Outcome]) -> list[tuple[float, bool]]:
-    """Probability and truth of every verdict that names something."""
-    return [
-        (item.probability, item.named and bool(item.truth) and item.kind != "unknown")
-        for item in outcomes
-        if item.verdict and math.isfinite(item.probability)
-    ]
-
-
-def _brier(outcomes: Iterable[Outcome]) -> float:
-    stated = _stated(outcomes)
-    return float(brier(*_columns(stated))) if stated else math.nan
-
-
 def calibration_error(outcomes: Sequence[Outcome]) -> Measure:
     """Expected calibration error of the verdict's probability."""
-    stated = _stated(outcomes)
-    value = float(expected_calibration_error(*_columns(stated))) if stated else math.nan
+    stated = stated_verdicts(outcomes)
+    value = float(expected_calibration_error(*in_columns(stated))) if stated else math.nan
     low, high = calibration_bounds(stated) if stated else (0.0, 1.0)
     most = 0.05
     passed = True if high <= most else False if low > most else None
@@ -216,7 +205,7 @@ def calibration_error(outcomes: Sequence[Outcome]) -> Measure:
 
 def calibration_bounds(stated: Sequence[tuple[float, bool]]) -> tuple[float, float]:
     """Smallest and largest calibration error that the exact intervals of the bins' shares allow."""
-    table = stated_and_observed(*_columns(stated))
+    table = stated_and_observed(*in_columns(stated))
     low = high = 0.0
     for mean, share, count in zip(*table, strict=True):
         if count:
@@ -228,10 +217,6 @@ def calibration_bounds(stated: Sequence[tuple[float, bool]]) -> tuple[float, flo
 
 def _thrice(value: float) -> tuple[float, float, float]:
     return value, math.nan, math.nan
-
-
-def _columns(stated: Sequence[tuple[float, bool]]) -> tuple[Any, Any]:
-    return np.array([p for p, _ in stated]), np.array([float(hit) for _, hit in stated])
 
 
 @dataclass(frozen=True)
@@ -255,7 +240,7 @@ def by_size(outcomes: Iterable[Outcome]) -> list[Bin]:
 
 def reliability(outcomes: Iterable[Outcome]) -> list[Bin]:
     """Share of right verdicts against the probability they state."""
-    return binned(_stated(outcomes), tuple(np.linspace(0.0, 1.0, 11)))
+    return binned(stated_verdicts(outcomes), tuple(np.linspace(0.0, 1.0, 11)))
 
 
 def binned(pairs: Sequence[tuple[float, bool]], edges: Sequence[float]) -> list[Bin]:
@@ -331,6 +316,7 @@ def results(outcomes: Sequence[Outcome]) -> dict[str, Any]:
         {
             "measures": table,
             "confusion": {"effect": confusion(outcomes), "site": confusion_by_site(outcomes)},
+            "rows": case_rows(outcomes),
             "accuracy_by_size": by_size(outcomes),
             "reliability": reliability(outcomes),
             "cases": [vars(item) for item in outcomes],

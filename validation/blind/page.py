@@ -19,6 +19,7 @@ from validation.blind.measures import (
     measures,
     reliability,
 )
+from validation.blind.rows import HEAD, case_rows
 from validation.blind.scoring import VISIBLE, Outcome
 
 TITLE = "Blind trial of the diagnosis"
@@ -44,6 +45,8 @@ def page(outcomes: Sequence[Outcome], about: str) -> str:
         right=len(outcomes) - len(wrong),
         count=len(outcomes),
         measures=measures(outcomes),
+        row_head=HEAD,
+        rows=[item.cells for item in case_rows(outcomes)],
         matrices=matrices(outcomes),
         curves=curves(outcomes),
         names=CASE,

@@ -15,6 +15,8 @@ from common.plan import plan as plans
 from common.plan import reality as realities
 from common.plan.reality import Reality
 from validation.blind.draw import Case, Laid
+from validation.blind.loggers import LOGGERS
+from validation.blind.relogging import relog
 from validation.spread import spread
 
 
@@ -35,19 +37,23 @@ def record_all(cases: Sequence[Case], folder: Path, jobs: int = 1) -> Iterator[R
 
 
 def record(case: Case, folder: Path) -> RecordedCase:
-    """Play a case in virtual time; a test that a limit stops is kept up to there."""
+    """Play a case in virtual time, and log it; a test that a limit stops is kept up to there."""
     from simulation import virtual
     from validation.blind.size import sizes
 
     plan = plans.from_tables(case.plan, Path())
     path = folder / f"{secrets.token_hex(8)}.mcap"
+    played = path.with_suffix(".true") if case.logger else path
     try:
-        bench = virtual.assemble(plan, reality(case), path)
+        bench = virtual.assemble(plan, reality(case), played)
     except InputError as error:
         raise InputError(f"Case {case.index} ({truth(case)}) cannot be built: {error}") from None
     ended = virtual.run(bench, lambda: "")
     if ended is not None and not isinstance(ended, InterlockError):
         raise InputError(f"Case {case.index} ({truth(case)}) cannot be recorded: {ended}")
+    if case.logger:
+        relog(played, path, plan, LOGGERS[case.logger], case.truths["sensors"], case.seed)
+        played.unlink()
     return RecordedCase(case.index, path.name, sizes(case, path), str(ended or ""))
 
 

@@ -2,7 +2,8 @@
 
 Naming any one effect of a set that the report calls equivalent counts as naming the set. An effect counts
 as named where the status says so much (`NAMING`); a laboratory whose parameters are all inside their
-tolerances, effect included, has no gap, and saying so is right.
+tolerances, effect included, has no gap, and saying so is right. What a data logger did to the signals may be named
+beside the effect, or where there is none: it is really there.
 """
 
 from __future__ import annotations
@@ -16,8 +17,10 @@ from diagnosis.report.values import Value
 from laboratories.effects import CATALOGUE, of_site
 from validation.blind.draw import Case, Laid
 from validation.blind.judge import NONE, DiagnosisAnswer
+from validation.blind.loggers import LOGGERS
 from validation.blind.record import RecordedCase
 
+QUIET = ("no_gap", "within_tolerances")
 NAMING = ("explained", "partly_explained", "ambiguous")
 UNKNOWN = ("unknown_effect", "partly_explained")
 VISIBLE = 2.0  # residual to noise from which an effect must be found: below it noise may hide an effect
@@ -57,9 +60,11 @@ class Outcome:
     probability: float  # NaN where nothing is named
     named: bool  # every true effect is named, or, where there is none or an unknown one, that is said
     located: bool  # the true site stands first
-    surplus: bool  # effects are named that are not there
+    surplus: int  # effects named that are not there
     right: bool
     why: str
+    logger: str = ""  # through which it was recorded
+    first: bool = False  # the first name of the verdict, the logger's doing apart, says a true effect
     estimates: list[JudgedEstimate] = field(default_factory=list)
     shrinkage: float = math.nan  # closed over what the true effects would close
     seconds: float = math.nan  # per 30 s of test
@@ -92,6 +97,8 @@ def judge(case: Case, recorded: RecordedCase, answer: DiagnosisAnswer) -> Outcom
     truth = [item.name for item in case.laid]
     site = report.where[0].site if report and report.where else ""
     located = any(site in sites_of(item, names, sets) for item in case.laid)
+    own = [name for name in names if not is_distortion(case, name) or name in truth]
+    wrong = [name for name in own if not any(same(item, name, sets) for item in truth)]
     named = is_named(case, status, names, sets)
     right = named and (located or not case.laid or case.inside)
     duration = float(case.plan["test"]["duration"])
@@ -112,9 +119,11 @@ def judge(case: Case, recorded: RecordedCase, answer: DiagnosisAnswer) -> Outcom
         probability=number(verdict.probability) if verdict else math.nan,
         named=named,
         located=located,
-        surplus=any(not any(same(item, name, sets) for item in truth) for name in names),
+        surplus=len(wrong),
         right=right,
         why="",
+        logger=case.logger,
+        first=bool(own) and own[0] not in wrong,
         estimates=estimates(case, verdict) if named and verdict else [],
         shrinkage=number(report.how_far.closed if report else None) / best_closed(case),
         seconds=answer.seconds * STANDARD_LENGTH / duration,
@@ -125,12 +134,19 @@ def judge(case: Case, recorded: RecordedCase, answer: DiagnosisAnswer) -> Outcom
 def is_named(case: Case, status: str, names: list[str], sets: list[set[str]]) -> bool:
     """Whether the verdict says what there is."""
     if case.kind == "clean":
-        return status == "no_gap"
+        return status in QUIET or (bool(names) and all(is_distortion(case, name) for name in names))
     if case.kind == "unknown":
         return status in UNKNOWN
-    if case.inside and status == "no_gap":
+    if case.inside and status in QUIET:
         return True
     return all(any(same(true, name, sets) for true in truths(item) for name in names) for item in case.laid)
+
+
+def is_distortion(case: Case, name: str) -> bool:
+    """Whether a name says what the case's logger did to a signal."""
+    if not case.logger or not name.startswith("sensor."):
+        return False
+    return name.rpartition(".")[2] in LOGGERS[case.logger].distortions
 
 
 def truths(item: Laid) -> set[str]:
@@ -156,7 +172,7 @@ def estimates(case: Case, verdict: Candidate) -> list[JudgedEstimate]:
     return [
         estimate(item, name, found[item.name].get(name))
         for item in case.laid
-        if item.name in found
+        if item.name in found and not is_distortion(case, item.name)
         for name in item.nulls
         if name in item.parameters
     ]

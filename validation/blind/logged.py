@@ -1,0 +1,136 @@
+"""What a data logger of the blind trial makes of a channel.
+
+A channel passes its logger in this order: calibration, hum of the mains, noise of the sensor, anti-alias filter,
+converter, late channels, printed decimals, and the linear interpolation with which an import puts a logger of another
+rate onto the plan's ticks. The parts before the converter are computed at the logger's own rate.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+from scipy import signal
+
+from common.signals import Signal
+from models.registry import Array
+from validation.blind.loggers import Logger
+
+MAINS = 50.0  # Hz
+ORDER = 4  # of the anti-alias filter and of the filters that colour noise
+CORRELATION = 0.95  # of neighbouring samples of the noise "ar1"
+FREEDOM = 3  # degrees of freedom of Student's t: the fewest whole number that has a variance
+DEEPEST = (
+    0.1  # Hz, below which pink noise is flat: ten seconds are the longest wave that half a minute shows well
+)
+RANGE = (1.5, 5.0)  # range of a converter over the peak of its channel: nobody fits it better, or wastes more
+DECIMALS = {"m": 1e-6, "N": 1.0, "m/s²": 1e-3}  # 3 decimals of mm, of kN, of m/s²
+SETTLING = 4096  # samples before the first, in which coloured noise becomes stationary
+
+
+def logged(
+    logger: Logger, row: Signal, values: Array, level: float, interval: float, generator: np.random.Generator
+) -> Array:
+    """What a recording holds of a channel whose true values (ticks,) stand every `interval` s; SI units.
+
+    `level` is the rms of the sensor's noise, drawn from `generator` with the hum's phase and the range.
+    """
+    ticks: Array = np.arange(values.size, dtype=np.float64) * interval
+    rate = logger.rate or 1.0 / interval
+    count = values.size if not logger.rate else math.ceil(ticks[-1] * rate) + 1
+    peak = float(np.max(np.abs(values), initial=0.0))
+    phase, spread = generator.uniform(0.0, 2.0 * math.pi), generator.uniform(*np.log(RANGE))
+    times: Array = np.arange(count, dtype=np.float64) / rate
+    sensed = values if not logger.rate else resampled(ticks, values, times)
+    sensed = logger.gain * sensed + logger.hum * peak * np.sin(2.0 * math.pi * MAINS * times + phase)
+    sensed = sensed + level * COLOURS[logger.colour](generator, count, rate)
+    if logger.cutoff:
+        sensed = filtered(sensed, logger.cutoff, rate)
+    if logger.bits and peak > 0.0:
+        sensed = converted(sensed, float(np.exp(spread)) * peak, logger.bits)
+    if logger.late and row.unit == "N":
+        sensed = np.concatenate([np.full(logger.late, sensed[0]), sensed[: -logger.late]])
+    if logger.printed:
+        sensed = rounded(sensed, DECIMALS[row.unit])
+    return np.interp(ticks, times, sensed) if logger.rate else sensed
+
+
+def resampled(ticks: Array, values: Array, times: Array) -> Array:
+    """The true signal at a logger's own times, by a cubic spline that reaches less than a sample beyond the last."""
+    from scipy.interpolate import CubicSpline
+
+    return np.asarray(CubicSpline(ticks, values)(times))
+
+
+def filtered(values: Array, cutoff: float, rate: float) -> Array:
+    """Behind an analogue Butterworth filter of order 4 that stood at the first value before, the input ramped."""
+    analogue = signal.butter(ORDER, 2.0 * math.pi * cutoff, analog=True, output="ba")
+    above, below, _ = signal.cont2discrete(analogue, 1.0 / rate, method="foh")
+    return np.asarray(signal.lfilter(above[0], below, values - values[0]) + values[0])
+
+
+def converted(values: Array, largest: float, bits: int) -> Array:
+    """Behind a converter that reads from -`largest` to `largest` in 2^`bits` steps."""
+    step = 2.0 * largest / 2**bits
+    return np.clip(rounded(values, step), -largest, largest - step)
+
+
+def rounded(values: Array, step: float) -> Array:
+    """To whole steps."""
+    return step * np.round(values / step)
+
+
+def white(generator: np.random.Generator, count: int, _rate: float) -> Array:
+    """Normal and without memory; as all colours of rms 1."""
+    return generator.standard_normal(count)
+
+
+def heavy_tailed(generator: np.random.Generator, count: int, _rate: float) -> Array:
+    """Student's t, whose variance is n/(n - 2) with n degrees of freedom."""
+    return generator.standard_t(FREEDOM, count) / math.sqrt(FREEDOM / (FREEDOM - 2.0))
+
+
+def low_passed(generator: np.random.Generator, count: int, rate: float, cutoff: float) -> Array:
+    """White noise behind a Butterworth filter of order 4."""
+    above, below = signal.butter(ORDER, cutoff, fs=rate)
+    return _settled(generator, count, above, below)
+
+
+def ar1(generator: np.random.Generator, count: int, _rate: float) -> Array:
+    """Each sample 0.95 of the one before, and something new."""
+    return _settled(generator, count, np.ones(1), np.array([1.0, -CORRELATION]))
+
+
+def _settled(generator: np.random.Generator, count: int, above: Array, below: Array) -> Array:
+    """White noise through a digital filter, in its stationary state and of rms 1."""
+    impulse = signal.lfilter(above, below, np.eye(1, SETTLING)[0])
+    noise = signal.lfilter(above, below, generator.standard_normal(count + SETTLING))[SETTLING:]
+    return np.asarray(noise / np.sqrt(np.sum(impulse**2)))
+
+
+def pink(generator: np.random.Generator, count: int, rate: float) -> Array:
+    """Power per hertz as 1/f down to 0.1 Hz, and flat below."""
+    size = 2 * count  # a stretch out of a longer record, because the transform makes a record that repeats
+    frequency: Array = np.asarray(np.fft.rfftfreq(size, 1.0 / rate), dtype=np.float64)
+    shape = pink_shape(frequency)
+    noise = np.fft.irfft(np.fft.rfft(generator.standard_normal(size)) * shape, size)[:count]
+    return np.asarray(noise / np.sqrt(np.mean(shape**2)))
+
+
+def pink_shape(frequency: Array) -> Array:
+    """Amplitude of pink noise at frequencies (Hz), up to a factor."""
+    return np.asarray(1.0 / np.sqrt(np.maximum(frequency, DEEPEST)))
+
+
+COLOURS: dict[str, Callable[[np.random.Generator, int, float], Array]] = {
+    "white": white,
+    "heavy_tailed": heavy_tailed,
+    "ar1": ar1,
+    "pink": pink,
+    "low_pass_50": partial(low_passed, cutoff=50.0),
+    "low_pass_100": partial(low_passed, cutoff=100.0),
+    "low_pass_200": partial(low_passed, cutoff=200.0),
+}
+"""Noise of rms 1: generator, number of samples, rate in Hz."""

@@ -1,0 +1,103 @@
+"""The table by logger, or by kind of case where there is none: each row's cases, and how the diagnosis did on them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+from report.text.formats import MISSING
+from validation.blind.loggers import LOGGERS
+from validation.blind.scoring import Outcome
+from validation.blind.stated import brier_skill, stated_verdicts
+
+HEAD = (
+    "",
+    "cases",
+    "clean called clean",
+    "true effect first",
+    "in the list",
+    "extra names",
+    "Brier skill",
+    "intervals hold",
+    "could be seen",
+)
+
+
+@dataclass(frozen=True)
+class Hits:
+    """A share of cases, as its two numbers."""
+
+    hits: int
+    count: int
+
+    @property
+    def text(self) -> str:
+        """In words, a dash without cases."""
+        return f"{self.hits} of {self.count}" if self.count else MISSING
+
+
+@dataclass(frozen=True)
+class CaseRow:
+    """A row of the table."""
+
+    name: str
+    cases: int
+    clean: Hits  # clean laboratories that are called clean
+    first: Hits  # single effects that can be seen: the verdict's first name is a right one
+    listed: Hits  # the same: the verdict names it
+    extra: float  # names per case of what is not there, what the logger did apart
+    skill: float  # of the stated probabilities, over a constant
+    inside: Hits  # stated intervals that hold the true parameter
+    seen: Hits  # cases with an effect that can be seen
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """The row in words."""
+        skill = MISSING if math.isnan(self.skill) else f"{self.skill:.2f}"
+        hits = (self.clean.text, self.first.text, self.listed.text)
+        return (
+            self.name,
+            str(self.cases),
+            *hits,
+            f"{self.extra:.2f}",
+            skill,
+            self.inside.text,
+            self.seen.text,
+        )
+
+
+def case_rows(outcomes: Sequence[Outcome]) -> list[CaseRow]:
+    """The rows in the order of the loggers or kinds, and one of all cases."""
+    by_logger = any(item.logger for item in outcomes)
+    groups: dict[str, list[Outcome]] = {}
+    for item in outcomes:
+        groups.setdefault(item.logger if by_logger else item.kind, []).append(item)
+    order = list(LOGGERS) if by_logger else sorted(groups)
+    texts = {name: LOGGERS[name].text if by_logger else name for name in groups}
+    rows = [case_row(texts[name], groups[name]) for name in order if name in groups]
+    return [*rows, case_row("all cases", outcomes)]
+
+
+def case_row(name: str, outcomes: Sequence[Outcome]) -> CaseRow:
+    """One row."""
+    effects = [item for item in outcomes if item.truth]
+    singles = [item for item in effects if item.single and item.visible]
+    stated = [one for item in outcomes for one in item.estimates if one.inside is not None]
+    return CaseRow(
+        name,
+        len(outcomes),
+        hits((item for item in outcomes if item.kind == "clean"), lambda item: item.named),
+        hits(singles, lambda item: item.first),
+        hits(singles, lambda item: item.named),
+        sum(item.surplus for item in outcomes) / len(outcomes) if outcomes else math.nan,
+        brier_skill(stated_verdicts(outcomes)),
+        Hits(sum(bool(one.inside) for one in stated), len(stated)),
+        hits(effects, lambda item: item.visible),
+    )
+
+
+def hits(outcomes: Iterable[Outcome], good: Callable[[Outcome], bool]) -> Hits:
+    """How many cases are good."""
+    judged = [good(item) for item in outcomes]
+    return Hits(sum(judged), len(judged))

@@ -1,0 +1,60 @@
+"""The sets of cases: what each draws its laboratories from.
+
+Sets share no draw. The thresholds of the diagnosis are set on "tune"; "judge" is for judging only. The others ask what
+"judge" does not: each says so in its text.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import accumulate
+from typing import TYPE_CHECKING
+
+from validation.blind.loggers import LOGGERS
+
+if TYPE_CHECKING:
+    from validation.blind.lots import Lot
+
+# what may be wrong in a laboratory, and in how many of all cases it is
+SHARES = {"catalogue": 0.50, "formula": 0.15, "unknown": 0.10, "pair": 0.10, "clean": 0.15}
+
+
+@dataclass(frozen=True)
+class CaseSet:
+    """How the cases of a set are drawn."""
+
+    text: str  # what it asks, for the help
+    shares: Mapping[str, float] = field(default_factory=lambda: SHARES)  # of kinds of case
+    turns: tuple[str, ...] = ()  # kinds that take turns instead, a round of loggers each
+    loggers: tuple[
+        str, ...
+    ] = ()  # taken in turn by the number of the case; none: the recording is the test's own
+
+    def kind(self, lot: Lot) -> str:
+        """The kind of a case."""
+        if self.turns:
+            return self.turns[self._round(lot) % len(self.turns)]
+        from validation.blind import lots
+
+        share = lots.generator(*lot, "kind").random()
+        sums = accumulate(self.shares.values())
+        return next(kind for kind, most in zip(self.shares, sums, strict=True) if share < most)
+
+    def logger(self, lot: Lot) -> str:
+        """The logger of a case, empty for none."""
+        return self.loggers[int(lot[-1]) % len(self.loggers)] if self.loggers else ""
+
+    def _round(self, lot: Lot) -> int:
+        return int(lot[-1]) // max(len(self.loggers), 1)
+
+
+SETS = {
+    "judge": CaseSet("for judging only"),
+    "tune": CaseSet("where thresholds are set"),
+    "loggers": CaseSet(
+        "clean laboratories and single effects through data loggers",
+        turns=("clean", "catalogue"),
+        loggers=tuple(LOGGERS),
+    ),
+}
