@@ -11,6 +11,7 @@ from benchmarks import loops, opensees_peer
 from benchmarks.opensees_peer import PeerAnswer, PeerCase
 from benchmarks.result import BenchmarkFigure, rate_figure, rates
 from common.plan.plan import Plan, ideal
+from common.plan.read import with_test
 from common.plan.tables import Control, RecordingTable
 from loop import substructure
 from loop.closed_loop import signals, simulate
@@ -85,7 +86,7 @@ def opensees(answer: PeerAnswer | str, x: Array, compiled: float, objects: float
 
 def run(*, quick: bool = False) -> list[BenchmarkFigure]:
     """The default test without and with noise; the ideal test beside plain Python and OpenSeesPy."""
-    plan, repeats = (Plan().with_test(duration=QUICK_S), 1) if quick else (Plan(), REPEATS)
+    plan, repeats = (with_test(Plan(), duration=QUICK_S), 1) if quick else (Plan(), REPEATS)
     alone = bare(plan)
     ground = substructure.ground_rows(plan, substructure.motion(plan))
     peer = statistics.median(rates(lambda: len(plain_python(plan, ground)), repeats))

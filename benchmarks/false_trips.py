@@ -17,6 +17,7 @@ import numpy as np
 
 from benchmarks.result import BenchmarkFigure
 from common.plan.plan import Plan
+from common.plan.read import with_test
 from common.plan.reality import as_planned
 from common.plan.tables import RecordingTable
 from common.roles import MASTER
@@ -50,7 +51,7 @@ class Piece(NamedTuple):
 
 def planned(seed: int, seconds: float) -> Plan:
     """The default test over a piece's length, without a recorder."""
-    plan = Plan().with_test(duration=seconds)
+    plan = with_test(Plan(), duration=seconds)
     return replace(plan, test=replace(plan.test, seed=seed), recording=RecordingTable(required=False))
 
 

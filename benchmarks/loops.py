@@ -13,6 +13,7 @@ from pathlib import Path
 from benchmarks.result import BenchmarkFigure, rate_figure
 from common.plan import reality
 from common.plan.plan import Plan
+from common.plan.read import with_test
 from common.plan.tables import RecordingTable
 from simulation import virtual
 
@@ -40,7 +41,7 @@ def played(plan: Plan, output: Callable[[], Path | None], repeats: int) -> list[
 
 def run(*, quick: bool = False) -> list[BenchmarkFigure]:
     """The default test, its drive and loops over the link in memory."""
-    plan, repeats = (Plan().with_test(duration=QUICK_S), 1) if quick else (Plan(), REPEATS)
+    plan, repeats = (with_test(Plan(), duration=QUICK_S), 1) if quick else (Plan(), REPEATS)
     alone = played(replace(plan, recording=RecordingTable(required=False)), lambda: None, repeats)
     with tempfile.TemporaryDirectory() as folder:
         recorded = played(plan, lambda: Path(folder) / "a.mcap", repeats)

@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from common.plan import patience
-from common.plan.plan import Plan, parse
+from common.plan.plan import Plan
+from common.plan.read import parse
 from common.plan.tables import Limits, Preflight, SafetyTable
 from common.rig import ColumnMeasurement, TableCommand, TableMeasurement
 from common.safety.modes import MEANING, TURNS, mermaid

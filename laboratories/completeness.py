@@ -11,7 +11,7 @@ import linecache
 import math
 import re
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numba
 import numpy as np
@@ -20,11 +20,9 @@ from numba import types
 from common import blame
 from common.errors import InputError
 from common.signals import BUILDING, MODE, NUMERICAL, Channels
+from laboratories.device import Device
 from models.compiled import jit_apart
 from models.registry import Array
-
-if TYPE_CHECKING:
-    from laboratories.device import Device
 
 VECTOR = types.float64[::1]
 KERNEL = types.void(VECTOR, VECTOR, VECTOR, types.float64, types.float64)
@@ -39,6 +37,13 @@ BESIDE = 64  # numbers kept on each side of an array that the kernel is tried on
 INTERVAL = 2e-3  # s
 TICKS = 250
 REACH = 1e-3  # m
+
+
+def complete(kind: Device, where: str) -> None:
+    """Compile the kernel of a user's kind; raises InputError with one sentence where the class is no complete kind."""
+    if wrong := complaint(kind):
+        raise InputError(f"{called(kind)} named in {where} {wrong}.")
+    kind.move_by(compiled(kind, where))
 
 
 def complaint(kind: Device) -> str:

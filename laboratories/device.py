@@ -22,7 +22,6 @@ from common.plan.schema import Rule, as_type, in_range, nearest
 from common.plan.tables import ForceCorrection
 from common.safety.ramp import MotionRamp, Ramp
 from common.signals import Channels, Signal
-from laboratories import completeness
 from laboratories.kind import Chosen, Coupling, Follows, Kind, Limited, Machine, Sensed, usual
 from models.compiled import jit
 from models.registry import Array
@@ -183,11 +182,9 @@ class Device(Kind):
             noisy = tuple(name for name in cls.channels.names if cls.rms.get(name, 0.0) > 0.0)
             cls.sensed = (Sensed(noisy, cls.channels.position),) if noisy else ()
 
-    def check(self, where: str) -> None:
-        """Compile the kernel; raises InputError with one sentence where the class is no complete kind."""
-        if wrong := completeness.complaint(self):
-            raise InputError(f"{completeness.called(self)} named in {where} {wrong}.")
-        self._kernel = completeness.compiled(self, where)
+    def move_by(self, kernel: Any) -> None:
+        """Take the compiled `step`, which every laboratory of this kind is then moved by."""
+        self._kernel = kernel
 
     @property
     def effects(self) -> tuple[Effect, ...]:

@@ -21,6 +21,7 @@ from common.plan.plan import Plan
 from common.plan.plugins import construct, find
 from common.roles import MASTER
 from common.signals import Signal
+from laboratories import completeness
 from laboratories.column.kind import COLUMN
 from laboratories.device import Device, DeviceRecord, advance_device
 from laboratories.kind import Kind
@@ -91,7 +92,7 @@ def _loaded(reference: str, base: Path, where: str) -> Kind:
             f"{found.__name__} named in {where} is no kind of laboratory: derive it from laboratories.device.Device."
         )
     kind: Device = construct(found, {}, where)
-    kind.check(where)
+    completeness.complete(kind, where)
     return kind
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from common.plan.plan import Plan
+from common.plan.read import with_test
 from laboratories.column import model as column_lab
 from laboratories.kinds import KINDS
 from laboratories.sensors import readings
@@ -22,7 +23,7 @@ from models.system import System
 
 def compile_all() -> None:
     """Compile what the loops and the simulation call, and note that it is done."""
-    plan = Plan().with_test(duration=0.01)
+    plan = with_test(Plan(), duration=0.01)
     ground = np.zeros((2, plan.ticks + 1))
     simulate(plan, ground)
     alone = replace(plan, control=replace(plan.control, amd=False))

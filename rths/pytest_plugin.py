@@ -47,7 +47,7 @@ def expect(recording: str | Path, budget: str | Path | None) -> BudgetReport:
     """The report of a recording that is within its budget; ends the test otherwise."""
     __tracebackhide__ = True
     from common.errors import RthsError
-    from report.budget import assess
+    from report.budget import assess, text
 
     report, mistake = None, ""
     try:
@@ -57,7 +57,7 @@ def expect(recording: str | Path, budget: str | Path | None) -> BudgetReport:
     if report is None:  # failed here, not in the handler: there pytest shows the error beside its own
         pytest.fail(mistake, pytrace=False)
     if report.status == "over":
-        pytest.fail(str(report), pytrace=False)
+        pytest.fail(text(report), pytrace=False)
     if report.status == "not_judged":
-        pytest.skip(str(report))
+        pytest.skip(text(report))
     return report

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from common.errors import InputError
-from common.plan import plan
+from common.plan import read as plans
 from common.recording.reader import Run, Values, read
 from common.roles import MASTER, name_of
 from common.terminal import cli
@@ -46,7 +46,7 @@ def simulated(path: Path) -> ComparedRun:
     from loop import substructure
     from loop.closed_loop import signals, simulate
 
-    test = plan.load(path)
+    test = plans.load(path)
     record = substructure.motion(test)
     values = signals(test, simulate(test, substructure.ground_rows(test, record)))
     ticks = (values["t"] / test.test.interval).round().astype(int)

@@ -14,7 +14,8 @@ import pytest
 from hypothesis import settings
 
 from common.host import running
-from common.plan import plan, reality
+from common.plan import read as plans
+from common.plan import reality
 from common.plan.patience import strict
 from common.plan.plan import Plan
 from common.terminal import cli
@@ -133,13 +134,13 @@ def apart(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 @pytest.fixture(scope="session")
 def default_plan() -> Plan:
     """The default test with the strict figures of rigs."""
-    return strict(plan.load(cli.plan_path(None)))
+    return strict(plans.load(cli.plan_path(None)))
 
 
 @pytest.fixture(scope="session")
 def short_plan(default_plan: Plan) -> Plan:
     """Its first four seconds, in which the strongest motion lies."""
-    return default_plan.with_test(duration=4.0)
+    return plans.with_test(default_plan, duration=4.0)
 
 
 @pytest.fixture(scope="session")

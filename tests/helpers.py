@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from common.plan import plan
+from common.plan import read as plans
 from common.plan.plan import Plan
 from common.plan.reality import as_planned
 from simulation import virtual
@@ -115,7 +115,7 @@ def with_table(base: Plan, table: str, **values: object) -> Plan:
     """A plan with some keys of one table changed."""
     tables = base.tables()
     tables[table] |= values
-    return plan.from_tables(tables, base.base)
+    return plans.from_tables(tables, base.base)
 
 
 def without_recorder(base: Plan) -> Plan:

@@ -145,7 +145,7 @@ def codes(node: ast.AST) -> list[str]:
 
 
 def test_the_plan_that_documents_the_keys_is_the_default_plan() -> None:
-    from common.plan.plan import load
+    from common.plan.read import load
 
     assert strict(load(ROOT / "rths/plans/default.toml")).digest() == Plan().digest()
 

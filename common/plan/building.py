@@ -6,16 +6,14 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from common.errors import PlanError
 from common.plan.kinds import COLUMN, OWN, TABLE, known_kind
+from common.plan.plan import Plan
 from common.plan.schema import StoreysOrMatrix
 from common.plan.tables import Actuator, Experimental, ServoHydraulics, Structure
 from common.roles import name_of
-
-if TYPE_CHECKING:
-    from common.plan.plan import Plan
 
 ASYMMETRY = 1e-9  # of the largest entry, that rounding may make
 OF_FOPDT = ("gain", "delay", "time_constant")

@@ -11,10 +11,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from common.plan.plan import Plan
+from common.plan.plan import OVERRUN, Plan
 
 # s. Pauses of 50 ms are to be borne; beside other load they were seen to reach 0.5 s, and four such may coincide.
 PATIENCE = 2.0
@@ -25,8 +24,6 @@ LOST_SHARE = (
     0.01  # of the exchanges: one that a pause held up for 100 ms is asked again, and may count as lost
 )
 SHOCK = 10.0  # on the table's acceleration: a target that is 50 ms ahead was seen to take 53 m/s², 100 ms the double
-
-OVERRUN = "safety.overrun"
 
 Figure = Callable[["Plan"], float]
 
@@ -79,8 +76,6 @@ def strict(plan: Plan) -> Plan:
 
 def standard(name: str) -> float:
     """A figure that is not written out, as it holds beside a rig."""
-    from common.plan.plan import Plan
-
     return figure(Plan, name)
 
 

@@ -5,17 +5,15 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-import tomllib
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import tomli_w
 
-from common.errors import InputError, PlanError
-from common.plan import building, patience
-from common.plan.kinds import NONE, TABLES_OF_KIND, check_kind, known_kind, planned
-from common.plan.schema import fill, nearest, plain
+from common.errors import InputError
+from common.plan.kinds import NONE, TABLES_OF_KIND, known_kind, planned
+from common.plan.schema import nearest, plain
 from common.plan.tables import (
     Actuator,
     Column,
@@ -29,7 +27,6 @@ from common.plan.tables import (
     Link,
     Preflight,
     RecordingTable,
-    RigTable,
     SafetyTable,
     SensorsTable,
     ShakingTable,
@@ -41,10 +38,8 @@ from common.plan.tables import (
 from common.roles import MASTER, name_of, slave_role
 
 PROTOCOL_VERSION = 5
-# eight laboratories on one master take 0.17 ms of a tick of 2 ms (docs/reference/benchmarks.md)
-MOST_SLAVES = 16
+OVERRUN = "safety.overrun"
 FOLLOWS_IN = "table.compensator"
-SLAVE_NAME = re.compile(r"[a-z][a-z0-9_]*")
 
 
 @dataclass(frozen=True)
@@ -90,7 +85,7 @@ class Plan:
     @property
     def makes_good(self) -> bool:
         """Whether a tick that comes late is made up for: an emulated rig knows no time but its ticks."""
-        return patience.OVERRUN in self.eased
+        return OVERRUN in self.eased
 
     @property
     def storeys(self) -> int:
@@ -208,183 +203,11 @@ class Plan:
         text = json.dumps(tables, sort_keys=True)
         return hashlib.blake2b(text.encode(), digest_size=8).hexdigest()
 
-    def with_test(
-        self, *, duration: float | None = None, scale: float | None = None, seed: int | None = None
-    ) -> Plan:
-        """The plan with command-line values in place of its own, checked like those of a file."""
-        tables = self.written()
-        for table, name, value in (
-            ("test", "duration", duration),
-            ("ground_motion", "scale", scale),
-            ("test", "seed", seed),
-        ):
-            if value is not None:
-                tables[table][name] = value
-        return replace(from_tables(tables, self.base), follows_in=self.follows_in)
-
 
 BESIDE = ("slaves", "base", "follows_in", "eased")  # no tables of a file
 TABLES = tuple(name for name in Plan.__dataclass_fields__ if name not in BESIDE)
 INTERFACE = tuple(dict.fromkeys(name for names in TABLES_OF_KIND.values() for name in names))
 """The tables that a named slave may have of its own, those of all kinds."""
-
-
-def load(path: Path) -> Plan:
-    """The plan in a TOML file.
-
-    Raises:
-        PlanError: the file cannot be read, is no TOML, or holds what no plan can.
-    """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
-        raise PlanError(f"Cannot read the plan {path}: {reason}; give the path of a TOML file.") from None
-    return parse(text, path.parent, str(path))
-
-
-def parse(text: str, base: Path, name: str = "the plan") -> Plan:
-    """The plan in a TOML text; relative paths start from `base`; `name` stands in errors."""
-    try:
-        tables = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise PlanError(f"{name} is not valid TOML: {error}.") from None
-    except RecursionError:
-        raise PlanError(f"{name} is not a plan: its values are nested too deeply.") from None
-    try:
-        return from_tables(tables, base)
-    except PlanError as error:
-        raise PlanError(f"{name}: {error}") from None
-
-
-def from_tables(tables: dict[str, Any], base: Path) -> Plan:
-    """The plan of nested plain values."""
-    for name in tables:
-        if name not in TABLES:
-            raise PlanError(f"Unknown table [{name}]: {nearest(name, TABLES)}")
-    types = {name: type(getattr(Plan, name)) for name in TABLES}
-    slaves = named_slaves(tables.get("slave", {}))
-    given = {name: fill(types[name], tables[name], name) for name in tables if name != "slave" or not slaves}
-    if "structure" in given:
-        given["structure"] = building.with_modal_damping(given["structure"], tables["structure"])
-    plan = Plan(base=base, **given)
-    plan = replace(plan, slaves={name: slave_laboratory(plan, name, slaves[name]) for name in slaves})
-    check_laboratories(plan)
-    building.check(plan)
-    if plan.ticks < 1:
-        raise PlanError(f"duration in [test] is {plan.test.duration} s, shorter than one interval.")
-    check_tolerances(plan)
-    plan = patience.eased(plan, tables)
-    check_safety(plan)
-    return plan
-
-
-def check_laboratories(plan: Plan) -> None:
-    """Raise PlanError where a kind is none, or no process would have a laboratory."""
-    for role in (MASTER, "slave"):
-        check_kind(getattr(plan, role).kind, role)
-    if not plan.kinds:
-        raise PlanError(
-            "Neither [master] nor [slave] has a laboratory: give one of them a kind other than 'none'."
-        )
-
-
-def named_slaves(given: object) -> dict[str, dict[str, Any]]:
-    """The slaves that [slave] names, none where it holds the rig of the only one.
-
-    Raises:
-        PlanError: names and a rig are mixed, a name is not valid, or there are too many.
-    """
-    if not isinstance(given, dict) or given.keys() <= {"rig", "kind"}:
-        return {}
-    for name, table in given.items():
-        if not isinstance(table, dict):
-            raise PlanError(
-                f"{name} in [slave] is {table!r}: give [slave.rig], or tables [slave.NAME.rig] for several slaves."
-            )
-        if not SLAVE_NAME.fullmatch(name):
-            raise PlanError(
-                f"The slave's name '{name}' in [slave.{name}] must begin with a letter and have "
-                "small letters, digits and _ only."
-            )
-    if "rig" in given:
-        names = ", ".join(name for name in given if name != "rig")
-        raise PlanError(
-            f"[slave] holds a rig beside the slaves {names}: name that one too, as [slave.NAME.rig]."
-        )
-    if len(given) > MOST_SLAVES:
-        raise PlanError(f"[slave] names {len(given)} slaves, but there may be at most {MOST_SLAVES}.")
-    return given
-
-
-def slave_laboratory(plan: Plan, name: str, given: dict[str, Any]) -> SlaveLaboratory:
-    """The laboratory of a named slave, on top of the plan's own tables."""
-    where = f"slave.{name}"
-    kind = check_kind(given.get("kind", ""), where)
-    known = (*TABLES_OF_KIND[known_kind(planned(slave_role(name), kind))], "rig", "kind")
-    for entry in given:
-        if entry not in known:
-            raise PlanError(f"Unknown key '{entry}' in [{where}]: {nearest(entry, known)}")
-    parts: dict[str, Any] = {}
-    for part in INTERFACE:
-        own, common = given.get(part, {}), getattr(plan, part)
-        merged = plain(common) | own if isinstance(own, dict) else own
-        parts[part] = fill(type(common), merged, f"{where}.{part}")
-    return SlaveLaboratory(rig=fill(RigTable, given.get("rig", {}), f"{where}.rig"), kind=kind, **parts)
-
-
-def check_tolerances(plan: Plan) -> None:
-    """Every tolerance must name a nominal parameter and be a share between 0 and 1."""
-    tables = plan.tables()
-    tables["actuator"] = building.parameters(plan.actuator)
-    known = [name for table in NOMINAL for name in uncertain(table, tables[table])]
-    chosen = plan.actuator.model
-    other = "fopdt" if chosen == "servo_hydraulic" else "servo_hydraulic"
-    foreign = uncertain("actuator", building.parameters(replace(plan.actuator, model=other)))
-    for name, value in plan.tolerances.parameters.items():
-        if name in foreign:
-            raise PlanError(
-                f"'{name}' in [tolerances] is of the actuator's model '{other}', but '{chosen}' is chosen in "
-                "[actuator]: leave it out."
-            )
-        if name not in known:
-            raise PlanError(f"Unknown parameter '{name}' in [tolerances]: {nearest(name, known)}")
-        if not 0.0 <= value <= 1.0:
-            raise PlanError(f"'{name}' in [tolerances] is {value}, but must be at least 0 and at most 1.")
-
-
-def uncertain(where: str, table: dict[str, Any]) -> list[str]:
-    """The parameters of a table that are uncertain: its numbers without those that are chosen freely."""
-    names = []
-    for key, value in table.items():
-        name = f"{where}.{key}"
-        if name in CHOSEN:
-            continue
-        if isinstance(value, dict):
-            names += uncertain(name, value)
-        elif isinstance(value, int | float | list):
-            names.append(name)
-    return names
-
-
-def check_safety(plan: Plan) -> None:
-    """A laboratory holds before it ramps."""
-    safety = plan.safety
-    if safety.hold_after >= safety.ramp_after:
-        raise PlanError(
-            f"hold_after in [safety] is {safety.hold_after}, but must be below ramp_after, {safety.ramp_after}."
-        )
-
-
-NOMINAL = ("structure", "column", "actuator", "table", "damper", "sensors")
-CHOSEN = (
-    "structure.rho_infinity",
-    "structure.columns",
-    "structure.experimental",
-    "column.storey",
-    "column.columns_per_storey",
-    "column.represents",
-)
 
 
 def resolve(plan: Plan, path: str) -> Path:

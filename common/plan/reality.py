@@ -15,7 +15,8 @@ from typing import Any
 from common.errors import PlanError
 from common.plan.building import OF_FOPDT
 from common.plan.kinds import TABLES_OF_KIND, known_kind
-from common.plan.plan import Plan, from_tables
+from common.plan.plan import Plan
+from common.plan.read import from_tables
 from common.plan.schema import fill, nearest
 from common.plan.tables import RigTable
 from common.roles import MASTER, SLAVE, slave_role

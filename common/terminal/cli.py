@@ -15,7 +15,7 @@ from typing import Any, NoReturn
 
 from common.errors import InputError, RthsError
 from common.host import realtime
-from common.plan import plan as plans
+from common.plan import read as plans
 from common.plan import reality as realities
 from common.plan.plan import Plan
 from common.plan.reality import Reality
@@ -126,8 +126,8 @@ def accepted_risks(args: argparse.Namespace) -> tuple[str, ...]:
 
 def load_plan(args: argparse.Namespace) -> Plan:
     """The plan that the command line asks for; raises PlanError."""
-    return plans.load(plan_path(args.plan)).with_test(
-        duration=args.duration, scale=args.scale, seed=args.seed
+    return plans.with_test(
+        plans.load(plan_path(args.plan)), duration=args.duration, scale=args.scale, seed=args.seed
     )
 
 

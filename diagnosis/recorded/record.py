@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import InputError
-from common.plan.plan import Plan, ideal, parse
+from common.plan.plan import Plan, ideal
+from common.plan.read import parse
 from common.recording.reader import GROUND, Run
 from common.roles import MASTER, SLAVE, title
 from common.signals import BUILDING as OF_BUILDING

@@ -9,10 +9,12 @@ from pathlib import Path
 
 from common.recording.reader import read
 from report.budget.figures import figures
-from report.budget.judge import BudgetReport, judge
+from report.budget.judge import judge
 from report.budget.limits import load
+from report.budget.text import text
+from report.budget.verdict import BudgetReport
 
-__all__ = ["BudgetReport", "assess"]
+__all__ = ["BudgetReport", "assess", "text"]
 
 
 def assess(recording: str | Path, budget: str | Path | None = None) -> BudgetReport:

@@ -7,59 +7,16 @@ its gap is the whole test, and no noise loses every row.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 
 from common.errors import InputError
-from report.budget.checks import DOUBT, LEAST_BEYOND, OK, OVER, SHORT, BudgetCheck, checks_of, longest_run
-from report.budget.figures import ExchangeTicks, Figures, measured
-from report.budget.limits import PERCENTILES, Budget, MachineLimits
+from report.budget.checks import DOUBT, LEAST_BEYOND, OVER, SHORT, BudgetCheck, checks_of
+from report.budget.figures import ExchangeTicks, Figures
+from report.budget.limits import Budget, MachineLimits
+from report.budget.verdict import NOT_JUDGED, WITHIN, BudgetReport
 from report.text.formats import percent
-
-WITHIN, NOT_JUDGED = "within", "not_judged"
-
-
-@dataclass(frozen=True)
-class BudgetReport:
-    """A recording judged; `str()` is the table, `plain()` what `--json` writes."""
-
-    status: str
-    figures: Figures
-    budget: Budget
-    checks: list[BudgetCheck]
-    doubts: list[str]
-    warnings: list[str]
-
-    @property
-    def exit_code(self) -> int:
-        """1 where the recording is over its budget."""
-        return int(self.status == OVER)
-
-    def __str__(self) -> str:
-        from report.budget.text import text
-
-        return text(self)
-
-    def plain(self) -> dict[str, Any]:
-        """Plain values without NaN or inf; with several slaves, names are led by theirs."""
-        found = self.figures
-        bare = found.bare
-        return {
-            "status": self.status,
-            "recording": found.recording,
-            "budget": self.budget.plain(),
-            "ticks": max(item.ticks for item in found.exchanges),
-            "segments": {name: row for item in found.exchanges for name, row in percentiles(item).items()},
-            "late": {
-                item.label(key): value for item in found.exchanges for key, value in counts(item).items()
-            },
-            "bare_loop": bare.plain() if bare else None,
-            "machine": {"stolen_share": found.stolen, "scheduler": found.schedulers, "doubts": self.doubts},
-            "checks": [asdict(check) | {"ok": check.verdict == OK} for check in self.checks],
-            "warnings": self.warnings,
-        }
 
 
 def judge(found: Figures, budget: Budget) -> BudgetReport:
@@ -132,29 +89,6 @@ def unsteadiness(found: Figures, machine: MachineLimits) -> list[str]:
 def late_share(found: Figures) -> float:
     """Share of late ticks of the bare loop, 0 where none ran."""
     return found.bare.late_share if found.bare else 0.0
-
-
-def percentiles(item: ExchangeTicks) -> dict[str, dict[str, float | int]]:
-    """Percentiles, maximum (s) and count of every segment that was measured."""
-    return {
-        item.label(name): {key: float(np.percentile(values, rank)) for key, rank in PERCENTILES.items()}
-        | {"max": float(values.max()), "n": int(values.size)}
-        for name, values in ((name, measured(column)) for name, column in item.segments.items())
-    }
-
-
-def counts(item: ExchangeTicks) -> dict[str, float | int]:
-    """Late and missed ticks, their shares, and the longest run of late ones; what was not recorded is left out."""
-    found: dict[str, float | int] = {"ticks": item.ticks}
-    if item.late is not None:
-        found |= {
-            "late": int(item.late.sum()),
-            "share": float(item.late.mean()),
-            "longest_gap": longest_run(item.late),
-        }
-    if item.missed is not None:
-        found |= {"missed": int(item.missed.sum()), "missed_share": float(item.missed.mean())}
-    return found
 
 
 def remarks(found: Figures, budget: Budget, checks: list[BudgetCheck]) -> list[str]:

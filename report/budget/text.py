@@ -6,8 +6,8 @@ import io
 
 from common.terminal.printable import shown
 from report.budget.checks import DOUBT, OVER, BudgetCheck
-from report.budget.judge import NOT_JUDGED, WITHIN, BudgetReport, counts, percentiles
 from report.budget.limits import PERCENTILES
+from report.budget.verdict import NOT_JUDGED, WITHIN, BudgetReport, counts, percentiles
 from report.facts.circumstances import NO_LATENCY
 from report.text.formats import percent
 from report.text.terminal import table

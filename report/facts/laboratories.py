@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from common.plan.kinds import COLUMN, TABLE, planned
-from common.plan.plan import Plan, parse
+from common.plan.plan import Plan
+from common.plan.read import parse
 from common.recording.reader import Run
 from common.roles import MASTER, SLAVE, kind_of
 from common.signals import RATES, Channels, Signal

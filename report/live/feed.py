@@ -14,7 +14,8 @@ import numpy as np
 
 from common.errors import InputError
 from common.host.clock import Clock
-from common.plan.plan import Plan, parse
+from common.plan.plan import Plan
+from common.plan.read import parse
 from common.recording.outcome import outcome
 from common.recording.reader import Run, Tail, Values
 from common.roles import LATENCY, MASTER, SLAVE, kind_of, latency_topic

@@ -27,12 +27,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Judge a recording; 1 where it is over its budget, 0 where it is within or the machine allows no verdict."""
     with Progress("reading"):
-        from report.budget import assess
+        from report.budget import assess, text
 
         report = assess(args.file, args.budget)
-    text = json.dumps(report.plain(), allow_nan=False) + "\n" if args.json else str(report)
+    written = json.dumps(report.plain(), allow_nan=False) + "\n" if args.json else text(report)
     try:
-        sys.stdout.write(text)
+        sys.stdout.write(written)
         sys.stdout.flush()
     except BrokenPipeError:  # the verdict comes first, for readers who read no further
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

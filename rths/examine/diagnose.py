@@ -142,7 +142,7 @@ def diagnose_slaves(
     Raises:
         InputError: a file cannot be read, or holds nothing to diagnose.
     """
-    from common.plan import plan as plans
+    from common.plan import read as plans
     from common.recording.reader import read
     from diagnosis.diagnose import diagnose
     from diagnosis.recorded import record

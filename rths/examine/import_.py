@@ -11,7 +11,7 @@ from typing import Any
 
 from common import signals
 from common.errors import InputError, PlanError
-from common.plan import plan as plans
+from common.plan import read as plans
 from common.plan.plan import Plan
 from common.plan.schema import fill, key, nearest
 from common.roles import MASTER, name_of
@@ -212,7 +212,7 @@ def write(path: Path, mapping: Mapping, t: Any, values: dict[str, Any], data: st
         topic: (signals.SEQ, signals.TIME, *(known[name][1] for name in names))
         for topic, names in given.items()
     }
-    plan = mapping.plan.with_test(duration=t.size * mapping.plan.test.interval)
+    plan = plans.with_test(mapping.plan, duration=t.size * mapping.plan.test.interval)
     recording = Recording(path, plan.test.name, plan.storeys, topics, plan.roles)
     recording.metadata("plan", {"toml": plan.toml(), "digest": plan.digest()})
     recording.describe()

@@ -92,13 +92,13 @@ class Subject:
 
 def of_default_test() -> Subject:
     """The default test as it ships."""
-    from common.plan import plan
+    from common.plan import read as plans
     from common.recording.reader import Run
     from laboratories import kinds
     from report.facts.laboratories import laboratories
 
     path = cli.plan_path(None)
-    test = plan.load(path)
+    test = plans.load(path)
     fields = {topic: frozenset(row.name for row in rows) for topic, rows in kinds.topics(test).items()}
     labs = laboratories(Run(path, roles=test.roles, columns={topic: {} for topic in fields}))
     return Subject(test.test.name, test.roles, test.test.interval, test.ticks - 1, fields, labs)

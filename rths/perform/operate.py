@@ -13,7 +13,8 @@ from pathlib import Path
 from common.errors import LostError
 from common.host import running
 from common.link.endpoint import Endpoint
-from common.plan.plan import Plan, parse
+from common.plan.plan import Plan
+from common.plan.read import parse
 from common.protocol.messages import Answer, Operator
 from common.roles import MASTER, OPERATOR, title
 from common.terminal import cli

@@ -64,9 +64,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Play the bench test of a part; its exit code."""
     from common.host.stopping import Stopper
-    from common.plan import plan as plans
+    from common.plan import read as plans
 
-    plan = plans.load(cli.plan_path(args.plan)).with_test(seed=args.seed)
+    plan = plans.with_test(plans.load(cli.plan_path(args.plan)), seed=args.seed)
     # in real time nothing may run beside the loop
     with contextlib.nullcontext() if args.real_time else Progress("bench test") as progress:
         from recorder import files

@@ -79,7 +79,7 @@ def identified(args: argparse.Namespace, tell: Tell) -> list[dict[str, Any]]:
 
 def devices(recording: Any, plan_name: str, tell: Tell) -> list[dict[str, Any]]:
     """The reports on the laboratories of the user's own kinds; raises InputError where the plan has none."""
-    from common.plan import plan as plans
+    from common.plan import read as plans
     from laboratories.device import Device
     from laboratories.kinds import kinds_of
     from report.facts.identification import of_device

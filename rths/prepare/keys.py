@@ -74,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
 
 def slave_roles(args: argparse.Namespace) -> tuple[str, ...]:
     """The slaves' roles that the command line asks for; raises InputError."""
-    from common.plan import plan as plans
+    from common.plan import read as plans
 
     if args.plan is not None:
         args.slaves = plans.load(cli.plan_path(args.plan)).slaves

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from common.errors import PlanError
 from common.plan import building, reality
-from common.plan.plan import Plan, from_tables, ideal, parse
+from common.plan.plan import Plan, ideal
+from common.plan.read import from_tables, parse
 from common.plan.tables import Actuator, ServoHydraulics
 from tests.helpers import SERVO_PLAN, with_table
 

@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import InputError, PlanError, RthsError
-from common.plan.plan import Plan, parse
+from common.plan.plan import Plan
+from common.plan.read import parse
 from common.recording.reader import read
 from common.recording.records import RECORD_LIMIT
 from common.recording.writer import Recording

@@ -12,8 +12,9 @@ from common.host.bare_loop import BareLoop
 from common.host.realtime import NOTHING
 from common.lab import lacking
 from common.plan import patience, reality
-from common.plan import plan as plans
-from common.plan.plan import Plan, from_tables, parse
+from common.plan import read as plans
+from common.plan.plan import OVERRUN, Plan
+from common.plan.read import from_tables, parse, with_test
 from common.safety.longest import resting
 from common.terminal import cli
 
@@ -28,7 +29,7 @@ HERE = Path()
 @pytest.mark.parametrize("name", cli.SHIPPED)
 def test_shipped_plans_bear_pauses_and_are_strict_beside_a_rig(name: str) -> None:
     shipped = plans.load(cli.plan_path(name))
-    assert {patience.OVERRUN, "safety.ramp_after", "safety.hold_after"} <= set(shipped.eased)
+    assert {OVERRUN, "safety.ramp_after", "safety.hold_after"} <= set(shipped.eased)
     interval, safety = shipped.test.interval, shipped.safety
     assert min(safety.overrun, safety.ramp_after) * interval >= 10 * 0.05  # pauses of 50 ms
     assert shipped.link.loss_timeout > (safety.overrun + safety.ramp_after) * interval
@@ -92,7 +93,7 @@ def test_every_process_derives_the_same_and_the_recordings_plan_too() -> None:
     planned = parse("[test]\nduration = 4.0\n[preflight]\nexchanges = 500\n", HERE)
     again = parse(planned.toml(), HERE)
     assert (again, again.eased, again.digest()) == (planned, planned.eased, planned.digest())
-    assert planned.with_test(seed=planned.test.seed).digest() == planned.digest()
+    assert with_test(planned, seed=planned.test.seed).digest() == planned.digest()
     assert planned.with_ticks(20).eased == planned.eased
     assert planned.digest() != patience.strict(planned).digest()
     written = planned.written()

@@ -8,9 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.errors import PlanError
-from common.plan import plan, reality
+from common.plan import read as plans
+from common.plan import reality
 from common.plan.patience import strict
-from common.plan.plan import Plan, from_tables, parse
+from common.plan.plan import Plan
+from common.plan.read import from_tables, parse, with_test
 from common.terminal import cli
 
 
@@ -19,7 +21,7 @@ def test_the_shipped_default_plan_is_what_a_plan_is_by_default(default_plan: Pla
 
 
 def test_the_paper_differs_in_name_and_lead_only(default_plan: Plan) -> None:
-    tables = strict(plan.load(cli.plan_path("paper"))).tables()
+    tables = strict(plans.load(cli.plan_path("paper"))).tables()
     tables["test"]["name"], tables["compensator"]["lead"] = "default", 0.044
     assert tables == default_plan.tables()
 
@@ -99,10 +101,10 @@ def test_a_wrong_plan_is_refused_with_a_sentence(text_and_message: tuple[str, st
 
 def test_a_plan_that_cannot_be_read_is_named(tmp_path: Path) -> None:
     with pytest.raises(PlanError, match=r"missing.toml: No such file"):
-        plan.load(tmp_path / "missing.toml")
+        plans.load(tmp_path / "missing.toml")
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe")
     with pytest.raises(PlanError, match="not UTF-8"):
-        plan.load(tmp_path / "binary.toml")
+        plans.load(tmp_path / "binary.toml")
 
 
 @given(
@@ -128,15 +130,15 @@ def test_a_plan_survives_its_own_text(
 
 
 def test_the_digest_tells_tests_apart_but_not_folders(default_plan: Plan) -> None:
-    assert default_plan.with_test(scale=0.2).digest() != default_plan.digest()
-    assert default_plan.with_test(seed=9).digest() != default_plan.digest()
+    assert with_test(default_plan, scale=0.2).digest() != default_plan.digest()
+    assert with_test(default_plan, seed=9).digest() != default_plan.digest()
     elsewhere = from_tables(default_plan.tables() | {"recording": {"folder": "elsewhere"}}, Path())
     assert elsewhere.digest() == default_plan.digest()
 
 
 def test_values_of_the_command_line_are_checked_like_those_of_a_file(default_plan: Plan) -> None:
     with pytest.raises(PlanError, match="duration"):
-        default_plan.with_test(duration=-3.0)
+        with_test(default_plan, duration=-3.0)
 
 
 def reality_of(default_plan: Plan, tmp_path: Path, text: str) -> reality.Reality:

@@ -10,9 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
 
-from common.plan import plan as plans
 from common.plan import plan_difference as difference
-from common.plan.plan import PROTOCOL_VERSION, Plan, parse
+from common.plan import read as plans
+from common.plan.plan import PROTOCOL_VERSION, Plan
+from common.plan.read import parse
 from common.protocol import codec
 from common.protocol.messages import Recorder, Register
 from common.terminal import cli

@@ -21,7 +21,7 @@ from common.link.access import access_control
 from common.link.address import dialled, loopback, place, secured
 from common.link.transport import heard, said
 from common.link.zenoh_link import key
-from common.plan import plan
+from common.plan import read as plans
 from common.plan.plan import Plan
 from rths.__main__ import main
 from tests.certificates import DAY, NOW, ROLES, again, made
@@ -45,7 +45,7 @@ def copy(base: Path, tmp_path: Path) -> Path:
 
 
 def secure_plan(folder: Path) -> Plan:
-    return plan.parse(TEXT, folder)
+    return plans.parse(TEXT, folder)
 
 
 def made_by(*words: str | Path) -> int:

@@ -16,8 +16,10 @@ from common.errors import InputError, PlanError
 from common.lab.outlet import next_of, pack_nexts
 from common.link import transport
 from common.link.transport import Route, heard, said
-from common.plan import plan, reality
-from common.plan.plan import MOST_SLAVES, Plan, from_tables, parse
+from common.plan import read as plans
+from common.plan import reality
+from common.plan.plan import Plan, ideal
+from common.plan.read import MOST_SLAVES, from_tables, parse, with_test
 from common.recording.reader import read
 from common.recording.writer import Recording
 from common.signals import default_topics
@@ -139,7 +141,7 @@ def test_a_plan_with_slaves_survives_its_own_text(slaves: dict[str, Any], mass: 
     assert returned == original
     assert list(returned.slaves) == list(slaves)
     assert returned.digest() == original.digest()
-    assert original.with_test(seed=5).slaves == original.slaves
+    assert with_test(original, seed=5).slaves == original.slaves
     for name, own in slaves.items():
         expected = own.get("damper", {}).get("mass", mass)
         assert returned.of(roles.slave_role(name)).damper.mass == expected
@@ -152,13 +154,13 @@ def test_the_digest_tells_the_order_of_slaves_apart() -> None:
 
 
 def test_every_slave_gets_what_holds_everywhere() -> None:
-    ideal = plan.ideal(two())
-    assert all(math.isinf(ideal.of(role).table.frequency) for role in ideal.roles)
-    assert ideal.of("slave.roof").damper.mass == 20.0
+    perfect = ideal(two())
+    assert all(math.isinf(perfect.of(role).table.frequency) for role in perfect.roles)
+    assert perfect.of("slave.roof").damper.mass == 20.0
 
 
 def test_the_shipped_plan_has_two_dampers_on_two_floors() -> None:
-    found = plan.load(cli.plan_path("two_dampers"))
+    found = plans.load(cli.plan_path("two_dampers"))
     assert found.roles == ("slave.roof", "slave.middle")
     assert [found.of(role).damper.floor for role in found.roles] == [3, 2]
     assert found.of("slave.middle").table.frequency == 20.0

@@ -11,7 +11,8 @@ from common.host.realtime import NOTHING, Granted
 from common.lab.laboratory import Laboratory, Setting
 from common.lab.surroundings import Surroundings, described
 from common.link.memory_link import MemoryHub
-from common.plan.plan import Plan, parse
+from common.plan.plan import Plan
+from common.plan.read import parse
 
 
 def laboratory(plan: Plan | None = None) -> Laboratory:

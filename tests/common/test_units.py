@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.errors import PlanError
-from common.plan.plan import parse
+from common.plan.read import parse
 from common.plan.units import in_si
 
 # factors of NIST SP 811 (2008), appendix B, exact where it prints them in bold

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from common.errors import InterlockError, RthsError
-from common.plan import plan, reality
+from common.plan import read as plans
+from common.plan import reality
 from common.plan.plan import Plan
 from common.recording.reader import read
 from common.terminal import cli
@@ -39,7 +40,7 @@ Effects = Mapping[str, Mapping[str, float]]
 
 def short(duration: float = SECONDS, **test: Any) -> Plan:
     """The default plan, shorter."""
-    return plan.load(cli.plan_path(None)).with_test(duration=duration, **test)
+    return plans.with_test(plans.load(cli.plan_path(None)), duration=duration, **test)
 
 
 def jitter(seed: int) -> dict[str, float]:

@@ -8,7 +8,8 @@ from typing import Any
 import pytest
 
 from common.plan import reality
-from common.plan.plan import Plan, from_tables, load
+from common.plan.plan import Plan
+from common.plan.read import from_tables, load, with_test
 from common.recording.reader import read
 from diagnosis.report.records import Report
 from loop import substructure
@@ -34,7 +35,7 @@ YIELDING = {"name": "column.yielding", "yield_displacement": 0.002}
 
 def diagnosed(plan: Plan, path: Path, *hidden: dict[str, Any]) -> dict[str, Report]:
     """Reports on a simulated recording of laboratories with hidden effects, by the slave's name."""
-    short = plan.with_test(duration=SECONDS)
+    short = with_test(plan, duration=SECONDS)
     truth = reality.from_reality({"effect": list(hidden), "seed": 3}, short, short.base)
     rollout, motion = really(truth, noise=True), substructure.motion(short)
     write(path / "test.mcap", short, rollout, motion, substructure.ground_rows(short, motion))

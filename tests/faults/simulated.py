@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from common.link.transport import TICK
-from common.plan import plan as plans
+from common.plan import read as plans
 from common.plan.plan import Plan
 from common.plan.reality import Reality, as_planned
 from common.protocol import codec

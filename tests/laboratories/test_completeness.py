@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from common.errors import InputError, PlanError
-from common.plan import plan as plans
+from common.plan import read as plans
 from laboratories.device import Device
 from laboratories.kinds import kind_of, named
 from tests.helpers import ROOT

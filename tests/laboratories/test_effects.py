@@ -17,6 +17,7 @@ from scipy.integrate import quad, solve_ivp, trapezoid
 
 from common.errors import InputError
 from common.plan.plan import Plan
+from common.plan.read import with_test
 from common.plan.tables import Actuator, Column, Damper, ShakingTable
 from common.rig import ColumnCommand, TableCommand
 from common.roles import SLAVE
@@ -48,7 +49,7 @@ EACH = pytest.mark.parametrize("effect", DISTINCT.values(), ids=list(DISTINCT))
 
 @pytest.fixture(scope="module")
 def plan(default_plan: Plan) -> Plan:
-    return default_plan.with_test(duration=3.0)
+    return with_test(default_plan, duration=3.0)
 
 
 def rollout(system: System, seed: int | None = 3) -> Rollout:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common.plan import plan as plans
+from common.plan import read as plans
 from common.plan.plan import Plan
 from laboratories.completeness import driven
 from laboratories.device import Device

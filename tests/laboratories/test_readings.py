@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from common.plan.plan import Plan
+from common.plan.read import with_test
 from common.plan.tables import SensorsTable
 from common.rig import ColumnCommand, TableCommand
 from laboratories.column.kind import COLUMN
@@ -216,7 +217,7 @@ def loop(system: System) -> Rollout:
 
 def test_the_loop_acts_on_the_falsified_force(default_plan: Plan) -> None:
     """A load cell off by a factor and a specimen off by it are one to a linear, unloaded laboratory."""
-    plan = default_plan.with_test(duration=3.0)
+    plan = with_test(default_plan, duration=3.0)
     cell = loop(lay(System(plan), [("sensor.column_force.gain", {"factor": 1.07})]))
     column = loop(lay(System(plan), [("column.stiffness", {"factor": 1.07})]))
     for name, right in column.master.items():
@@ -227,7 +228,7 @@ def test_the_loop_acts_on_the_falsified_force(default_plan: Plan) -> None:
 
 
 def test_a_bias_of_the_force_moves_the_building_by_its_statics(default_plan: Plan) -> None:
-    plan = default_plan.with_test(duration=20.0)
+    plan = with_test(default_plan, duration=20.0)
     still = np.zeros((2, plan.ticks + 1))
     system = lay(System(plan), [("sensor.column_force.bias", {"offset": 1000.0})])
     found = simulate(system.plan, still, effects=system.effects)

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from common.errors import InputError
-from common.plan.plan import Plan, parse
+from common.plan.plan import Plan
+from common.plan.read import parse, with_test
 from common.plan.tables import Actuator, Column, ServoHydraulics
 from laboratories.column import model as column_lab
 from laboratories.column.kind import COLUMN as KIND
@@ -261,7 +262,7 @@ def test_the_lag_feels_mass_and_dashpot_of_its_specimen() -> None:
 
 
 def test_the_plan_of_the_laboratory_alone_reads_what_the_loop_read(plan: Plan) -> None:
-    short = plan.with_test(duration=0.5)
+    short = with_test(plan, duration=0.5)
     for base in (short, with_table(short, "actuator", command="ramp")):
         ground = substructure.ground_rows(base, substructure.motion(base))
         found = closed_loop.simulate(base, ground)

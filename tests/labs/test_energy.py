@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common.plan import plan, reality
+from common.plan import read as plans
+from common.plan import reality
 from common.plan.plan import Plan
 from common.recording.reader import Run, read
 from common.rig import ColumnMeasurement
@@ -76,7 +77,7 @@ def test_a_delayed_spring_gives_what_the_closed_form_says(delay: float) -> None:
 
 
 def test_the_running_energy_is_the_indicator_of_the_recording(tmp_path: Path) -> None:
-    chosen = plan.load(cli.plan_path("paper")).with_test(duration=6.0)
+    chosen = plans.with_test(plans.load(cli.plan_path("paper")), duration=6.0)
     run = recorded(chosen, tmp_path / "paper.mcap")
     of, column = run.columns["master"], chosen.column
     target, measured, force, energy = (
@@ -96,7 +97,7 @@ def test_the_running_energy_is_the_indicator_of_the_recording(tmp_path: Path) ->
 
 @pytest.mark.parametrize("name", ["default", "two_dampers"])
 def test_the_drift_is_kinetic_energy_and_all_works_without_a_rest(name: str, tmp_path: Path) -> None:
-    chosen = plan.load(cli.plan_path(name)).with_test(duration=3.0)
+    chosen = plans.with_test(plans.load(cli.plan_path(name)), duration=3.0)
     run = recorded(chosen, tmp_path / "works.mcap")
     of, ticks = run.columns["master"], run.ticks("master")
     mass, damping, _ = matrices(chosen)
@@ -123,7 +124,9 @@ def test_the_drift_is_kinetic_energy_and_all_works_without_a_rest(name: str, tmp
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("name", ["default", "two_dampers"])
 def test_a_stable_integration_makes_no_energy(name: str, kind: str, tmp_path: Path) -> None:
-    chosen = with_table(plan.load(cli.plan_path(name)).with_test(duration=4.0), "structure", integrator=kind)
+    chosen = with_table(
+        plans.with_test(plans.load(cli.plan_path(name)), duration=4.0), "structure", integrator=kind
+    )
     _, drift = replayed(chosen, recorded(chosen, tmp_path / "stable.mcap"))
     assert largest(drift) < 0.01
 

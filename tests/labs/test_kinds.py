@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from common.plan import plan as plans
+from common.plan import read as plans
 from common.plan.plan import Plan
 from common.plan.reality import as_planned
 from common.recording.reader import Run, read

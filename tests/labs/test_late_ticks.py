@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from common.plan import patience, reality
-from common.plan.plan import Plan, parse
+from common.plan.plan import Plan
+from common.plan.read import parse
 from common.recording.reader import Run, read
 from common.roles import MASTER, SLAVE
 from report.facts.summary import summarize

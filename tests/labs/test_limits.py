@@ -12,9 +12,11 @@ import numpy as np
 import pytest
 
 from common.errors import InterlockError
-from common.plan import plan, reality
+from common.plan import read as plans
+from common.plan import reality
 from common.plan.limits import PATIENCE
-from common.plan.plan import Plan, from_tables, ideal
+from common.plan.plan import Plan, ideal
+from common.plan.read import from_tables, with_test
 from common.plan.reality import Reality, from_reality
 from common.plan.tables import Limits
 from common.recording.reader import Run, read
@@ -125,7 +127,7 @@ def test_a_test_within_its_limits_is_the_same_to_the_bit(short_plan: Plan, recor
 
 
 def test_every_slave_is_stopped_by_its_own_rates(tmp_path: Path) -> None:
-    chosen = plan.load(cli.plan_path("two_dampers")).with_test(duration=2.0)
+    chosen = with_test(plans.load(cli.plan_path("two_dampers")), duration=2.0)
     path = tmp_path / "two.mcap"
     assert virtual.run(virtual.assemble(chosen, reality.as_planned(chosen), path), str) is None
     columns = read(path).columns
@@ -142,7 +144,7 @@ def test_every_slave_is_stopped_by_its_own_rates(tmp_path: Path) -> None:
 
 
 def test_a_limit_on_the_building_holds_for_every_storey(tmp_path: Path) -> None:
-    chosen = plan.load(cli.plan_path("two_dampers")).with_test(duration=2.0)
+    chosen = with_test(plans.load(cli.plan_path("two_dampers")), duration=2.0)
     path = tmp_path / "storeys.mcap"
     assert virtual.run(virtual.assemble(chosen, reality.as_planned(chosen), path), str) is None
     for name in ("velocity", "acceleration"):
@@ -179,7 +181,7 @@ def nominal_peak(chosen: Plan) -> float:
 def test_an_unstable_delay_is_stopped_before_the_building_moves_more_than_it_should(
     delay: float, amd: bool, default_plan: Plan
 ) -> None:
-    chosen = with_table(default_plan.with_test(duration=10.0), "control", amd=amd)
+    chosen = with_table(with_test(default_plan, duration=10.0), "control", amd=amd)
     peaks = []
     real = from_reality({"actuator": {"delay": delay}}, chosen, Path())
     bench = virtual.assemble(

@@ -13,7 +13,8 @@ from common.errors import InputError, InterlockError, LostError, RigError, RthsE
 from common.lab.laboratory import REPEAT_NS
 from common.link.endpoint import Received
 from common.plan import reality
-from common.plan.plan import PROTOCOL_VERSION, Plan, from_tables
+from common.plan.plan import PROTOCOL_VERSION, Plan
+from common.plan.read import from_tables, with_test
 from common.plan.reality import Reality
 from common.plan.tables import RigTable
 from common.protocol.exchange import State
@@ -62,7 +63,7 @@ def test_the_loops_equal_the_rollout_with_every_correction(
         "ats": {"lead": 0.03},
     }[kind]
     compensator = {"kind": kind, "force": {"cutoff": 0.05, "unity": 2.0}, **own}
-    tables = short_plan.with_test(duration=2.0).tables() | {"compensator": compensator}
+    tables = with_test(short_plan, duration=2.0).tables() | {"compensator": compensator}
     tables["table"] |= {"compensator": {"kind": "taylor", "lead": 0.0189, "order": 2}}
     plan = from_tables(tables, short_plan.base)
     found, error, _ = run(plan, tmp_path / "corrected.mcap")
@@ -106,7 +107,7 @@ def test_the_same_inputs_give_the_same_bits(short_plan: Plan, recording: Run, tm
 
 
 def test_another_seed_gives_other_noise(short_plan: Plan, recording: Run, tmp_path: Path) -> None:
-    other, _, _ = run(short_plan.with_test(seed=2), tmp_path / "other.mcap")
+    other, _, _ = run(with_test(short_plan, seed=2), tmp_path / "other.mcap")
     assert not np.array_equal(
         other.columns["master"]["column_force"], recording.columns["master"]["column_force"]
     )
@@ -233,7 +234,7 @@ def test_an_unstable_test_is_stopped_by_a_limit(default_plan: Plan, tmp_path: Pa
 
 def test_another_plan_or_protocol_is_refused_before_anything_moves(short_plan: Plan) -> None:
     for request in (
-        Register(5, PROTOCOL_VERSION, short_plan.with_test(scale=0.2).digest()),
+        Register(5, PROTOCOL_VERSION, with_test(short_plan, scale=0.2).digest()),
         Register(5, PROTOCOL_VERSION + 1, short_plan.digest()),
     ):
         bench = virtual.assemble(without_recorder(short_plan), reality.as_planned(short_plan), None)

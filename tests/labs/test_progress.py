@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from common.plan import plan, reality
+from common.plan import read as plans
+from common.plan import reality
 from common.plan.plan import Plan
 from common.recording.reader import read
 from simulation import virtual
@@ -15,7 +16,7 @@ from tests.helpers import ROOT
 
 @pytest.mark.parametrize("name", ["default", "two_dampers"])
 def test_progress_has_the_newest_drift_forces_and_late_ticks(name: str, tmp_path: Path) -> None:
-    test: Plan = plan.load(ROOT / f"rths/plans/{name}.toml").with_test(duration=0.5)
+    test: Plan = plans.with_test(plans.load(ROOT / f"rths/plans/{name}.toml"), duration=0.5)
     bench = virtual.assemble(test, reality.as_planned(test), tmp_path / "a.mcap")
     assert virtual.run(bench, lambda: "") is None
     progress, master = bench.master.progress, read(tmp_path / "a.mcap").columns["master"]

@@ -12,9 +12,11 @@ import pytest
 from common.errors import InputError, InterlockError, LostError, RigError
 from common.lab.laboratory import Setting
 from common.link.endpoint import Received
-from common.plan import plan, reality
+from common.plan import read as plans
+from common.plan import reality
 from common.plan.patience import strict
-from common.plan.plan import PROTOCOL_VERSION, Plan, from_tables
+from common.plan.plan import PROTOCOL_VERSION, Plan
+from common.plan.read import from_tables, with_test
 from common.plan.reality import Reality
 from common.plan.tables import RigTable
 from common.protocol.exchange import State
@@ -333,7 +335,7 @@ def test_of_two_processes_that_register_the_first_is_armed() -> None:
 
 
 def test_the_shipped_plan_reduces_the_motion() -> None:
-    chosen = plan.load(cli.plan_path("two_dampers")).with_test(duration=5.0)
+    chosen = with_test(plans.load(cli.plan_path("two_dampers")), duration=5.0)
     ground = substructure.ground_rows(chosen, substructure.motion(chosen))
     peaks = []
     for amd in (True, False):

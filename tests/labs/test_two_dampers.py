@@ -9,7 +9,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import StateSpace, lsim
 
-from common.plan.plan import Plan, from_tables, ideal
+from common.plan.plan import Plan, ideal
+from common.plan.read import from_tables
 from loop import substructure
 from loop.closed_loop import simulate
 

@@ -8,7 +8,8 @@ import math
 import numpy as np
 import pytest
 
-from common.plan.plan import Plan, from_tables, ideal
+from common.plan.plan import Plan, ideal
+from common.plan.read import from_tables, with_test
 from common.plan.tables import Actuator, CompensatorTable, Control
 from common.roles import SLAVE
 from common.signals import TOPICS
@@ -53,7 +54,7 @@ def test_the_nominal_building_drifts_by_the_published_peak(default_plan: Plan) -
 def growth(plan: Plan, delay: float, seconds: float = 30.0) -> float:
     """Growth rate (1/s) of the loop's free vibration behind a pure delay of the actuator, after a shock."""
     plan = dataclasses.replace(
-        without_damper(plan).with_test(duration=seconds),
+        with_test(without_damper(plan), duration=seconds),
         actuator=Actuator(gain=1.0, delay=delay, time_constant=0.0),
         compensator=CompensatorTable("none", {}),
     )
@@ -103,7 +104,7 @@ def test_what_diverges_to_infinity_is_cut_there(default_plan: Plan) -> None:
 
 def test_the_damper_adds_three_points_of_damping(default_plan: Plan) -> None:
     def decay(plan: Plan) -> float:
-        plan = ideal(plan.with_test(duration=6.0))
+        plan = ideal(with_test(plan, duration=6.0))
         shock = np.zeros((2, plan.ticks + 1))
         shock[0, 1:6] = 1.0
         x = np.abs(signals(plan, simulate(plan, shock))["displacement"])

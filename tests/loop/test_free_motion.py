@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from common.plan import plan as plans
+from common.plan import read as plans
 from common.plan.plan import Plan
 from common.terminal import cli
 from loop.nominal import free_motion

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 from common.errors import InputError
-from common.plan import plan as plans
-from common.plan.plan import Plan, ideal, parse
+from common.plan import read as plans
+from common.plan.plan import Plan, ideal
+from common.plan.read import parse, with_test
 from common.plan.tables import CompensatorTable
 from common.roles import MASTER
 from common.signals import OF_BUILDING, OF_STOREYS
@@ -67,7 +68,7 @@ def test_it_is_the_closed_loop_to_the_last_bit(plan: Plan, seed: int | None) -> 
     ],
 )
 def test_it_is_so_with_effects_and_any_compensator(default_plan: Plan, laid: list[effects.Entry]) -> None:
-    base = with_table(default_plan.with_test(duration=3.0), "control", amd=False)
+    base = with_table(with_test(default_plan, duration=3.0), "control", amd=False)
     system = effects.lay(System(base), laid)
     ground = ground_of(base)
     found = alone(system.plan, ground, effects=system.effects, seed=1)
@@ -141,7 +142,7 @@ def written_out(plan: Plan, ground: Array, *, late: bool) -> Array:
 
 @pytest.mark.parametrize("late", [False, True])
 def test_with_an_ideal_actuator_it_solves_the_equations_written_out(plan: Plan, late: bool) -> None:
-    base = ideal(plan.with_test(duration=1.0))
+    base = ideal(with_test(plan, duration=1.0))
     force = replace(base.compensator.force, unit_delay=late)
     base = replace(base, compensator=replace(base.compensator, force=force))
     ground = ground_of(base)

@@ -11,7 +11,8 @@ import pytest
 from scipy.optimize import root
 
 from common.errors import InputError
-from common.plan.plan import Plan, parse
+from common.plan.plan import Plan
+from common.plan.read import parse
 from common.plan.tables import Experimental
 from loop.nominal import partition
 from loop.nominal.preflight import expected_delay

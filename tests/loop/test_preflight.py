@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from common.plan import plan as plans
+from common.plan import read as plans
 from common.plan.plan import Plan
 from common.plan.tables import CompensatorTable, Control
 from common.roles import MASTER, SLAVE
@@ -154,7 +154,7 @@ def test_limited_quantities_that_are_no_signals(short_plan: Plan) -> None:
 
 
 def test_several_slaves_have_peaks_too() -> None:
-    plan = plans.load(cli.plan_path("two_dampers")).with_test(duration=3.0)
+    plan = plans.with_test(plans.load(cli.plan_path("two_dampers")), duration=3.0)
     assert "of their limits at most (" in peaks_check(plan).text
     found = peaks_check(with_table(plan, "limits", damper_stroke=0.01)).risk
     assert found is not None

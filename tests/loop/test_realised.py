@@ -11,7 +11,8 @@ import pytest
 
 from common.errors import InputError, RthsError
 from common.plan import reality
-from common.plan.plan import Plan, from_tables
+from common.plan.plan import Plan
+from common.plan.read import from_tables, with_test
 from common.plan.reality import Reality
 from common.recording.reader import Run, read
 from common.roles import MASTER, SLAVE, kind_of
@@ -30,7 +31,7 @@ from tests.laboratories.effects.distinct import DISTINCT
 
 @pytest.fixture(scope="module")
 def plan(default_plan: Plan) -> Plan:
-    return default_plan.with_test(duration=2.5)
+    return with_test(default_plan, duration=2.5)
 
 
 def real(plan: Plan, *effects: dict[str, Any], **tables: Any) -> Reality:

@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from common.plan.plan import Plan
+from common.plan.read import with_test
 from laboratories.column.kind import COLUMN
 from laboratories.effects import CATALOGUE, lay
 from laboratories.effects.effect import Effect
@@ -27,7 +28,7 @@ IN_SHORT_STEPS = ("viscous", "friction", "inertia")  # of the column: rates coun
 
 @pytest.fixture(scope="module")
 def plan(default_plan: Plan) -> Plan:
-    return default_plan.with_test(duration=3.0)
+    return with_test(default_plan, duration=3.0)
 
 
 def ground(system: System) -> Array:

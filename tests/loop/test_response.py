@@ -10,7 +10,8 @@ import pytest
 from scipy.linalg import expm
 
 from common.errors import InputError
-from common.plan.plan import Plan, parse
+from common.plan.plan import Plan
+from common.plan.read import parse
 from loop import substructure
 from loop.nominal.partition import matrices
 from loop.nominal.response import response

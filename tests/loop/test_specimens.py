@@ -11,7 +11,8 @@ import pytest
 from scipy.signal import StateSpace, lsim
 
 from common.errors import PlanError
-from common.plan.plan import Plan, from_tables, load
+from common.plan.plan import Plan
+from common.plan.read import from_tables, load
 from common.terminal import cli
 from loop.nominal import critical, partition, preflight
 from loop.substructure import Substructure, ground_rows, motion

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from common.plan import plan as plans
+from common.plan import read as plans
 from common.plan.tables import ForceCorrection
 from common.terminal import cli
 from models import force_correction

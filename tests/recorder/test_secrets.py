@@ -14,7 +14,7 @@ from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
 
 from common.link.zenoh_link import listenable
-from common.plan import plan as plans
+from common.plan import read as plans
 from common.plan import reality
 from common.plan.plan import Plan
 from simulation import virtual

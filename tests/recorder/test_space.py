@@ -10,6 +10,7 @@ import pytest
 
 from common.lab.preflight import RefusedError
 from common.plan.plan import Plan
+from common.plan.read import with_test
 from common.recording.reader import read
 from common.recording.schema import message_class, message_name, schema_file
 from common.signals import TICK_TOPICS, TOPICS, FieldType, default_topics
@@ -50,7 +51,7 @@ def test_the_bytes_of_a_message_are_those_of_its_fields(topic: str, storeys: int
 
 
 def test_twice_the_test_needs_twice_the_room(short_plan: Plan) -> None:
-    longer = short_plan.with_test(duration=8.0)
+    longer = with_test(short_plan, duration=8.0)
     assert space.need(longer) - space.FIXED == pytest.approx(2.0 * (space.need(short_plan) - space.FIXED))
 
 

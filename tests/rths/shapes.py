@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from common.plan.plan import Plan, parse
+from common.plan.plan import Plan
+from common.plan.read import parse
 from common.recording.reader import CLOCK
 from common.recording.writer import Recording
 from common.signals import LATENCY as LATENCY_ROWS

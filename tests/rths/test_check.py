@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from common.plan import plan as plans
+from common.plan import read as plans
 from common.terminal import cli
 from loop.nominal import preflight
 from report.plan import classes

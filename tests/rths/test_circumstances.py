@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common.plan.plan import Plan, from_tables
+from common.plan.plan import Plan
+from common.plan.read import from_tables
 from common.plan.tables import LaboratoryTable, RigTable
 from common.recording.reader import CLOCK, Run, read
 from report.facts import circumstances, storeys

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common.plan.plan import load
+from common.plan.read import load, with_test
 from common.recording.reader import read
 from common.terminal.cli import plan_path
 from rths.__main__ import EXAMPLES, MODULES, VERBS, main, parser_for
@@ -323,7 +323,7 @@ def test_a_reality_leaves_no_trace_in_the_recording(call: Any, tmp_path: Path) -
     secret.write_text("[column]\nstiffness = 13.1e6\n")
     path = tmp_path / "real.mcap"
     assert call("run", "--virtual", "--duration", "4", "--reality", secret, "-o", path) == 0
-    real, plan = read(path), load(plan_path(None)).with_test(duration=4.0)
+    real, plan = read(path), with_test(load(plan_path(None)), duration=4.0)
     assert real.metadata["plan"] == {"toml": plan.toml(), "digest": plan.digest()}
     ratio = real.columns["master"]["column_force"] / real.columns["master"]["column_displacement"]
     strong = np.abs(real.columns["master"]["column_displacement"]) > 1e-3

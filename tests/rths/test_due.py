@@ -11,13 +11,14 @@ import numpy as np
 import pytest
 
 from common.plan.plan import Plan
+from common.plan.read import with_test
 from common.recording.reader import Run
 from common.safety.modes import Mode
 from report.facts.due import due
 from report.run.verdict import completeness
 from rths.examine.inspect import stopped
 
-PLAN = Plan().with_test(duration=0.02)  # ten ticks
+PLAN = with_test(Plan(), duration=0.02)  # ten ticks
 
 
 def turn(lab: str, tick: int, before: Mode, after: Mode) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from mcap_protobuf.decoder import DecoderFactory
 
 from common import signals
 from common.plan import reality
-from common.plan.plan import from_tables
+from common.plan.read import from_tables
 from common.recording.checksums import CHECKSUMS
 from common.recording.reader import Run, read
 from common.recording.recovery import recover

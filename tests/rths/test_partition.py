@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from common.plan import plan as plans
+from common.plan import read as plans
 from common.plan.plan import Plan
 from common.plan.tables import CompensatorTable
 from common.terminal import cli
@@ -55,7 +55,7 @@ def test_two_storeys_diverge_beyond_their_critical_delay_only(default_plan: Plan
     critical = critical_delay_of(plan)
     growth = []
     for factor in (0.9, 1.1):
-        late = delayed(plan, factor * critical).with_test(duration=20.0)
+        late = plans.with_test(delayed(plan, factor * critical), duration=20.0)
         drift = np.abs(signals(late, simulate(late, pulse(late)))["column_target"])
         middle = drift.size // 2
         growth.append(drift[middle:].max() / drift[1000:middle].max())

@@ -11,6 +11,7 @@ import pytest
 from common.lab.preflight import Gate, RefusedError
 from common.plan import reality
 from common.plan.plan import Plan
+from common.plan.read import with_test
 from common.plan.tables import CompensatorTable
 from common.recording.reader import Run, read
 from rths.__main__ import parser_for
@@ -108,7 +109,7 @@ def test_a_sensor_off_zero_refuses_as_its_laboratory_arms(
 
 
 def test_judging_the_sensors_changes_no_bit_of_a_test(short_plan: Plan, tmp_path: Path) -> None:
-    plan = short_plan.with_test(duration=1.0)
+    plan = with_test(short_plan, duration=1.0)
     runs = []
     for name, gate in (("with", Gate()), ("without", None)):
         path = tmp_path / f"{name}.mcap"

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from common.plan import reality
-from common.plan.plan import parse
+from common.plan.read import parse
 from common.recording.reader import Run, read
 from diagnosis.recorded import record
 from diagnosis.recorded.parts import Building

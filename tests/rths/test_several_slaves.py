@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from common.plan import reality
-from common.plan.plan import Plan, from_tables
+from common.plan.plan import Plan
+from common.plan.read import from_tables
 from common.recording.reader import read
 from report.text import tabular
 from simulation import virtual

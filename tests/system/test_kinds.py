@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from common.plan import plan as plans
+from common.plan import read as plans
 from common.recording.reader import Run, read
 from tests.helpers import PATIENT
 from tests.labs.test_kinds import PLANS

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common.plan import plan as plans
+from common.plan import read as plans
 from common.plan import reality
 from common.recording.reader import Run, read
 from simulation import virtual

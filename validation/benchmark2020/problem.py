@@ -8,7 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from common.plan.plan import Plan, load
+from common.plan.plan import Plan
+from common.plan.read import load
 from common.plan.tables import CompensatorTable
 from loop import substructure
 

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from common.errors import InputError
-from common.plan import plan as plans
+from common.plan import read as plans
 from common.plan.plan import Plan
 from common.plan.schema import nearest
 from common.terminal import cli

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from common.errors import InputError, InterlockError
-from common.plan import plan as plans
+from common.plan import read as plans
 from common.plan import reality as realities
 from common.plan.reality import Reality
 from validation.blind.draw import Case, Laid

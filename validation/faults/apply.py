@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from common.link.transport import TICK
-from common.plan import plan as plans
+from common.plan import read as plans
 from common.plan.patience import strict
 from common.plan.plan import Plan
 from common.plan.reality import as_planned
@@ -26,7 +26,7 @@ STATES = {"outage": DROPS, "backlog": QUEUES}
 
 def plan_of(schedule: Schedule) -> Plan:
     """The plan of a scheduled test, which waits for a recorder where it is recorded; its figures are those of rigs."""
-    plan = strict(plans.load(cli.plan_path(schedule.plan)).with_test(duration=schedule.duration))
+    plan = strict(plans.with_test(plans.load(cli.plan_path(schedule.plan)), duration=schedule.duration))
     tables = plan.tables()
     tables["recording"]["required"] = schedule.recorded
     return plans.from_tables(tables, Path())

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from common.lab.preflight import Gate
-from common.plan import plan as plans
+from common.plan import read as plans
 from common.plan.plan import Plan, ideal
 from common.plan.reality import as_planned
 from common.plan.tables import Actuator, CompensatorTable, Control, GroundMotionTable, TableCompensator
@@ -184,7 +184,7 @@ def pulse(plan: Plan) -> Array:
 
 def free_damping(plan: Plan, *, noise: bool = True) -> tuple[float, float]:
     """Frequency (Hz) and damping ratio of the free vibration after a pulse."""
-    plan = plan.with_test(duration=6.0)
+    plan = plans.with_test(plan, duration=6.0)
     columns = signals(plan, simulate(plan, pulse(plan), seed=plan.test.seed if noise else None))
     begin = round(0.5 / plan.test.interval)
     return indicators.free_vibration_damping(columns["displacement"][begin:], plan.test.interval)

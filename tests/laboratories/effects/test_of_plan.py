@@ -8,7 +8,8 @@ from typing import Any
 import pytest
 
 from common.errors import InputError, PlanError
-from common.plan.plan import Plan, from_tables
+from common.plan.plan import Plan
+from common.plan.read import from_tables
 from common.plan.reality import Reality, from_reality
 from laboratories import effects
 from laboratories.effects.sites import of_plan

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from common.errors import InputError
-from common.plan import plan as plans
+from common.plan import read as plans
 from common.plan.plan import Plan
 from laboratories.device import Device
 from laboratories.identification import device

@@ -17,7 +17,8 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, ru
 
 from common.lab.laboratory import Setting
 from common.link.endpoint import Received
-from common.plan.plan import PROTOCOL_VERSION, Plan, load
+from common.plan.plan import PROTOCOL_VERSION, Plan
+from common.plan.read import load, with_test
 from common.plan.reality import as_planned
 from common.protocol import messages
 from common.protocol.codec import MESSAGES
@@ -38,7 +39,7 @@ from validation.faults.rigs import Probe
 
 SESSION, OTHER = 5, 6
 INSTANCE = 3
-PLAN: Plan = without_recorder(load(cli.plan_path(None)).with_test(duration=2.0))
+PLAN: Plan = without_recorder(with_test(load(cli.plan_path(None)), duration=2.0))
 INTERVAL = 2_000_000
 
 SESSIONS = st.sampled_from([0, SESSION, SESSION, OTHER])

@@ -12,6 +12,7 @@ import pytest
 
 from common.plan import reality
 from common.plan.plan import Plan
+from common.plan.read import with_test
 from rths.__main__ import main
 from simulation import virtual
 from tests.helpers import ROOT
@@ -56,7 +57,7 @@ def recorded(plan: Plan, folder: Path, options: str) -> Path:
 def test_a_recording_with_two_percent_of_delays_is_over(
     options: str, call: Any, capsys: Any, short_plan: Plan, tmp_path: Path
 ) -> None:
-    path = recorded(short_plan.with_test(duration=5.0), tmp_path, options)
+    path = recorded(with_test(short_plan, duration=5.0), tmp_path, options)
     assert call(path, "--json") == 1
     report = json.loads(capsys.readouterr().out)
     over = [item["name"] for item in report["checks"] if item["verdict"] == "over"]

@@ -15,8 +15,8 @@ from common.recording.reader import Run, read
 from common.recording.writer import Recording
 from report.budget.checks import longest_run
 from report.budget.figures import Bare, bare_loop, figures, measured
-from report.budget.judge import percentiles
 from report.budget.limits import PERCENTILES
+from report.budget.verdict import percentiles
 from tests.rths.latency_budget import noisy
 
 times = st.floats(0.0, 0.1)

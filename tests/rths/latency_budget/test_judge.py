@@ -12,8 +12,10 @@ from common.errors import InputError
 from common.recording.reader import Run
 from report.budget.checks import BudgetCheck
 from report.budget.figures import figures
-from report.budget.judge import BudgetReport, judge
+from report.budget.judge import judge
 from report.budget.limits import from_tables, load
+from report.budget.text import text
+from report.budget.verdict import BudgetReport
 from tests.rths.latency_budget import noisy
 
 QUIET = {
@@ -119,7 +121,7 @@ def test_an_unfit_machine_allows_no_verdict_on_what_is_over(changed: dict[str, s
     slow = verdict(noisy.run(late_in(0.08, 1.5e-3), record() | changed), TAIL)
     assert slow.status == "not_judged"
     assert slow.doubts[0].startswith(reason)
-    assert reason in str(slow)
+    assert reason in text(slow)
     assert verdict(noisy.run(late_in(0.0, 0.0), record() | changed), TAIL).status == "within"
 
 
@@ -240,7 +242,7 @@ def test_a_slave_without_a_row_is_over_any_budget_on_any_machine() -> None:
         "middle/ticks without latency",
     }
     assert report.plain()["late"]["middle/longest_gap"] == 1166
-    assert "over the budget: middle/late share" in str(report)
+    assert "over the budget: middle/late share" in text(report)
     assert report.warnings == [
         "The recording has no latency of any of the 1166 ticks with middle: over any budget."
     ]
@@ -314,10 +316,10 @@ def test_a_report_is_strict_json(run: Run) -> None:
 
 
 def test_the_table_names_what_is_over_and_the_bare_loop() -> None:
-    text = str(verdict(noisy.delayed(1, 2500)))
-    assert "over the budget: feedback_one_way p99" in text.splitlines()[-1]
-    assert any(line.startswith("bare loop ") for line in text.splitlines())
-    assert "; bare loop: " in text
+    said = text(verdict(noisy.delayed(1, 2500)))
+    assert "over the budget: feedback_one_way p99" in said.splitlines()[-1]
+    assert any(line.startswith("bare loop ") for line in said.splitlines())
+    assert "; bare loop: " in said
 
 
 @given(st.floats(0.0, 5e-3), st.floats(0.0, 5e-3), st.sampled_from(["p50", "p90", "p99"]))

@@ -17,7 +17,8 @@ from bokeh.document import Document
 from common.errors import EmergencyStopError
 from common.host.clock import VirtualClock
 from common.plan import reality
-from common.plan.plan import Plan, load
+from common.plan.plan import Plan
+from common.plan.read import load, with_test
 from common.recording.reader import Run, Tail, length, read
 from common.recording.writer import Recording
 from common.signals import TOPICS
@@ -180,7 +181,7 @@ def test_a_second_reader_gets_all_of_the_window_at_once(growing: Growing) -> Non
 
 
 def test_several_slaves_are_shown_one_at_a_time(tmp_path: Path, grow: Grow) -> None:
-    plan = load(ROOT / "rths/plans/two_dampers.toml").with_test(duration=1.0)
+    plan = with_test(load(ROOT / "rths/plans/two_dampers.toml"), duration=1.0)
     path = tmp_path / "two.mcap"
     assert virtual.run(virtual.assemble(plan, reality.as_planned(plan), path), lambda: "") is None
     run = read(path)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from common.plan import reality
-from common.plan.plan import from_tables
+from common.plan.read import from_tables
 from common.recording.reader import Run, read
 from common.terminal.telling import untold
 from diagnosis.report.read import report as read_report

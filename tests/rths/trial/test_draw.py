@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from common.errors import InputError
-from common.plan import plan as plans
+from common.plan import read as plans
 from common.plan import reality as realities
 from laboratories.effects.effect import Effect, Parameter
 from laboratories.effects.reading import SIGNALS

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from common.plan import plan as plans
+from common.plan import read as plans
 from validation.benchmark2020.problem import CASES, EL_CENTRO, SETTINGS, planned, with_compensator
 
 

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.link.zenoh_link import listenable
-from common.plan import plan as plans
+from common.plan import read as plans
 from common.plan.plan import Plan
 from common.recording.reader import Run, read
 from tests.faults.rows import motion_bound

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from common.link.transport import CONTROL, Packet
 from common.link.zenoh_link import ZenohLink
-from common.plan import plan as plans
+from common.plan import read as plans
 from common.roles import OBSERVER
 
 

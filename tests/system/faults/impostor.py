@@ -8,7 +8,7 @@ from pathlib import Path
 
 from common.link.transport import CONTROL, TICK, Route
 from common.link.zenoh_link import configuration, key, reach, unrefused
-from common.plan import plan as plans
+from common.plan import read as plans
 from common.plan.plan import PROTOCOL_VERSION
 from common.protocol import codec
 from common.protocol.messages import Command, Message, Register, Stop, Trip
