@@ -1,0 +1,71 @@
+"""What an imported recording states of its channels: written, read back, and what it does to a prediction."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from common.errors import InputError
+from common.recording.imported import (
+    IMPORT,
+    NOTHING_STATED,
+    ImportedChannel,
+    ImportedData,
+    LoggerFilter,
+    exchange_known,
+    imported,
+)
+from common.recording.reader import Run
+
+LOW_PASS = LoggerFilter("butterworth", 4, 100.0)
+FORCE = ImportedChannel(LOW_PASS, 0.004, 1.0, 0.01, interpolated=True, rate=1024.0)
+
+
+def of(metadata: dict[str, dict[str, str]]) -> Run:
+    return Run(Path("a.mcap"), metadata=metadata)
+
+
+def test_what_is_written_is_read_back() -> None:
+    stated = ImportedData("a.csv", True, {"master": {"column_force": FORCE}})
+    found = imported(of({IMPORT: stated.metadata()}))
+    assert found == stated
+    assert found.channel("master", "column_force") == FORCE
+    assert found.channel("slave", "damper_force") == NOTHING_STATED
+
+
+def test_a_test_of_rths_is_no_import_and_an_older_import_states_nothing() -> None:
+    assert imported(of({})) is None
+    older = imported(of({IMPORT: {"data": "b.csv"}}))
+    assert older == ImportedData("b.csv")
+    with pytest.raises(InputError, match="its metadata 'import' cannot be read"):
+        imported(of({IMPORT: {"channels": '{"master": {"x": {"colour": 1}}}'}}))
+
+
+@pytest.mark.parametrize("kind", ["butterworth", "bessel"])
+def test_a_filter_loses_three_decibels_at_its_cutoff_and_delays_what_is_slow(kind: str) -> None:
+    low_pass = LoggerFilter(kind, 4, 50.0)
+    assert abs(low_pass.response(np.array([50.0]))[0]) == pytest.approx(math.sqrt(0.5), rel=1e-6)
+    t = np.arange(2000) * 0.001
+    slow = np.sin(2.0 * math.pi * 2.0 * t)
+    late = -np.angle(low_pass.response(np.array([2.0])))[0] / (2.0 * math.pi * 2.0)
+    expected = np.sin(2.0 * math.pi * 2.0 * (t - late))
+    assert np.max(np.abs(low_pass.filtered(slow, 0.001) - expected)[500:]) < 1e-3
+
+
+def test_a_prediction_passes_filter_and_delay() -> None:
+    t = np.arange(1000) * 0.002
+    ramp = np.asarray(3.0 * t, dtype=np.float64)
+    seen = FORCE.through(ramp, 0.002)
+    late = 0.004 + 2.6131 / (2.0 * math.pi * 100.0)  # the delay, and the filter's at low frequency
+    assert np.allclose(seen[100:], 3.0 * (t - late)[100:], atol=1e-6)
+    assert NOTHING_STATED.through(ramp, 0.002) is ramp
+
+
+def test_the_exchange_is_known_by_numbers_or_stamps() -> None:
+    numbers = Run(Path("a.mcap"), columns={"master": {"damper_force_seq": np.zeros(3)}})
+    stamps = Run(Path("a.mcap"), columns={"latency": {"command_one_way": np.zeros(3)}})
+    neither = Run(Path("a.mcap"), columns={"slave": {"seq": np.zeros(3), "damper_force": np.zeros(3)}})
+    assert [exchange_known(run) for run in (numbers, stamps, neither)] == [True, True, False]
