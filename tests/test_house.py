@@ -30,6 +30,13 @@ def test_the_readme_names_commands_and_files_that_exist() -> None:
             assert (ROOT / folder).is_dir(), folder
 
 
+def test_the_readme_says_what_each_folder_holds() -> None:
+    folders = {path.relative_to(ROOT).parts[0] for path in tracked() if path.parent != ROOT}
+    rows = re.findall(r"^\| (`.+?/`) \|", README, flags=re.MULTILINE)
+    named = {folder for row in rows for folder in re.findall(r"`(.+?)/`", row)}
+    assert named == {folder for folder in folders if not folder.startswith(".")}
+
+
 def test_the_readmes_first_screen_is_the_two_commands_and_the_output_of_the_first() -> None:
     head = README[: README.index("## The loop")]
     assert "make run" in head
