@@ -108,7 +108,7 @@ class Laboratories:
             ZenohLink("slave", plan.test.name, connect=endpoint, patience=PATIENCE_S),
         ]
         self.labs = [
-            Laboratory(name, Setting(plan, FrameEndpoint(link, self._digest), MonotonicClock()))
+            Laboratory(name, Setting(plan, FrameEndpoint(link, self._digest), MonotonicClock()), TOPICS)
             for name, link in zip(("master", "slave"), self._links, strict=True)
         ]
         for lab in self.labs:

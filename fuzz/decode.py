@@ -30,6 +30,8 @@ with atheris.instrument_imports(
     from common.plan.plan import Plan
     from common.protocol import codec
     from common.protocol.messages import Samples
+    from common.recording.rows import layout, other
+    from common.signals import TOPICS
     from recorder.items import Items
 
 SESSION = 7
@@ -108,8 +110,9 @@ def seeds(folder: Path) -> None:
         body = codec.encode(message, KEY)[: -codec.CHECK_SIZE]
         for choice in range(12):
             (folder / f"{kind.__name__}-{choice}").write_bytes(bytes([choice]) + body)
-    event = ["event", 0, 0, 0.0, "master", "info", "begin", "begun", {"a": 1.0}]
-    (folder / "piece").write_bytes(b"\0" + msgpack.packb([event]))
+    event = other("event", 0, 0, (0.0, "master", "info", "begin", "begun", {"a": 1.0}))
+    row = layout(TOPICS["slave"], 1).pack(0, 0, 0, 0.0, -1, *[0.5] * 10)
+    (folder / "piece").write_bytes(b"\0" + msgpack.packb([event, ("slave", row)]))
 
 
 def main() -> None:

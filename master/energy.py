@@ -17,7 +17,7 @@ from loop.nominal.partition import drifts, felt, storey_stiffness
 from master.step import Outputs
 from models import energy_balance
 from models.compiled import plain
-from models.energy_balance import ACCELERATION, DISPLACEMENT, DRIFT_SHARE, ERROR_SHARE, VELOCITY
+from models.energy_balance import DRIFT_SHARE, ERROR_SHARE
 
 # of the largest displacement allowed: with less motion a share of the ground's energy says nothing
 FLOOR_SHARE = 0.01
@@ -27,12 +27,15 @@ class EnergyMonitor:
     """The balance of one test, moving on tick by tick, and its limits `error_energy` and `numerical_drift`."""
 
     def __init__(self, plan: Plan) -> None:
-        self._limits, self._plain = vars(plan.limits), plan.storeys == 1
+        self._limits, self._motions = vars(plan.limits), 3 * plan.storeys
         ratio, scale, self._felt = interface(kinds.own(plan), plan)
         self._balance = energy_balance.build(
             plan.test.interval, ratio, scale, floor(plan), np.array(plan.structure.mass)
         )
         self._enter, self._sums = energy_balance.enter, plain(self._balance)
+        self._motion = self._balance.motion.reshape(-1)[
+            : self._motions
+        ]  # displacement, velocity, acceleration
 
     @property
     def error_energy(self) -> float:
@@ -46,14 +49,7 @@ class EnergyMonitor:
 
     def violation(self, measured: tuple[float, ...], outputs: Outputs) -> LimitViolation | None:
         """Take one tick into the sums; the first of them beyond its limit."""
-        balance = self._balance
-        motion = balance.motion
-        if self._plain:
-            motion[DISPLACEMENT, 0] = outputs.displacement
-            motion[VELOCITY, 0] = outputs.velocity
-            motion[ACCELERATION, 0] = outputs.acceleration
-        else:
-            motion[: ACCELERATION + 1] = outputs[5:8]
+        self._motion[:] = outputs.storeys[: self._motions]
         self._enter(self._sums, outputs.ground_acceleration, outputs.target, *self._felt(measured))
         error, drift = self.error_energy, self.numerical_drift
         limits = self._limits

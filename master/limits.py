@@ -10,8 +10,6 @@ from laboratories.limits import LaboratoryLimits, NoLimits, sent_guard
 from master.energy import EnergyMonitor
 from master.step import Outputs, Sent
 
-STOREYS = Outputs._fields.index(OF_STOREYS[0])
-
 
 class MasterLimits:
     """The plan's limits on the master's own laboratory, on the building, and on what is sent to the slaves.
@@ -21,10 +19,10 @@ class MasterLimits:
 
     def __init__(self, plan: Plan) -> None:
         own = kinds.own(plan)
-        several = OF_STOREYS if plan.storeys > 1 else ()
+        storeys = tuple(name for name in OF_STOREYS for _ in range(plan.storeys))
         self._own = LaboratoryLimits(own, plan) if own else NoLimits()
         self._sent = [sent_guard(kinds.kind_of(plan, role), plan.of(role)) for role in plan.roles]
-        self._storeys = Guard(vars(plan.limits), OF_STOREYS, several)
+        self._storeys = Guard(vars(plan.limits), storeys)
         self._energy = EnergyMonitor(plan)
         self.written = self._own.written
         self.standing = self._own.standing
@@ -39,7 +37,7 @@ class MasterLimits:
             self._own.readings(measured)
             or self._own.commands(wanted)
             or self._beyond(outputs.sent)
-            or self._storeys.violation(outputs[STOREYS:])
+            or self._storeys.violation(outputs.storeys)
             or motion
             or energy
         )

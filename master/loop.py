@@ -7,6 +7,7 @@ real and in virtual time.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import chain
 from typing import Any
 
 from common.errors import InterlockError, RigError
@@ -60,7 +61,7 @@ class MasterLoop(RigLoop):
         epoch_ns: int,
         gate: Gate | None = None,
     ) -> None:
-        plan, lab = setting.plan, Laboratory(MASTER, setting)
+        plan, lab = setting.plan, Laboratory(MASTER, setting, kinds.topics(setting.plan))
         self._limits = MasterLimits(plan)
         self._own = OwnLaboratory(plan)
         descent = Descent(lab, rig, self._own.ramp, self._own.zero, self._own.channels)
@@ -222,24 +223,21 @@ class MasterLoop(RigLoop):
             tick,
             tick * lab.plan.test.interval,
             outputs.ground_acceleration,
-            outputs.displacement,
-            outputs.velocity,
-            outputs.acceleration,
-            outputs.absolute_acceleration,
+            *outputs.storeys[: -lab.plan.storeys],
             *self._own.row(outputs, self._command, measured),
-            outputs.numerical_force,
+            *outputs.storeys[-lab.plan.storeys :],  # the numerical forces
             *self._exchanged(tick),
         )
         lab.outlet.add("master", log_ns, publish_ns, values)
 
-    def _exchanged(self, tick: int) -> list[Any]:
-        """What was used and what was sent: one value each, or one per slave where several are of one kind."""
-        found: list[Any] = []
+    def _exchanged(self, tick: int) -> list[float]:
+        """What was used and what was sent; of several slaves of one kind each signal with the values of all."""
+        found: list[float] = []
         for group in self._groups:
             if len(group) == 1:
                 found += group[0].row(tick)
             else:
-                found += zip(*(partner.row(tick) for partner in group), strict=True)
+                found += chain.from_iterable(zip(*(partner.row(tick) for partner in group), strict=True))
         return found
 
     def _watch(self, tick: int, now: int) -> None:

@@ -75,10 +75,8 @@ class OwnLaboratory:
         """Drift (m) of the storey that a user watches."""
         if self._ratio:
             return outputs.target / self._ratio
-        moved = outputs.displacement
-        if isinstance(moved, float):
-            return moved
-        return moved[self._storey - 1] - (moved[self._storey - 2] if self._storey > 1 else 0.0)
+        moved, storey = outputs.storeys, self._storey  # the displacements come first
+        return moved[storey - 1] - (moved[storey - 2] if storey > 1 else 0.0)
 
 
 def watched(plan: Plan) -> tuple[int, float]:

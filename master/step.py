@@ -6,19 +6,18 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from common.plan.plan import Plan
+from common.signals import OF_STOREYS
 from loop import substructure
 from models.compiled import plain
 from models.registry import Array
 
-Values = float | list[float]
 Sent = tuple[float, ...]  # target m, motor force N, and the rates of the target m/s, m/s², m/s³
 
 
 class Outputs(NamedTuple):
     """What a tick computes: the building and the targets at t_k, and the commands for the interval's end.
 
-    What concerns storeys is one value each where there are several. Of a master without a laboratory target, command
-    and effort are zero.
+    Of a master without a laboratory target, command and effort are zero.
     """
 
     ground_acceleration: float
@@ -26,11 +25,15 @@ class Outputs(NamedTuple):
     command: float  # of its transfer system, m
     effort: float  # of its motor, N
     sent: list[Sent]  # to each slave, in the plan's order
-    displacement: Values
-    velocity: Values
-    acceleration: Values
-    absolute_acceleration: Values
-    numerical_force: Values
+    storeys: list[
+        float
+    ]  # of each signal of the storeys in turn (`common.signals.OF_STOREYS`) the value of every one
+
+    @property
+    def of_storeys(self) -> dict[str, list[float]]:
+        """The values of every storey by signal."""
+        n = len(self.storeys) // len(OF_STOREYS)
+        return {name: self.storeys[place * n : (place + 1) * n] for place, name in enumerate(OF_STOREYS)}
 
 
 class MasterStep:
@@ -43,10 +46,7 @@ class MasterStep:
         width, first = substructure.SENT_VALUES, substructure.OF_SLAVES
         end = first + width * len(plan.roles)
         self._sent = [slice(place, place + width) for place in range(first, end, width)]
-        n = plan.storeys
         self._end = end
-        self._storeys = [slice(place, place + n) for place in range(end, building.output.size, n)]
-        self._one_storey = n == 1
         self._advance = substructure.enter
 
     def __call__(self, tick: int, position: float, force: float, forces: Sequence[float]) -> Outputs:
@@ -57,5 +57,4 @@ class MasterStep:
         row = self._output.tolist()
         sent = [tuple(row[place]) for place in self._sent]
         ground, target, command, effort = row[: substructure.OF_SLAVES]
-        storeys = row[self._end :] if self._one_storey else [row[place] for place in self._storeys]
-        return Outputs(ground, target, command, effort, sent, *storeys)
+        return Outputs(ground, target, command, effort, sent, row[self._end :])

@@ -1,4 +1,4 @@
-"""Rows of numbers as MCAP messages with their protobuf content, many in one call of a compiled kernel.
+"""Rows of numbers as MCAP messages with their protobuf content, checked and encoded many in one call of a kernel.
 
 Byte for byte it is what protobuf's own library and the MCAP library write, in a tenth of their time: a test in virtual
 time has some forty thousand messages per second. In proto3 a field that holds 0 or false is left out; −0.0 is not 0.
@@ -6,48 +6,62 @@ time has some forty thousand messages per second. In proto3 a field that holds 0
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from common.recording.chunks import Block
+from common.recording.rows import STAMPS, Item, is_plain, layouts
 from common.signals import FieldType, Signal
 from models.compiled import jit_apart
 
-Bytes = npt.NDArray[np.uint8]
+ByteArray = npt.NDArray[np.uint8]
 Numbers = npt.NDArray[np.int64]
 
-STAMPS = 16  # bytes of log and publish time, with which a row begins
 HEAD = 31  # bytes of an MCAP message record before its data: opcode, length, channel, sequence, both times
 PREFIX = 9  # bytes of opcode and length, which the length does not count
 OPCODE = 5  # of a message
-LONGEST = 12  # bytes of a field at most: a tag of two, and ten of a negative number
-VARINT, DOUBLE = 0, 1  # how a field's value is stored: the low three bits of its tag
+LONGEST = 12  # bytes of a field at most beside its numbers: a tag of two, and a length of ten
+MOST = 10  # bytes of a number at most: a negative one
+VARINT, DOUBLE, PACKED = 0, 1, 2  # how a field's value is stored: the low three bits of its tag
 END, OF_DOUBLE, OF_COUNT, OF_INDEX, OF_STAMP, OF_FLAG = range(6)
+KIND, COUNT = range(2)  # of a field, in a table of fields
 
-# of each kind of signal, how a row holds it and how the kernel names it
-HELD: Mapping[FieldType, tuple[str, int]] = {
-    FieldType.NUMBER: ("d", OF_DOUBLE),
-    FieldType.STOREYS: ("d", OF_DOUBLE),
-    FieldType.COUNT: ("I", OF_COUNT),
-    FieldType.INDEX: ("i", OF_INDEX),
-    FieldType.STAMP: ("q", OF_STAMP),
-    FieldType.FLAG: ("?", OF_FLAG),
-}
-
-
-def is_plain(rows: Sequence[Signal], storeys: int) -> bool:
-    """Whether a topic has one number per signal, its tick first."""
-    return rows[0].kind is FieldType.COUNT and all(
-        row.kind in HELD and row.count(storeys) == 1 for row in rows
-    )
+KINDS: Mapping[FieldType, int] = {
+    FieldType.NUMBER: OF_DOUBLE,
+    FieldType.STOREYS: OF_DOUBLE,
+    FieldType.COUNT: OF_COUNT,
+    FieldType.INDEX: OF_INDEX,
+    FieldType.STAMP: OF_STAMP,
+    FieldType.FLAG: OF_FLAG,
+}  # how the kernels name a signal's kind
 
 
-def layout(rows: Sequence[Signal]) -> struct.Struct:
-    """A row of a plain topic: log and publish time, and the values in the order of the signal table."""
-    return struct.Struct("<QQ" + "".join(HELD[row.kind][0] for row in rows))
+class RowTable:
+    """The plain topics among `topics` as the kernels know them, and rows of theirs as they read them."""
+
+    def __init__(self, topics: Mapping[str, Sequence[Signal]], storeys: int) -> None:
+        plain = {topic: rows for topic, rows in topics.items() if is_plain(rows)}
+        self.sizes = {topic: found.size for topic, found in layouts(plain, storeys).items()}
+        self.names = tuple(plain)
+        self._places = {topic: place for place, topic in enumerate(plain)}
+        self.fields = np.zeros((len(plain), max(map(len, plain.values()), default=0) + 1, 2), dtype=np.int64)
+        for place, rows in enumerate(plain.values()):
+            for field, row in enumerate(rows):
+                self.fields[place, field] = KINDS[row.kind], row.count(storeys)
+
+    def gathered(self, items: Sequence[Item]) -> tuple[ByteArray, ByteArray]:
+        """The rows of items one after the other, and the place of each one's topic."""
+        places = bytes([self._places[topic] for topic, _ in items])
+        rows = b"".join([row for _, row in items])
+        return np.frombuffer(rows, dtype=np.uint8), np.frombuffer(places, dtype=np.uint8)
+
+    def sound(self, items: Sequence[Item], ticks: int) -> bool:
+        """Whether rows of plain topics have their size, stamps that are times, ticks below `ticks`, and true flags."""
+        if any(len(row) != self.sizes[topic] for topic, row in items):
+            return False
+        return bool(check(*self.gathered(items), self.fields, ticks))
 
 
 class RowEncoder:
@@ -56,49 +70,39 @@ class RowEncoder:
     def __init__(
         self, topics: Mapping[str, Sequence[Signal]], channels: Mapping[str, int], storeys: int
     ) -> None:
-        plain = {topic: rows for topic, rows in topics.items() if is_plain(rows, storeys)}
-        self.layouts = {topic: layout(rows) for topic, rows in plain.items()}
-        self._places = {topic: place for place, topic in enumerate(plain)}
-        self._channels = [channels[topic] for topic in plain]
+        self._table = RowTable(topics, storeys)
+        self.sizes = self._table.sizes
+        self._channels = [channels[topic] for topic in self._table.names]
         self._numbers = np.array(self._channels, dtype=np.int64)
-        fields = np.zeros((len(plain), max(map(len, plain.values()), default=0) + 1), dtype=np.int64)
-        for place, rows in enumerate(plain.values()):
-            fields[place, : len(rows)] = [HELD[row.kind][1] for row in rows]
-        self._fields = fields
-        self._most = HEAD + LONGEST * fields.shape[1]
+        counts = self._table.fields[:, :, COUNT]
+        self._most = HEAD + int(np.max(np.sum(LONGEST + MOST * counts, axis=1), initial=0))
         self._room(16)
-        for topic in list(plain)[:1]:  # the kernel is compiled, or its code loaded, before a test begins
-            self.encode([topic], [bytes(self.layouts[topic].size)])
+        for topic, size in list(self.sizes.items())[
+            :1
+        ]:  # the kernel is compiled, or loaded, before a test begins
+            self.encode([(topic, bytes(size))])
 
     def _room(self, rows: int) -> None:
         self._entries = np.zeros((rows, 2), dtype=np.int64)
         self._records = np.zeros(rows * self._most, dtype=np.uint8)
         self._size = np.zeros(1, dtype=np.int64)
 
-    def encode(self, topics: Sequence[str], rows: Sequence[bytes]) -> Block:
-        """The messages of rows, each held as its topic's layout says."""
-        if len(rows) > len(self._entries):
-            self._room(2 * len(rows))
-        places = bytes([self._places[topic] for topic in topics])
-        pack(
-            np.frombuffer(b"".join(rows), dtype=np.uint8),
-            np.frombuffer(places, dtype=np.uint8),
-            self._fields,
-            self._numbers,
-            self._records,
-            self._entries,
-            self._size,
-        )
+    def encode(self, items: Sequence[Item]) -> Block:
+        """The messages of items, whose topics are plain."""
+        if len(items) > len(self._entries):
+            self._room(2 * len(items))
+        rows, places = self._table.gathered(items)
+        pack(rows, places, self._table.fields, self._numbers, self._records, self._entries, self._size)
         channels = self._channels
         return Block(
             self._records[: self._size[0]].data,
-            [channels[place] for place in places],
-            self._entries[: len(rows)].tolist(),
+            [channels[place] for place in places.tolist()],
+            self._entries[: len(items)].tolist(),
         )
 
 
 @jit_apart
-def put_varint(out: Bytes, at: int, number: int) -> int:
+def put_varint(out: ByteArray, at: int, number: int) -> int:
     """A number in groups of seven bits, the lowest first; all but the last have the eighth bit set. Its end."""
     rest = number
     while rest & -128:
@@ -110,7 +114,17 @@ def put_varint(out: Bytes, at: int, number: int) -> int:
 
 
 @jit_apart
-def copied(source: Bytes, begin: int, out: Bytes, at: int, count: int) -> bool:
+def varint_size(number: int) -> int:
+    """How many bytes `put_varint` needs for a number."""
+    rest, size = number, 1
+    while rest & -128:
+        rest = (rest >> 7) & 0x01FFFFFFFFFFFFFF
+        size += 1
+    return size
+
+
+@jit_apart
+def copied(source: ByteArray, begin: int, out: ByteArray, at: int, count: int) -> bool:
     """Copy bytes; whether any of them is not 0."""
     some = 0
     for place in range(count):
@@ -121,7 +135,7 @@ def copied(source: Bytes, begin: int, out: Bytes, at: int, count: int) -> bool:
 
 
 @jit_apart
-def whole(source: Bytes, begin: int, count: int) -> int:
+def whole(source: ByteArray, begin: int, count: int) -> int:
     """The whole number that some bytes hold, the lowest first."""
     number = np.int64(0)
     for place in range(count):
@@ -130,35 +144,75 @@ def whole(source: Bytes, begin: int, count: int) -> int:
 
 
 @jit_apart
-def put_fields(rows: Bytes, begin: int, kinds: Numbers, out: Bytes, at: int) -> tuple[int, int]:
+def size_of(kind: int) -> int:
+    """Bytes of a number of this kind in a row."""
+    if kind in (OF_DOUBLE, OF_STAMP):
+        return 8
+    return 1 if kind == OF_FLAG else 4
+
+
+@jit_apart
+def number_of(rows: ByteArray, begin: int, kind: int) -> int:
+    """The whole number of this kind that stands in a row."""
+    number = whole(rows, begin, size_of(kind))
+    if kind == OF_INDEX and number >= 1 << 31:
+        number -= 1 << 32
+    return number
+
+
+@jit_apart
+def put_one(rows: ByteArray, begin: int, field: int, kind: int, out: ByteArray, at: int) -> int:
+    """A field of one number, left out where that is 0; the end of the message so far."""
+    if kind == OF_DOUBLE:
+        after = put_varint(out, at, (field + 1) << 3 | DOUBLE)
+        return after + 8 if copied(rows, begin, out, after, 8) else at
+    number = number_of(rows, begin, kind)
+    if number:
+        at = put_varint(out, put_varint(out, at, (field + 1) << 3 | VARINT), number)
+    return at
+
+
+@jit_apart
+def put_several(
+    rows: ByteArray, begin: int, field: int, kind: int, count: int, out: ByteArray, at: int
+) -> int:
+    """A field of several numbers, packed; the end of the message so far."""
+    at = put_varint(out, at, (field + 1) << 3 | PACKED)
+    if kind == OF_DOUBLE:
+        at = put_varint(out, at, 8 * count)
+        copied(rows, begin, out, at, 8 * count)
+        return at + 8 * count
+    size, step = 0, size_of(kind)
+    for place in range(count):
+        size += varint_size(number_of(rows, begin + step * place, kind))
+    at = put_varint(out, at, size)
+    for place in range(count):
+        at = put_varint(out, at, number_of(rows, begin + step * place, kind))
+    return at
+
+
+@jit_apart
+def put_fields(rows: ByteArray, begin: int, fields: Numbers, out: ByteArray, at: int) -> tuple[int, int]:
     """The protobuf message of a row's values; the ends of the row and of the message."""
-    for field in range(kinds.shape[0]):
-        kind = kinds[field]
+    for field in range(fields.shape[0]):
+        kind, count = fields[field, KIND], fields[field, COUNT]
         if kind == END:
             break
-        if kind == OF_DOUBLE:
-            after = put_varint(out, at, (field + 1) << 3 | DOUBLE)
-            if copied(rows, begin, out, after, 8):
-                at = after + 8
-            begin += 8
-            continue
-        size = 8 if kind == OF_STAMP else 1 if kind == OF_FLAG else 4
-        number = whole(rows, begin, size)
-        if kind == OF_INDEX and number >= 1 << 31:
-            number -= 1 << 32
-        if number:
-            at = put_varint(out, put_varint(out, at, (field + 1) << 3 | VARINT), number)
-        begin += size
+        if count == 1:
+            at = put_one(rows, begin, field, kind, out, at)
+        else:
+            at = put_several(rows, begin, field, kind, count, out, at)
+        begin += count * size_of(kind)
     return begin, at
 
 
 @jit_apart
 def pack(
-    rows: Bytes,
-    topics: Bytes,
+    rows: ByteArray,
+    topics: ByteArray,
     fields: Numbers,
     channels: Numbers,
-    out: Bytes,
+    out: ByteArray,
     entries: Numbers,
     size: Numbers,
 ) -> None:
@@ -175,3 +229,24 @@ def pack(
             out[start + 1 + place] = ((at - start - PREFIX) >> (8 * place)) & 255
         out[start + PREFIX], out[start + PREFIX + 1] = channels[topic] & 255, channels[topic] >> 8
     size[0] = at
+
+
+@jit_apart
+def check(rows: ByteArray, topics: ByteArray, fields: Numbers, ticks: int) -> bool:
+    """Whether all rows have stamps that are times, ticks below `ticks`, and flags that are 0 or 1."""
+    begin = 0
+    for row in range(topics.shape[0]):
+        if whole(rows, begin, 8) < 0 or whole(rows, begin + 8, 8) < 0:
+            return False
+        begin += STAMPS
+        if whole(rows, begin, 4) >= ticks:
+            return False
+        for field in range(fields.shape[1]):
+            kind = fields[topics[row], field, KIND]
+            if kind == END:
+                break
+            for _ in range(fields[topics[row], field, COUNT]):
+                if kind == OF_FLAG and rows[begin] > 1:
+                    return False
+                begin += size_of(kind)
+    return True

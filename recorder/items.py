@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable, Mapping
 from typing import Any
 
 import msgpack
 
-from common.lab.outlet import PIECE
+from common.lab.outlet import PIECE, pairs
 from common.plan.plan import Plan
+from common.recording.rows import Item, values_of
 from common.roles import MASTER, latency_topic, ramp_topic
 from common.signals import FieldType, Signal
 from laboratories import kinds
-from recorder.encoding import is_plain, layout
+from recorder.encoding import RowTable
 
-Item = list[Any]
 Check = Callable[[Any], bool]
 
-STAMPED = 3  # places of an item before its values: topic, log and publish time
-STAMPS = range(2**63)  # those times, ns
+STAMPS = range(2**63)  # log and publish time, ns
 INTEGERS = {
     FieldType.COUNT: range(2**32),
     FieldType.INDEX: range(-(2**31), 2**31),
@@ -34,53 +32,53 @@ class Items:
         topics = kinds.topics(plan)
         own = {"event", lab, ramp_topic(lab), *(map(latency_topic, plan.roles) if lab == MASTER else ())}
         own &= topics.keys()  # a master without a laboratory has no ramp
-        self._ticks = range(plan.ticks)
-        self._unbounded = ("event", ramp_topic(lab))  # the ramp to rest goes on after the last tick
-        self._rows = {topic: checks(topics[topic], plan) for topic in own}
-        self._plain = {topic: Plain(topics[topic]) for topic in own if is_plain(topics[topic], plan.storeys)}
+        self._ticks = plan.ticks
+        self._table = RowTable({topic: topics[topic] for topic in own}, plan.storeys)
+        self._others = {topic: checks(topics[topic], plan) for topic in own if topic not in self._table.sizes}
+        for topic, size in list(self._table.sizes.items())[:1]:  # loads the kernel before a test begins
+            self._table.sound([(topic, bytes(size))], 1)
 
-    def unpack(self, packed: bytes) -> list[Item] | None:
+    def unpack(self, packed: bytes) -> tuple[Item, ...] | None:
         """The items of a piece; None where it holds anything that cannot be recorded."""
         try:
-            items = msgpack.unpackb(packed)
+            items = pairs(packed)
         except (ValueError, msgpack.UnpackException):
             return None
-        if type(items) is not list or not 0 < len(items) <= PIECE or not all(map(self._admits, items)):
+        if type(items) is not tuple or not 0 < len(items) <= PIECE or not all(map(is_item, items)):
             return None
+        sizes = self._table.sizes
+        numbers = [item for item in items if item[0] in sizes]
+        if numbers and not self._table.sound(numbers, self._ticks):
+            return None
+        if len(numbers) < len(items):
+            others = [item for item in items if item[0] not in sizes]
+            return items if all(self._admits(topic, row) for topic, row in others) else None
         return items
 
-    def _admits(self, item: Any) -> bool:
-        if type(item) is not list or len(item) < 4 or type(item[0]) is not str or item[0] not in self._rows:
+    def _admits(self, topic: str, row: bytes) -> bool:
+        """Whether a row that is not of numbers alone holds times, and what its signals must be; its tick may be any.
+
+        Such rows are events and the ramp to rest, which goes on after the last tick.
+        """
+        if topic not in self._others:
             return False
-        topic, log_ns, publish_ns, tick = item[:4]
-        if topic in self._plain and self._plain[topic].fits(item):
-            return tick in self._ticks
-        rows = self._rows[topic]
-        if type(log_ns) is not int or type(publish_ns) is not int or len(item) - STAMPED != len(rows):
+        try:
+            found = values_of(row)
+        except (ValueError, msgpack.UnpackException):
+            return False
+        if type(found) is not list or len(found) != 2 + len(self._others[topic]):
+            return False
+        log_ns, publish_ns, *values = found
+        if type(log_ns) is not int or type(publish_ns) is not int:
             return False
         if log_ns not in STAMPS or publish_ns not in STAMPS:
             return False
-        if topic not in self._unbounded and tick not in self._ticks:
-            return False
-        return all(check(value) for check, value in zip(rows, item[STAMPED:], strict=True))
+        return all(check(value) for check, value in zip(self._others[topic], values, strict=True))
 
 
-class Plain:
-    """Items of a topic that has one number per signal, checked by calls into C: most of a test's items."""
-
-    def __init__(self, rows: tuple[Signal, ...]) -> None:
-        self._types = (str, int, int, *(TYPES[row.kind] for row in rows))
-        self._pack = layout(rows).pack
-
-    def fits(self, item: Item) -> bool:
-        """Whether times and values are of exactly the types of their signals, and in their ranges."""
-        if tuple(map(type, item)) != self._types:
-            return False
-        try:
-            self._pack(*item[1:])
-        except struct.error:
-            return False
-        return item[1] | item[2] in STAMPS
+def is_item(item: Any) -> bool:
+    """Whether something is a topic and a row."""
+    return type(item) is tuple and tuple(map(type, item)) == (str, bytes)
 
 
 def checks(rows: tuple[Signal, ...], plan: Plan) -> list[Check]:
@@ -124,13 +122,4 @@ CHECKS: dict[FieldType, Check] = {
     FieldType.FLAG: lambda value: type(value) is bool,
     FieldType.TEXT: lambda value: type(value) is str,
     FieldType.VALUES: is_values,
-}
-
-TYPES: dict[FieldType, type] = {
-    FieldType.NUMBER: float,
-    FieldType.STOREYS: float,
-    FieldType.COUNT: int,
-    FieldType.INDEX: int,
-    FieldType.STAMP: int,
-    FieldType.FLAG: bool,
 }

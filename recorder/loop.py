@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from common import signals
@@ -16,11 +16,12 @@ from common.plan import patience
 from common.plan.plan import PROTOCOL_VERSION, Plan
 from common.plan.plan_difference import differences, digest_of, said
 from common.protocol.messages import Finished, Message, Recorder, Register, Resend, Samples
+from common.recording.rows import HEAD, Item, layout, other, values_of
 from common.reporting import Report
 from common.roles import MASTER, RECORDER, kind_of, latency_topic, title
 from laboratories import kinds
 from recorder.items import Items
-from recorder.sink import Item, Sink
+from recorder.sink import Sink
 
 # a test from which nothing is heard for so long is over: its laboratories repeat their last words for as long
 SILENCE_NS = 5_000_000_000
@@ -34,7 +35,8 @@ STALL_NS = 1_000_000_000  # a recorder that did nothing for so long was held up 
 ROWS_LOST = "rows_lost"  # code of the event that says what a laboratory did not send again
 MISSED = ("watchdog", "lost")  # a laboratory has missed another
 CONSEQUENCE = "remote_trip"  # the other laboratory's cause counts
-MISSED_AT = [row.name for row in signals.LATENCY].index("deadline_missed")
+# where a row of latency says that its deadline was missed: behind the numbers before that signal
+MISSED_AT = layout(signals.LATENCY[: [row.name for row in signals.LATENCY].index("deadline_missed")], 1).size
 
 
 class StreamHole(NamedTuple):
@@ -76,7 +78,8 @@ class RecorderLoop:
         self._said_failure = False
         self._unended: list[str] = []  # laboratories the end of whose stream never came
         self._settled = False  # the test had ended when somebody stopped the recorder
-        self._newest: list[Any] = ["", 0, 0, 0]  # item of the newest tick
+        self._begun = False  # whether a tick has come
+        self._newest_ns = self._newest_tick = 0  # log time and number of the newest tick
         self._wish = ""  # why it was asked to stop
         self._asked_ns = 0
         self.error: IncompleteError | InputError | InterlockError | LostError | None = None
@@ -128,19 +131,18 @@ class RecorderLoop:
             self._sink.put(items)
 
     def _count(self, item: Item) -> None:
-        topic = item[0]
-        if topic == "event":
-            self._take_event(item[3:])
-        elif topic in self._seen:
-            tick, seen = item[3], self._seen[topic]
-            if tick > self._newest[3]:
-                self._newest = item
-            if 0 <= tick < len(seen):
-                seen[tick] = 1  # one byte each, so that memory does not grow with the test
+        topic, row = item
+        if (seen := self._seen.get(topic)) is not None:
+            log_ns, _, tick = HEAD.unpack_from(row)
+            if tick > self._newest_tick:
+                self._begun, self._newest_ns, self._newest_tick = True, log_ns, tick
+            seen[tick] = 1  # one byte each, so that memory does not grow with the test
             if topic in self._latencies:
-                self._missed += bool(item[3 + MISSED_AT])
+                self._missed += row[MISSED_AT]
+        elif topic == "event":
+            self._take_event(values_of(row)[2:])
 
-    def _take_event(self, values: Item) -> None:
+    def _take_event(self, values: Sequence[Any]) -> None:
         """Take note of the machines, and of why the test ended: the first cause, or what led to it if that is late."""
         _, lab, level, code, text, numbers = values
         if code in CODES:
@@ -228,9 +230,9 @@ class RecorderLoop:
 
     def _say_lost(self, text: str, values: Mapping[str, float]) -> None:
         """Record and report that something is missing, at the time of the newest tick."""
-        _, log_ns, _, tick, *_ = self._newest
-        t = tick * self._plan.test.interval
-        self._sink.put([["event", log_ns, log_ns, t, RECORDER, "error", ROWS_LOST, text, dict(values)]])
+        log_ns, t = self._newest_ns, self._newest_tick * self._plan.test.interval
+        event = (t, RECORDER, "error", ROWS_LOST, text, dict(values))
+        self._sink.put([other("event", log_ns, log_ns, event)])
         said = {"t": t, "lab": RECORDER, "level": "error", "code": ROWS_LOST, "text": text}
         self._report("event", said | dict(values))
 
@@ -269,8 +271,7 @@ class RecorderLoop:
     @property
     def _silence_ns(self) -> int:
         """Silence after which a test is over; before its first tick a rig may be arming, and its laboratory waits."""
-        begun = bool(self._newest[0])
-        return SILENCE_NS if begun else max(SILENCE_NS, round(self._plan.link.connect_timeout * 1e9))
+        return SILENCE_NS if self._begun else max(SILENCE_NS, round(self._plan.link.connect_timeout * 1e9))
 
     def _fell_silent(self) -> None:
         """No laboratory is heard; a test that was to end in order is incomplete where one has not reported its end."""

@@ -4,22 +4,24 @@ from __future__ import annotations
 
 import threading
 from queue import Empty, Queue
-from typing import Any, Protocol
+from typing import Protocol
 
 from common.host.clock import Clock
 from common.lab.outlet import AT_ONCE
 from common.recording.reader import MACHINES
+from common.recording.rows import Item, values_of
 from common.recording.writer import Recording
 from recorder.encoding import RowEncoder
 
 FLUSH_NS = 50_000_000  # with a piece of a laboratory's stream on its way, less than 0.1 s is not in the file
 # of a recording in virtual time, where a second passes in some hundredths of one: full chunks cost half as much
 SELDOM_NS = 1_000_000_000
+BLOCK_BYTES = (
+    8 << 10
+)  # of rows encoded at once: a kernel's call costs as much as ten rows; an eighth of a chunk
 SYNC_NS = 1_000_000_000  # a power cut costs a second at most; a sync takes tens of ms on a slow disk
 QUEUE_ITEMS = 60_000  # forty seconds of a default test
 CLOSE_S = 25.0  # less than `rths run` allows the recorder to write what it holds
-
-Item = list[Any]
 
 
 class Sink(Protocol):
@@ -54,6 +56,8 @@ class FileSink:
         self._recording = recording
         self._clock = clock
         self._encoder = RowEncoder(recording.topics, recording.channels, recording.storeys)
+        self._numbers: list[Item] = []  # plain items that wait to be encoded together
+        self._held = 0  # bytes of their rows
         self._timely = timely
         self._flush_ns = FLUSH_NS if timely else SELDOM_NS
         self._flushed_ns = self._synced_ns = clock.now()
@@ -66,28 +70,27 @@ class FileSink:
         if self.failure:
             self.dropped += len(items)
             return
-        at_once, layouts = False, self._encoder.layouts
-        topics: list[str] = []
-        rows: list[bytes] = []
+        at_once, plain, numbers = False, self._encoder.sizes, self._numbers
         for item in items:
-            topic = item[0]
-            if (layout := layouts.get(topic)) is not None:
-                topics.append(topic)
-                rows.append(layout.pack(*item[1:]))
+            topic, row = item
+            if topic in plain:
+                numbers.append(item)
+                self._held += len(row)
                 continue
             at_once = at_once or topic == AT_ONCE
-            self._write(topics, rows)
-            _, log_ns, publish_ns, *values = item
+            self._encode()
+            log_ns, publish_ns, *values = values_of(row)
             self._recording.add(topic, log_ns, publish_ns, values)
-        self._write(topics, rows)
+        if self._held >= BLOCK_BYTES:
+            self._encode()
         self.keep_up(at_once=at_once)
 
-    def _write(self, topics: list[str], rows: list[bytes]) -> None:
-        """Write rows of numbers and forget them."""
-        if rows:
-            self._recording.add_block(self._encoder.encode(topics, rows))
-            topics.clear()
-            rows.clear()
+    def _encode(self) -> None:
+        """Hand rows of numbers that wait to the file."""
+        if self._numbers:
+            self._recording.add_block(self._encoder.encode(self._numbers))
+            self._numbers.clear()
+            self._held = 0
 
     def keep_up(self, *, at_once: bool = False) -> None:
         """Flush and sync where it is time; flush `at_once` in any case."""
@@ -95,6 +98,7 @@ class FileSink:
         try:
             if at_once or now - self._flushed_ns >= self._flush_ns:
                 self._flushed_ns = now
+                self._encode()
                 self._recording.flush()
             if self._timely and now - self._synced_ns >= SYNC_NS:
                 self._synced_ns = now
@@ -106,6 +110,7 @@ class FileSink:
         """Finish the file; after a failure it stays readable up to there."""
         try:
             if not self.failure:
+                self._encode()
                 if machines:
                     self._recording.metadata(MACHINES, machines)
                 self._recording.close(summary)

@@ -18,6 +18,7 @@ from common.plan.limits import Guard, LimitViolation
 from common.plan.plan import Plan
 from common.plan.reality import Reality
 from common.recording.reader import CLOCK
+from common.recording.rows import RowPacker, other
 from common.recording.writer import Recording
 from common.rig import GuardedRig, command_of
 from common.roles import MASTER, name_of
@@ -31,7 +32,7 @@ from models import excitation
 from models.compensators.follower import Follower
 from models.excitation import POSITION, Programme, ProgrammeSegment, Reach
 from recorder import files
-from recorder.sink import FileSink, Item, Sink, ThreadedSink
+from recorder.sink import FileSink, Sink, ThreadedSink
 
 LEAD_NS = 100_000_000  # before the first tick: what is left to prepare takes a few ms
 UNCOMPENSATED = Chosen("none", {}, "compensator")
@@ -174,7 +175,8 @@ def armed(rig: GuardedRig, sink: Sink, at_ns: int) -> Iterator[None]:
         yield
     finally:
         if complaint := rig.disarm():
-            sink.put([["event", at_ns, at_ns, 0.0, "bench", "warning", "disarm", str(complaint), {}]])
+            values = (0.0, "bench", "warning", "disarm", str(complaint), dict[str, float]())
+            sink.put([other("event", at_ns, at_ns, values)])
 
 
 class Bench:
@@ -194,6 +196,7 @@ class Bench:
         units = {row.name: row.unit for row in self.rows}
         self._measurements = Guard(limits, channels.names, units=units)
         self._commands = Guard(limits, (channels.target.name, *channels.drives), units=units)
+        self.packer = RowPacker({self.topic: self.rows}, plan.storeys)
         self._command = command_of(channels)
         self._ahead = int(role != MASTER)
         self._force = programme.motion[POSITION] if order.part in OF_EFFORT else None
@@ -270,15 +273,8 @@ def loop(
         except (RigError, InterlockError) as error:
             raise StoppedError(error, tick, late) from None
         at_ns = epoch_ns + plan.tick_ns(tick)
-        row: Item = [
-            bench.topic,
-            at_ns,
-            at_ns + clock.now() - nominal,
-            tick,
-            tick * plan.test.interval,
-            *values,
-        ]
-        sink.put([row])
+        row = (tick, tick * plan.test.interval, *values)
+        sink.put([bench.packer.item(bench.topic, at_ns, at_ns + clock.now() - nominal, row)])
         if violation:
             raise StoppedError(InterlockError(str(violation)), tick + 1, late)
     return plan.ticks, late

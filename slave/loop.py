@@ -49,7 +49,7 @@ class SlaveLoop(RigLoop):
     def __init__(
         self, setting: Setting, rig: GuardedRig, link: LinkModel, *, role: str = SLAVE, instance: int = 1
     ) -> None:
-        lab, plan = Laboratory(role, setting), setting.plan.of(role)
+        lab, plan = Laboratory(role, setting, kinds.topics(setting.plan)), setting.plan.of(role)
         kind = kinds.kind_of(setting.plan, role)
         self._limits = SlaveLimits(kind, plan)
         self._wanted = command_of(kind.channels)

@@ -19,7 +19,7 @@ from common.protocol.exchange import Event
 from common.protocol.messages import Command
 from common.rig import ColumnCommand, ColumnMeasurement, TableCommand, TableMeasurement
 from common.safety.modes import TURNS, Mode, Turn
-from common.signals import SENT
+from common.signals import OF_STOREYS, SENT
 from docs import generate
 from laboratories.table.kind import TABLE
 from master.limits import MasterLimits
@@ -78,8 +78,9 @@ def master_trips(name: str) -> bool:
     checks, draw = MasterLimits(only(name)), random.Random(1)
     for _ in range(10):
         measured = ColumnMeasurement(*(draw.random() * 0.1 for _ in ColumnMeasurement._fields))
-        drawn = Outputs(*(draw.random() * 0.1 for _ in Outputs._fields))  # type: ignore[arg-type]
-        outputs = drawn._replace(sent=[tuple(draw.random() * 0.1 for _ in SENT)])
+        sent, storeys = ([draw.random() * 0.1 for _ in names] for names in (SENT, OF_STOREYS))
+        ground, target, command, effort = (draw.random() * 0.1 for _ in range(4))
+        outputs = Outputs(ground, target, command, effort, [tuple(sent)], storeys)
         violation = checks.violation(measured, ColumnCommand(outputs.command), outputs)
         if violation is not None:
             assert violation.name == name

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -15,11 +15,13 @@ from common.plan.limits import LimitViolation, Standstill
 from common.plan.plan import Plan
 from common.protocol.exchange import Event, Exchange, State
 from common.protocol.messages import Message, Recorder, Resend, Trip
+from common.recording.rows import RowPacker
 from common.reporting import Report, silent
 from common.rig import GuardedRig
 from common.rig_time import RigTime
 from common.roles import MASTER, SLAVE, title
 from common.safety.modes import Cause, Mode, Safety, Turn
+from common.signals import Signal
 
 SLOW_RIG = "slow_rig"  # code of the event of a rig whose calls take too long, and of the message that says so
 # an unanswered request is sent again after this long: many round trips even on a slow link, and no wait for a user
@@ -41,9 +43,9 @@ class Setting(NamedTuple):
 
 
 class Laboratory:
-    """State shared by the master's and the slave's loop; composed by both."""
+    """State shared by the master's and the slave's loop; composed by both. `topics` are those of its recording."""
 
-    def __init__(self, name: str, setting: Setting) -> None:
+    def __init__(self, name: str, setting: Setting, topics: Mapping[str, Sequence[Signal]]) -> None:
         self.name = name
         self.plan = setting.plan
         self.endpoint = setting.endpoint
@@ -58,7 +60,8 @@ class Laboratory:
         self._even = self._exact_ns == self.interval_ns
         self.start_ns = 0  # own clock, tick 0
         self.epoch_ns = 0  # Unix time of tick 0 on the master's base
-        self.outlet = Outlet(0, name, kept_items(self.plan, name))
+        self._rows = RowPacker(topics, setting.plan.storeys)
+        self.outlet = Outlet(0, name, kept_items(self.plan, name), self._rows)
         self.error: RthsError | None = None
         self.rig_time = RigTime(self.interval_ns)
         self._rig_name = ""
@@ -71,7 +74,7 @@ class Laboratory:
         """Take part in a session."""
         self.exchange.session = session
         self.endpoint.enter(session)
-        self.outlet = Outlet(session, self.name, kept_items(self.plan, self.name))
+        self.outlet = Outlet(session, self.name, kept_items(self.plan, self.name), self._rows)
 
     def move(self, event: Event) -> None:
         """One step of the handshake, agreed with the others."""

@@ -1,8 +1,8 @@
 """A laboratory's stream to the recorder: items in order, sent in pieces, kept for sending again.
 
-An item is `[topic, log_ns, publish_ns, values…]`; the pieces are sent between ticks, so that nothing is
-written in the loop and a slow recorder costs it nothing. What is kept is bounded by the plan, so that every laboratory
-is full after the same time of test and grows no more, however long that is.
+The pieces are sent between ticks, so that nothing is written in the loop and a slow recorder costs it nothing. What
+is kept is bounded by the plan, so that every laboratory is full after the same time of test and grows no more, however
+long that is.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import msgpack
 
 from common.plan.plan import Plan
 from common.protocol.messages import Finished, Message, Resend, Samples
+from common.recording.rows import Item, RowPacker
 from common.roles import MASTER
 
 PIECE = 10  # items; at 500 ticks per second a piece leaves every 10 to 20 ms
@@ -39,13 +40,17 @@ def kept_items(plan: Plan, lab: str) -> float:
 
 
 class Outlet:
-    """Sending end of one laboratory's stream; its newest `kept` items can be sent again, up to `KEPT_BYTES`."""
+    """Sending end of one laboratory's stream; its newest `kept` items can be sent again, up to `KEPT_BYTES`.
 
-    def __init__(self, session: int, lab: str, kept: float) -> None:
+    `rows` packs the values of an item.
+    """
+
+    def __init__(self, session: int, lab: str, kept: float, rows: RowPacker) -> None:
         self._session = session
         self._lab = lab
         self._kept = kept
-        self._pending: list[list[Any]] = []
+        self._item = rows.item
+        self._pending: list[Item] = []
         self._sent: deque[Samples] = deque()  # one joining the other
         self._sent_bytes = 0
         self._hurry = False
@@ -53,7 +58,7 @@ class Outlet:
 
     def add(self, topic: str, log_ns: int, publish_ns: int, values: tuple[Any, ...]) -> None:
         """Queue one item."""
-        self._pending.append([topic, log_ns, publish_ns, *values])
+        self._pending.append(self._item(topic, log_ns, publish_ns, values))
         self._hurry = self._hurry or topic == AT_ONCE
         self.total += 1
 
@@ -90,6 +95,12 @@ class Outlet:
         return Finished(self._session, self._lab, self.total)
 
 
+def pairs(packed: bytes) -> tuple[Item, ...]:
+    """The items of a piece, as `Outlet` packs them; their types are not checked."""
+    items: tuple[Item, ...] = msgpack.unpackb(packed, use_list=False)
+    return items
+
+
 def pack_nexts(nexts: Mapping[str, int]) -> bytes:
     """How far the recorder is with each stream, as its message carries it."""
     packed: bytes = msgpack.packb(dict(nexts))
@@ -113,19 +124,17 @@ class Inlet:
     counts as missing. `most` bounds the stream's items, so that no number in a message makes it go on for ever.
     """
 
-    def __init__(
-        self, unpack: Callable[[bytes], list[list[Any]] | None] = msgpack.unpackb, most: int = 2**62
-    ) -> None:
+    def __init__(self, unpack: Callable[[bytes], tuple[Item, ...] | None] = pairs, most: int = 2**62) -> None:
         self.next = 0
         self.total: int | None = None
         self.lost = 0
         self.rejected = 0
         self._unpack = unpack
         self._most = most
-        self._early: dict[int, tuple[list[list[Any]], int]] = {}  # items, and bytes they came in
+        self._early: dict[int, tuple[tuple[Item, ...], int]] = {}  # items, and bytes they came in
         self._held = 0
 
-    def take(self, piece: Samples) -> list[list[Any]]:
+    def take(self, piece: Samples) -> list[Item]:
         """The items that are now complete and in order; repeated pieces give none."""
         if piece.first < self.next or piece.first in self._early:
             return []
@@ -135,7 +144,7 @@ class Inlet:
             return []
         if piece.first == self.next:
             self.next += len(items)
-            return items + self._ready()
+            return [*items, *self._ready()]
         if len(self._early) < EARLY and self._held + len(piece.items) <= EARLY_BYTES:
             self._early[piece.first] = (items, len(piece.items))
             self._held += len(piece.items)
@@ -148,8 +157,8 @@ class Inlet:
         else:
             self.rejected += 1
 
-    def _ready(self) -> list[list[Any]]:
-        items: list[list[Any]] = []
+    def _ready(self) -> list[Item]:
+        items: list[Item] = []
         while (found := self._early.pop(self.next, None)) is not None:
             new, size = found
             self._held -= size
@@ -177,7 +186,7 @@ class Inlet:
         if self.total is not None and expected < self.total:
             yield expected, self.total - 1
 
-    def give_up(self) -> list[list[Any]]:
+    def give_up(self) -> list[Item]:
         """Count the first hole as lost and hand on what follows it."""
         hole = self.missing()
         if hole is None:

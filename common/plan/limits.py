@@ -78,43 +78,28 @@ def violated(limits: Mapping[str, float], **values: float) -> LimitViolation | N
 
 
 class Guard:
-    """Checks the values of one kind of record, by the names they have in it.
-
-    `several` are the names that hold one value per storey, `units` those of limits that are none of the plan's own.
-    """
+    """Checks values by their names; one name may stand for several. `units` are those of limits outside the plan."""
 
     def __init__(
         self,
         limits: Mapping[str, float],
         names: tuple[str, ...],
-        several: tuple[str, ...] = (),
         units: Mapping[str, str] = NO_UNITS,
     ) -> None:
         limited = [place for place, name in enumerate(names) if name in limits]
-        self._single = [place for place in limited if names[place] not in several]
-        self._several = [place for place in limited if names[place] in several]
         self._all = {place: limits[names[place]] for place in limited}
-        twice = (*self._single, *self._single[:1])  # the first again: the getter of one place gives no tuple
+        twice = (*limited, *limited[:1])  # the first again: the getter of one place gives no tuple
         self._values: Callable[[Any], Any] = itemgetter(*twice) if twice else lambda _: ()
         self._most = [self._all[place] for place in twice]
         self._names, self._units = names, units
 
-    def violation(self, values: tuple[Any, ...]) -> LimitViolation | None:
+    def violation(self, values: Sequence[float]) -> LimitViolation | None:
         """The first value beyond its limit."""
-        if all(map(le, map(abs, self._values(values)), self._most)) and not self._several:
+        if all(map(le, map(abs, self._values(values)), self._most)):
             return None
-        for place in self._single:
-            if not abs(values[place]) <= self._all[place]:
-                return self._beyond(place, values[place])
-        for place in self._several:
-            for value in values[place]:
-                if not abs(value) <= self._all[place]:
-                    return self._beyond(place, value)
-        return None
-
-    def _beyond(self, place: int, value: float) -> LimitViolation:
+        place = next(place for place, most in self._all.items() if not abs(values[place]) <= most)
         name = self._names[place]
-        return LimitViolation(name, value, self._all[place], self._units.get(name, ""))
+        return LimitViolation(name, values[place], self._all[place], self._units.get(name, ""))
 
 
 class Change:

@@ -37,7 +37,7 @@ from common.plan.tables import (
 )
 from common.roles import MASTER, name_of, slave_role
 
-PROTOCOL_VERSION = 5
+PROTOCOL_VERSION = 6
 OVERRUN = "safety.overrun"
 FOLLOWS_IN = "table.compensator"
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from common.errors import InputError
 from common.roles import MASTER, SLAVE, latency_topic, title
-from common.signals import OF_STOREYS, SENT
+from common.signals import SENT
 from common.terminal import cli
 from common.terminal.printable import shown
 from common.terminal.telling import Tell, untold
@@ -105,12 +105,13 @@ def replay_master(recording: Run, tell: Tell = untold) -> dict[str, Match]:
 def named(outputs: Outputs) -> dict[str, Any]:
     """What the master computed, by the signals of its topic."""
     sent = outputs.sent[0] if len(outputs.sent) == 1 else map(list, zip(*outputs.sent, strict=True))
+    storeys = outputs.of_storeys
     return {
         "ground_acceleration": outputs.ground_acceleration,
         "column_target": outputs.target,
         "actuator_command": outputs.command,
         **dict(zip(SENT, sent, strict=True)),
-        **{name: getattr(outputs, name) for name in OF_STOREYS},
+        **{name: values[0] if len(values) == 1 else values for name, values in storeys.items()},
     }
 
 

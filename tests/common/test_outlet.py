@@ -11,11 +11,14 @@ from common.lab import outlet
 from common.lab.outlet import BURST, PATIENCES, PIECE, Inlet, Outlet, kept_items
 from common.plan.plan import Plan
 from common.protocol.messages import Resend, Samples
+from common.recording.rows import Item, RowPacker, values_of
 from tests.helpers import with_table
+
+ROWS = RowPacker({}, 1)  # without topics every row is msgpack
 
 
 def filled(count: int, kept: float = math.inf) -> tuple[Outlet, list[Samples]]:
-    outlet = Outlet(1, "master", kept)
+    outlet = Outlet(1, "master", kept, ROWS)
     pieces: list[Any] = []
     for number in range(count):
         outlet.add("master", number, number, (number, 0.5))
@@ -24,8 +27,8 @@ def filled(count: int, kept: float = math.inf) -> tuple[Outlet, list[Samples]]:
     return outlet, pieces
 
 
-def numbers(items: list[list[Any]]) -> list[int]:
-    return [item[3] for item in items]
+def numbers(items: list[Item]) -> list[int]:
+    return [values_of(row)[2] for _, row in items]
 
 
 @given(st.integers(0, 200), st.randoms(use_true_random=False), st.floats(0.0, 0.9))
@@ -51,7 +54,7 @@ def test_whatever_is_lost_swapped_or_repeated_the_stream_comes_whole_and_in_orde
 
 
 def test_pieces_leave_when_they_are_full() -> None:
-    outlet = Outlet(1, "slave", math.inf)
+    outlet = Outlet(1, "slave", math.inf, ROWS)
     for number in range(PIECE - 1):
         outlet.add("slave", 0, 0, (number,))
     assert outlet.pieces() == []

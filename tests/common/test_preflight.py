@@ -17,8 +17,10 @@ from common.lab.preflight import Gate, PreflightCheck, RefusedError, SensorsAtRe
 from common.link.memory_link import MemoryHub
 from common.plan.patience import strict
 from common.plan.plan import Plan
+from common.recording.rows import values_of
 from common.rig import ColumnMeasurement, GuardedRig
 from common.safety.risks import Risk
+from common.signals import TOPICS
 from common.terminal import cli
 from tests.helpers import with_table
 
@@ -55,12 +57,12 @@ def test_a_refusal_is_one_sentence_that_says_how_to_overrule_it() -> None:
 
 def test_a_gate_tells_the_recording_once_what_was_passed_and_what_was_overruled() -> None:
     clock = VirtualClock()
-    lab = Laboratory("master", Setting(Plan(), MemoryHub().join("master", clock), clock))
+    lab = Laboratory("master", Setting(Plan(), MemoryHub().join("master", clock), clock), TOPICS)
     gate = Gate(["peaks"])
     gate.judge([PreflightCheck("link good"), PreflightCheck("", PEAKS)])
     for _ in range(2):
         gate.note(lab)
-    assert [tuple(item[5:8]) for item in lab.outlet._pending] == [
+    assert [tuple(values_of(row)[4:7]) for _, row in lab.outlet._pending] == [
         ("info", "preflight", "pre-flight: link good."),
         ("warning", "accepted_risk", "risk 'peaks' accepted: too high, so lower it."),
     ]

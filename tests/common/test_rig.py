@@ -209,6 +209,6 @@ def test_limits_apply_by_name_and_take_no_nan() -> None:
 
 
 def test_limits_apply_to_every_storey() -> None:
-    guard = Guard(vars(tables.Limits(displacement=1.0)), ("displacement", "other"), several=("displacement",))
-    assert guard.violation(([0.5, 1.0], 99.0)) is None
-    assert str(guard.violation(([0.5, -1.5], 0.0))) == "displacement is -1.5, beyond its limit of 1 m."
+    guard = Guard(vars(tables.Limits(displacement=1.0)), ("displacement", "displacement", "other"))
+    assert guard.violation((0.5, 1.0, 99.0)) is None
+    assert str(guard.violation((0.5, -1.5, 0.0))) == "displacement is -1.5, beyond its limit of 1 m."

@@ -13,6 +13,7 @@ from common.plan.plan import Plan
 from common.protocol.messages import Trip
 from common.rig import GuardedRig, TableCommand, TableMeasurement
 from common.safety.modes import Turn
+from common.signals import TOPICS
 
 MS = 1_000_000
 
@@ -38,7 +39,7 @@ class Slow:
 def laboratory(plan: Plan, read_ms: float, write_ms: float, ticks: int, role: str = "slave") -> Laboratory:
     """A laboratory that runs, after some ticks of a rig."""
     clock = VirtualClock()
-    lab = Laboratory(role, Setting(plan, MemoryHub(plan.roles).join(role, clock), clock))
+    lab = Laboratory(role, Setting(plan, MemoryHub(plan.roles).join(role, clock), clock), TOPICS)
     lab.enter(1)
     for turn in (Turn.CONFIGURE, Turn.ARM, Turn.RUN):
         lab.safety.take(turn)

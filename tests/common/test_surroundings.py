@@ -13,16 +13,18 @@ from common.lab.surroundings import Surroundings, described
 from common.link.memory_link import MemoryHub
 from common.plan.plan import Plan
 from common.plan.read import parse
+from common.recording.rows import values_of
+from common.signals import TOPICS
 
 
 def laboratory(plan: Plan | None = None) -> Laboratory:
     clock = VirtualClock()
-    return Laboratory("slave", Setting(plan or Plan(), MemoryHub().join("slave", clock), clock))
+    return Laboratory("slave", Setting(plan or Plan(), MemoryHub().join("slave", clock), clock), TOPICS)
 
 
 def events(lab: Laboratory) -> list[tuple[str, str, str]]:
     """Level, code and text of what was noted."""
-    return [tuple(item[5:8]) for item in lab.outlet._pending if item[0] == "event"]
+    return [tuple(values_of(row)[4:7]) for topic, row in lab.outlet._pending if topic == "event"]
 
 
 @pytest.mark.parametrize(

@@ -28,7 +28,8 @@ KINDS = ("newmark_explicit", "central_difference", "cr", "kr_alpha")
 
 
 def outputs(target: float, displacement: Any = 0.0, velocity: Any = 0.0, acceleration: Any = 0.0) -> Outputs:
-    return Outputs(0.0, target, 0.0, 0.0, [], displacement, velocity, acceleration, 0.0, 0.0)
+    motion = np.ravel([displacement, velocity, acceleration])
+    return Outputs(0.0, target, 0.0, 0.0, [], [*motion.tolist(), *[0.0] * (2 * motion.size // 3)])
 
 
 def replayed(chosen: Plan, run: Run) -> tuple[Any, Any]:

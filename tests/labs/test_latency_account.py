@@ -15,6 +15,7 @@ from common.lab.laboratory import Laboratory, Setting
 from common.link.memory_link import MemoryHub
 from common.plan.plan import Plan
 from common.protocol.messages import Feedback, Recorder
+from common.recording.rows import layout
 from master.latency import LatencyAccount
 from master.partner import NO_FEEDBACK, OFFSET_BLOCK, OFFSET_BLOCKS
 
@@ -42,7 +43,9 @@ class Trial:
     def __init__(self, plan: Plan, master: Clock, slave: Clock, delays: Delays, extra: float = 0.0) -> None:
         self.master, self.slave, self.delays, self.extra = master, slave, delays, extra
         clock = VirtualClock()
-        self.lab = Laboratory("master", Setting(plan, MemoryHub().join("master", clock), clock))
+        self.lab = Laboratory(
+            "master", Setting(plan, MemoryHub().join("master", clock), clock), signals.TOPICS
+        )
         self.lab.enter(1)
         self.lab.recorder = Recorder(1, "recording", "", "", b"")
         self.offset = ClockOffset(length=OFFSET_BLOCK, blocks=OFFSET_BLOCKS)
@@ -65,7 +68,8 @@ class Trial:
             self.account.answer(feedback, t4, t4 + 7_000, self.extra)
             self.truth.append(self.delays(true + 60_000))
         self.account.finish(ticks - 1, self.master(SECOND + ticks * INTERVAL))
-        rows = [item[3:] for item in self.lab.outlet._pending if item[0] == "latency"]
+        unpack = layout(signals.LATENCY, 1).unpack
+        rows = [unpack(row)[2:] for topic, row in self.lab.outlet._pending if topic == "latency"]
         names = [row.name for row in signals.LATENCY]
         columns: dict[str, Any] = {
             name: np.array([row[place] for row in rows]) for place, name in enumerate(names)

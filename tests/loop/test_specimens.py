@@ -55,7 +55,7 @@ def played(plan: Plan) -> Array:
         outputs = step(tick, target, own * target, forces)
         assert outputs.target == target
         sent = [one[0] for one in outputs.sent]
-        found.append(np.atleast_1d(outputs.displacement))
+        found.append(outputs.of_storeys["displacement"])
         target = drift * reached(step, plan) if own else 0.0
     return np.array(found)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,18 +14,15 @@ from mcap.reader import make_reader
 
 from common.recording import chunks
 from common.recording.chunks import MESSAGE
+from common.recording.rows import HEAD, Item, RowPacker, is_plain
 from common.recording.schema import message_class, message_name, schema_file
 from common.recording.writer import CHUNK_SIZE, Recording
-from common.signals import TOPICS, FieldType
-from recorder.encoding import RowEncoder, is_plain
+from common.signals import TOPICS, FieldType, Signal, default_topics
+from recorder.encoding import RowEncoder
 
 PLAIN = ("master", "slave", "latency")
 CHANNELS = {topic: 255 + number for number, topic in enumerate(TOPICS)}
-ENCODER = RowEncoder(TOPICS, CHANNELS, 1)
-CLASSES = {
-    topic: message_class(schema_file(topic, TOPICS[topic], 1), f"rths.{message_name(topic)}")
-    for topic in PLAIN
-}
+SEVERAL = default_topics(("slave.roof", "slave.cellar", "slave.attic"))
 DOUBLES = st.one_of(st.floats(), st.sampled_from([0.0, -0.0, 5e-324]))
 DRAWN: dict[FieldType, st.SearchStrategy[Any]] = {
     FieldType.NUMBER: DOUBLES,
@@ -35,46 +33,73 @@ DRAWN: dict[FieldType, st.SearchStrategy[Any]] = {
     FieldType.FLAG: st.booleans(),
 }
 STAMP = st.integers(0, 2**63 - 1)
-ITEM = st.sampled_from(PLAIN).flatmap(
-    lambda topic: st.tuples(st.just(topic), STAMP, STAMP, *(DRAWN[row.kind] for row in TOPICS[topic]))
-)
 
 
-def record(item: tuple[Any, ...]) -> bytes:
-    """An item as protobuf's own library and the MCAP format have it."""
-    topic, log_ns, publish_ns, *values = item
-    names = [row.name for row in TOPICS[topic]]
-    data: bytes = CLASSES[topic](**dict(zip(names, values, strict=True))).SerializeToString()
-    length = MESSAGE.size - chunks.PREFIX + len(data)
-    return MESSAGE.pack(5, length, CHANNELS[topic], values[0], log_ns, publish_ns) + data
+class Recorded:
+    """Rows of some topics in a building of some storeys, as the kernel and as protobuf's own library have them."""
+
+    def __init__(self, topics: Mapping[str, tuple[Signal, ...]], storeys: int) -> None:
+        self.topics, self.storeys = topics, storeys
+        self.plain = [topic for topic, rows in topics.items() if is_plain(rows)]
+        self.channels = {topic: 255 + number for number, topic in enumerate(topics)}
+        self.encoder = RowEncoder(topics, self.channels, storeys)
+        self.packer = RowPacker(topics, storeys)
+        self.classes = {
+            topic: message_class(schema_file(topic, topics[topic], storeys), f"rths.{message_name(topic)}")
+            for topic in self.plain
+        }
+
+    def drawn(self, draw: st.DrawFn) -> tuple[Item, bytes]:
+        """An item, and its record as protobuf's own library and the MCAP format have it."""
+        topic, log_ns, publish_ns = draw(st.sampled_from(self.plain)), draw(STAMP), draw(STAMP)
+        values: dict[str, Any] = {}
+        flat: list[Any] = []
+        for row in self.topics[topic]:
+            count = row.count(self.storeys)
+            numbers = [draw(DRAWN[row.kind]) for _ in range(count)]
+            values[row.name] = numbers if count > 1 else numbers[0]
+            flat += numbers
+        data: bytes = self.classes[topic](**values).SerializeToString()
+        length = MESSAGE.size - chunks.PREFIX + len(data)
+        head = MESSAGE.pack(5, length, self.channels[topic], values["seq"], log_ns, publish_ns)
+        return self.packer.item(topic, log_ns, publish_ns, flat), head + data
 
 
-def row(item: tuple[Any, ...]) -> bytes:
-    return ENCODER.layouts[item[0]].pack(*item[1:])
+SHAPES = {
+    "one of each": Recorded(TOPICS, 1),
+    "three storeys and slaves": Recorded(SEVERAL, 3),
+    "two storeys": Recorded(TOPICS, 2),
+}
 
 
-@given(st.lists(ITEM, min_size=1, max_size=40))
-def test_rows_are_encoded_as_protobufs_own_library_does_it(items: list[tuple[Any, ...]]) -> None:
-    block = ENCODER.encode([item[0] for item in items], [row(item) for item in items])
-    records = [record(item) for item in items]
+@pytest.mark.parametrize("shape", SHAPES)
+@given(st.data())
+def test_rows_are_encoded_as_protobufs_own_library_does_it(shape: str, data: st.DataObject) -> None:
+    recorded = SHAPES[shape]
+    drawn = data.draw(st.lists(st.composite(recorded.drawn)(), min_size=1, max_size=15))
+    items, records = [item for item, _ in drawn], [record for _, record in drawn]
+    block = recorded.encoder.encode(items)
     assert bytes(block.records) == b"".join(records)
-    assert block.channels == [CHANNELS[item[0]] for item in items]
+    assert block.channels == [recorded.channels[topic] for topic, _ in items]
     places = [sum(map(len, records[:place])) for place in range(len(items))]
-    assert block.entries == [[item[1], place] for item, place in zip(items, places, strict=True)]
+    times = [HEAD.unpack_from(row)[0] for _, row in items]
+    assert block.entries == [[time, place] for time, place in zip(times, places, strict=True)]
 
 
 def write(path: Path, *, rows: bool) -> None:
     """A file of several chunks, whose times do not grow."""
     recording = Recording(path, "trial", 1, TOPICS)
-    encoder = RowEncoder(TOPICS, recording.channels, 1)
+    encoder, packer = RowEncoder(TOPICS, recording.channels, 1), RowPacker(TOPICS, 1)
     for tick in range(2 * CHUNK_SIZE // 400):
         items: list[tuple[Any, ...]] = [
             (topic, (tick * 7919) % 1000, tick, tick, *(tick % 3 for _ in TOPICS[topic][1:]))
             for topic in PLAIN
         ]
         if rows:
-            packed = [encoder.layouts[topic].pack(*values) for topic, *values in items]
-            recording.add_block(encoder.encode(PLAIN, packed))
+            packed = [
+                packer.item(topic, log_ns, publish_ns, values) for topic, log_ns, publish_ns, *values in items
+            ]
+            recording.add_block(encoder.encode(packed))
         else:
             for topic, log_ns, publish_ns, *values in items:
                 recording.add(topic, log_ns, publish_ns, values)
@@ -98,29 +123,24 @@ def test_a_file_of_encoded_rows_is_the_librarys_own_to_the_byte(
 def test_a_full_chunk_is_closed(tmp_path: Path) -> None:
     recording = Recording(tmp_path / "a.mcap", "trial", 1, TOPICS)
     encoder = RowEncoder(TOPICS, recording.channels, 1)
-    item = encoder.layouts["slave"].pack(1, 1, 1, 0.5, 1, *[0.5] * 10)
-    for _ in range(3 * CHUNK_SIZE // len(item)):
-        recording.add_block(encoder.encode(["slave"], [item]))
+    item = RowPacker(TOPICS, 1).item("slave", 1, 1, (1, 0.5, 1, *[0.5] * 10))
+    count, size = 3 * CHUNK_SIZE // len(item[1]), len(item[1])
+    for _ in range(count):
+        recording.add_block(encoder.encode([item]))
     recording.close({})
     with (tmp_path / "a.mcap").open("rb") as stream:
         summary = make_reader(stream).get_summary()
     assert summary is not None
     assert summary.statistics is not None
-    assert summary.statistics.message_count == 3 * CHUNK_SIZE // len(item)
+    assert summary.statistics.message_count == count
     assert len(summary.chunk_indexes) > 2
-    assert (
-        max(found.uncompressed_size for found in summary.chunk_indexes)
-        <= CHUNK_SIZE + len(item) + MESSAGE.size
-    )
+    assert max(found.uncompressed_size for found in summary.chunk_indexes) <= CHUNK_SIZE + size + MESSAGE.size
 
 
-def test_topics_of_texts_tables_and_several_values_are_no_rows_of_numbers() -> None:
-    assert [topic for topic, rows in TOPICS.items() if is_plain(rows, 1)] == list(PLAIN)
-    assert [topic for topic, rows in TOPICS.items() if is_plain(rows, 2)] == ["slave", "latency"]
-    of_two = [row._replace(slaves=("slave.roof", "slave.cellar")) for row in TOPICS["slave"]]
-    assert not is_plain(of_two, 1)
+def test_topics_with_texts_or_tables_are_no_rows_of_numbers() -> None:
+    assert [topic for topic, rows in TOPICS.items() if is_plain(rows)] == list(PLAIN)
 
 
 def test_a_number_that_its_field_cannot_hold_is_no_row() -> None:
     with pytest.raises(struct.error):
-        ENCODER.layouts["slave"].pack(0, 0, 2**32, 0.0, -1, *[0.0] * 10)
+        RowPacker(TOPICS, 1).item("slave", 0, 0, (2**32, 0.0, -1, *[0.0] * 10))

@@ -9,6 +9,7 @@ import msgpack
 import pytest
 from hypothesis import given
 
+from common import signals
 from common.lab import outlet
 from common.lab.outlet import PIECE, Inlet
 from common.link.memory_link import MemoryEndpoint
@@ -16,18 +17,32 @@ from common.plan import reality
 from common.plan.plan import Plan
 from common.protocol.messages import Finished, Message, Samples
 from common.recording.reader import read
+from common.recording.rows import Item, RowPacker
 from recorder.items import Items
 from simulation import virtual
 from tests.common.test_hostile import STRUCTURES
 from tests.common.test_slaves import two
 
 PLAN = Plan()
-SLAVE_ITEM: list[Any] = ["slave", 1, 1, 0, 0.0, -1, *[0.5] * 10]
-EVENT: list[Any] = ["event", 1, 1, 0.0, "slave", "info", "code", "text", {"a": 1.0}]
+NUMBERS = (0, 0.0, -1, *[0.5] * 10)
+SLAVE_ITEM: Item = RowPacker(signals.TOPICS, 1).item("slave", 1, 1, NUMBERS)
+EVENT_VALUES: list[Any] = [1, 1, 0.0, "slave", "info", "code", "text", {"a": 1.0}]
+EVENT: Item = ("event", msgpack.packb(EVENT_VALUES))
+RAMP_VALUES: list[Any] = [1, 1, 0, 0.0, "ramping", *[0.5] * 6]
+LATENCY = RowPacker(signals.TOPICS, 1).item("latency", 1, 1, (0, *[0.0] * 8, True, *[0.0] * 4, *[1] * 8))
+FLAG_AT = 16 + 4 + 8 * 8  # behind two stamps, the tick and eight numbers
 
 
-def changed(item: list[Any], place: int, value: object) -> list[Any]:
-    return [*item[:place], value, *item[place + 1 :]]
+def row(log_ns: int = 1, publish_ns: int = 1, tick: int = 0) -> Item:
+    return RowPacker(signals.TOPICS, 1).item("slave", log_ns, publish_ns, (tick, *NUMBERS[1:]))
+
+
+def event(place: int, value: object) -> Item:
+    return "event", msgpack.packb([*EVENT_VALUES[:place], value, *EVENT_VALUES[place + 1 :]])
+
+
+def ramp(place: int, value: object) -> Item:
+    return "slave_ramp", msgpack.packb([*RAMP_VALUES[:place], value, *RAMP_VALUES[place + 1 :]])
 
 
 HOSTILE: dict[str, object] = {
@@ -36,31 +51,43 @@ HOSTILE: dict[str, object] = {
     "nil": None,
     "an empty item": [[]],
     "no list": [7],
+    "two texts": ["ab", "cd"],
     "too many": [SLAVE_ITEM] * (PIECE + 1),
-    "an unknown topic": [changed(SLAVE_ITEM, 0, "roof")],
-    "another laboratory's topic": [["master", *SLAVE_ITEM[1:]]],
-    "a list as its topic": [changed(SLAVE_ITEM, 0, ["slave"])],
-    "a negative time": [changed(SLAVE_ITEM, 1, -1)],
-    "a time that no stamp holds": [changed(SLAVE_ITEM, 2, 2**63)],
-    "a tick beyond the plan": [changed(SLAVE_ITEM, 3, PLAN.ticks)],
-    "a tick of 2^32": [changed(SLAVE_ITEM, 3, 2**32)],
-    "a truth value as its tick": [changed(SLAVE_ITEM, 3, True)],
-    "a text as a number": [changed(SLAVE_ITEM, 7, "1.0")],
-    "a list as a number": [changed(SLAVE_ITEM, 7, [1.0])],
-    "a command of 2^31": [changed(SLAVE_ITEM, 5, 2**31)],
-    "a value less": [SLAVE_ITEM[:-1]],
-    "a value more": [[*SLAVE_ITEM, 0.0]],
-    "an event whose values are none": [changed(EVENT, 8, [1.0])],
-    "an event with a text as a value": [changed(EVENT, 8, {"a": "1"})],
-    "an event with a number as its text": [changed(EVENT, 7, 1)],
-    "the second one": [SLAVE_ITEM, changed(SLAVE_ITEM, 7, None)],
+    "an unknown topic": [("roof", SLAVE_ITEM[1])],
+    "another laboratory's topic": [("master", SLAVE_ITEM[1])],
+    "a list as its topic": [(["slave"], SLAVE_ITEM[1])],
+    "a text as its row": [("slave", "row")],
+    "three parts": [(*SLAVE_ITEM, b"")],
+    "a negative time": [row(log_ns=-1)],
+    "a negative time of publication": [row(publish_ns=-(2**63))],
+    "a tick beyond the plan": [row(tick=PLAN.ticks)],
+    "a tick of 2^32 - 1": [row(tick=2**32 - 1)],
+    "a byte less": [("slave", SLAVE_ITEM[1][:-1])],
+    "a byte more": [("slave", SLAVE_ITEM[1] + b"\0")],
+    "a row of msgpack": [("slave", msgpack.packb([1, 1, *NUMBERS]))],
+    "an event that is no msgpack": [("event", b"\xc1")],
+    "an event of a row of numbers": [("event", SLAVE_ITEM[1])],
+    "an event that is a map": [("event", msgpack.packb({"a": 1}))],
+    "an event with a negative time": [event(0, -1)],
+    "an event at a time that no stamp holds": [event(1, 2**63)],
+    "an event whose values are none": [event(7, [1.0])],
+    "an event with a text as a value": [event(7, {"a": "1"})],
+    "an event with a number as its text": [event(6, 1)],
+    "an event with a value less": [("event", msgpack.packb(EVENT_VALUES[:-1]))],
+    "an event with a value more": [("event", msgpack.packb([*EVENT_VALUES, 0.0]))],
+    "a ramp with a truth value as its tick": [ramp(2, True)],
+    "a ramp at a tick of 2^32": [ramp(2, 2**32)],
+    "a ramp with a text as a number": [ramp(5, "1.0")],
+    "a ramp with a list as a number": [ramp(5, [1.0])],
+    "the second one": [SLAVE_ITEM, row(log_ns=-1)],
+    "the second one an event": [SLAVE_ITEM, event(6, None)],
 }
 BYTES = {
     "empty": b"",
     "cut off": msgpack.packb([SLAVE_ITEM])[:-1],
     "trailing bytes": msgpack.packb([SLAVE_ITEM]) + b"\0",
     "deeply nested": b"\x91" * 100_000,
-    "bad UTF-8": b"\x91\x91\xa2\xff\xfe",
+    "bad UTF-8": b"\x91\x92\xa2\xff\xfe\xc4\x00",
     "said to be of 2^32 - 1": b"\xdd\xff\xff\xff\xff",
 } | {name: msgpack.packb(content) for name, content in HOSTILE.items()}
 
@@ -70,10 +97,19 @@ def test_what_can_not_be_recorded_is_no_piece(packed: bytes) -> None:
     assert Items(PLAN, "slave").unpack(packed) is None
 
 
+def test_a_flag_is_true_or_false_and_nothing_else() -> None:
+    topic, latency = LATENCY
+    for flag, recorded in ((0, True), (1, True), (2, False)):
+        changed = latency[:FLAG_AT] + bytes([flag]) + latency[FLAG_AT + 1 :]
+        found = Items(PLAN, "master").unpack(msgpack.packb([(topic, changed)]))
+        assert (found is not None) == recorded
+
+
 def test_what_a_laboratory_may_send_is_a_piece() -> None:
-    assert Items(PLAN, "slave").unpack(msgpack.packb([SLAVE_ITEM, EVENT])) == [SLAVE_ITEM, EVENT]
+    items = (SLAVE_ITEM, EVENT, ramp(2, PLAN.ticks + 1))
+    assert Items(PLAN, "slave").unpack(msgpack.packb(items)) == items
     roof, cellar = Items(two(), "slave.roof"), Items(two(), "slave.cellar")
-    packed = msgpack.packb([changed(SLAVE_ITEM, 0, "slave.roof")])
+    packed = msgpack.packb([("slave.roof", SLAVE_ITEM[1])])
     assert roof.unpack(packed) is not None
     assert cellar.unpack(packed) is None
 

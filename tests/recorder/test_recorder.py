@@ -17,6 +17,7 @@ from common.plan import reality
 from common.plan.plan import Plan
 from common.protocol.messages import Samples
 from common.recording.reader import read
+from common.recording.rows import Item, RowPacker
 from common.recording.writer import Recording
 from common.signals import TOPICS
 from recorder.files import reserved
@@ -24,7 +25,9 @@ from recorder.sink import FileSink, ThreadedSink
 from simulation import virtual
 from tests.helpers import with_table
 
-ITEM = ["slave", 0, 0, 0, 0.0, -1, *[0.0] * 10]
+
+def item(seq: int) -> Item:
+    return RowPacker(TOPICS, 1).item("slave", 0, 0, (seq, 0.0, -1, *[0.0] * 10))
 
 
 def recording(tmp_path: Path) -> Recording:
@@ -61,7 +64,7 @@ def test_a_full_disk_leaves_what_was_written_readable_and_is_said(tmp_path: Path
     sink = FileSink(file, clock)
     for seq in range(500):
         clock.time += 20_000_000
-        sink.put([[*ITEM[:3], seq, *ITEM[4:]]])
+        sink.put([item(seq)])
     assert "No space left on device" in sink.failure
     sink.close({}, {})
     run = read(tmp_path / "a.mcap")
@@ -110,7 +113,7 @@ def test_a_slow_disk_costs_drops_never_time(tmp_path: Path) -> None:
     sink.put = slow  # type: ignore[method-assign]
     threaded = ThreadedSink(sink, capacity=200)
     for seq in range(300):
-        threaded.put([[*ITEM[:3], seq, *ITEM[4:]]])
+        threaded.put([item(seq)])
     assert threaded.dropped >= 99  # what does not fit beside the two hundred that wait
     assert threaded.most_waiting == 200
     assert "too slow" in threaded.failure
@@ -149,7 +152,7 @@ def test_a_disk_that_stalls_again_and_again_costs_nothing(tmp_path: Path) -> Non
     threaded = ThreadedSink(FileSink(file, clock))
     for seq in range(6_000):
         clock.time += 20_000_000
-        threaded.put([[*ITEM[:3], seq, *ITEM[4:]]])  # returns while the disk stalls, or the test would hang
+        threaded.put([item(seq)])  # returns while the disk stalls, or the test would hang
         if seq % 150 == 149:
             disk.released.set()
     disk.over = True
@@ -168,7 +171,7 @@ def test_a_disk_that_hangs_does_not_keep_the_recorder_for_ever(tmp_path: Path, m
     sink = FileSink(recording(tmp_path), MonotonicClock())
     monkeypatch.setattr(sink, "put", lambda _: gate.wait(60.0))
     threaded = ThreadedSink(sink)
-    threaded.put([ITEM])
+    threaded.put([item(0)])
     threaded.close({}, {})
     assert threaded.failure == "the disk has not taken the last 1 samples within 0.2 s."
     gate.set()

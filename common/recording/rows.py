@@ -1,0 +1,74 @@
+"""Items of a laboratory's stream: a topic, and its values as one row of bytes.
+
+A topic of numbers alone has a fixed layout, which is packed once, where the values are computed, and which the
+recorder's kernels read; rows of any other topic, of events among them, are msgpack.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
+
+import msgpack
+
+from common.signals import FieldType, Signal
+
+Item = tuple[str, bytes]  # topic and row
+
+STAMPS = 16  # bytes of log and publish time, with which a row of numbers begins
+HEAD = struct.Struct("<qqI")  # log and publish time in ns, and the tick
+LETTERS: Mapping[FieldType, str] = {
+    FieldType.NUMBER: "d",
+    FieldType.STOREYS: "d",
+    FieldType.COUNT: "I",
+    FieldType.INDEX: "i",
+    FieldType.STAMP: "q",
+    FieldType.FLAG: "?",
+}  # how struct names what a row holds of a signal
+
+
+def is_plain(rows: Sequence[Signal]) -> bool:
+    """Whether a topic holds numbers alone, its tick first."""
+    return rows[0].kind is FieldType.COUNT and all(row.kind in LETTERS for row in rows)
+
+
+def layout(rows: Sequence[Signal], storeys: int) -> struct.Struct:
+    """A row of a plain topic: log and publish time, and all numbers in the order of the signal table."""
+    return struct.Struct("<qq" + "".join(LETTERS[row.kind] * row.count(storeys) for row in rows))
+
+
+def layouts(topics: Mapping[str, Sequence[Signal]], storeys: int) -> dict[str, struct.Struct]:
+    """The layouts of those topics that are plain."""
+    return {topic: layout(rows, storeys) for topic, rows in topics.items() if is_plain(rows)}
+
+
+class RowPacker:
+    """Makes items of topics; `storeys` are those of the building."""
+
+    def __init__(self, topics: Mapping[str, Sequence[Signal]], storeys: int) -> None:
+        self._pack: dict[str, Callable[..., bytes]] = {
+            topic: found.pack for topic, found in layouts(topics, storeys).items()
+        }
+
+    def item(self, topic: str, log_ns: int, publish_ns: int, values: Iterable[Any]) -> Item:
+        """An item; signals of several numbers stand with all of them among the values of a plain topic."""
+        pack = self._pack.get(topic)
+        if pack is None:
+            return other(topic, log_ns, publish_ns, values)
+        return topic, pack(log_ns, publish_ns, *values)
+
+
+def other(topic: str, log_ns: int, publish_ns: int, values: Iterable[Any]) -> Item:
+    """An item of a topic that is not plain."""
+    return topic, msgpack.packb((log_ns, publish_ns, *values))
+
+
+def values_of(row: bytes) -> list[Any]:
+    """Log time, publish time and values of a row that is not plain.
+
+    Raises:
+        ValueError, msgpack.UnpackException: it is not msgpack.
+    """
+    found: list[Any] = msgpack.unpackb(row)
+    return found
