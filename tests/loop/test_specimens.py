@@ -108,7 +108,7 @@ def test_no_specimen_leaves_the_building_whole() -> None:
 
 def played_without(plan: Plan) -> Array:
     step = MasterStep(plan, ground_rows(plan, motion(plan)))
-    return np.array([step(tick, 0.0, 0.0, [0.0]).displacement for tick in range(plan.ticks)])
+    return np.array([step(tick, 0.0, 0.0, [0.0]).of_storeys["displacement"] for tick in range(plan.ticks)])
 
 
 @pytest.mark.parametrize(
