@@ -20,8 +20,9 @@ from common.errors import InputError
 from common.plan.plan import Plan
 from common.plan.schema import Rule, as_type, in_range, nearest
 from common.plan.tables import ForceCorrection
-from common.safety.ramp import MotionRamp, Ramp
+from common.safety.ramp import Ramp
 from common.signals import Channels, Signal
+from laboratories.descent import HoldRamp
 from laboratories.kind import Chosen, Coupling, Follows, Kind, Limited, Machine, Sensed, usual
 from models.compiled import jit
 from models.registry import Array
@@ -105,45 +106,6 @@ def advance_device(lab: DeviceRecord, truth: Array, command: float, effort: floa
 def enter_device(lab: tuple[Any, ...], truth: Array, command: float, effort: float) -> None:
     """`advance_device` for a caller outside compiled code, which holds the device as `compiled.plain` gives it."""
     lab[0](lab[1], lab[2], truth, command, effort)
-
-
-class HoldRamp:
-    """The command comes to a hold, and where the plan says so goes on to where the device carries no force."""
-
-    def __init__(
-        self, plan: Plan, last: tuple[float, ...], before: tuple[float, ...], force: int, *, effort: bool
-    ) -> None:
-        safety, interval = plan.safety, plan.test.interval
-        velocity = (last[0] - before[0]) / interval
-        self._motion = MotionRamp(safety, interval, last[0], velocity, unload=safety.unload)
-        self._force = force
-        self._rest = (0.0,) if effort else ()
-
-    def step(self, measured: tuple[float, ...] | None) -> tuple[float, ...]:
-        """The command for the coming interval, a motor's force at zero."""
-        return (self._motion.step(measured[self._force] if measured else None), *self._rest)
-
-    @property
-    def done(self) -> bool:
-        """Whether the command is at rest."""
-        return self._motion.done
-
-    @property
-    def travel(self) -> float:
-        """How far apart the commands have been, m."""
-        return self._motion.travel
-
-    @property
-    def left(self) -> float:
-        """How long it takes at most from here on, s."""
-        return self._motion.left
-
-    def doing(self, measured: tuple[float, ...] | None) -> str:
-        """What it does, in words, with the force that the device still carries."""
-        force = "unknown force" if measured is None else f"{abs(measured[self._force]) * 1e-3:.1f} kN"
-        if self._motion.unloading:
-            return f"unloading the device: {force} left"
-        return f"bringing the device to a halt: {force} on it"
 
 
 class Device(Kind):
@@ -285,7 +247,8 @@ class Device(Kind):
     def ramp(self, plan: Plan, last: tuple[float, ...], before: tuple[float, ...]) -> Ramp:
         """The command comes to a hold, then the device is unloaded."""
         force = self.channels.names.index(self.channels.force)
-        return HoldRamp(plan, last, before, force, effort=self.channels.effort is not None)
+        rest = (0.0,) if self.channels.effort else ()
+        return HoldRamp(plan, last, before, force, "device", "device", rest)
 
     def _given(self, table: Mapping[str, Any], units: Mapping[str, str], where: str) -> dict[str, float]:
         """The numbers of a table of the plan, whose names are among `units`; raises InputError where one is none."""

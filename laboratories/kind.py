@@ -13,6 +13,8 @@ from enum import Enum
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
+import numpy as np
+
 from common.plan.plan import Plan
 from common.plan.tables import ForceCorrection
 from common.safety.ramp import Ramp
@@ -188,13 +190,13 @@ class Kind(ABC):
     def compensator(self, plan: Plan) -> Chosen:
         """The compensator that the plan chooses for it."""
 
-    @abstractmethod
     def noise(self, plan: Plan) -> Array:
-        """Nominal rms noise of its measured channels, (channels,), each in its signal's unit."""
+        """Nominal rms noise of its measured channels, (channels,), each in its signal's unit, as `[sensors]` has it."""
+        return np.array([getattr(plan.sensors, name) for name in self.channels.names])
 
-    @abstractmethod
     def limits(self, plan: Plan) -> Mapping[str, float]:
         """Largest magnitudes by signal, and of those that `limited` names; what is not in it has no limit."""
+        return dict(vars(plan.limits))
 
     @abstractmethod
     def ramp(self, plan: Plan, last: tuple[float, ...], before: tuple[float, ...]) -> Ramp:

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from common.plan.plan import Plan
 from common.signals import COLUMN_CHANNELS
 from laboratories.column import model
-from laboratories.column.descent import ColumnRamp
 from laboratories.column.model import ColumnLab
+from laboratories.descent import HoldRamp
 from laboratories.kind import Chosen, Coupling, Follows, Hysteresis, Kind, Limited, Machine, Pictured, Sensed
-from laboratories.sensors import noise
 from models.registry import Array
 from models.system import System
 
@@ -111,17 +109,10 @@ class ColumnKind(Kind):
         """That of `[compensator]`."""
         return Chosen(plan.compensator.kind, plan.compensator.parameters, "compensator")
 
-    def noise(self, plan: Plan) -> Array:
-        """As `[sensors]` has it."""
-        return noise.levels(plan.sensors, self.channels.names)
-
-    def limits(self, plan: Plan) -> Mapping[str, float]:
-        """As `[limits]` has them."""
-        return {field.name: getattr(plan.limits, field.name) for field in dataclasses.fields(plan.limits)}
-
-    def ramp(self, plan: Plan, last: tuple[float, ...], before: tuple[float, ...]) -> ColumnRamp:
+    def ramp(self, plan: Plan, last: tuple[float, ...], before: tuple[float, ...]) -> HoldRamp:
         """The actuator comes to a hold, then unloads the specimen."""
-        return ColumnRamp(plan, last, before)
+        force = self.channels.names.index(self.channels.force)
+        return HoldRamp(plan, last, before, force, "actuator", "column")
 
 
 COLUMN = ColumnKind()

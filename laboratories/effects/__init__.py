@@ -166,14 +166,6 @@ def allowed(parameter: Parameter) -> str:
     return words + (", or inf for no effect" if math.isinf(parameter.null) else "")
 
 
-def null_parameters(effect: Effect) -> dict[str, float]:
-    """The parameters with which an effect is not there; what only shapes it is at its default."""
-    return {
-        item.name: item.default if item.shape and item.default is not None else item.null
-        for item in effect.parameters
-    }
-
-
 def of_site(site: str) -> list[Effect]:
     """The effects at one site, in the catalogue's order; none at an unknown site."""
     return [effect for effect in CATALOGUE.values() if effect.site == site]

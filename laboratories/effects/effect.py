@@ -23,14 +23,18 @@ class Parameter:
     most: float
     sizes: tuple[float, ...]  # from barely visible to strong, where a search starts
     says: str = ""
-    shape: bool = False  # not how strong the effect is but what it looks like; it has no null value
-    default: float | None = None  # of a parameter that need not be given
+    shape: bool = False  # not how strong the effect is but what it looks like: at `null` unless it is given
     follows: str = (
         ""  # recorded signal whose peak scales the sizes; empty: the site's signal of the same unit
     )
     smoothing: float = (
         0.0  # of a velocity that smooths a law at rest: its share of the peak velocity in a search
     )
+
+    @property
+    def default(self) -> float | None:
+        """Its value where it is not given, None where it must be."""
+        return self.null if self.shape else None
 
 
 @dataclass(frozen=True)
@@ -85,7 +89,3 @@ class Effect:
         """All parameters by name, those not given at their default."""
         defaults = {item.name: item.default for item in self.parameters if item.default is not None}
         return defaults | dict(given)
-
-    def is_called_by(self, parameter: str) -> bool:
-        """Whether the effect's name says this parameter already, as `table.delay` does of its delay."""
-        return self.name.replace(".", "_").endswith(f"_{parameter}")

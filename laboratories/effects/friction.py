@@ -13,6 +13,5 @@ VELOCITY = Parameter(
     sizes=(0.0003, 0.001, 0.003),
     says="below which it falls off, F·tanh(|v|/velocity); at its least it is Coulomb's",
     shape=True,
-    default=1e-06,
     smoothing=0.03,  # of the peak velocity: smooth enough that a fit has a slope to follow, far from viscous
 )

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from common.plan.tables import SensorsTable
 from models.registry import Array
 
 LAB_A, LAB_B = 1, 2
@@ -16,11 +13,6 @@ BLOCK = 1024  # rows drawn at once, so that a reading costs a list's pop
 def lab_seed(seed: int, lab: int) -> int:
     """Seed of one laboratory under the seed of a plan or of a reality."""
     return int(np.random.SeedSequence([seed, lab]).generate_state(1)[0])
-
-
-def levels(sensors: SensorsTable, names: Sequence[str]) -> Array:
-    """Rms noise that the plan gives the named readings, each in its signal's unit."""
-    return np.array([getattr(sensors, name) for name in names])
 
 
 class Noise:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
@@ -10,7 +9,6 @@ from common.plan.plan import Plan
 from common.plan.tables import ForceCorrection
 from common.signals import TABLE_CHANNELS
 from laboratories.kind import Chosen, Coupling, Follows, Hysteresis, Kind, Limited, Machine, Pictured, Sensed
-from laboratories.sensors import noise
 from laboratories.table import model
 from laboratories.table.descent import TableRamp
 from laboratories.table.model import TableLab
@@ -108,14 +106,6 @@ class TableKind(Kind):
         """That of `[table.compensator]`."""
         chosen = plan.table.compensator
         return Chosen(chosen.kind, chosen.parameters, plan.follows_in)
-
-    def noise(self, plan: Plan) -> Array:
-        """As `[sensors]` has it."""
-        return noise.levels(plan.sensors, self.channels.names)
-
-    def limits(self, plan: Plan) -> Mapping[str, float]:
-        """As `[limits]` has them."""
-        return {field.name: getattr(plan.limits, field.name) for field in dataclasses.fields(plan.limits)}
 
     def ramp(self, plan: Plan, last: tuple[float, ...], before: tuple[float, ...]) -> TableRamp:
         """The table comes to a hold, the motor's force goes to zero."""

@@ -24,7 +24,7 @@ from common.roles import SLAVE
 from laboratories.column import model as column_lab
 from laboratories.column import specimen
 from laboratories.column.kind import COLUMN
-from laboratories.effects import CATALOGUE, lay, null_parameters
+from laboratories.effects import CATALOGUE, lay
 from laboratories.effects.effect import Effect, Parameter
 from laboratories.emulated import EmulatedLab
 from laboratories.table import model as table_lab
@@ -32,7 +32,7 @@ from laboratories.table.kind import TABLE
 from loop import substructure
 from loop.closed_loop import Rollout, signals, simulate
 from models.system import ActuatorEffects, ColumnEffects, DamperEffects, System, TableEffects
-from tests.laboratories.effects.distinct import DISTINCT
+from tests.laboratories.effects.distinct import DISTINCT, null_parameters
 
 Array = NDArray[np.floating[Any]]
 

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from common.plan.tables import Actuator, Column, Damper, SensorsTable, ShakingTable
+from common.plan.plan import Plan
+from common.plan.tables import Actuator, Column, Damper, ShakingTable
 from laboratories.column import model as column_lab
 from laboratories.sensors import noise
 from laboratories.table import model as table_lab
@@ -195,7 +196,7 @@ def test_the_dampers_force_balances_its_motion() -> None:
 
 
 def test_noise_is_the_same_one_by_one_and_at_once() -> None:
-    levels = noise.levels(SensorsTable(), TABLE.channels.names)
+    levels = TABLE.noise(Plan())
     single, whole = noise.Noise(3, levels), noise.Noise(3, levels)
     rows = whole.rows(2500)
     assert np.array_equal(rows, [single.row() for _ in range(2500)])

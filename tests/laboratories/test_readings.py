@@ -19,7 +19,7 @@ from common.rig import ColumnCommand, TableCommand
 from laboratories.column.kind import COLUMN
 from laboratories.effects import CATALOGUE, lay
 from laboratories.emulated import EmulatedLab
-from laboratories.sensors import noise, readings
+from laboratories.sensors import readings
 from laboratories.table.kind import TABLE
 from loop import substructure
 from loop.closed_loop import Rollout, simulate
@@ -153,8 +153,8 @@ def test_quantisation_errors_are_those_of_widrow() -> None:
 
 @pytest.mark.parametrize("name", [*COLUMN.channels.names, *TABLE.channels.names])
 def test_levels_add_as_independent_noises_do(name: str) -> None:
-    names = COLUMN.channels.names if name in COLUMN.channels.names else TABLE.channels.names
-    nominal = noise.levels(SensorsTable(), names)
+    kind = COLUMN if name in COLUMN.channels.names else TABLE
+    names, nominal = kind.channels.names, kind.noise(Plan())
     found = readings.levels(names, nominal, {name: SensorEffects(noise=3.0)})
     for place, other in enumerate(names):
         squared = nominal[place] ** 2 + (9.0 if other == name else 0.0)

@@ -71,7 +71,7 @@ def stage(case: PartitionCase, motion: Motion, plants: int, seed: int) -> Stage:
     """A case under a motion, its reference computed, its plants and its noise drawn."""
     plan = planned(case, motion)
     ground = substructure.ground_rows(plan, substructure.motion(plan))
-    levels = noise.levels(plan.sensors, COLUMN.channels.names)
+    levels = COLUMN.noise(plan)
     rows = noise.Noise(noise.lab_seed(plan.test.seed, noise.LAB_A), levels).rows(plan.ticks)
     others = [with_plant(plan, plant) for plant in draw(plan, plants, seed)]
     reference = response.response(plan, ground)

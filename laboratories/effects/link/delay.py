@@ -8,22 +8,14 @@ so the round trip is longer by two delays, each rounded up to whole intervals. N
 
 from __future__ import annotations
 
-from laboratories.effects.effect import Effect, Parameter
-from models.system import System
+from laboratories.effects.effect import Parameter
+from laboratories.effects.laws import sets
 
-
-def apply(system: System, delay: float) -> System:
-    """Each message later by `delay` s."""
-    return system.laid("link", delay=delay)
-
-
-EFFECT = Effect(
-    name="link.delay",
-    site="link",
-    kind="physics",
-    says="messages take longer",
-    parameters=(
-        Parameter(
+EFFECT = sets(
+    "link",
+    "delay",
+    {
+        "delay": Parameter(
             "delay",
             "s",
             null=0.0,
@@ -32,7 +24,7 @@ EFFECT = Effect(
             sizes=(0.001, 0.003, 0.007, 0.015, 0.03),
             says="added to each direction",
         ),
-    ),
+    },
+    says="messages take longer",
     reference="there from the first tick at or after nominal time + delay",
-    apply=apply,
 )

@@ -9,22 +9,14 @@ tells them apart.
 
 from __future__ import annotations
 
-from laboratories.effects.effect import Effect, Parameter
-from models.system import System
+from laboratories.effects.effect import Parameter
+from laboratories.effects.laws import sets
 
-
-def apply(system: System, std: float) -> System:
-    """Delays that vary by `std` s."""
-    return system.laid("link", jitter=std)
-
-
-EFFECT = Effect(
-    name="link.jitter",
-    site="link",
-    kind="physics",
-    says="messages take varying times",
-    parameters=(
-        Parameter(
+EFFECT = sets(
+    "link",
+    "jitter",
+    {
+        "jitter": Parameter(
             "std",
             "s",
             null=0.0,
@@ -33,7 +25,7 @@ EFFECT = Effect(
             sizes=(0.0003, 0.001, 0.003, 0.01),
             says="standard deviation",
         ),
-    ),
+    },
+    says="messages take varying times",
     reference="delay of a message = delay + n, n exponential of standard deviation std",
-    apply=apply,
 )

@@ -8,24 +8,14 @@ r = 1/burst. Not to be confused with `link.jitter`: late messages come after all
 
 from __future__ import annotations
 
-from laboratories.effects.effect import Effect, Parameter
-from models.system import LinkEffects, System
+from laboratories.effects.effect import Parameter
+from laboratories.effects.laws import sets
 
-
-def apply(system: System, probability: float, burst: float) -> System:
-    """Share `probability` of messages lost, `burst` in a row; without it the shape leaves no trace."""
-    if probability == 0.0:
-        burst = LinkEffects.burst
-    return system.laid("link", loss=probability, burst=burst)
-
-
-EFFECT = Effect(
-    name="link.loss",
-    site="link",
-    kind="physics",
-    says="messages are lost",
-    parameters=(
-        Parameter(
+EFFECT = sets(
+    "link",
+    "loss",
+    {
+        "loss": Parameter(
             "probability",
             "",
             null=0.0,
@@ -34,7 +24,7 @@ EFFECT = Effect(
             sizes=(0.002, 0.01, 0.05, 0.2),
             says="share of messages lost",
         ),
-        Parameter(
+        "burst": Parameter(
             "burst",
             "",
             null=1.0,
@@ -43,9 +33,8 @@ EFFECT = Effect(
             sizes=(1.0, 5.0, 20.0),
             says="mean messages lost in a row",
             shape=True,
-            default=1.0,
         ),
-    ),
+    },
+    says="messages are lost",
     reference="Gilbert, Bell Syst. Tech. J. 39 (1960) 1253-1265",
-    apply=apply,
 )

@@ -9,24 +9,18 @@ loop moves too.
 from __future__ import annotations
 
 from laboratories.effects.effect import Parameter
-from laboratories.effects.reading import ReadingFault, SensorSignal, sized
+from laboratories.effects.reading import ReadingFault, sized
 
-
-def parameter(signal: SensorSignal) -> Parameter:
-    """Its one parameter, sized for a signal."""
-    return Parameter(
+FAULT = ReadingFault(
+    "bias",
+    lambda signal: Parameter(
         "offset",
         signal.unit,
         null=0.0,
         least=-5.0 * signal.typical,
         most=5.0 * signal.typical,
         sizes=sized(signal.typical, -0.05, -0.01, 0.002, 0.01, 0.05),
-    )
-
-
-FAULT = ReadingFault(
-    "bias",
-    parameter,
+    ),
     says="the reading is off by a constant",
     reference="reading = value + offset",
 )

@@ -8,12 +8,11 @@ Not to be confused with `sensor.<signal>.bias`, which is there from the beginnin
 from __future__ import annotations
 
 from laboratories.effects.effect import Parameter
-from laboratories.effects.reading import ReadingFault, SensorSignal, sized
+from laboratories.effects.reading import ReadingFault, sized
 
-
-def parameter(signal: SensorSignal) -> Parameter:
-    """Its one parameter, sized for a signal."""
-    return Parameter(
+FAULT = ReadingFault(
+    "drift",
+    lambda signal: Parameter(
         "rate",
         f"{signal.unit}/s",
         null=0.0,
@@ -21,12 +20,7 @@ def parameter(signal: SensorSignal) -> Parameter:
         most=0.5 * signal.typical,
         sizes=sized(signal.typical, -1e-3, 1e-4, 1e-3, 4e-3),
         says="offset per second",
-    )
-
-
-FAULT = ReadingFault(
-    "drift",
-    parameter,
+    ),
     says="the reading goes astray steadily",
     reference="reading = value + rate·t",
 )

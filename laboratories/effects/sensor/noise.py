@@ -8,12 +8,11 @@ Not to be confused with `link.jitter`, which scatters what is used, not what was
 from __future__ import annotations
 
 from laboratories.effects.effect import Parameter
-from laboratories.effects.reading import ReadingFault, SensorSignal, sized
+from laboratories.effects.reading import ReadingFault, sized
 
-
-def parameter(signal: SensorSignal) -> Parameter:
-    """Its one parameter, sized for a signal."""
-    return Parameter(
+FAULT = ReadingFault(
+    "noise",
+    lambda signal: Parameter(
         "rms",
         signal.unit,
         null=0.0,
@@ -21,12 +20,7 @@ def parameter(signal: SensorSignal) -> Parameter:
         most=signal.typical,
         sizes=sized(signal.noise, 0.7, 2.0, 6.0, 20.0),
         says="beside the plan's noise",
-    )
-
-
-FAULT = ReadingFault(
-    "noise",
-    parameter,
+    ),
     says="the reading is noisier than believed",
     reference="reading = value + white noise",
     in_samples=True,

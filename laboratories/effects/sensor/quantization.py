@@ -9,12 +9,11 @@ the readings lie on a grid.
 from __future__ import annotations
 
 from laboratories.effects.effect import Parameter
-from laboratories.effects.reading import ReadingFault, SensorSignal, sized
+from laboratories.effects.reading import ReadingFault, sized
 
-
-def parameter(signal: SensorSignal) -> Parameter:
-    """Its one parameter, sized for a signal."""
-    return Parameter(
+FAULT = ReadingFault(
+    "quantization",
+    lambda signal: Parameter(
         "step",
         signal.unit,
         null=0.0,
@@ -22,12 +21,7 @@ def parameter(signal: SensorSignal) -> Parameter:
         most=signal.typical,
         sizes=sized(signal.noise, 3.0, 10.0, 30.0, 100.0),
         says="whole step",
-    )
-
-
-FAULT = ReadingFault(
-    "quantization",
-    parameter,
+    ),
     says="the reading comes in steps",
     reference="Widrow, Kollár, Quantization Noise, Cambridge University Press 2008",
     in_samples=True,

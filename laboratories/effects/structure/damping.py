@@ -8,7 +8,7 @@ shows between command and achieved displacement.
 
 from __future__ import annotations
 
-from laboratories.effects.factor import factor_on
+from laboratories.effects.laws import factor_on
 from models.system import System
 
 

@@ -9,7 +9,7 @@ which adds the same stiffness to every storey instead of a share.
 
 from __future__ import annotations
 
-from laboratories.effects.factor import factor_on, of_plan
+from laboratories.effects.laws import factor_on, of_plan
 
 EFFECT = factor_on(
     "structure",

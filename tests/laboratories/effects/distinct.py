@@ -17,3 +17,8 @@ def _distinct() -> dict[str, Effect]:
 
 
 DISTINCT = _distinct()
+
+
+def null_parameters(effect: Effect) -> dict[str, float]:
+    """The parameters with which an effect is not there."""
+    return {item.name: item.null for item in effect.parameters}

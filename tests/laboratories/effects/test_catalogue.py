@@ -14,11 +14,11 @@ from common.plan.plan import Plan
 from common.plan.tables import Damper, ShakingTable, Structure
 from common.signals import TOPICS
 from laboratories import effects
-from laboratories.effects import CATALOGUE, lay, null_parameters, of_site
+from laboratories.effects import CATALOGUE, lay, of_site
 from laboratories.effects.effect import Effect, Kind, Parameter
 from laboratories.effects.sites import SITES
 from models.system import Effects, SensorEffects, System
-from tests.laboratories.effects.distinct import DISTINCT
+from tests.laboratories.effects.distinct import DISTINCT, null_parameters
 
 ROOM = Path(effects.__file__).parent.parent
 BASE = System(Plan())
@@ -135,20 +135,6 @@ def test_effects_on_readings_of_one_fault_are_one_family() -> None:
     assert CATALOGUE["table.delay"].family == "table.delay"
 
 
-@pytest.mark.parametrize(
-    ("name", "parameter", "called"),
-    [
-        ("table.delay", "delay", True),
-        ("ground.time_shift", "shift", True),
-        ("sensor.column_force.delay", "delay", True),
-        ("damper.motor_lag", "time_constant", False),
-        ("damper.force_limit", "force", False),
-    ],
-)
-def test_a_parameter_that_the_name_says_is_known(name: str, parameter: str, called: bool) -> None:
-    assert CATALOGUE[name].is_called_by(parameter) is called
-
-
 @EACH
 def test_what_is_said_of_a_search_refers_to_parameters_and_signals_that_are_there(effect: Effect) -> None:
     names = {item.name for item in effect.parameters}
@@ -191,11 +177,9 @@ def test_every_size_is_within_bounds_and_changes_the_system(effect: Effect) -> N
     for item in effect.parameters:
         assert item.least < item.most
         assert item.least <= item.null <= item.most or math.isinf(item.null)
-        assert item.shape == (item.default is not None)
         assert all(item.least <= size <= item.most for size in item.sizes)
         assert len(set(item.sizes)) == len(item.sizes)
         if item.shape:
-            assert item.default == item.null
             assert len(item.sizes) >= 3
             continue
         assert 4 <= len(item.sizes) <= 6

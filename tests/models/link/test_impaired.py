@@ -103,19 +103,25 @@ def test_directions_and_seeds_are_independent() -> None:
     ],
 )
 def test_what_no_network_does_is_refused(options: dict[str, float]) -> None:
-    with pytest.raises(InputError):
+    with pytest.raises(InputError, match=next(iter(options))):
         ImpairedLink(0, **options)
 
 
-@pytest.mark.parametrize(
-    "options",
-    [{"delay": 0.003}, {"jitter": 0.003}, {"loss": 0.2, "burst": 3.0}, {"delay": 0.002, "jitter": 0.001}],
+@given(
+    st.integers(0, 1000),
+    st.one_of(st.floats(0.0, 0.03), st.integers(0, 10).map(lambda ticks: ticks * INTERVAL)),
+    st.floats(0.0, 0.01),
+    st.floats(0.0, 0.5),
+    st.floats(1.0, 10.0),
 )
-def test_the_exchange_is_that_of_mailboxes(options: dict[str, float]) -> None:
-    ticks = 2000
-    found = exchange(ticks, INTERVAL, ImpairedLink(4, **options))
+def test_the_exchange_is_that_of_mailboxes(
+    seed: int, delay: float, jitter: float, loss: float, burst: float
+) -> None:
+    options = {"delay": delay, "jitter": jitter, "loss": loss, "burst": burst}
+    ticks = 150
+    found = exchange(ticks, INTERVAL, ImpairedLink(seed, **options))
     for direction, nominal, used in (("command", 0, found.command), ("feedback", 1, found.feedback)):
-        box: Mailbox[int] = Mailbox(ImpairedLink(4, **options), direction, INTERVAL, nominal)
+        box: Mailbox[int] = Mailbox(ImpairedLink(seed, **options), direction, INTERVAL, nominal)
         newest = -1
         for tick in range(ticks):
             if nominal == 0:

@@ -8,22 +8,14 @@ specimen moves but gives no force, or with `actuator.deadband`, which acts on th
 
 from __future__ import annotations
 
-from laboratories.effects.effect import Effect, Parameter
-from models.system import System
+from laboratories.effects.effect import Parameter
+from laboratories.effects.laws import sets
 
-
-def apply(system: System, width: float) -> System:
-    """Whole play of `width` m."""
-    return system.laid("actuator", backlash=width)
-
-
-EFFECT = Effect(
-    name="actuator.backlash",
-    site="actuator",
-    kind="physics",
-    says="play between piston and specimen",
-    parameters=(
-        Parameter(
+EFFECT = sets(
+    "actuator",
+    "backlash",
+    {
+        "backlash": Parameter(
             "width",
             "m",
             null=0.0,
@@ -32,8 +24,8 @@ EFFECT = Effect(
             sizes=(2e-05, 6e-05, 0.0002, 0.0006),
             says="whole play",
         ),
-    ),
+    },
+    says="play between piston and specimen",
     reference="Nordin, Gutman, Controlling mechanical systems with backlash: a survey, Automatica 38 (2002) 1633-1649",
-    apply=apply,
     actuators=("fopdt",),
 )

@@ -8,22 +8,14 @@ memory behind the piston: the dead band leaves a slow creep short of the target.
 
 from __future__ import annotations
 
-from laboratories.effects.effect import Effect, Parameter
-from models.system import System
+from laboratories.effects.effect import Parameter
+from laboratories.effects.laws import sets
 
-
-def apply(system: System, width: float) -> System:
-    """Whole dead band of `width` m on the loop's error."""
-    return system.laid("actuator", deadband=width)
-
-
-EFFECT = Effect(
-    name="actuator.deadband",
-    site="actuator",
-    kind="physics",
-    says="small errors of the loop move no oil",
-    parameters=(
-        Parameter(
+EFFECT = sets(
+    "actuator",
+    "deadband",
+    {
+        "deadband": Parameter(
             "width",
             "m",
             null=0.0,
@@ -32,7 +24,7 @@ EFFECT = Effect(
             sizes=(5e-05, 0.00015, 0.0004, 0.001),
             says="whole band of the error",
         ),
-    ),
+    },
+    says="small errors of the loop move no oil",
     reference="Merritt, Hydraulic Control Systems, Wiley 1967",
-    apply=apply,
 )

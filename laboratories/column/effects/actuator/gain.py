@@ -9,7 +9,7 @@ per reading does not.
 
 from __future__ import annotations
 
-from laboratories.effects.factor import factor_on
+from laboratories.effects.laws import factor_on
 from models.system import System
 
 

@@ -11,22 +11,14 @@ from __future__ import annotations
 
 import math
 
-from laboratories.effects.effect import Effect, Parameter
-from models.system import System
+from laboratories.effects.effect import Parameter
+from laboratories.effects.laws import sets
 
-
-def apply(system: System, velocity: float) -> System:
-    """Piston no faster than `velocity` m/s."""
-    return system.laid("actuator", velocity_limit=velocity)
-
-
-EFFECT = Effect(
-    name="actuator.velocity_limit",
-    site="actuator",
-    kind="physics",
-    says="the piston has a highest speed",
-    parameters=(
-        Parameter(
+EFFECT = sets(
+    "actuator",
+    "velocity_limit",
+    {
+        "velocity_limit": Parameter(
             "velocity",
             "m/s",
             null=math.inf,
@@ -35,7 +27,7 @@ EFFECT = Effect(
             sizes=(0.036, 0.03, 0.022, 0.015),
             says="highest speed",
         ),
-    ),
+    },
+    says="the piston has a highest speed",
     reference="Merritt, Hydraulic Control Systems, Wiley 1967",
-    apply=apply,
 )

@@ -8,22 +8,14 @@ in every cycle, or `column.stiffness`, which is there from the beginning.
 
 from __future__ import annotations
 
-from laboratories.effects.effect import Effect, Parameter
-from models.system import System
+from laboratories.effects.effect import Parameter
+from laboratories.effects.laws import sets
 
-
-def apply(system: System, rate: float) -> System:
-    """Loss of the share `rate` of the stiffness, well past the reference deformation."""
-    return system.laid("column", degradation=rate)
-
-
-EFFECT = Effect(
-    name="column.degradation",
-    site="column",
-    kind="physics",
-    says="stiffness is lost with the largest deformation seen",
-    parameters=(
-        Parameter(
+EFFECT = sets(
+    "column",
+    "degradation",
+    {
+        "degradation": Parameter(
             "rate",
             "",
             null=0.0,
@@ -32,7 +24,7 @@ EFFECT = Effect(
             sizes=(0.03, 0.08, 0.2, 0.4),
             says="share lost in the end",
         ),
-    ),
+    },
+    says="stiffness is lost with the largest deformation seen",
     reference="f = (1 − rate·(1 − exp(−δ_max/2 mm)))·f_column",
-    apply=apply,
 )

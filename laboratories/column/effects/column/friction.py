@@ -9,26 +9,18 @@ small amplitude.
 
 from __future__ import annotations
 
-from laboratories.effects.effect import Effect, Parameter
+from laboratories.effects.effect import Parameter
 from laboratories.effects.friction import VELOCITY
-from models.system import ColumnEffects, System
+from laboratories.effects.laws import sets
 
-
-def apply(system: System, force: float, presliding: float, velocity: float) -> System:
-    """Friction of `force` N after `presliding` m; without it the shape leaves no trace."""
-    if force == 0.0:
-        presliding, velocity = ColumnEffects.presliding, ColumnEffects.friction_velocity
-    return system.laid("column", friction=force, presliding=presliding, friction_velocity=velocity)
-
-
-EFFECT = Effect(
-    name="column.friction",
-    site="column",
-    kind="physics",
-    says="rubbing in the set-up of the specimen",
-    parameters=(
-        Parameter("force", "N", null=0.0, least=0.0, most=30000.0, sizes=(100.0, 300.0, 900.0, 3000.0)),
-        Parameter(
+EFFECT = sets(
+    "column",
+    "friction",
+    {
+        "friction": Parameter(
+            "force", "N", null=0.0, least=0.0, most=30000.0, sizes=(100.0, 300.0, 900.0, 3000.0)
+        ),
+        "presliding": Parameter(
             "presliding",
             "m",
             null=1e-05,
@@ -37,10 +29,9 @@ EFFECT = Effect(
             sizes=(3e-06, 1e-05, 5e-05),
             says="deformation before it slides, to one side",
             shape=True,
-            default=1e-05,
         ),
-        VELOCITY,
-    ),
+        "friction_velocity": VELOCITY,
+    },
+    says="rubbing in the set-up of the specimen",
     reference="Armstrong-Hélouvry, Dupont, Canudas de Wit, Automatica 30 (1994) 1083-1138",
-    apply=apply,
 )

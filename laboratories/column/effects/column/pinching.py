@@ -9,24 +9,14 @@ edge and no force at all inside, or with `actuator.backlash`.
 
 from __future__ import annotations
 
-from laboratories.effects.effect import Effect, Parameter
-from models.system import ColumnEffects, System
+from laboratories.effects.effect import Parameter
+from laboratories.effects.laws import sets
 
-
-def apply(system: System, factor: float, hardening: float, width: float) -> System:
-    """Pinching by `factor` over `width` m, then `hardening`; without it the shape leaves no trace."""
-    if factor == 0.0:
-        hardening, width = ColumnEffects.pinching_hardening, ColumnEffects.pinching_width
-    return system.laid("column", pinching=factor, pinching_hardening=hardening, pinching_width=width)
-
-
-EFFECT = Effect(
-    name="column.pinching",
-    site="column",
-    kind="physics",
-    says="little stiffness until cracks have closed",
-    parameters=(
-        Parameter(
+EFFECT = sets(
+    "column",
+    "pinching",
+    {
+        "pinching": Parameter(
             "factor",
             "",
             null=0.0,
@@ -35,7 +25,7 @@ EFFECT = Effect(
             sizes=(0.05, 0.15, 0.35, 0.6),
             says="share of the force missing at the origin",
         ),
-        Parameter(
+        "pinching_hardening": Parameter(
             "hardening",
             "",
             null=0.0,
@@ -44,9 +34,8 @@ EFFECT = Effect(
             sizes=(0.0, 0.1, 0.3),
             says="share of force added far out",
             shape=True,
-            default=0.0,
         ),
-        Parameter(
+        "pinching_width": Parameter(
             "width",
             "m",
             null=0.001,
@@ -55,9 +44,8 @@ EFFECT = Effect(
             sizes=(0.0003, 0.001, 0.003),
             says="from the origin to where 1/e is left",
             shape=True,
-            default=0.001,
         ),
-    ),
+    },
+    says="little stiffness until cracks have closed",
     reference="f = (1 − factor·w + hardening·(1 − w))·f_column, w = exp(−(δ/width)²)",
-    apply=apply,
 )

@@ -8,22 +8,14 @@
 
 from __future__ import annotations
 
-from laboratories.effects.effect import Effect, Parameter
-from models.system import System
+from laboratories.effects.effect import Parameter
+from laboratories.effects.laws import sets
 
-
-def apply(system: System, gap: float) -> System:
-    """Whole gap of `gap` m without force."""
-    return system.laid("column", slip=gap)
-
-
-EFFECT = Effect(
-    name="column.slip",
-    site="column",
-    kind="physics",
-    says="no force inside a gap",
-    parameters=(
-        Parameter(
+EFFECT = sets(
+    "column",
+    "slip",
+    {
+        "slip": Parameter(
             "gap",
             "m",
             null=0.0,
@@ -32,7 +24,7 @@ EFFECT = Effect(
             sizes=(2e-05, 6e-05, 0.0002, 0.0006),
             says="whole gap",
         ),
-    ),
+    },
+    says="no force inside a gap",
     reference="f = f_column(δ − clip(δ, ±gap/2))",
-    apply=apply,
 )

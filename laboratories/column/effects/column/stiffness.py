@@ -8,7 +8,7 @@ cannot be told apart by these signals.
 
 from __future__ import annotations
 
-from laboratories.effects.factor import factor_on, of_plan
+from laboratories.effects.laws import factor_on, of_plan
 
 EFFECT = factor_on(
     "column",

@@ -8,22 +8,14 @@ specimen's loop alike; nor with `column.friction`, whose force does not grow wit
 
 from __future__ import annotations
 
-from laboratories.effects.effect import Effect, Parameter
-from models.system import System
+from laboratories.effects.effect import Parameter
+from laboratories.effects.laws import sets
 
-
-def apply(system: System, coefficient: float) -> System:
-    """Viscous force of `coefficient` N·s/m."""
-    return system.laid("column", viscous=coefficient)
-
-
-EFFECT = Effect(
-    name="column.viscous",
-    site="column",
-    kind="physics",
-    says="force that grows with the rate of deformation",
-    parameters=(
-        Parameter(
+EFFECT = sets(
+    "column",
+    "viscous",
+    {
+        "viscous": Parameter(
             "coefficient",
             "N·s/m",
             null=0.0,
@@ -31,7 +23,7 @@ EFFECT = Effect(
             most=2000000.0,
             sizes=(3000.0, 10000.0, 40000.0, 150000.0),
         ),
-    ),
+    },
+    says="force that grows with the rate of deformation",
     reference="f = f_column + coefficient·δ̇",
-    apply=apply,
 )

@@ -10,26 +10,14 @@ from __future__ import annotations
 
 import math
 
-from laboratories.effects.effect import Effect, Parameter
-from models.system import ColumnEffects, System
+from laboratories.effects.effect import Parameter
+from laboratories.effects.laws import sets
 
-
-def apply(system: System, yield_displacement: float, hardening: float, exponent: float) -> System:
-    """Yielding from `yield_displacement` m on; without it the shape leaves no trace."""
-    if math.isinf(yield_displacement):
-        hardening, exponent = ColumnEffects.hardening, ColumnEffects.exponent
-    return system.laid(
-        "column", yield_displacement=yield_displacement, hardening=hardening, exponent=exponent
-    )
-
-
-EFFECT = Effect(
-    name="column.yielding",
-    site="column",
-    kind="physics",
-    says="the specimen yields",
-    parameters=(
-        Parameter(
+EFFECT = sets(
+    "column",
+    "yielding",
+    {
+        "yield_displacement": Parameter(
             "yield_displacement",
             "m",
             null=math.inf,
@@ -37,7 +25,7 @@ EFFECT = Effect(
             most=0.1,
             sizes=(0.004, 0.0025, 0.0015, 0.0008),
         ),
-        Parameter(
+        "hardening": Parameter(
             "hardening",
             "",
             null=0.05,
@@ -46,9 +34,8 @@ EFFECT = Effect(
             sizes=(0.0, 0.05, 0.2),
             says="stiffness after yielding over elastic",
             shape=True,
-            default=0.05,
         ),
-        Parameter(
+        "exponent": Parameter(
             "exponent",
             "",
             null=2.0,
@@ -57,9 +44,8 @@ EFFECT = Effect(
             sizes=(1.0, 2.0, 5.0),
             says="sharpness of the transition",
             shape=True,
-            default=2.0,
         ),
-    ),
+    },
+    says="the specimen yields",
     reference="Wen, Method for random vibration of hysteretic systems, J. Eng. Mech. Div. ASCE 102 (1976) 249-263",
-    apply=apply,
 )

@@ -9,22 +9,14 @@ from __future__ import annotations
 
 import math
 
-from laboratories.effects.effect import Effect, Parameter
-from models.system import System
+from laboratories.effects.effect import Parameter
+from laboratories.effects.laws import sets
 
-
-def apply(system: System, force: float) -> System:
-    """Motor force of `force` N at most."""
-    return system.laid("damper", force_limit=force)
-
-
-EFFECT = Effect(
-    name="damper.force_limit",
-    site="damper",
-    kind="physics",
-    says="the motor has a largest force",
-    parameters=(
-        Parameter(
+EFFECT = sets(
+    "damper",
+    "force_limit",
+    {
+        "force_limit": Parameter(
             "force",
             "N",
             null=math.inf,
@@ -34,7 +26,7 @@ EFFECT = Effect(
             says="largest magnitude",
             follows="damper_command",
         ),
-    ),
+    },
+    says="the motor has a largest force",
     reference="T_m·u̇ + u = clip(damper_command, ±force)",
-    apply=apply,
 )

@@ -8,19 +8,12 @@ leaves the stroke as it was.
 
 from __future__ import annotations
 
-from laboratories.effects.factor import factor_on
-from models.system import System
-
-
-def apply(system: System, factor: float) -> System:
-    """Motor command multiplied by `factor`."""
-    return system.laid("damper", gain=factor)
-
+from laboratories.effects.laws import factor_on, of_site
 
 EFFECT = factor_on(
     "damper",
     "gain",
-    apply,
+    of_site("damper", "gain"),
     says="the motor gives more or less force than told",
     reference="T_m·u̇ + u = factor·damper_command",
     bounds=(0.0, 3.0),

@@ -8,32 +8,22 @@ reading (`sensor.damper_force.lag`), which leaves the stroke as it was.
 
 from __future__ import annotations
 
-from laboratories.effects.effect import Effect, Parameter
-from models.system import System
+from laboratories.effects.effect import Parameter
+from laboratories.effects.laws import adds
 
-
-def apply(system: System, time_constant: float) -> System:
-    """Motor lag longer by `time_constant` s, in total not below 0."""
-    total = max(system.plan.damper.motor_time_constant + time_constant, 0.0)
-    return system.moved("damper", motor_time_constant=total)
-
-
-EFFECT = Effect(
-    name="damper.motor_lag",
-    site="damper",
-    kind="physics",
-    says="the motor's force lags more or less behind its command",
-    parameters=(
-        Parameter(
-            "time_constant",
-            "s",
-            null=0.0,
-            least=-0.05,
-            most=0.2,
-            sizes=(-0.002, 0.001, 0.003, 0.008, 0.02),
-            says="added",
-        ),
+EFFECT = adds(
+    "damper",
+    "motor_lag",
+    "motor_time_constant",
+    Parameter(
+        "time_constant",
+        "s",
+        null=0.0,
+        least=-0.05,
+        most=0.2,
+        sizes=(-0.002, 0.001, 0.003, 0.008, 0.02),
+        says="added",
     ),
+    says="the motor's force lags more or less behind its command",
     reference="(T_m + time_constant)·u̇ + u = damper_command",
-    apply=apply,
 )

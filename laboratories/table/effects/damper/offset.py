@@ -7,22 +7,14 @@ Felt on the table as its reaction. Not to be confused with `sensor.damper_force.
 
 from __future__ import annotations
 
-from laboratories.effects.effect import Effect, Parameter
-from models.system import System
+from laboratories.effects.effect import Parameter
+from laboratories.effects.laws import sets
 
-
-def apply(system: System, force: float) -> System:
-    """A constant `force` N on the moving mass."""
-    return system.laid("damper", offset=force)
-
-
-EFFECT = Effect(
-    name="damper.offset",
-    site="damper",
-    kind="physics",
-    says="a constant force on the moving mass",
-    parameters=(
-        Parameter(
+EFFECT = sets(
+    "damper",
+    "offset",
+    {
+        "offset": Parameter(
             "force",
             "N",
             null=0.0,
@@ -31,7 +23,7 @@ EFFECT = Effect(
             sizes=(-3.0, -0.5, -0.1, 0.1, 0.5, 3.0),
             says="along +x",
         ),
-    ),
+    },
+    says="a constant force on the moving mass",
     reference="m·(s̈ + ÿ) = … + force",
-    apply=apply,
 )

@@ -10,24 +10,14 @@ from __future__ import annotations
 
 import math
 
-from laboratories.effects.effect import Contact, Effect, Parameter
-from models.system import DamperEffects, System
+from laboratories.effects.effect import Contact, Parameter
+from laboratories.effects.laws import sets
 
-
-def apply(system: System, stroke: float, stiffness: float) -> System:
-    """Stops of `stiffness` N/m at `stroke` m; without them the shape leaves no trace."""
-    if math.isinf(stroke):
-        stiffness = DamperEffects.stop_stiffness
-    return system.laid("damper", stop_stroke=stroke, stop_stiffness=stiffness)
-
-
-EFFECT = Effect(
-    name="damper.stroke_stop",
-    site="damper",
-    kind="physics",
-    says="the damper hits its end stops",
-    parameters=(
-        Parameter(
+EFFECT = sets(
+    "damper",
+    "stroke_stop",
+    {
+        "stop_stroke": Parameter(
             "stroke",
             "m",
             null=math.inf,
@@ -36,7 +26,7 @@ EFFECT = Effect(
             sizes=(0.046, 0.04, 0.03, 0.02),
             says="from the middle to one stop",
         ),
-        Parameter(
+        "stop_stiffness": Parameter(
             "stiffness",
             "N/m",
             null=2000.0,
@@ -45,11 +35,10 @@ EFFECT = Effect(
             sizes=(500.0, 2000.0, 20000.0),
             says="of the stop",
             shape=True,
-            default=2000.0,
         ),
-    ),
+    },
+    says="the damper hits its end stops",
     reference="contact spring: stiffness·(|s| − stroke) beyond the stop",
-    apply=apply,
     contact=Contact(
         motion="damper_stroke",
         force="damper_force",

@@ -8,7 +8,7 @@ oscillation is exponential here, straight there.
 
 from __future__ import annotations
 
-from laboratories.effects.factor import factor_on, of_plan
+from laboratories.effects.laws import factor_on, of_plan
 
 EFFECT = factor_on(
     "damper",

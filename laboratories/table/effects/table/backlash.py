@@ -8,22 +8,14 @@ confused with `table.friction`, which also distorts reversals but grows no small
 
 from __future__ import annotations
 
-from laboratories.effects.effect import Effect, Parameter
-from models.system import System
+from laboratories.effects.effect import Parameter
+from laboratories.effects.laws import sets
 
-
-def apply(system: System, width: float) -> System:
-    """Whole play of `width` m."""
-    return system.laid("table", backlash=width)
-
-
-EFFECT = Effect(
-    name="table.backlash",
-    site="table",
-    kind="physics",
-    says="play in the table's drive",
-    parameters=(
-        Parameter(
+EFFECT = sets(
+    "table",
+    "backlash",
+    {
+        "backlash": Parameter(
             "width",
             "m",
             null=0.0,
@@ -32,7 +24,7 @@ EFFECT = Effect(
             sizes=(3e-05, 0.0001, 0.0004, 0.0015),
             says="whole play",
         ),
-    ),
+    },
+    says="play in the table's drive",
     reference="Nordin, Gutman, Controlling mechanical systems with backlash: a survey, Automatica 38 (2002) 1633-1649",
-    apply=apply,
 )

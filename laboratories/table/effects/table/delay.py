@@ -8,31 +8,22 @@ changes amplitudes near ω, or with `link.delay`, which the messages' stamps sho
 
 from __future__ import annotations
 
-from laboratories.effects.effect import Effect, Parameter
-from models.system import System
+from laboratories.effects.effect import Parameter
+from laboratories.effects.laws import adds
 
-
-def apply(system: System, delay: float) -> System:
-    """Dead time longer by `delay` s, in total not below 0."""
-    return system.moved("table", delay=max(system.plan.table.delay + delay, 0.0))
-
-
-EFFECT = Effect(
-    name="table.delay",
-    site="table",
-    kind="physics",
-    says="dead time of the table is longer or shorter",
-    parameters=(
-        Parameter(
-            "delay",
-            "s",
-            null=0.0,
-            least=-0.05,
-            most=0.2,
-            sizes=(-0.003, -0.001, 0.001, 0.003, 0.008, 0.02),
-            says="added",
-        ),
+EFFECT = adds(
+    "table",
+    "delay",
+    "delay",
+    Parameter(
+        "delay",
+        "s",
+        null=0.0,
+        least=-0.05,
+        most=0.2,
+        sizes=(-0.003, -0.001, 0.001, 0.003, 0.008, 0.02),
+        says="added",
     ),
+    says="dead time of the table is longer or shorter",
     reference="Y(s) = e^(−(L + delay)·s)·ω²/(s² + 2ζω·s + ω²)·U(s)",
-    apply=apply,
 )

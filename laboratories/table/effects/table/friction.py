@@ -8,25 +8,15 @@ size. Not to be confused with `table.backlash`: friction shows as spikes of acce
 
 from __future__ import annotations
 
-from laboratories.effects.effect import Effect, Parameter
+from laboratories.effects.effect import Parameter
 from laboratories.effects.friction import VELOCITY
-from models.system import System, TableEffects
+from laboratories.effects.laws import sets
 
-
-def apply(system: System, acceleration: float, velocity: float) -> System:
-    """Friction force of `acceleration` m/s² times the moving mass."""
-    if acceleration == 0.0:
-        velocity = TableEffects.friction_velocity
-    return system.laid("table", friction=acceleration, friction_velocity=velocity)
-
-
-EFFECT = Effect(
-    name="table.friction",
-    site="table",
-    kind="physics",
-    says="Coulomb friction of the table's bearings",
-    parameters=(
-        Parameter(
+EFFECT = sets(
+    "table",
+    "friction",
+    {
+        "friction": Parameter(
             "acceleration",
             "m/s²",
             null=0.0,
@@ -35,8 +25,8 @@ EFFECT = Effect(
             sizes=(0.03, 0.1, 0.3, 1.0),
             says="friction force over moving mass",
         ),
-        VELOCITY,
-    ),
+        "friction_velocity": VELOCITY,
+    },
+    says="Coulomb friction of the table's bearings",
     reference="Armstrong-Hélouvry, Dupont, Canudas de Wit, Automatica 30 (1994) 1083-1138",
-    apply=apply,
 )

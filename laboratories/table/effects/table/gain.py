@@ -8,19 +8,12 @@ the damper feels the table's true motion, and both of its readings change togeth
 
 from __future__ import annotations
 
-from laboratories.effects.factor import factor_on
-from models.system import System
-
-
-def apply(system: System, factor: float) -> System:
-    """Table command multiplied by `factor`."""
-    return system.laid("table", gain=factor)
-
+from laboratories.effects.laws import factor_on, of_site
 
 EFFECT = factor_on(
     "table",
     "gain",
-    apply,
+    of_site("table", "gain"),
     says="the table goes farther or less far than told",
     reference="Y(s) = G(s)·factor·U(s)",
     bounds=(0.0, 3.0),

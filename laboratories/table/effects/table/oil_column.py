@@ -9,25 +9,17 @@ from __future__ import annotations
 
 import math
 
-from laboratories.effects.effect import Effect, Parameter
-from models.system import System, TableEffects
+from laboratories.effects.effect import Parameter
+from laboratories.effects.laws import sets
 
-
-def apply(system: System, frequency: float, damping: float) -> System:
-    """Oil column at `frequency` Hz with `damping` ratio; without it the shape leaves no trace."""
-    if math.isinf(frequency):
-        damping = TableEffects.oil_damping
-    return system.laid("table", oil_frequency=frequency, oil_damping=damping)
-
-
-EFFECT = Effect(
-    name="table.oil_column",
-    site="table",
-    kind="physics",
-    says="a resonance on top of the table's loop",
-    parameters=(
-        Parameter("frequency", "Hz", null=math.inf, least=1.0, most=500.0, sizes=(40.0, 25.0, 16.0, 10.0)),
-        Parameter(
+EFFECT = sets(
+    "table",
+    "oil_column",
+    {
+        "oil_frequency": Parameter(
+            "frequency", "Hz", null=math.inf, least=1.0, most=500.0, sizes=(40.0, 25.0, 16.0, 10.0)
+        ),
+        "oil_damping": Parameter(
             "damping",
             "",
             null=0.1,
@@ -36,9 +28,8 @@ EFFECT = Effect(
             sizes=(0.03, 0.1, 0.3),
             says="damping ratio",
             shape=True,
-            default=0.1,
         ),
-    ),
+    },
+    says="a resonance on top of the table's loop",
     reference="Merritt, Hydraulic Control Systems, Wiley 1967",
-    apply=apply,
 )

@@ -8,25 +8,17 @@ with G the second order of the table's loop: the force meets no dead time. Not t
 
 from __future__ import annotations
 
-from laboratories.effects.effect import Effect, Parameter
-from models.system import System
+from laboratories.effects.effect import Parameter
+from laboratories.effects.laws import sets
 
-
-def apply(system: System, compliance: float) -> System:
-    """Table moved by `compliance` m per newton of the damper's force."""
-    return system.laid("table", compliance=compliance)
-
-
-EFFECT = Effect(
-    name="table.payload",
-    site="table",
-    kind="physics",
-    says="the damper's force moves the table",
-    parameters=(
-        Parameter(
+EFFECT = sets(
+    "table",
+    "payload",
+    {
+        "compliance": Parameter(
             "compliance", "m/N", null=0.0, least=0.0, most=0.002, sizes=(3e-07, 1.5e-06, 6e-06, 2.5e-05)
         ),
-    ),
+    },
+    says="the damper's force moves the table",
     reference="Dyke, Spencer, Quast, Sain, J. Eng. Mech. 121 (1995) 322-338",
-    apply=apply,
 )

@@ -1,0 +1,104 @@
+"""The laws that most effects share: a factor on one thing, an addition to one parameter, fields that no plan has."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
+
+from laboratories.effects.effect import Effect, Parameter
+from models.system import System
+
+Apply = Callable[..., System]
+
+
+def factor_on(
+    site: str,
+    thing: str,
+    apply: Apply,
+    *,
+    says: str,
+    reference: str,
+    bounds: tuple[float, float],
+    sizes: tuple[float, ...],
+    meaning: str = "",
+) -> Effect:
+    """The effect `site.thing` with one parameter, `factor`, which is 1 where the effect is not there.
+
+    Args:
+        site: where it is, as `laboratories/effects/sites.py` lists them.
+        thing: what is multiplied, the rest of the effect's name.
+        apply: lays it over a system, given the factor; `of_plan` and `of_site` make it.
+        says: what the effect is, in a few words.
+        reference: a source or an equation.
+        bounds: least and largest factor that is physically possible.
+        sizes: factors on both sides of 1, from which a search starts.
+        meaning: what the factor is on, where `says` leaves that open.
+    """
+    parameter = Parameter("factor", "", 1.0, *bounds, sizes, meaning)
+    return Effect(f"{site}.{thing}", site, "physics", says, (parameter,), reference, apply)
+
+
+def sets(
+    site: str, thing: str, fields: Mapping[str, Parameter], *, says: str, reference: str, **more: Any
+) -> Effect:
+    """The effect `site.thing` whose parameters set fields of the site's record in `models.system.Effects`.
+
+    Args:
+        site: where it is, as `laboratories/effects/sites.py` lists them.
+        thing: the rest of the effect's name.
+        fields: the parameter that sets each field. The first one says how strong the effect is; where it has its null
+            value, the others, which shape the effect, leave no trace.
+        says: what the effect is, in a few words.
+        reference: a source or an equation.
+        more: further fields of `Effect`.
+    """
+    names = {field: parameter.name for field, parameter in fields.items()}
+    parameters = tuple(fields.values())
+    law = partial(laid, site=site, fields=names, null=parameters[0].null)
+    return Effect(f"{site}.{thing}", site, "physics", says, parameters, reference, law, **more)
+
+
+def laid(system: System, *, site: str, fields: Mapping[str, str], null: float, **given: float) -> System:
+    """The system with fields of a site's record set, by the names of the parameters in `given`."""
+    values = {field: given[name] for field, name in fields.items()}
+    if next(iter(values.values())) == null:
+        untouched = type(getattr(system.effects, site))()
+        values = {field: getattr(untouched, field) for field in fields}
+    return system.laid(site, **values)
+
+
+def of_site(site: str, field: str) -> Apply:
+    """The law that sets one field of a site's record to the factor."""
+    return partial(laid, site=site, fields={field: "factor"}, null=1.0)
+
+
+def of_plan(table: str, key: str) -> Apply:
+    """The law that multiplies one parameter of the plan, every storey's where it has several."""
+    return partial(multiplied, table=table, key=key)
+
+
+def multiplied(system: System, factor: float, *, table: str, key: str) -> System:
+    """The system with a parameter of the plan times `factor`."""
+    return system.scaled(table, key, factor)
+
+
+def added(system: System, *, table: str, key: str, **given: float) -> System:
+    """The system with the one parameter given added to a parameter of the plan, in total not below 0."""
+    (more,) = given.values()
+    return system.moved(table, **{key: max(getattr(getattr(system.plan, table), key) + more, 0.0)})
+
+
+def adds(site: str, thing: str, key: str, parameter: Parameter, *, says: str, reference: str) -> Effect:
+    """The effect `site.thing` that adds to the parameter `key` of the plan's table of that name, in total not below 0.
+
+    Args:
+        site: where it is, and the plan's table.
+        thing: the rest of the effect's name.
+        key: of the table.
+        parameter: what is added.
+        says: what the effect is, in a few words.
+        reference: a source or an equation.
+    """
+    law = partial(added, table=site, key=key)
+    return Effect(f"{site}.{thing}", site, "physics", says, (parameter,), reference, law)
