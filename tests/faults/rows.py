@@ -35,10 +35,19 @@ class Row:
     evidence: str  # what the recording shows
 
 
-def passed(row: Row) -> None:
-    """Keep the result of a row."""
+def passed(
+    fault: str,
+    title: str,
+    how: str,
+    state: str,
+    seconds: float | None,
+    motion: float | None,
+    evidence: str,
+) -> None:
+    """Keep the result of a row, whose fields are those of `Row`."""
     place = os.environ.get("RTHS_FAULT_ROWS")
     if place:
+        row = Row(fault, title, how, state, seconds, motion, evidence)
         with Path(place).open("a", encoding="utf-8") as stream:
             stream.write(json.dumps(dataclasses.asdict(row)) + "\n")
 

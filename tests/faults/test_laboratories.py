@@ -16,7 +16,7 @@ from common.plan.reality import Reality, as_planned
 from common.roles import MASTER, SLAVE
 from rths.__main__ import main
 from simulation.world import Process
-from tests.faults.rows import Row, passed
+from tests.faults.rows import passed
 from tests.faults.simulated import AT, Course, Scene, Stop
 from tests.helpers import largest, with_table
 from validation.faults.rigs import Wrong
@@ -58,15 +58,13 @@ def test_f37_a_sensor_that_gives_no_number_or_always_the_same(tmp_path: Path) ->
             stops["frozen"].append(course.stopped(AT, within=count + 3))
     nan, frozen = (worst(found) for found in stops.values())
     passed(
-        Row(
-            "F37",
-            "a sensor reads NaN; or 25 times the same",
-            "simulation: the rig's probe, each of the six sensors",
-            "RAMPING, then SAFE, both laboratories",
-            frozen.seconds,
-            max(nan.motion, frozen.motion),
-            f"NaN: event rig within {nan.seconds * 1e3:.0f} ms; frozen: event limit “{text}” at the 25th reading",
-        )
+        "F37",
+        "a sensor reads NaN; or 25 times the same",
+        "simulation: the rig's probe, each of the six sensors",
+        "RAMPING, then SAFE, both laboratories",
+        frozen.seconds,
+        max(nan.motion, frozen.motion),
+        f"NaN: event rig within {nan.seconds * 1e3:.0f} ms; frozen: event limit “{text}” at the 25th reading",
     )
 
 
@@ -82,15 +80,13 @@ def test_f38_a_force_beyond_its_limit(tmp_path: Path) -> None:
         stops.append(course.stopped(AT, within=3))
     stop = worst(stops)
     passed(
-        Row(
-            "F38",
-            "a force 20 % beyond its limit",
-            "simulation: the rig's probe, in either laboratory",
-            "RAMPING within the interval, then SAFE; no second, hard limit (ADR 0023)",
-            stop.seconds,
-            stop.motion,
-            f"event limit: “{text}”",
-        )
+        "F38",
+        "a force 20 % beyond its limit",
+        "simulation: the rig's probe, in either laboratory",
+        "RAMPING within the interval, then SAFE; no second, hard limit (ADR 0023)",
+        stop.seconds,
+        stop.motion,
+        f"event limit: “{text}”",
     )
 
 
@@ -113,15 +109,13 @@ def test_f39_an_actuator_that_does_not_follow(tmp_path: Path) -> None:
     stop = course.stopped(last, within=6)
     assert np.array_equal(beyond[-3:], np.arange(beyond[-1] - 2, beyond[-1] + 1))
     passed(
-        Row(
-            "F39",
-            "the specimen lags behind its target",
-            "simulation: an actuator of 400 ms in place of 30 ms, column_error of 1 mm",
-            "RAMPING after three intervals beyond the limit, then SAFE; no emergency stop at twice it (ADR 0023)",
-            stop.seconds,
-            stop.motion,
-            f"event limit in the master: “{text}”",
-        )
+        "F39",
+        "the specimen lags behind its target",
+        "simulation: an actuator of 400 ms in place of 30 ms, column_error of 1 mm",
+        "RAMPING after three intervals beyond the limit, then SAFE; no emergency stop at twice it (ADR 0023)",
+        stop.seconds,
+        stop.motion,
+        f"event limit in the master: “{text}”",
     )
 
 
@@ -143,15 +137,13 @@ def test_f40_an_unstable_loop(tmp_path: Path) -> None:
     assert max(peaks) < 1.5
     assert "error_energy" in seen
     passed(
-        Row(
-            "F40",
-            "a dead time of the actuator that makes the loop unstable",
-            f"simulation: {', '.join(f'{1e3 * delay:.0f}' for delay in DELAYS)} ms in place of 14 ms",
-            f"RAMPING and SAFE before x > {max(peaks):.2f} × the nominal peak",
-            stop.seconds,
-            stop.motion,
-            f"event limit in the master: {' or '.join(sorted(seen))}; +8 ms is stable (ADR 0023)",
-        )
+        "F40",
+        "a dead time of the actuator that makes the loop unstable",
+        f"simulation: {', '.join(f'{1e3 * delay:.0f}' for delay in DELAYS)} ms in place of 14 ms",
+        f"RAMPING and SAFE before x > {max(peaks):.2f} × the nominal peak",
+        stop.seconds,
+        stop.motion,
+        f"event limit in the master: {' or '.join(sorted(seen))}; +8 ms is stable (ADR 0023)",
     )
 
 
@@ -183,15 +175,13 @@ def test_f42_a_loop_that_stands_still(tmp_path: Path) -> None:
             shown.append(f"{missed}")
     stop = worst(stops)
     passed(
-        Row(
-            "F42",
-            "a loop stands still for 20, 50, 200 ms",
-            "simulation: either process does not run",
-            "RAMPING, then SAFE: the other one by its watchdog within 12.5 ms, the one that stood still on waking",
-            stop.seconds,
-            stop.motion,
-            f"events overrun and watchdog; {', '.join(shown)} intervals left out, none caught up",
-        )
+        "F42",
+        "a loop stands still for 20, 50, 200 ms",
+        "simulation: either process does not run",
+        "RAMPING, then SAFE: the other one by its watchdog within 12.5 ms, the one that stood still on waking",
+        stop.seconds,
+        stop.motion,
+        f"events overrun and watchdog; {', '.join(shown)} intervals left out, none caught up",
     )
 
 
@@ -232,14 +222,12 @@ def test_f43_a_busy_thread_beside_the_loop(
         assert code == int(bool(median)), (name, over)
         assert not median or "wake_lateness p50" in over, over
     passed(
-        Row(
-            "F43",
-            "a busy Python thread in the process",
-            "simulation: the master's loop wakes late by 0.25 ms and by 0.55 ms, median",
-            "RUNNING; the recording is over its budget",
-            None,
-            0.0,
-            "rths budget ends with 1: p50 of wake_lateness over 0.2 ms (a budget of that), "
-            "over 0.4 ms (the shipped one); the calm test is within",
-        )
+        "F43",
+        "a busy Python thread in the process",
+        "simulation: the master's loop wakes late by 0.25 ms and by 0.55 ms, median",
+        "RUNNING; the recording is over its budget",
+        None,
+        0.0,
+        "rths budget ends with 1: p50 of wake_lateness over 0.2 ms (a budget of that), "
+        "over 0.4 ms (the shipped one); the calm test is within",
     )

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from common.roles import MASTER, SLAVE
-from tests.faults.rows import Row, passed
+from tests.faults.rows import passed
 from tests.faults.simulated import AT, LOST, Course, Scene, longest_silence, same_commands
 from validation.faults.wire import Conditions
 
@@ -29,15 +29,13 @@ def test_f01_one_sample_lost(tmp_path: Path) -> None:
     motion = kept(course, AT, 1)
     assert motion <= course.plan.limits.table_velocity * course.plan.test.interval
     passed(
-        Row(
-            "F01",
-            "one command lost",
-            "simulation: the wire drops one command",
-            "RUNNING",
-            None,
-            motion,
-            f"commands: {account}; no hold before {course.plan.safety.hold_after} intervals",
-        )
+        "F01",
+        "one command lost",
+        "simulation: the wire drops one command",
+        "RUNNING",
+        None,
+        motion,
+        f"commands: {account}; no hold before {course.plan.safety.hold_after} intervals",
     )
 
 
@@ -57,15 +55,13 @@ def test_f02_three_samples_lost(tmp_path: Path) -> None:
     holding = course.seconds_to(SLAVE, "holding", since)
     assert course.seconds_to(SLAVE, "running", since) - holding <= 2 * course.plan.test.interval
     passed(
-        Row(
-            "F02",
-            "three commands lost in a row",
-            "simulation: the wire drops three commands",
-            "slave HOLDING, then RUNNING again; master RUNNING",
-            holding,
-            motion,
-            f"events mode running → holding → running; commands: {account}",
-        )
+        "F02",
+        "three commands lost in a row",
+        "simulation: the wire drops three commands",
+        "slave HOLDING, then RUNNING again; master RUNNING",
+        holding,
+        motion,
+        f"events mode running → holding → running; commands: {account}",
     )
 
 
@@ -79,17 +75,15 @@ def test_f03_five_samples_lost(tmp_path: Path) -> None:
     account = course.account(SLAVE)
     assert account.lost >= 5
     passed(
-        Row(
-            "F03",
-            "five commands lost and more",
-            "simulation: the wire drops a hundred commands",
-            "RAMPING, then SAFE, both laboratories",
-            stop.seconds,
-            stop.motion,
-            f"event watchdog in the slave, {course.code(MASTER)} in the master; "
-            f"at rest after {stop.rest * 1e3:.0f} ms; "
-            f"commands: {account}",
-        )
+        "F03",
+        "five commands lost and more",
+        "simulation: the wire drops a hundred commands",
+        "RAMPING, then SAFE, both laboratories",
+        stop.seconds,
+        stop.motion,
+        f"event watchdog in the slave, {course.code(MASTER)} in the master; "
+        f"at rest after {stop.rest * 1e3:.0f} ms; "
+        f"commands: {account}",
     )
 
 
@@ -109,16 +103,14 @@ def test_f04_five_percent_lost_for_a_minute(tmp_path: Path) -> None:
     largest = float(np.max(np.abs(np.diff(commands))))
     assert times.size >= course.plan.ticks
     passed(
-        Row(
-            "F04",
-            "5 % of all messages lost, each by itself, 60 s",
-            "simulation: loss of the wire in both directions",
-            "RUNNING",
-            None,
-            largest,
-            f"{holds} holds, no trip; commands: {accounts[0]}; feedbacks: {accounts[1]}; "
-            "motion: largest step of the table",
-        )
+        "F04",
+        "5 % of all messages lost, each by itself, 60 s",
+        "simulation: loss of the wire in both directions",
+        "RUNNING",
+        None,
+        largest,
+        f"{holds} holds, no trip; commands: {accounts[0]}; feedbacks: {accounts[1]}; "
+        "motion: largest step of the table",
     )
 
 
@@ -133,16 +125,14 @@ def test_f11_jitter(tmp_path: Path) -> None:
     delays = np.diff(np.sort([time for time, *_ in scene.route(SLAVE).ledger.arrivals]))
     gap = float(np.max(delays)) * 1e-9
     passed(
-        Row(
-            "F11",
-            "delay of 2 ms and an exponential of mean 2 ms on top",
-            "simulation: delay of the wire in both directions",
-            "RUNNING and HOLDING, then RAMPING and SAFE where five intervals were silent",
-            stop.seconds,
-            stop.motion,
-            f"{holds} holds in {lasted} intervals, longest gap between commands {gap * 1e3:.1f} ms; commands: "
-            f"{course.account(SLAVE)}; feedbacks: {course.account(MASTER)}",
-        )
+        "F11",
+        "delay of 2 ms and an exponential of mean 2 ms on top",
+        "simulation: delay of the wire in both directions",
+        "RUNNING and HOLDING, then RAMPING and SAFE where five intervals were silent",
+        stop.seconds,
+        stop.motion,
+        f"{holds} holds in {lasted} intervals, longest gap between commands {gap * 1e3:.1f} ms; commands: "
+        f"{course.account(SLAVE)}; feedbacks: {course.account(MASTER)}",
     )
 
 
@@ -163,16 +153,14 @@ def test_f12_a_step_of_the_delay(tmp_path: Path) -> None:
     )
     assert 0.0029 < after - before < 0.0031
     passed(
-        Row(
-            "F12",
-            "delay longer by 10 ms at once",
-            "simulation: delay of the wire in both directions",
-            "RAMPING, then SAFE, both laboratories; with 3 ms RUNNING",
-            stop.seconds,
-            stop.motion,
-            f"the step is a silence of five intervals: event watchdog; commands: {account}; the step of 3 ms is in the "
-            f"latency from tick {AT} on ({before * 1e3:.2f} → {after * 1e3:.2f} ms)",
-        )
+        "F12",
+        "delay longer by 10 ms at once",
+        "simulation: delay of the wire in both directions",
+        "RAMPING, then SAFE, both laboratories; with 3 ms RUNNING",
+        stop.seconds,
+        stop.motion,
+        f"the step is a silence of five intervals: event watchdog; commands: {account}; the step of 3 ms is in the "
+        f"latency from tick {AT} on ({before * 1e3:.2f} → {after * 1e3:.2f} ms)",
     )
 
 
@@ -189,16 +177,14 @@ def test_f13_duplicates(tmp_path: Path, undisturbed: Course) -> None:
         assert 0 <= twice - account.turned_away["repeated"] <= 1  # the last one comes after the account
     assert same_commands(course, undisturbed)
     passed(
-        Row(
-            "F13",
-            "20 % of all messages twice",
-            "simulation: the wire delivers them twice",
-            "RUNNING",
-            None,
-            0.0,
-            f"every command to the last bit that of the undisturbed test; commands: {accounts[SLAVE]}; feedbacks: "
-            f"{accounts[MASTER]}",
-        )
+        "F13",
+        "20 % of all messages twice",
+        "simulation: the wire delivers them twice",
+        "RUNNING",
+        None,
+        0.0,
+        f"every command to the last bit that of the undisturbed test; commands: {accounts[SLAVE]}; feedbacks: "
+        f"{accounts[MASTER]}",
     )
 
 
@@ -212,15 +198,13 @@ def test_f14_out_of_order(tmp_path: Path) -> None:
     motion = course.motion(SLAVE, AT - 1, 1)
     assert motion <= course.plan.limits.table_velocity * course.plan.test.interval
     passed(
-        Row(
-            "F14",
-            "a command comes after its successor",
-            "simulation: the wire holds one command back for 3 ms",
-            "RUNNING",
-            None,
-            motion,
-            f"commands: {account}",
-        )
+        "F14",
+        "a command comes after its successor",
+        "simulation: the wire holds one command back for 3 ms",
+        "RUNNING",
+        None,
+        motion,
+        f"commands: {account}",
     )
 
 
@@ -237,14 +221,12 @@ def test_f16_flipped_bits(tmp_path: Path) -> None:
         assert account.damaged == damaged
         assert course.rejected(role) == {"check": damaged}
     passed(
-        Row(
-            "F16",
-            "a bit flipped in 1 % of all messages",
-            "simulation: the wire flips a bit in both directions",
-            "RUNNING; a damaged message counts as a missing one, several in a second too (ADR 0023)",
-            None,
-            course.motion(SLAVE, scene.route(SLAVE).ledger.numbers["corrupted"][0] - 1, 1),
-            f"event rejected, by check: {course.rejected(SLAVE)['check']} in the slave, "
-            f"{course.rejected(MASTER)['check']} in the master; commands: {course.account(SLAVE)}",
-        )
+        "F16",
+        "a bit flipped in 1 % of all messages",
+        "simulation: the wire flips a bit in both directions",
+        "RUNNING; a damaged message counts as a missing one, several in a second too (ADR 0023)",
+        None,
+        course.motion(SLAVE, scene.route(SLAVE).ledger.numbers["corrupted"][0] - 1, 1),
+        f"event rejected, by check: {course.rejected(SLAVE)['check']} in the slave, "
+        f"{course.rejected(MASTER)['check']} in the master; commands: {course.account(SLAVE)}",
     )

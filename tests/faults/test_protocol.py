@@ -15,7 +15,7 @@ from common.protocol.codec import MESSAGES
 from common.protocol.exchange import State
 from common.protocol.messages import Message
 from common.roles import MASTER, RECORDER, SLAVE
-from tests.faults.rows import Row, passed
+from tests.faults.rows import passed
 from tests.faults.simulated import AT, LOST, Course, Scene, same_commands
 from tests.rths.faults import test_protocol as machines
 from tests.rths.faults.test_protocol import INSTANCE, PLAN, SESSION, MasterMachine, SlaveMachine
@@ -46,15 +46,13 @@ def test_f34_another_version_or_plan(tmp_path: Path, changes: dict[str, Any], pa
         assert simulation.world.processes[role].error is None
         assert simulation.probes[role].log.commands == []
     passed(
-        Row(
-            "F34",
-            "another version, another plan (its units too), both",
-            "simulation: a relay changes the master's registration",
-            "REFUSED, both laboratories; with both the version is named (ADR 0023)",
-            None,
-            0.0,
-            f"no recording begins; the master says: “{simulation.loops[MASTER].lab.exchange.cause}”",
-        )
+        "F34",
+        "another version, another plan (its units too), both",
+        "simulation: a relay changes the master's registration",
+        "REFUSED, both laboratories; with both the version is named (ADR 0023)",
+        None,
+        0.0,
+        f"no recording begins; the master says: “{simulation.loops[MASTER].lab.exchange.cause}”",
     )
 
 
@@ -85,17 +83,15 @@ def test_f35_start_twice_stop_lost_stop_too_early(tmp_path: Path, undisturbed: C
     assert seconds <= (stopped.plan.safety.ramp_after + 1) * stopped.plan.test.interval
     motion = stopped.motion(SLAVE, AT - 1)
     passed(
-        Row(
-            "F35",
-            "START again, STOP lost, STOP in IDLE",
-            "simulation: the control route loses all, repeats the start, and brings a stop before any session",
-            "RUNNING, then DONE; where every STOP is lost in the middle of the test SAFE",
-            seconds,
-            motion,
-            f"at the end STOP is sent every 50 ms until it is heard ({lost} lost); "
-            "in the middle the event watchdog in the slave; "
-            "the early one is rejected as unregistered",
-        )
+        "F35",
+        "START again, STOP lost, STOP in IDLE",
+        "simulation: the control route loses all, repeats the start, and brings a stop before any session",
+        "RUNNING, then DONE; where every STOP is lost in the middle of the test SAFE",
+        seconds,
+        motion,
+        f"at the end STOP is sent every 50 ms until it is heard ({lost} lost); "
+        "in the middle the event watchdog in the slave; "
+        "the early one is rejected as unregistered",
     )
 
 
@@ -219,13 +215,11 @@ def test_f36_every_control_message_in_every_state() -> None:
     assert len(changed) == sum(map(len, EXPECTED.values()))
     assert machines.PLAN is PLAN
     passed(
-        Row(
-            "F36",
-            "every control message in every state",
-            f"without a link: {tried} messages of either laboratory and the recorder, each twice",
-            "the state they came in, but for the message that it waits for, STOP and TRIP",
-            None,
-            0.0,
-            "no command reaches a rig; there is no negative acknowledgement (ADR 0023)",
-        )
+        "F36",
+        "every control message in every state",
+        f"without a link: {tried} messages of either laboratory and the recorder, each twice",
+        "the state they came in, but for the message that it waits for, STOP and TRIP",
+        None,
+        0.0,
+        "no command reaches a rig; there is no negative acknowledgement (ADR 0023)",
     )

@@ -12,7 +12,7 @@ from mcap.stream_reader import StreamReader
 from common.recording.reader import read
 from common.recording.recovery import recover
 from common.roles import MASTER, RECORDER, SLAVE
-from tests.faults.rows import Row, passed
+from tests.faults.rows import passed
 from tests.faults.simulated import Scene
 
 TOPICS = (MASTER, SLAVE, "latency")
@@ -63,15 +63,13 @@ def test_f48_power_is_cut(unfinished: Path, tmp_path: Path) -> None:
     seconds = (1000 * 0.002) - (read(unfinished).log_ns[MASTER][-1] - begun[0]) * 1e-9
     assert seconds <= 1.0
     passed(
-        Row(
-            "F48",
-            "power is cut",
-            "simulation: the recorder is killed, its file cut at 40, 70 and 99.9 % of its bytes",
-            "recovered",
-            None,
-            None,
-            f"rths recover: every whole chunk, no gap in any topic; the killed recorder lost {seconds * 1e3:.0f} ms",
-        )
+        "F48",
+        "power is cut",
+        "simulation: the recorder is killed, its file cut at 40, 70 and 99.9 % of its bytes",
+        "recovered",
+        None,
+        None,
+        f"rths recover: every whole chunk, no gap in any topic; the killed recorder lost {seconds * 1e3:.0f} ms",
     )
 
 
@@ -88,14 +86,12 @@ def test_f49_bits_rot(unfinished: Path, tmp_path: Path) -> None:
     missing = sum(found.topics[topic].lost for topic in TOPICS)
     assert gaps(output) == missing > 0
     passed(
-        Row(
-            "F49",
-            "a bit in the file has flipped",
-            "a bit in the middle of a chunk of a simulated test's recording",
-            "recovered",
-            None,
-            None,
-            f"rths recover: one of {len(places)} chunks lost, bytes {begin} to {end - 1}; {missing} records named "
-            "by topic and number",
-        )
+        "F49",
+        "a bit in the file has flipped",
+        "a bit in the middle of a chunk of a simulated test's recording",
+        "recovered",
+        None,
+        None,
+        f"rths recover: one of {len(places)} chunks lost, bytes {begin} to {end - 1}; {missing} records named "
+        "by topic and number",
     )

@@ -19,7 +19,7 @@ from common.protocol.messages import Command, Feedback, Message
 from common.roles import MASTER, SLAVE
 from simulation.world import Drift
 from tests.common.test_hostile import CONTENTS
-from tests.faults.rows import Row, passed
+from tests.faults.rows import passed
 from tests.faults.simulated import AT, Course, Scene, same_commands, signed
 from validation.faults import hostile, lab
 from validation.faults.lab import SESSION, Surrounding
@@ -61,16 +61,14 @@ def test_f25_replay_of_an_old_session(
     assert sum(sum(counts.values()) for counts in rejected.values()) == count
     assert {reason for counts in rejected.values() for reason in counts} == {"check"}
     passed(
-        Row(
-            "F25",
-            "all frames of an earlier session again",
-            "simulation: frames of a test played before are put onto all routes",
-            "RUNNING",
-            None,
-            0.0,
-            f"{count} frames, all rejected by check (the key is of the session); "
-            "every command to the last bit that of the undisturbed test",
-        )
+        "F25",
+        "all frames of an earlier session again",
+        "simulation: frames of a test played before are put onto all routes",
+        "RUNNING",
+        None,
+        0.0,
+        f"{count} frames, all rejected by check (the key is of the session); "
+        "every command to the last bit that of the undisturbed test",
     )
 
 
@@ -85,15 +83,13 @@ def test_f26_replay_within_the_session(tmp_path: Path, undisturbed: Course) -> N
     accounts = [course.account(role) for role in (SLAVE, MASTER)]
     assert [account.turned_away for account in accounts] == [{"repeated": 400}] * 2
     passed(
-        Row(
-            "F26",
-            "frames of the same session again",
-            "simulation: the first 400 frames of every route are put onto it again, those of the handshake too",
-            "RUNNING",
-            None,
-            0.0,
-            f"every command to the last bit that of the undisturbed test; commands: {accounts[0]}",
-        )
+        "F26",
+        "frames of the same session again",
+        "simulation: the first 400 frames of every route are put onto it again, those of the handshake too",
+        "RUNNING",
+        None,
+        0.0,
+        f"every command to the last bit that of the undisturbed test; commands: {accounts[0]}",
     )
 
 
@@ -120,15 +116,13 @@ def test_f27_a_jump_of_the_numbers(tmp_path: Path) -> None:
     far = hostile.command(SESSION, 2**32 + 5, 0.0)
     assert codec.decode(codec.encode(far, key), key) == far
     passed(
-        Row(
-            "F27",
-            "numbers ahead by 1000; beyond 2^32",
-            "simulation: an insider's 50 commands; a relay raises the numbers of all commands",
-            "RUNNING with the insider's; RAMPING, then SAFE where all are ahead",
-            stop.seconds,
-            stop.motion,
-            f"{turned:.0f} turned away as ahead; numbers do not wrap: the longest plan has {largest:.2g} ticks",
-        )
+        "F27",
+        "numbers ahead by 1000; beyond 2^32",
+        "simulation: an insider's 50 commands; a relay raises the numbers of all commands",
+        "RUNNING with the insider's; RAMPING, then SAFE where all are ahead",
+        stop.seconds,
+        stop.motion,
+        f"{turned:.0f} turned away as ahead; numbers do not wrap: the longest plan has {largest:.2g} ticks",
     )
 
 
@@ -166,18 +160,16 @@ def test_f28_stamps_in_the_future_and_clocks_apart(tmp_path: Path, undisturbed: 
     one_way = float(np.nanmax(found["feedback_one_way"][AT:]))
     assert one_way < -0.9
     passed(
-        Row(
-            "F28",
-            "stamps 1 s in the future, clocks 4 and 6 s apart",
-            "simulation: a relay changes sent_ns of commands, then of feedbacks; the slave's clock has an offset",
-            "RUNNING",
-            None,
-            0.0,
-            f"every command to the last bit that of the undisturbed test; "
-            f"feedback_one_way is {one_way:.1f} s, which is no delay, "
-            f"and clock_offset_bound is {bounds[1] * 1e6:.0f} µs in place of {bounds[0] * 1e6:.0f} µs; "
-            f"with the commands' stamps nothing changes, command_one_way stays below {future} µs",
-        )
+        "F28",
+        "stamps 1 s in the future, clocks 4 and 6 s apart",
+        "simulation: a relay changes sent_ns of commands, then of feedbacks; the slave's clock has an offset",
+        "RUNNING",
+        None,
+        0.0,
+        f"every command to the last bit that of the undisturbed test; "
+        f"feedback_one_way is {one_way:.1f} s, which is no delay, "
+        f"and clock_offset_bound is {bounds[1] * 1e6:.0f} µs in place of {bounds[0] * 1e6:.0f} µs; "
+        f"with the commands' stamps nothing changes, command_one_way stays below {future} µs",
     )
 
 
@@ -193,15 +185,13 @@ def test_f29_clocks_drift_apart(tmp_path: Path) -> None:
     account = course.account(SLAVE)
     assert account.rejected == 0
     passed(
-        Row(
-            "F29",
-            "the slave's clock gains 200 ppm on the master's",
-            "simulation: its clock drifts for 20 s, 4 ms in all",
-            "RUNNING",
-            None,
-            0.0,
-            f"slope of clock_offset {slope * 1e6:.1f} ppm, no hold; commands: {account}",
-        )
+        "F29",
+        "the slave's clock gains 200 ppm on the master's",
+        "simulation: its clock drifts for 20 s, 4 ms in all",
+        "RUNNING",
+        None,
+        0.0,
+        f"slope of clock_offset {slope * 1e6:.1f} ppm, no hold; commands: {account}",
     )
 
 
@@ -229,15 +219,13 @@ def test_f30_values_that_are_no_numbers(tmp_path: Path) -> None:
     watched = course.plan.safety.ramp_after * course.plan.test.interval
     assert during <= course.plan.limits.table_velocity * watched
     passed(
-        Row(
-            "F30",
-            "NaN, ±inf, −0.0 and a denormal in commands",
-            "simulation: a relay changes a field under the right check, single ones and then all",
-            "RUNNING with single ones, which count as missing; RAMPING, then SAFE with all",
-            stop.seconds,
-            stop.motion,
-            f"event rejected, by value: {rejected['value']}; −0.0 and 5e-324 are used; commands: {account}",
-        )
+        "F30",
+        "NaN, ±inf, −0.0 and a denormal in commands",
+        "simulation: a relay changes a field under the right check, single ones and then all",
+        "RUNNING with single ones, which count as missing; RAMPING, then SAFE with all",
+        stop.seconds,
+        stop.motion,
+        f"event rejected, by value: {rejected['value']}; −0.0 and 5e-324 are used; commands: {account}",
     )
 
 
@@ -263,15 +251,13 @@ def test_f31_f32_a_command_beyond_a_limit(
     limits, step = course.plan.limits, course.plan.test.interval
     assert course.motion(SLAVE, AT - 1, 1) <= limits.table_velocity * step
     passed(
-        Row(
-            fault,
-            title,
-            "simulation: a relay changes one command under the right check",
-            "RAMPING at once, then SAFE, both laboratories",
-            stop.seconds,
-            stop.motion,
-            f"event limit in the slave: “{text}” Nothing of that command reaches the rig, it is not clamped",
-        )
+        fault,
+        title,
+        "simulation: a relay changes one command under the right check",
+        "RAMPING at once, then SAFE, both laboratories",
+        stop.seconds,
+        stop.motion,
+        f"event limit in the slave: “{text}” Nothing of that command reaches the rig, it is not clamped",
     )
 
 
@@ -298,15 +284,13 @@ def test_f33_hostile_contents(tmp_path: Path, undisturbed: Course) -> None:
     assert recorded == course.rejected(SLAVE)
     told = ", ".join(f"{count:.0f} {reason}" for reason, count in sorted(recorded.items()))
     passed(
-        Row(
-            "F33",
-            f"{len(letters)} hostile contents: malformed, nested, oversize, empty",
-            "simulation: each five times onto both routes of the ticks, under the right check",
-            "RUNNING",
-            None,
-            0.0,
-            f"event rejected in the slave: {told}; every command to the last bit that of the undisturbed test",
-        )
+        "F33",
+        f"{len(letters)} hostile contents: malformed, nested, oversize, empty",
+        "simulation: each five times onto both routes of the ticks, under the right check",
+        "RUNNING",
+        None,
+        0.0,
+        f"event rejected in the slave: {told}; every command to the last bit that of the undisturbed test",
     )
 
 
@@ -331,14 +315,12 @@ def test_f53_a_wrong_check_under_a_right_content(tmp_path: Path, undisturbed: Co
     for role, letters in forged.items():
         assert course.rejected(role) == {"check": len(letters)}
     passed(
-        Row(
-            "F53",
-            "right session, number and content, wrong check",
-            "simulation: 150 forged frames each way: another plan's key, the key that all share, a CRC-32",
-            "RUNNING",
-            None,
-            0.0,
-            f"event rejected, by check: {len(forged[SLAVE])} in each laboratory; "
-            "every command to the last bit that of the undisturbed test",
-        )
+        "F53",
+        "right session, number and content, wrong check",
+        "simulation: 150 forged frames each way: another plan's key, the key that all share, a CRC-32",
+        "RUNNING",
+        None,
+        0.0,
+        f"event rejected, by check: {len(forged[SLAVE])} in each laboratory; "
+        "every command to the last bit that of the undisturbed test",
     )

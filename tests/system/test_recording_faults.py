@@ -17,7 +17,7 @@ from common.recording.reader import read
 from common.signals import TICK_TOPICS
 from recorder import space
 from report.facts.laboratories import plan_of
-from tests.faults.rows import Row, passed
+from tests.faults.rows import passed
 from tests.helpers import PATIENT
 from tests.system.test_real_time import crew, finish, start, wait_for_ticks
 
@@ -74,9 +74,7 @@ def test_a_killed_recorder_loses_less_than_a_tenth_of_a_second(tmp_path: Path) -
     print("lost, s:", [round(float(loss), 4) for loss in losses])
     assert min(losses) < 0.1  # a stall of a shared machine on top of it is not the recorder's
     lost = f"{min(losses) * 1e3:.0f} ms lost, file recovered whole"
-    passed(
-        Row("F44", "recorder killed", "kill -9 of its process", "running while it is missed", None, 0.0, lost)
-    )
+    passed("F44", "recorder killed", "kill -9 of its process", "running while it is missed", None, 0.0, lost)
 
 
 @pytest.fixture
@@ -120,9 +118,7 @@ def test_a_full_disk_stops_the_test_in_order_and_leaves_what_was_written(
     assert finish(start("recover", path, "-o", whole))[0] == 0
     assert read(whole).ticks("master") == ticks
     evidence = f"recording_lost; all {ticks} ticks before it readable"
-    passed(
-        Row("F46", "disk full", "a real disk of 700 kB", "ended in order, exit code 3", None, None, evidence)
-    )
+    passed("F46", "disk full", "a real disk of 700 kB", "ended in order, exit code 3", None, None, evidence)
 
 
 def test_a_recorder_alone_on_a_full_disk_refuses_with_a_sentence(tmp_path: Path, small_disk: Path) -> None:
@@ -156,6 +152,6 @@ def test_a_recorder_that_is_held_up_for_seven_seconds_gets_what_it_missed(tmp_pa
     assert summary["items_lost"] == summary["items_dropped"] == "0"
     stalled = float(summary["recorder_stalled_s"])
     evidence = f"held up {stalled:.1f} s, nothing lost"
-    passed(Row("F45", "recorder held up 7 s", "SIGSTOP of its process", "running", None, 0.0, evidence))
+    passed("F45", "recorder held up 7 s", "SIGSTOP of its process", "running", None, 0.0, evidence)
     plan_read: Any = plan_of(run)
     assert space.need(plan_read) == pytest.approx(path.stat().st_size, rel=0.3)

@@ -25,7 +25,7 @@ from common.link.transport import CHANNELS, CONTROL, SAMPLES, TICK, Packet, Rout
 from common.link.zenoh_link import ZenohLink, key, listenable
 from rths.prepare import keys
 from tests.certificates import DAY, NOW, again, identity, made
-from tests.faults.rows import Row, passed
+from tests.faults.rows import passed
 from tests.helpers import PATIENT, ROOT
 
 TEST = "secure"
@@ -305,7 +305,7 @@ def test_a_recorders_certificate_cannot_command_the_slave(folder: Path, mode: st
             assert found["master"].until(b"its own") == []
     how = "no certificate, another's, an expired one; commands put under the recorder's"
     evidence = "the session is refused; of what a recorder puts on the master's keys nothing comes"
-    passed(Row("F52", "no credentials, or another role's", how, "refused", None, 0.0, evidence))
+    passed("F52", "no credentials, or another role's", how, "refused", None, 0.0, evidence)
 
 
 def test_a_slaves_certificate_cannot_listen_to_what_is_not_for_it(folder: Path) -> None:

@@ -12,7 +12,7 @@ import pytest
 from common.link.zenoh_link import LEASE_MS
 from common.protocol.codec import KINDS
 from common.protocol.messages import Stop
-from tests.faults.rows import Row, passed
+from tests.faults.rows import passed
 from tests.system.faults.bench import (
     INTERVAL,
     LABS,
@@ -52,7 +52,7 @@ def both(bench: Bench, *causes: str) -> tuple[dict[str, Reaction], dict[str, flo
 
 def row(fault: str, title: str, how: str, found: dict[str, Reaction], more: str = "") -> None:
     """Keep what two laboratories that tripped have shown."""
-    passed(Row(fault, title, how, "both safe", *worst(found), evidence(found) + (more and f"; {more}")))
+    passed(fault, title, how, "both safe", *worst(found), evidence(found) + (more and f"; {more}"))
 
 
 def ear(bench: Bench, *before: str) -> Process:
@@ -261,6 +261,6 @@ def test_f35_a_stop_that_is_lost_is_made_good_by_the_watchdog(tmp_path: Path) ->
         assert lost
         state = "slave safe by its watchdog"
         told = f"{evidence(found)}; {len(lost)} times sent and lost"
-        passed(Row("F35", "STOP lost", "relay loses it again and again, udp", state, *worst(found), told))
+        passed("F35", "STOP lost", "relay loses it again and again, udp", state, *worst(found), told)
 
     undisturbed(scenario, tmp_path)

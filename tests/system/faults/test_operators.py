@@ -18,7 +18,7 @@ from common.link.endpoint import FrameEndpoint
 from common.protocol.messages import Answer, Operator
 from common.roles import OPERATOR
 from common.terminal.cli import text_report
-from tests.faults.rows import Row, motion_bound, passed
+from tests.faults.rows import motion_bound, passed
 from tests.system.faults.bench import (
     INTERVAL,
     LABS,
@@ -78,7 +78,7 @@ def test_f19_f22_a_killed_master_and_the_next_one(tmp_path: Path) -> None:
             killed = bench.master.signal(signal.SIGKILL)
             bench.rest("slave")
             seconds, motion = by_log(bench, killed)
-            f19 = Row(
+            passed(
                 "F19",
                 "master killed",
                 "kill -9 of its process",
@@ -87,7 +87,6 @@ def test_f19_f22_a_killed_master_and_the_next_one(tmp_path: Path) -> None:
                 motion,
                 f"slave: {bench.slave.events('safe')[0]['text']}",
             )
-            passed(f19)
             bench.recorder.kill()
             before = bench.logs["slave"].written().ns.size
             bench.master = bench.start("master")
@@ -108,15 +107,13 @@ def test_f19_f22_a_killed_master_and_the_next_one(tmp_path: Path) -> None:
             run = bench.finish()
             assert run.ticks("slave") > 0.2 / INTERVAL - 1
             passed(
-                Row(
-                    "F22",
-                    "master starts again, slave latched",
-                    "new process, new session",
-                    "refused until the slave's reset, then runs",
-                    None,
-                    0.0,
-                    text,
-                )
+                "F22",
+                "master starts again, slave latched",
+                "new process, new session",
+                "refused until the slave's reset, then runs",
+                None,
+                0.0,
+                text,
             )
 
     undisturbed(scenario, tmp_path)
@@ -162,15 +159,13 @@ def test_f54_the_red_button_of_one_laboratory_stops_both(lab: str, tmp_path: Pat
             if lab == "slave":
                 state = "emergency stop where it was pressed, the other safe"
                 passed(
-                    Row(
-                        "F54",
-                        "emergency stop",
-                        "rig raises, in either laboratory; rths stop --emergency",
-                        state,
-                        far["t"] - cause["t"],
-                        worst(found)[1],
-                        evidence(found),
-                    )
+                    "F54",
+                    "emergency stop",
+                    "rig raises, in either laboratory; rths stop --emergency",
+                    state,
+                    far["t"] - cause["t"],
+                    worst(found)[1],
+                    evidence(found),
                 )
 
     undisturbed(scenario, tmp_path)
@@ -200,14 +195,12 @@ def test_f55_a_reset_needs_a_new_press_and_the_cause_gone(tmp_path: Path) -> Non
             }
             assert found["slave"].modes[-1] == "safe → idle (reset)"
             passed(
-                Row(
-                    "F55",
-                    "reset held, or while the fault is present",
-                    "operator's messages; rig reads 1 m",
-                    "safe until a new press after the cause is gone",
-                    *worst(found),
-                    first["slave"].text,
-                )
+                "F55",
+                "reset held, or while the fault is present",
+                "operator's messages; rig reads 1 m",
+                "safe until a new press after the cause is gone",
+                *worst(found),
+                first["slave"].text,
             )
 
     undisturbed(scenario, tmp_path)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.faults.rows import Row, passed
+from tests.faults.rows import passed
 from tests.system.faults.bench import (
     INTERVAL,
     WATCHDOG,
@@ -34,7 +34,7 @@ def test_f20_a_killed_slave_brings_the_master_to_rest(tmp_path: Path) -> None:
             bench.rest("master")
             found = {"master": judge(bench.finish("master"), bench, "master", ["watchdog"])}
         state = "master safe; the killed one's rig is left to its own watchdog"
-        passed(Row("F20", "slave killed", "kill -9 of its process", state, *worst(found), evidence(found)))
+        passed("F20", "slave killed", "kill -9 of its process", state, *worst(found), evidence(found))
 
     undisturbed(scenario, tmp_path)
 
@@ -51,14 +51,12 @@ def test_f21_a_master_that_is_held_up_finds_both_at_rest(tmp_path: Path) -> None
                 "master": judge(run, bench, "master", ["overrun", "remote_trip"], most=HOLD + 2 * WATCHDOG),
             }
         passed(
-            Row(
-                "F21",
-                f"master held up {HOLD * 1e3:.0f} ms",
-                "SIGSTOP",
-                "both safe",
-                *worst(found),
-                evidence(found),
-            )
+            "F21",
+            f"master held up {HOLD * 1e3:.0f} ms",
+            "SIGSTOP",
+            "both safe",
+            *worst(found),
+            evidence(found),
         )
 
     undisturbed(scenario, tmp_path)
@@ -77,14 +75,12 @@ def test_f15_a_slave_that_was_held_up_uses_no_stale_command(tmp_path: Path) -> N
             }
         assert exchanged(run, "slave")["commands.turned_away.stale"] > 0
         passed(
-            Row(
-                "F15",
-                "slave held up 500 ms",
-                "SIGSTOP",
-                "both safe, stale commands turned away",
-                *worst(found),
-                evidence(found),
-            )
+            "F15",
+            "slave held up 500 ms",
+            "SIGSTOP",
+            "both safe, stale commands turned away",
+            *worst(found),
+            evidence(found),
         )
 
     undisturbed(scenario, tmp_path)

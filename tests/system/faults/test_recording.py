@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from common.recording.reader import Run
-from tests.faults.rows import Row, passed
+from tests.faults.rows import passed
 from tests.system.faults.bench import AT, INTERVAL, LABS, Bench, DisturbedError, Process, later, undisturbed
 from tests.system.faults.hostile import Stranger
 from tests.system.faults.impostor import FAR
@@ -46,20 +46,18 @@ def test_f47_f51_neither_a_slow_disk_nor_strangers_hold_up_the_loop(tmp_path: Pa
         waiting = summary["items_waiting_most"]
         assert int(waiting) > 0.2 / INTERVAL  # of some items a tick, while the disk stalls for 0.3 s
         passed(
-            Row(
-                "F47",
-                "disk stalls 300 ms each second",
-                "wrapper of the file",
-                "running",
-                None,
-                0.0,
-                f"nothing lost, {waiting} items waiting at most",
-            )
+            "F47",
+            "disk stalls 300 ms each second",
+            "wrapper of the file",
+            "running",
+            None,
+            0.0,
+            f"nothing lost, {waiting} items waiting at most",
         )
         not_obeyed(run, turned_away)
         share = f"late ticks {loud.mean() * 100:.2f} % with, {quiet.mean() * 100:.2f} % without"
         how = "300 connections and 5000 datagrams of garbage, 300 half-open connections"
-        passed(Row("F51", "strangers on the port", how, "running", None, 0.0, share))
+        passed("F51", "strangers on the port", how, "running", None, 0.0, share)
 
     undisturbed(scenario, tmp_path)
 
@@ -85,8 +83,8 @@ def not_obeyed(run: Run, turned_away: str) -> None:
     assert rejected
     assert not np.any(run.columns["slave"]["table_target"] == FAR)
     how = "its own session, under the master's keys"
-    passed(Row("F23", "second master", how, "running", None, 0.0, rejected[-1]["text"]))
-    passed(Row("F24", "second slave", "second process", "running", None, 0.0, turned_away))
+    passed("F23", "second master", how, "running", None, 0.0, rejected[-1]["text"])
+    passed("F24", "second slave", "second process", "running", None, 0.0, turned_away)
 
 
 def test_f50_nothing_is_armed_without_a_recorder_or_room_for_it(tmp_path: Path) -> None:
@@ -106,13 +104,11 @@ def test_f50_nothing_is_armed_without_a_recorder_or_room_for_it(tmp_path: Path) 
             assert "Traceback" not in bench.lab(lab).errors
     how = "a recorder that finds no room, so that none is there"
     passed(
-        Row(
-            "F50",
-            "recorder absent, disk too small",
-            how,
-            "never armed",
-            None,
-            0.0,
-            "exit codes 3 of the recorder and the slave, 4 of the master",
-        )
+        "F50",
+        "recorder absent, disk too small",
+        how,
+        "never armed",
+        None,
+        0.0,
+        "exit codes 3 of the recorder and the slave, 4 of the master",
     )

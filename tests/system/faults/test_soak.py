@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from common.lab.outlet import kept_seconds
 from common.recording.reader import Run
-from tests.faults.rows import Row, passed
+from tests.faults.rows import passed
 from tests.helpers import JUMPS
 from tests.system.faults.bench import (
     INTERVAL,
@@ -194,7 +194,7 @@ def test_f56_a_soak_with_a_fault_every_ten_seconds(machines: Network, tmp_path: 
         text = ", ".join(f"{role} {size / 1e3:+.0f} kB" for role, size in growth.items())
         how = f"{SECONDS:g} s, a fault every {SLOT:g} s"
         evidence = f"every message accounted for, {bench.plan.ticks} ticks recorded; memory {text}"
-        passed(Row("F56", "soak", how, "running", None, 0.0, evidence))
+        passed("F56", "soak", how, "running", None, 0.0, evidence)
 
     undisturbed(scenario, tmp_path)
 
@@ -220,4 +220,4 @@ def hogs(run: Run, soak: Soak) -> None:
     late, quiet = soak.late(run, "hogs"), soak.late(run, "quiet")
     later(late, quiet, "hogs")
     evidence = f"ticks over 2 ms late: {late.mean() * 100:.2f} %, without hogs {quiet.mean() * 100:.2f} %"
-    passed(Row("F41", "four busy processes", "FIFO priority", "running", None, 0.0, evidence))
+    passed("F41", "four busy processes", "FIFO priority", "running", None, 0.0, evidence)
