@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from common.plan.tables import ServoHydraulics
 from models import compensators
 from models.compensators import inverse
-from tests.models.compensators.benchmark import DT, Plant
-from tests.models.compensators.rig import ask
+from models.transfer_systems import servo_hydraulic
+from tests.models.compensators.rig import DT, ask
 
 
 def test_the_command_is_the_sum_of_its_terms() -> None:
@@ -29,11 +30,10 @@ def test_with_the_series_of_a_lag_it_is_the_inverse_of_that_lag() -> None:
 
 @pytest.mark.parametrize("frequency", [0.5, 2.0, 5.0, 10.0])
 def test_the_defaults_invert_the_plant_of_the_benchmark(frequency: float) -> None:
-    """Against the plant's own response to a command held from tick to tick, which adds half a tick."""
-    transition, held = Plant().discrete()
+    """Against the response of the servo-hydraulics with the benchmark's specimen."""
+    a, b = servo_hydraulic.rates(ServoHydraulics(), 1.19e6, 114.6, 29.13, 0.0)
     s = 2j * np.pi * frequency
-    states = np.linalg.solve(np.exp(s * DT) * np.eye(5) - transition, held)
+    position = np.linalg.solve(s * np.eye(servo_hydraulic.STATES) - a, b[:, 0])[servo_hydraulic.POSITION]
     built = compensators.build("series", {}, DT)
     series = sum(built.params[i] * s**i for i in range(4))
-    left = states[3] * series * np.exp(s * DT / 2.0)
-    assert abs(left - 1.0) < 6e-3
+    assert abs(position * series - 1.0) < 6e-3

@@ -7,10 +7,12 @@ import pytest
 
 from common.errors import InputError
 from common.plan.plan import Plan
+from laboratories.column.kind import COLUMN
 from loop.force_path import force_path
 from models import indicators
 from models.registry import Array
-from tests.models.compensators import benchmark
+from validation.benchmark2020.problem import CASES, EL_CENTRO, SETTINGS, with_compensator
+from validation.benchmark2020.runs import play, specimen_force, stage
 
 DT = 0.002
 
@@ -60,13 +62,14 @@ def test_the_interval_holds_the_truth_as_often_as_it_says() -> None:
 @pytest.mark.parametrize("case", [1, 4])
 def test_it_bears_the_noise_of_a_specimen_with_mass(ticks: int, case: int) -> None:
     """The benchmark's readings: twice differentiated, the displacement's noise is twenty times the force."""
-    run = benchmark.run("amb", {}, case)
-    x = run.measured
-    rate = np.gradient(x, benchmark.DT)
-    expected = benchmark.K_E * x + benchmark.C_E * rate + benchmark.M_E * np.gradient(rate, benchmark.DT)
-    found = indicators.force_path(expected, np.roll(run.force, ticks), benchmark.DT)
-    assert found.delay == pytest.approx(ticks * benchmark.DT, abs=1e-4)
-    assert found.interval[0] - 5e-5 <= ticks * benchmark.DT <= found.interval[1] + 5e-5
+    on = stage(CASES[case - 1], EL_CENTRO, 0, 1)
+    plan = with_compensator(on.plants[0], SETTINGS["amb"])
+    _, rollout = play(on, "amb", plan)
+    measured, late = (np.ascontiguousarray(rollout.master[name]) for name in COLUMN.channels.names)
+    interval = plan.test.interval
+    found = indicators.force_path(specimen_force(plan, measured), np.roll(late, ticks), interval)
+    assert found.delay == pytest.approx(ticks * interval, abs=1e-4)
+    assert found.interval[0] - 5e-5 <= ticks * interval <= found.interval[1] + 5e-5
     assert found.gain == pytest.approx(1.0, abs=5e-3)
 
 

@@ -26,7 +26,7 @@ class Played(NamedTuple):
 @pytest.fixture(scope="session")
 def played(tmp_path_factory: pytest.TempPathFactory) -> Played:
     folder = tmp_path_factory.mktemp("benchmark2020")
-    settings = {name: SETTINGS[name] for name in ("sample", "amb", "none")}
+    settings = {name: SETTINGS[name] for name in ("sample", "amb", "ats", "none")}
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(late_force, "DELAYS", (0.0, 1e-3, 2e-3, 10e-3))
         found = evidence.gather(settings, 1, 2020, 2, untold)

@@ -45,12 +45,12 @@ def test_a_late_force_is_seen_by_its_own_indicator_only(played: Played) -> None:
         assert item.result.found is not None
         assert item.result.found.j1 <= 0.3e-3
     late = {(item.result.case, item.delay): item.result.found for item in played.evidence.late}
-    for case in (1, 4):
+    for case, published in ((1, 0.129), (4, 0.231)):
         without, with_it = late[case, 0.0], late[case, 2e-3]
         assert without is not None
         assert with_it is not None
         assert with_it.j2 < 1.1 * without.j2
-        assert with_it.j4 > 3.0 * without.j4
+        assert with_it.j4 == pytest.approx(published, abs=0.003)
 
 
 def test_no_compensation_is_unstable_and_amb_is_not(played: Played) -> None:
@@ -60,7 +60,7 @@ def test_no_compensation_is_unstable_and_amb_is_not(played: Played) -> None:
     assert found["none"].unstable > 0
     assert math.isinf(found["none"].nominal)
     assert found["amb"].unstable == 0
-    assert found["amb"].nominal <= 0.05
+    assert max(found["amb"].nominal, found["ats"].nominal) <= 0.04
     assert found["amb"].plants <= 0.06
     assert found["amb"].force <= FORCE
     assert found["amb"].meets
