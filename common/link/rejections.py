@@ -15,10 +15,9 @@ UNTOLD = frozenset({Reject.UNREGISTERED.value})  # a process in no test hears th
 
 
 class RejectionCount(NamedTuple):
-    """The rejections for one reason: when they began, the last one, and as which role its sender spoke."""
+    """The rejections for one reason: when they began, and as which role the sender of the last one spoke."""
 
     first_ns: int
-    last_ns: int
     role: str
 
 
@@ -38,7 +37,7 @@ class Rejections:
         name = reason.value
         with self._lock:
             first_ns = self.seen[name].first_ns if name in self.seen else now_ns
-            self.seen[name] = RejectionCount(first_ns, now_ns, role)
+            self.seen[name] = RejectionCount(first_ns, role)
             self.counts[name] += 1  # last: `news` looks for who was seen
         self._fresh = self._fresh or name not in UNTOLD
 

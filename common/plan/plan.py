@@ -215,11 +215,6 @@ def resolve(plan: Plan, path: str) -> Path:
     return plan.base / path
 
 
-def safe_name(text: str) -> str:
-    """`text` as part of a file name."""
-    return re.sub(r"[^A-Za-z0-9_.-]+", "-", text)
-
-
 def ideal(plan: Plan) -> Plan:
     """The plan with transfer systems that follow at once, and no compensation.
 

@@ -223,11 +223,6 @@ class Peaks(NamedTuple):
     units: dict[str, str]  # of each
 
 
-def peaks_check(plan: Plan) -> PreflightCheck:
-    """The check of the simulated peaks, for a gate."""
-    return simulated_peaks(plan)[2]
-
-
 def simulated_peaks(plan: Plan, *, known_unstable: bool = False) -> tuple[Peaks | None, bool, PreflightCheck]:
     """Peaks of the simulated test, whether its loop is unstable, and the check of both.
 

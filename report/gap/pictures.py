@@ -187,11 +187,11 @@ def residual_amplitude(parts: Sequence[PartSeen]) -> str:
     return svg(canvas)
 
 
-def worst(t: Values, error: Values, length: float = ZOOM) -> slice:
-    """The stretch of `length` s with the largest error."""
+def worst(t: Values, error: Values) -> slice:
+    """The stretch of `ZOOM` s with the largest error."""
     steps = np.diff(t)
     usual = float(np.nanmedian(steps)) if steps.size else 0.0
-    count = round(length / usual) if usual > 0.0 else t.size
+    count = round(ZOOM / usual) if usual > 0.0 else t.size
     if not 1 < count < t.size:
         return slice(0, t.size)
     energy = np.concatenate(([0.0], np.cumsum(np.nan_to_num(error) ** 2)))

@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from common.plan import read as plans
 from common.plan.plan import Plan
-from common.terminal import cli
 from loop.nominal import free_motion
 from models.indicators.growth import grows
 from tests.helpers import with_table
@@ -17,11 +15,6 @@ from validation.paper.experiments import delayed
 @pytest.mark.parametrize(("delay", "unstable"), [(0.0324, False), (0.0334, True), (0.1, True)])
 def test_it_turns_at_the_critical_delay(default_plan: Plan, delay: float, unstable: bool) -> None:
     assert free_motion.unstable(delayed(default_plan, delay)) is unstable
-
-
-@pytest.mark.parametrize("name", [name for name in cli.SHIPPED if name != "two_dampers"])
-def test_every_plan_that_ships_is_stable(name: str) -> None:
-    assert not free_motion.unstable(plans.load(cli.plan_path(name)))
 
 
 def test_the_dampers_control_takes_part(default_plan: Plan) -> None:

@@ -14,12 +14,14 @@ from common.errors import InputError
 from common.plan.plan import Plan
 from common.plan.read import parse
 from common.plan.tables import Experimental
+from loop.closed_loop import signals, simulate
 from loop.nominal import partition
-from loop.nominal.preflight import expected_delay
+from loop.nominal.preflight import expected_delay, partition_text
 from models.indicators import FrequencyEvaluation
 from models.registry import Array
 from models.structures import shear_building
 from tests.helpers import SERVO_PLAN, with_table
+from validation.paper.experiments import delayed, pulse
 
 # mass of a floor kg, damping ratio, critical delay ms: computed from the published equations
 CASES = [(1000.0, 0.05, 14.65), (1100.0, 0.04, 12.23), (1300.0, 0.03, 9.92), (1000.0, 0.03, 8.73)]
@@ -151,3 +153,40 @@ def test_the_unit_delay_is_expected_in_the_path(plan: Plan) -> None:
     assert expected_delay(plan, late) == pytest.approx(late.delay + plan.test.interval)
     assert late.damping_points > early.damping_points
     assert late.critical_delay == early.critical_delay
+
+
+def test_the_default_partition(default_plan: Plan) -> None:
+    found = partition.assess(default_plan)
+    assert found.frequency == pytest.approx(1.989, abs=1e-3)
+    assert found.critical_delay == pytest.approx(0.0329, abs=1e-4)
+    assert found.delay == pytest.approx(0.0002, abs=1e-4)
+    assert found.amplitude == pytest.approx(1.028, abs=2e-3)
+    assert "Stable up to 32.9 ms of delay; 2.2 ms expected (margin 15)" in partition_text(default_plan, found)
+
+
+@pytest.mark.parametrize(("lead", "points"), [(0.0088, 1.9), (0.044, 0.0)])
+def test_the_cost_is_that_of_the_residual_delay(default_plan: Plan, lead: float, points: float) -> None:
+    plan = with_table(default_plan, "compensator", lead=lead)
+    assert 100.0 * partition.assess(plan).damping_points == pytest.approx(points, abs=0.05)
+
+
+def test_a_specimen_without_stiffness_bears_any_delay(default_plan: Plan) -> None:
+    plan = with_table(default_plan, "column", stiffness=0.0)
+    found = partition.assess(plan)
+    assert math.isinf(found.critical_delay)
+    assert "Stable at any delay; " in partition_text(plan, found)
+
+
+def test_two_storeys_diverge_beyond_their_critical_delay_only(default_plan: Plan) -> None:
+    plan = with_table(
+        default_plan, "structure", mass=[1.6e5, 1.6e5], stiffness=[50e6, 40e6], damping=[4e5, 3e5]
+    )
+    plan = with_table(plan, "column", stiffness=20e6, storey=2)
+    critical = partition.critical_delay_of(plan)
+    growth = []
+    for factor in (0.9, 1.1):
+        late = plans.with_test(delayed(plan, factor * critical), duration=20.0)
+        drift = np.abs(signals(late, simulate(late, pulse(late)))["column_target"])
+        middle = drift.size // 2
+        growth.append(drift[middle:].max() / drift[1000:middle].max())
+    assert growth[0] < 1.0 < growth[1]

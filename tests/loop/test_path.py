@@ -107,11 +107,3 @@ def test_a_longer_delay_is_never_expected_to_be_shorter(
     assert long >= short - 1e-4  # of a path whose compensator weakens the longer delay nearly to the same
     if not proportional:
         assert long - short == pytest.approx(delays[1] - delays[0], abs=2e-3)
-
-
-@pytest.mark.parametrize(("represents", "critical"), [(1, 32.9), (2, 16.1), (3, 10.7), (4, 8.0)])
-def test_the_critical_delay_by_the_specimens_share(
-    default_plan: Plan, represents: int, critical: float
-) -> None:
-    plan = with_table(default_plan, "column", represents=represents)
-    assert partition.critical_delay_of(plan) * 1e3 == pytest.approx(critical, abs=0.05)

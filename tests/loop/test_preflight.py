@@ -18,7 +18,7 @@ from loop import substructure
 from loop.closed_loop import signals, simulate
 from loop.nominal import limited, preflight
 from loop.nominal.partition import assess, critical_delay_of
-from loop.nominal.preflight import expected_delay, partition_check, peaks, peaks_check
+from loop.nominal.preflight import expected_delay, partition_check, peaks, simulated_peaks
 from models.registry import Array
 from tests.helpers import with_table
 
@@ -27,7 +27,7 @@ def uncompensated(plan: Plan) -> Plan:
     return dataclasses.replace(plan, compensator=CompensatorTable("none", {}))
 
 
-@pytest.mark.parametrize("represents", [1, 2])
+@pytest.mark.parametrize("represents", [1, 2, 3, 4])
 def test_the_critical_delay_of_a_storey_solves_its_characteristic_equation(
     default_plan: Plan, represents: int
 ) -> None:
@@ -77,7 +77,7 @@ def test_every_plan_that_ships_passes(name: str) -> None:
 
 def test_the_first_quantity_beyond_its_share_is_named(short_plan: Plan) -> None:
     plan = with_table(short_plan, "limits", actuator_command=0.003, damper_stroke=0.01)
-    found = peaks_check(plan).risk
+    found = simulated_peaks(plan)[2].risk
     assert found is not None
     columns = signals(
         plan, simulate(plan, substructure.ground_rows(plan, substructure.motion(plan)), seed=plan.test.seed)
@@ -128,7 +128,7 @@ def test_a_lead_is_only_advised_where_it_then_serves(default_plan: Plan) -> None
 
 def test_an_unstable_control_of_the_damper_is_named(default_plan: Plan) -> None:
     plan = with_table(default_plan, "control", gain=3e6)
-    found = peaks_check(plan).risk
+    found = simulated_peaks(plan)[2].risk
     assert found is not None
     assert "lower gain in [control], 3e+06 N·s/m" in found.sentence
 
@@ -155,7 +155,7 @@ def test_limited_quantities_that_are_no_signals(short_plan: Plan) -> None:
 
 def test_several_slaves_have_peaks_too() -> None:
     plan = plans.with_test(plans.load(cli.plan_path("two_dampers")), duration=3.0)
-    assert "of their limits at most (" in peaks_check(plan).text
-    found = peaks_check(with_table(plan, "limits", damper_stroke=0.01)).risk
+    assert "of their limits at most (" in simulated_peaks(plan)[2].text
+    found = simulated_peaks(with_table(plan, "limits", damper_stroke=0.01))[2].risk
     assert found is not None
     assert "damper_stroke" in found.sentence

@@ -214,8 +214,9 @@ def free_vibrations(evidence: PaperEvidence) -> None:
     )
 
 
-def bisect(plan: Plan, low: float = 0.01, high: float = 0.1, width: float = 1e-4) -> tuple[float, float]:
-    """Delays (s) between which the closed loop turns unstable, at most `width` apart."""
+def bisect(plan: Plan) -> tuple[float, float]:
+    """Delays (s) between which the closed loop turns unstable, at most 0.1 ms apart."""
+    low, high, width = 0.01, 0.1, 1e-4
     while high - low > width:
         middle = 0.5 * (low + high)
         if free_damping(delayed(plan, middle), noise=False)[1] > 0.0:
