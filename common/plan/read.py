@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from common.plan.kinds import TABLES_OF_KIND, check_kind, known_kind, planned
 from common.plan.plan import INTERFACE, TABLES, Plan
 from common.plan.schema import fill, nearest, plain
 from common.plan.tables import RigTable, SlaveLaboratory
+from common.plan.toml_file import tables_in, text_of
 from common.roles import MASTER, slave_role
 
 # eight laboratories on one master take 0.17 ms of a tick of 2 ms (docs/reference/benchmarks.md)
@@ -36,22 +36,12 @@ def load(path: Path) -> Plan:
     Raises:
         PlanError: the file cannot be read, is no TOML, or holds what no plan can.
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
-        raise PlanError(f"Cannot read the plan {path}: {reason}; give the path of a TOML file.") from None
-    return parse(text, path.parent, str(path))
+    return parse(text_of(path, "plan"), path.parent, str(path))
 
 
 def parse(text: str, base: Path, name: str = "the plan") -> Plan:
     """The plan in a TOML text; relative paths start from `base`; `name` stands in errors."""
-    try:
-        tables = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise PlanError(f"{name} is not valid TOML: {error}.") from None
-    except RecursionError:
-        raise PlanError(f"{name} is not a plan: its values are nested too deeply.") from None
+    tables = tables_in(text, name)
     try:
         return from_tables(tables, base)
     except PlanError as error:

@@ -6,7 +6,6 @@ report.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -19,6 +18,7 @@ from common.plan.plan import Plan
 from common.plan.read import from_tables
 from common.plan.schema import fill, nearest
 from common.plan.tables import RigTable
+from common.plan.toml_file import load_tables
 from common.roles import MASTER, SLAVE, slave_role
 
 Entry = tuple[str, Mapping[str, float]]  # name of an effect of the catalogue, and its parameters
@@ -88,12 +88,7 @@ def load(path: Path, plan: Plan) -> Reality:
     Raises:
         PlanError: the file cannot be read, is no TOML, or holds what no reality can.
     """
-    try:
-        tables = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise PlanError(f"Cannot read the reality {path}: {error.strerror}.") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise PlanError(f"The reality {path} is not valid TOML: {error}.") from None
+    tables = load_tables(path, "reality")
     try:
         return from_reality(tables, plan, path.parent)
     except PlanError as error:

@@ -98,6 +98,21 @@ def processor_argument(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def recording_argument(parser: argparse.ArgumentParser, more: str = "", **options: Any) -> None:
+    """FILE, the recording that a command reads; `more` is said of it."""
+    parser.add_argument("file", type=Path, metavar="FILE", help=f"a recording (MCAP){more}", **options)
+
+
+def output_argument(parser: argparse.ArgumentParser, metavar: str, text: str, **options: Any) -> None:
+    """The option that says where a command writes."""
+    parser.add_argument("-o", "--output", type=Path, metavar=metavar, help=text, **options)
+
+
+def words(text: str) -> list[str]:
+    """A comma-separated list as the value of an option."""
+    return [word.strip() for word in text.split(",") if word.strip()]
+
+
 def json_argument(parser: argparse.ArgumentParser, text: str) -> None:
     """The option for machine-readable output."""
     parser.add_argument("--json", action="store_true", help=text)

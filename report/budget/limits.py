@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 
 from common.errors import PlanError
 from common.plan.schema import fill, key, nearest, table_fields
+from common.plan.toml_file import load_tables
 
 DEFAULT = Path(__file__).with_name("default.toml")
 PERCENTILES = {"p50": 50.0, "p90": 90.0, "p99": 99.0, "p99.9": 99.9}
@@ -87,14 +87,7 @@ def load(path: Path | None) -> Budget:
     """
     if path is None:
         return load(DEFAULT)
-    try:
-        tables = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise PlanError(
-            f"Cannot read the budget {path}: {error.strerror}; give the path of a TOML file."
-        ) from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise PlanError(f"The budget {path} is not valid TOML: {error}.") from None
+    tables = load_tables(path, "budget")
     try:
         return from_tables(tables, "default" if path == DEFAULT else str(path))
     except PlanError as error:

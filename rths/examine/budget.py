@@ -14,7 +14,7 @@ from report.text.progress import Progress
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `budget`."""
-    parser.add_argument("file", type=Path, metavar="FILE", help="a recording (MCAP)")
+    cli.recording_argument(parser)
     parser.add_argument(
         "--budget",
         type=Path,

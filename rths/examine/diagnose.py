@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `diagnose`."""
-    parser.add_argument("file", type=Path, metavar="FILE", help="a recording (MCAP), whole or of one part")
+    cli.recording_argument(parser, ", whole or of one part")
     parser.add_argument(
         "--plan", metavar="PLAN", help="what the laboratories should be (default: the plan in FILE)"
     )

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from common.errors import InputError
@@ -17,15 +16,8 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `export`."""
-    parser.add_argument("file", type=Path, metavar="FILE", help="a recording (MCAP)")
-    parser.add_argument(
-        "-o",
-        "--output",
-        type=Path,
-        required=True,
-        metavar="OUT",
-        help="the file to write: .csv, .parquet or .mat",
-    )
+    cli.recording_argument(parser)
+    cli.output_argument(parser, "OUT", "the file to write: .csv, .parquet or .mat", required=True)
     parser.add_argument(
         "--events",
         action="store_true",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from common.errors import InputError, PlanError
 from common.plan import read as plans
 from common.plan.plan import Plan
 from common.plan.schema import fill, key, nearest
+from common.plan.toml_file import load_tables
 from common.roles import MASTER, name_of
 from common.signals import FieldType, Signal
 from common.terminal import cli, outputs
@@ -72,9 +72,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--map", type=Path, required=True, metavar="MAP", help="TOML file that says what is what"
     )
-    parser.add_argument(
-        "-o", "--output", type=Path, required=True, metavar="FILE", help="the recording to write"
-    )
+    cli.output_argument(parser, "FILE", "the recording to write", required=True)
     cli.force_argument(parser)
     cli.json_argument(parser, "say what was written as JSON on standard output")
 
@@ -110,12 +108,7 @@ def show(args: argparse.Namespace, mapping: Mapping, ticks: int, present: list[s
 
 def load_map(path: Path) -> Mapping:
     """A map file; raises InputError naming what is wrong in it."""
-    try:
-        tables = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"Cannot read the map {path}: {error.strerror}.") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"The map {path} is not valid TOML: {error}.") from None
+    tables = load_tables(path, "map")
     known = ("plan", "time", "rate", "signals")
     for name in tables:
         if name not in known:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from pathlib import Path
 from typing import Any
 
 from common.recording.outcome import CUT_OFF, outcome
@@ -18,7 +17,7 @@ from report.text.terminal import table
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `inspect`."""
-    parser.add_argument("file", type=Path, metavar="FILE", help="a recording (MCAP)")
+    cli.recording_argument(parser)
     cli.json_argument(parser, "write the report as JSON on standard output")
 
 

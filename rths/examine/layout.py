@@ -34,16 +34,8 @@ SCRIPT = Path(__file__).with_name("layouts") / "histogram.ts"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `layout`."""
-    parser.add_argument(
-        "file",
-        type=Path,
-        nargs="?",
-        metavar="FILE",
-        help="a recording (MCAP); without it: of the default test",
-    )
-    parser.add_argument(
-        "-o", "--output", type=Path, required=True, metavar="OUT.json", help="the layout file to write"
-    )
+    cli.recording_argument(parser, "; without it: of the default test", nargs="?")
+    cli.output_argument(parser, "OUT.json", "the layout file to write", required=True)
     cli.force_argument(parser)
     cli.json_argument(parser, "say what was written as JSON on standard output")
 

@@ -40,16 +40,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `plot`."""
     from report.pictures import PICTURES
 
-    parser.add_argument("file", type=Path, metavar="FILE", help="a recording (MCAP)")
+    cli.recording_argument(parser)
     parser.add_argument(
         "names", nargs="*", metavar="NAME", help="pictures to draw (default: all that there are signals for)"
     )
-    parser.add_argument(
-        "-o",
-        "--output",
-        type=Path,
-        metavar="PLACE",
-        help="a folder (default: beside the recording), or for one picture a file: its ending says the format",
+    cli.output_argument(
+        parser,
+        "PLACE",
+        "a folder (default: beside the recording), or for one picture a file: its ending says the format",
     )
     cli.force_argument(parser)
     parser.add_argument("--format", choices=FORMATS, help="format of the pictures (default: png)")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 from common.terminal import cli, outputs
@@ -20,14 +19,8 @@ SHOWN = 10  # ranges of a topic, and holes of the file; JSON has all
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `recover`."""
-    parser.add_argument("file", type=Path, metavar="FILE", help="a recording (MCAP), damaged or cut off")
-    parser.add_argument(
-        "-o",
-        "--output",
-        type=Path,
-        metavar="OUT.mcap",
-        help="the recovered recording (default: FILE-recovered.mcap)",
-    )
+    cli.recording_argument(parser, ", damaged or cut off")
+    cli.output_argument(parser, "OUT.mcap", "the recovered recording (default: FILE-recovered.mcap)")
     cli.force_argument(parser)
     cli.json_argument(parser, "write the account as JSON on standard output")
 

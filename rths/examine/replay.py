@@ -6,7 +6,6 @@ import argparse
 import json
 import sys
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from common.errors import InputError
@@ -46,7 +45,7 @@ class Match:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `replay`."""
-    parser.add_argument("file", type=Path, metavar="FILE", help="a recording (MCAP)")
+    cli.recording_argument(parser)
     cli.json_argument(parser, "write the result as JSON on standard output")
 
 

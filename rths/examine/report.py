@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-from pathlib import Path
 
 from common.terminal import cli, outputs
 from common.terminal.printable import shown
@@ -12,14 +11,8 @@ from common.terminal.printable import shown
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `report`."""
-    parser.add_argument("file", type=Path, metavar="FILE", help="a recording (MCAP), damaged or cut off too")
-    parser.add_argument(
-        "-o",
-        "--output",
-        type=Path,
-        metavar="OUT.html",
-        help="the page (default: beside the recording, with .html)",
-    )
+    cli.recording_argument(parser, ", damaged or cut off too")
+    cli.output_argument(parser, "OUT.html", "the page (default: beside the recording, with .html)")
     cli.force_argument(parser)
     cli.json_argument(parser, "name the page, its sentences and its pictures as JSON on standard output")
 

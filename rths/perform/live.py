@@ -9,7 +9,6 @@ import os
 import sys
 import time
 import webbrowser
-from pathlib import Path
 
 from common.errors import InputError
 from common.lab import process
@@ -22,9 +21,7 @@ LOWEST = 19  # priority
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `live`."""
-    parser.add_argument(
-        "file", type=Path, metavar="FILE", help="a recording (MCAP), finished or being written"
-    )
+    cli.recording_argument(parser, ", finished or being written")
     parser.add_argument("--port", type=int, default=0, metavar="N", help="of the page (default: a free one)")
     parser.add_argument("--no-browser", action="store_true", help="print the page's address, open nothing")
     parser.add_argument(

@@ -53,9 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     clock.add_argument(
         "--virtual", action="store_true", help="one process, virtual clock, as fast as it goes"
     )
-    parser.add_argument(
-        "-o", "--output", type=Path, metavar="FILE", help="the recording (default: runs/<test>-<time>.mcap)"
-    )
+    cli.output_argument(parser, "FILE", "the recording (default: runs/<test>-<time>.mcap)")
     cli.force_argument(parser)
     parser.add_argument("--live", action="store_true", help="show it in a browser page while it runs")
     parser.add_argument(

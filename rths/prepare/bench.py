@@ -6,7 +6,6 @@ import argparse
 import contextlib
 import json
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from common.terminal import cli
@@ -50,13 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     clock = parser.add_mutually_exclusive_group()
     clock.add_argument("--virtual", action="store_true", help="virtual clock, as fast as it goes (default)")
     clock.add_argument("--real-time", action="store_true", help="wall clock")
-    parser.add_argument(
-        "-o",
-        "--output",
-        type=Path,
-        metavar="FILE",
-        help="the recording (default: runs/<test>-bench-<part>-<time>.mcap)",
-    )
+    cli.output_argument(parser, "FILE", "the recording (default: runs/<test>-bench-<part>-<time>.mcap)")
     cli.force_argument(parser)
     cli.json_argument(parser, "write the summary as JSON on standard output")
 

@@ -29,14 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="auto",
         help="real-time settings: take what is available (default), fail without all of them, or take none",
     )
-    parser.add_argument(
-        "-o",
-        "--output",
-        type=Path,
-        default=Path("runs"),
-        metavar="FOLDER",
-        help="where recordings will go (default: runs)",
-    )
+    cli.output_argument(parser, "FOLDER", "where recordings will go (default: runs)", default=Path("runs"))
     cli.json_argument(parser, "write the report as JSON on standard output")
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from pathlib import Path
 from typing import Any
 
 from common.errors import InputError
@@ -21,7 +20,7 @@ OF_SLAVE = ("table", "damper")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `identify`."""
-    parser.add_argument("file", type=Path, metavar="FILE", help="a recording (MCAP)")
+    cli.recording_argument(parser)
     parser.add_argument(
         "--part",
         choices=PARTS,

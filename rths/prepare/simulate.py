@@ -30,9 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--no-amd", action="store_true", help="the building without the damper")
     cli.reality_argument(parser)
     parser.add_argument("--noise", action="store_true", help="with the sensors' noise, from the plan's seed")
-    parser.add_argument(
-        "-o", "--output", type=Path, metavar="FILE", help="write the simulation as a recording"
-    )
+    cli.output_argument(parser, "FILE", "write the simulation as a recording")
     cli.force_argument(parser)
     cli.json_argument(parser, "write the summary as JSON on standard output")
 

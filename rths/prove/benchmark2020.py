@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--seed", type=int, default=USUAL["seed"], metavar="N", help="seed of the plants (default: 2020)"
     )
     parser.add_argument(
-        "--only", type=words, metavar="NAME,…", help="these settings of the compensators only"
+        "--only", type=cli.words, metavar="NAME,…", help="these settings of the compensators only"
     )
     parser.add_argument(
         "--jobs",
@@ -43,12 +43,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="tests at once (default: one per processor)",
     )
-    parser.add_argument(
-        "-o",
-        "--output",
-        type=Path,
-        metavar="FOLDER",
-        help="where page, pictures and results.json go (default: runs/benchmark2020); with --plan its file",
+    cli.output_argument(
+        parser,
+        "FOLDER",
+        "where page, pictures and results.json go (default: runs/benchmark2020); with --plan its file",
     )
     parser.add_argument(
         "--plan",
@@ -61,11 +59,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     cli.force_argument(parser)
     cli.json_argument(parser, "write the results as JSON on standard output")
-
-
-def words(text: str) -> list[str]:
-    """A comma-separated list."""
-    return [word.strip() for word in text.split(",") if word.strip()]
 
 
 def run(args: argparse.Namespace) -> int:

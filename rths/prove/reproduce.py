@@ -18,13 +18,11 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `reproduce`."""
-    parser.add_argument(
-        "-o",
-        "--output",
-        type=Path,
+    cli.output_argument(
+        parser,
+        "FOLDER",
+        "where recordings, figures and the page go (default: runs/reproduce)",
         default=Path("runs/reproduce"),
-        metavar="FOLDER",
-        help="where recordings, figures and the page go (default: runs/reproduce)",
     )
     cli.force_argument(parser)
     cli.json_argument(parser, "write the table as JSON on standard output")
