@@ -77,7 +77,7 @@ def test_a_budget_that_cannot_be_read_is_refused_in_a_sentence(tmp_path: Path) -
     with pytest.raises(PlanError, match="Cannot read the budget .*: Is a directory"):
         load(tmp_path)
     (tmp_path / "b.toml").write_bytes(b"\xff\xfe")
-    with pytest.raises(PlanError, match="not valid TOML"):
+    with pytest.raises(PlanError, match="not UTF-8"):
         load(tmp_path / "b.toml")
 
 
