@@ -6,7 +6,7 @@ import datetime
 from collections.abc import Mapping
 from importlib import metadata
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from common.recording.outcome import outcome
 from common.recording.reader import CLOCK, GROUND, MACHINES, Run
@@ -15,17 +15,10 @@ from report.facts.laboratories import plan_of
 from report.page import breakable
 from report.run.verdict import Margin, Summary, amount
 from report.text.formats import MISSING, milliseconds, reading, storey_rows, tracked
+from report.text.terminal import TitledTable
 
 EVENTS = 400  # rows of the page; JSON of rths inspect has all
 SHOWN = ("plan", CLOCK, GROUND, MACHINES)  # metadata that have a place of their own
-
-
-class TitledTable(NamedTuple):
-    """A table with what stands over it."""
-
-    title: str
-    head: tuple[str, ...]
-    rows: list[list[str]]
 
 
 def facts(run: Run, summary: Summary) -> list[tuple[str, str]]:

@@ -7,11 +7,19 @@ import os
 import shutil
 import sys
 from collections.abc import Mapping, Sequence
-from typing import Any, TextIO
+from typing import Any, NamedTuple, TextIO
 
 from common.terminal.plain_report import LINE_EVERY, facts
 from common.terminal.printable import behind, shown
 from report.text.board import Board, coloured
+
+
+class TitledTable(NamedTuple):
+    """A table of a terminal or a page, with what stands over it."""
+
+    title: str
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
 
 
 def table(rows: Sequence[Sequence[str]], stream: TextIO | None = None) -> None:

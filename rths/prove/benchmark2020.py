@@ -70,13 +70,14 @@ def run(args: argparse.Namespace) -> int:
     place = outputs.folder(args.output or Path("runs/benchmark2020"), args.force)
     with place as folder, Progress("benchmark") as progress:
         from validation.benchmark2020 import evidence, figures, page, text
+        from validation.proof import draw_all
 
         found = evidence.gather(settings, args.plants, args.seed, args.jobs, progress.tell)
         progress.tell("figures")
-        pictures = figures.draw_all(found, folder)
+        pictures = draw_all(figures.wanted(found), found, folder)
         checks = evidence.checks(found)
         results = json.dumps(text.as_json(found, checks))
-        (folder / "index.html").write_text(page.page(found, checks, pictures, folder), encoding="utf-8")
+        (folder / "index.html").write_text(page.page(found, checks, pictures), encoding="utf-8")
         (folder / "results.json").write_text(results + "\n", encoding="utf-8")
     if args.json:
         sys.stdout.write(results + "\n")

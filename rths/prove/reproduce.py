@@ -34,12 +34,13 @@ def run(args: argparse.Namespace) -> int:
     with outputs.folder(args.output, args.force) as folder, Progress("reproducing") as progress:
         from validation.paper import experiments, figures, page
         from validation.paper.rows import rows
+        from validation.proof import draw_all
 
         evidence = experiments.gather(folder, progress.tell)
         progress.tell("figures")
         table = rows(evidence)
-        pictures = figures.draw_all(evidence, folder)
-        target.write_text(page.page(table, pictures, folder), encoding="utf-8")
+        pictures = draw_all(figures.FIGURES, evidence, folder)
+        target.write_text(page.page(table, pictures), encoding="utf-8")
     if args.json:
         sys.stdout.write(json.dumps({"rows": [asdict(row) for row in table], "page": str(target)}))
         sys.stdout.write("\n")

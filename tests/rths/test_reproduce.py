@@ -15,11 +15,12 @@ from common.recording.reader import read
 from common.terminal.telling import untold
 from rths.__main__ import main
 from tests.rths.report.pages import check_alone, check_in_browser
-from validation.paper import experiments, figures
+from validation.paper import experiments
 from validation.paper.experiments import PaperEvidence
 from validation.paper.figures import FIGURES
 from validation.paper.page import page
 from validation.paper.rows import apparent_damping, beyond, building, critical_delay, instability, rows
+from validation.proof import draw_all
 
 
 @pytest.fixture(scope="module")
@@ -80,11 +81,11 @@ def test_the_command_leaves_recordings_pictures_and_one_page(
 
 @pytest.mark.slow
 def test_the_page_stands_alone_and_in_a_browser(evidence: PaperEvidence, tmp_path: Path) -> None:
-    table, drawn = rows(evidence), figures.draw_all(evidence, tmp_path)
+    table, drawn = rows(evidence), draw_all(FIGURES, evidence, tmp_path)
     table[0] = replace(table[0], name="<b>period</b>", note="<script>")
-    text = page(table, drawn, tmp_path)
+    text = page(table, drawn)
     assert "<b>period</b>" in check_alone(text).text
-    assert page(table, figures.draw_all(evidence, tmp_path), tmp_path) == text
+    assert page(table, draw_all(FIGURES, evidence, tmp_path)) == text
     (tmp_path / "index.html").write_text(text, encoding="utf-8")
     check_in_browser(tmp_path / "index.html", tmp_path)
 

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-from report.pictures.figure import COLOURS, REFERENCE, SINGLE, TEXT, figure, save
+from report.pictures.figure import COLOURS, REFERENCE, TEXT
 from report.pictures.layout import legend_above
 from report.text.formats import percent
 from validation.benchmark2020.criteria import MEANINGS
@@ -20,27 +18,9 @@ from validation.benchmark2020.evidence import (
     sample_cells,
 )
 from validation.benchmark2020.runs import NOMINAL
+from validation.proof import ProofFigure
 
 MOST = 300.0  # per cent, of the axis: beyond it a test tells no more than that it failed
-
-
-class GoalFigure(NamedTuple):
-    """One picture and what stands below it."""
-
-    file: str
-    caption: str
-    draw: Callable[[BenchmarkEvidence, Any], None]
-    height: float  # inches
-
-
-def draw_all(evidence: BenchmarkEvidence, folder: Path) -> list[GoalFigure]:
-    """Draw every figure that there are tests for into a folder."""
-    wanted = [item for item in FIGURES if item.draw is not table_3 or sample_cells(evidence)]
-    for item in wanted:
-        canvas = figure(SINGLE, item.height)
-        item.draw(evidence, canvas)
-        save(canvas, folder / item.file)
-    return wanted
 
 
 def compensators(evidence: BenchmarkEvidence, canvas: Any) -> None:
@@ -118,24 +98,29 @@ def table_3(evidence: BenchmarkEvidence, canvas: Any) -> None:
 
 
 FIGURES = (
-    GoalFigure(
+    ProofFigure(
         "compensators.png",
         "J4 of every test of every setting, log scale: 4 cases × 3 motions on the nominal plant and on those drawn; "
         "dashed and dotted the goals, 5 and 6 %",
         compensators,
         3.4,
     ),
-    GoalFigure(
+    ProofFigure(
         "late_force.png",
         "A force that comes late, with the adaptive model-based compensator: J1 and J2 hardly change, J4 grows; the "
         "indicator of the force's path reads the delay",
         late_force,
         4.2,
     ),
-    GoalFigure(
+    ProofFigure(
         "table3.png",
         "Deviation of the 36 cells from the published Table 3, over what is allowed",
         table_3,
         2.6,
     ),
 )
+
+
+def wanted(evidence: BenchmarkEvidence) -> list[ProofFigure]:
+    """Every picture that there are tests for."""
+    return [item for item in FIGURES if item.draw is not table_3 or sample_cells(evidence)]

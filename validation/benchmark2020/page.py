@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 from report.page import frame, render
-from report.page.photo import photo
+from report.page.photo import Photo
 from validation.benchmark2020.criteria import MEANINGS
 from validation.benchmark2020.evidence import BenchmarkEvidence, GoalCheck
-from validation.benchmark2020.figures import GoalFigure
 from validation.benchmark2020.tables import tables
 
 TITLE = "The 2020 benchmark of real-time hybrid simulation"
 
 
-def page(
-    evidence: BenchmarkEvidence, checks: Sequence[GoalCheck], figures: Sequence[GoalFigure], folder: Path
-) -> str:
-    """The page's text; pictures are taken from `folder` and stand inside."""
+def page(evidence: BenchmarkEvidence, checks: Sequence[GoalCheck], images: Sequence[Photo]) -> str:
+    """The page's text; pictures stand inside."""
     body = render(
         "benchmark2020.html",
         title=TITLE,
@@ -28,6 +24,6 @@ def page(
         checks=checks,
         tables=tables(evidence),
         meanings=list(MEANINGS.items()),
-        images=[photo((folder / item.file).read_bytes(), item.caption) for item in figures],
+        images=images,
     )
     return frame(TITLE, body)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 from report.text.formats import signed
+from report.text.terminal import TitledTable
 from validation.benchmark2020.criteria import MEANINGS
 from validation.benchmark2020.evidence import SAMPLE, BenchmarkEvidence
 from validation.benchmark2020.published import CRITICAL_DELAYS, TABLE_3
@@ -14,15 +14,7 @@ from validation.benchmark2020.runs import NOMINAL, on_el_centro
 MISSING, UNSTABLE = "–", "unstable"
 
 
-class GoalTable(NamedTuple):
-    """A table and what stands above it."""
-
-    title: str
-    head: list[str]
-    rows: list[list[str]]
-
-
-def tables(evidence: BenchmarkEvidence) -> list[GoalTable]:
+def tables(evidence: BenchmarkEvidence) -> list[TitledTable]:
     """All of them; those without rows are left out."""
     found = (
         table_3(evidence),
@@ -34,7 +26,7 @@ def tables(evidence: BenchmarkEvidence) -> list[GoalTable]:
     return [table for table in found if table.rows]
 
 
-def table_3(evidence: BenchmarkEvidence) -> GoalTable:
+def table_3(evidence: BenchmarkEvidence) -> TitledTable:
     """The sample controller's 36 cells beside the published ones."""
     rows = []
     for item in on_el_centro(evidence.results, SAMPLE):
@@ -56,7 +48,7 @@ def table_3(evidence: BenchmarkEvidence) -> GoalTable:
         "two-sided, ms",
         "J2 of noise, %",
     ]
-    return GoalTable("Table 3: sample controller, El Centro at 0.4", head, rows)
+    return TitledTable("Table 3: sample controller, El Centro at 0.4", head, rows)
 
 
 def cells(values: tuple[float, ...]) -> list[str]:
@@ -64,7 +56,7 @@ def cells(values: tuple[float, ...]) -> list[str]:
     return [milliseconds(values[0], 1), *map(percent, values[1:])]
 
 
-def compensators(evidence: BenchmarkEvidence) -> GoalTable:
+def compensators(evidence: BenchmarkEvidence) -> TitledTable:
     """Every setting at its worst, the best first."""
     rows = [
         [
@@ -90,14 +82,14 @@ def compensators(evidence: BenchmarkEvidence) -> GoalTable:
         "unstable",
         "force, N",
     ]
-    return GoalTable(
+    return TitledTable(
         f"Compensators: the worst of 4 cases × 3 motions, nominal and of {drawn} drawn",
         head,
         rows,
     )
 
 
-def by_motion(evidence: BenchmarkEvidence) -> GoalTable:
+def by_motion(evidence: BenchmarkEvidence) -> TitledTable:
     """J4 of every setting that is stable somewhere, on the nominal plant, by motion and case."""
     places = [(on.motion.title, on.case.number) for on in evidence.stages]
     found = {
@@ -108,10 +100,10 @@ def by_motion(evidence: BenchmarkEvidence) -> GoalTable:
         for item in sorted(evidence.summaries, key=lambda item: item.order)
         if any(found[item.setting, motion, case].stable for motion, case in places)
     ]
-    return GoalTable("J4, %, of the nominal plant", ["setting", *(f"{m} C{c}" for m, c in places)], rows)
+    return TitledTable("J4, %, of the nominal plant", ["setting", *(f"{m} C{c}" for m, c in places)], rows)
 
 
-def late(evidence: BenchmarkEvidence) -> GoalTable:
+def late(evidence: BenchmarkEvidence) -> TitledTable:
     """What the criteria and the indicator say of a force that comes late."""
     rows = []
     for item in evidence.late:
@@ -131,10 +123,10 @@ def late(evidence: BenchmarkEvidence) -> GoalTable:
             ]
         )
     head = ["", "force late by, ms", "J1, ms", "J2, %", "J4, %", "force path, ms", "± (95 %), ms"]
-    return GoalTable("A late force (amb, El Centro): J1 and J2 do not see it", head, rows)
+    return TitledTable("A late force (amb, El Centro): J1 and J2 do not see it", head, rows)
 
 
-def critical(evidence: BenchmarkEvidence) -> GoalTable:
+def critical(evidence: BenchmarkEvidence) -> TitledTable:
     """Critical delays by search, by equation, and as published."""
     rows = [
         [
@@ -146,7 +138,7 @@ def critical(evidence: BenchmarkEvidence) -> GoalTable:
         for item in evidence.critical
     ]
     head = ["", "by search, ms", "by the characteristic equation, ms", "published, ms"]
-    return GoalTable("Critical delays of the force", head, rows)
+    return TitledTable("Critical delays of the force", head, rows)
 
 
 def percent(value: float) -> str:

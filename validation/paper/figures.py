@@ -2,34 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from common.recording.reader import Run
 from report.facts.identification import identify, segments, step_ticks
-from report.pictures.figure import SINGLE, TEXT, figure, save
+from report.pictures.figure import TEXT
 from report.pictures.layout import legend_above
 from validation.paper.experiments import DELAYS, PaperEvidence
-
-HEIGHT = 2.6  # inches
-
-
-class PaperFigure(NamedTuple):
-    """One picture and what stands below it."""
-
-    file: str
-    caption: str
-    draw: Callable[[PaperEvidence, Any], None]
-
-
-def draw_all(evidence: PaperEvidence, folder: Path) -> list[PaperFigure]:
-    """Draw every figure into a folder."""
-    for item in FIGURES:
-        canvas = figure(SINGLE, HEIGHT)
-        item.draw(evidence, canvas)
-        save(canvas, folder / item.file)
-    return list(FIGURES)
+from validation.proof import ProofFigure
 
 
 def window(run: Run, word: str, begin: float, end: float, interval: float) -> tuple[Any, dict[str, Any]]:
@@ -162,45 +142,45 @@ def damping(evidence: PaperEvidence, canvas: Any) -> None:
 
 
 FIGURES = (
-    PaperFigure(
+    ProofFigure(
         "fig04-column.png",
         "Counterpart of Fig. 4: static loading of ±1.5 to ±7.5 mm, three cycles each; nominal and realistic column.",
         hysteresis,
     ),
-    PaperFigure(
+    ProofFigure(
         "fig06-delay.png",
         "Counterpart of Fig. 6: commanded and measured displacement of the bare actuator, 2 Hz.",
         delay,
     ),
-    PaperFigure(
+    ProofFigure(
         "fig07-step.png",
         "Counterpart of Fig. 7: step of 5 mm with the tangent at the inflection.",
         step_response,
     ),
-    PaperFigure(
+    ProofFigure(
         "fig10-sine.png",
         "Counterpart of Fig. 10: sine of 1 Hz, with PID + Taylor (τ = 8.8 ms) and without compensation.",
         sine,
     ),
-    PaperFigure(
+    ProofFigure(
         "fig11-random.png", "Counterpart of Fig. 11: random wave below 3 Hz behind PID.", random_wave
     ),
-    PaperFigure(
+    ProofFigure(
         "fig12-test-simulation.png",
         "Counterpart of Fig. 12: test and pure simulation, El Centro 10 %, AMD on, τ = 8.8 ms.",
         test_and_simulation,
     ),
-    PaperFigure(
+    ProofFigure(
         "fig13-amd.png",
         "Counterpart of Fig. 13: test with and without AMD, El Centro 20 %, τ = 8.8 ms.",
         control,
     ),
-    PaperFigure(
+    ProofFigure(
         "uncompensated.png",
         "Uncompensated closed loop without AMD, El Centro 10 %: it diverges until a limit stops it.",
         instability,
     ),
-    PaperFigure(
+    ProofFigure(
         "damping-delay.png", "Apparent damping against a delay in the path of the actuator.", damping
     ),
 )

@@ -12,6 +12,7 @@ from common.terminal.telling import untold
 from validation.benchmark2020 import evidence, figures, late_force, page, text
 from validation.benchmark2020.evidence import BenchmarkEvidence
 from validation.benchmark2020.problem import SETTINGS
+from validation.proof import draw_all
 
 
 class Played(NamedTuple):
@@ -31,7 +32,7 @@ def played(tmp_path_factory: pytest.TempPathFactory) -> Played:
         patch.setattr(late_force, "DELAYS", (0.0, 1e-3, 2e-3, 10e-3))
         found = evidence.gather(settings, 1, 2020, 2, untold)
     checks = evidence.checks(found)
-    pictures = figures.draw_all(found, folder)
+    pictures = draw_all(figures.wanted(found), found, folder)
     place = folder / "index.html"
-    place.write_text(page.page(found, checks, pictures, folder), encoding="utf-8")
+    place.write_text(page.page(found, checks, pictures), encoding="utf-8")
     return Played(found, checks, json.loads(json.dumps(text.as_json(found, checks), allow_nan=False)), place)
