@@ -7,7 +7,6 @@ import dataclasses
 import functools
 import html
 import re
-from html.parser import HTMLParser
 from typing import Any, cast
 
 import pytest
@@ -36,9 +35,8 @@ from report.text.formats import (
 )
 from tests.rths.diagnosis_report.reports import REPORTS, Report, bare, fresh
 from tests.rths.pictures.axes import check_axes
-from tests.rths.report.pages import check_alone
+from tests.rths.report.pages import Balanced, check_alone
 
-VOID = {"meta", "br", "img"}
 SECTIONS = (
     "gap",
     "where",
@@ -54,30 +52,8 @@ SECTIONS = (
 )
 
 
-class Balanced(HTMLParser):
-    """Fails where a tag is left open; gathers the text."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.open: list[str] = []
-        self.words: list[str] = []
-
-    def handle_starttag(self, tag: str, attrs: Any) -> None:
-        if tag not in VOID:
-            self.open.append(tag)
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.open.pop() == tag
-
-    def handle_data(self, data: str) -> None:
-        self.words.append(data)
-
-
 def text_of(html: str) -> str:
-    parser = Balanced()
-    parser.feed(html)
-    assert parser.open == []
-    return " ".join(" ".join(parser.words).split())
+    return " ".join(" ".join(Balanced(html).words).split())
 
 
 @functools.cache
@@ -167,10 +143,7 @@ def test_the_force_path_stands_on_the_terminal_and_the_page() -> None:
 def test_the_page_stands_alone(name: str) -> None:
     html = page_of(name)
     check_alone(html)
-    text_of(html)
     assert re.findall(r'<section id="([^"]+)"', html) == list(SECTIONS)
-    assert "<script" not in html
-    assert re.findall(r'(?:src|href)="(?!#|data:)', html) == []
     assert set(re.findall(r"https?://[^\s\"<]+", html)) <= {
         "http://www.w3.org/2000/svg",
         "http://www.w3.org/1999/xlink",
