@@ -43,18 +43,58 @@ def bare(status: str) -> Report:
         "where": [],
         "which": [],
         "equivalent": [],
-        "how_far": {
-            "before": None,
-            "after": None,
-            "closed": None,
-            "closed_interval": None,
-            "noise_floor": None,
-            "judged_on": None,
-        },
+        "how_far": far(None, None, None),
         "not_exercised": [],
         "next_test": "",
         "warnings": [],
     }
+
+
+def path(
+    delay: float, amplitude: float, points: float, nominal_delay: float, nominal_points: float
+) -> Report:
+    return {
+        "delay": delay,
+        "amplitude": amplitude,
+        "damping_points": points,
+        "nominal_delay": nominal_delay,
+        "nominal_damping_points": nominal_points,
+    }
+
+
+def place(
+    site: str,
+    share: float,
+    interval: list[float],
+    ratio: float,
+    when: list[list[float]],
+    band: list[float] | None,
+) -> Report:
+    return {
+        "site": site,
+        "share": share,
+        "share_interval": interval,
+        "residual_to_noise": ratio,
+        "when": when,
+        "frequency_band": band,
+    }
+
+
+def far(before: float | None, after: float | None, closed: float | None, interval: Any = None) -> Report:
+    """How far a gap closes on withheld windows; nothing was determined where no gap is given."""
+    return {
+        "before": before,
+        "after": after,
+        "closed": closed,
+        "closed_interval": interval,
+        "noise_floor": None if before is None else 0.0061,
+        "judged_on": None if before is None else "held-out time windows",
+    }
+
+
+def history(name: str, unit: str, recorded: Values, before: Values, after: Values) -> Report:
+    curves = {"t": T, "recorded": recorded, "before": before, "after": after}
+    return {"signal": name, "unit": unit} | {key: listed(curve) for key, curve in curves.items()}
 
 
 def gap(size: float) -> Report:
@@ -177,27 +217,9 @@ def details() -> Report:
         "test": facts_of_test(),
         "parts": parts(),
         "paths": {
-            "command": {
-                "delay": 0.0012,
-                "amplitude": 0.998,
-                "damping_points": -0.19,
-                "nominal_delay": 0.0004,
-                "nominal_damping_points": -0.06,
-            },
-            "force": {
-                "delay": 0.0,
-                "amplitude": 1.001,
-                "damping_points": 0.0,
-                "nominal_delay": 0.0,
-                "nominal_damping_points": 0.0,
-            },
-            "exchange": {
-                "delay": 0.0021,
-                "amplitude": 1.0,
-                "damping_points": -0.03,
-                "nominal_delay": 0.002,
-                "nominal_damping_points": -0.03,
-            },
+            "command": path(0.0012, 0.998, -0.19, 0.0004, -0.06),
+            "force": path(0.0, 1.001, 0.0, 0.0, 0.0),
+            "exchange": path(0.0021, 1.0, -0.03, 0.002, -0.03),
         },
         "loop_shares": [
             {"site": "damper", "shapley": 0.9, "interval": [0.85, 0.94], "first_in": 0.92, "last_out": 0.88},
@@ -230,22 +252,10 @@ def details() -> Report:
             {"label": "noise floor", "value": 0.0061},
         ],
         "histories": [
-            {
-                "signal": "damper_force",
-                "unit": "N",
-                "t": listed(T),
-                "recorded": listed(noisy(76.0 * shape, 0.2)),
-                "before": listed(70.0 * np.roll(shape, 6)),
-                "after": listed(75.6 * shape),
-            },
-            {
-                "signal": "column_displacement",
-                "unit": "m",
-                "t": listed(T),
-                "recorded": listed(noisy(2.4e-3 * shape, 5e-6)),
-                "before": listed(2.3e-3 * shape),
-                "after": listed(2.398e-3 * shape),
-            },
+            history("damper_force", "N", noisy(76.0 * shape, 0.2), 70.0 * np.roll(shape, 6), 75.6 * shape),
+            history(
+                "column_displacement", "m", noisy(2.4e-3 * shape, 5e-6), 2.3e-3 * shape, 2.398e-3 * shape
+            ),
         ],
         "next": [
             {
@@ -272,30 +282,9 @@ def explained() -> Report:
         },
         "gap": gap(0.049),
         "where": [
-            {
-                "site": "damper",
-                "share": 0.91,
-                "share_interval": [0.86, 0.95],
-                "residual_to_noise": 14.2,
-                "when": [[2.1, 9.8], [14.0, 16.5]],
-                "frequency_band": [1.5, 3.0],
-            },
-            {
-                "site": "actuator",
-                "share": 0.06,
-                "share_interval": [0.03, 0.09],
-                "residual_to_noise": 1.6,
-                "when": [],
-                "frequency_band": None,
-            },
-            {
-                "site": "sensor.column_force",
-                "share": 0.03,
-                "share_interval": [0.01, 0.05],
-                "residual_to_noise": 1.2,
-                "when": [],
-                "frequency_band": [0.0, 0.5],
-            },
+            place("damper", 0.91, [0.86, 0.95], 14.2, [[2.1, 9.8], [14.0, 16.5]], [1.5, 3.0]),
+            place("actuator", 0.06, [0.03, 0.09], 1.6, [], None),
+            place("sensor.column_force", 0.03, [0.01, 0.05], 1.2, [], [0.0, 0.5]),
         ],
         "which": [
             {
@@ -315,14 +304,7 @@ def explained() -> Report:
             },
         ],
         "equivalent": [["damper.friction", "table.friction"]],
-        "how_far": {
-            "before": 0.034,
-            "after": 0.0071,
-            "closed": 0.964,
-            "closed_interval": [0.94, 0.98],
-            "noise_floor": 0.0061,
-            "judged_on": "held-out time windows",
-        },
+        "how_far": far(0.034, 0.0071, 0.964, [0.94, 0.98]),
         "not_exercised": ["damper.stroke_stop", "actuator.velocity_limit", "column.pinching"],
         "next_test": "Run `rths bench damper` at a fifth of the force: friction then dominates, motor lag vanishes.",
         "warnings": ["3 of 20000 ticks are missing from the recording."],
@@ -337,14 +319,7 @@ def no_gap() -> Report:
     return bare("no_gap") | {
         "tolerances": {"column.stiffness": {"factor": 1.004, "z": 0.2}},
         "gap": gap(0.008),
-        "how_far": {
-            "before": 0.0062,
-            "after": 0.0062,
-            "closed": None,
-            "closed_interval": None,
-            "noise_floor": 0.0061,
-            "judged_on": "held-out time windows",
-        },
+        "how_far": far(0.0062, 0.0062, None),
         "details": kept,
     }
 
@@ -379,8 +354,7 @@ def unknown_effect() -> Report:
         "verdict": "",
         "which": [],
         "equivalent": [],
-        "how_far": bare("")["how_far"]
-        | {"before": 0.034, "after": 0.029, "closed": 0.18, "noise_floor": 0.0061},
+        "how_far": far(0.034, 0.029, 0.18) | {"judged_on": None},
         "details": found,
     }
 
@@ -424,14 +398,7 @@ def ambiguous() -> Report:
             for name, given, share in names
         ],
         "where": [
-            {
-                "site": site,
-                "share": share,
-                "share_interval": [share - 0.2, share + 0.2],
-                "residual_to_noise": 8.0,
-                "when": [[0.0, 40.0]],
-                "frequency_band": [0.5, 5.0],
-            }
+            place(site, share, [share - 0.2, share + 0.2], 8.0, [[0.0, 40.0]], [0.5, 5.0])
             for site, share in (("column", 0.48), ("sensor.column_force", 0.42), ("actuator", 0.1))
         ],
         "equivalent": [["column.stiffness", "sensor.column_force.gain"]],
