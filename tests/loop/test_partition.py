@@ -12,7 +12,7 @@ from scipy.optimize import root
 
 from common.errors import InputError
 from common.plan.plan import Plan
-from common.plan.read import parse
+from common.plan.read import parse, with_test
 from common.plan.tables import Experimental
 from loop.closed_loop import signals, simulate
 from loop.nominal import partition
@@ -185,7 +185,7 @@ def test_two_storeys_diverge_beyond_their_critical_delay_only(default_plan: Plan
     critical = partition.critical_delay_of(plan)
     growth = []
     for factor in (0.9, 1.1):
-        late = plans.with_test(delayed(plan, factor * critical), duration=20.0)
+        late = with_test(delayed(plan, factor * critical), duration=20.0)
         drift = np.abs(signals(late, simulate(late, pulse(late)))["column_target"])
         middle = drift.size // 2
         growth.append(drift[middle:].max() / drift[1000:middle].max())
