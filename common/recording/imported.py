@@ -101,6 +101,7 @@ class ImportedData:
     data: str  # name of the file that was imported
     static: bool = False  # times have no meaning: nothing of rates or of the dynamics of sensors can be seen
     channels: Mapping[str, Mapping[str, ImportedChannel]] = field(default_factory=dict)
+    as_is: bool = False  # its units and signs are the user's, whatever they look like
 
     def channel(self, topic: str, name: str) -> ImportedChannel:
         """What is stated of a signal; of one that the map does not name nothing."""
@@ -111,7 +112,8 @@ class ImportedData:
         tables = {
             topic: {name: _plain(row) for name, row in rows.items()} for topic, rows in self.channels.items()
         }
-        return {"data": self.data, "static": json.dumps(self.static), "channels": json.dumps(tables)}
+        flags = {"static": json.dumps(self.static), "as_is": json.dumps(self.as_is)}
+        return {"data": self.data, **flags, "channels": json.dumps(tables)}
 
 
 def imported(run: Run) -> ImportedData | None:
@@ -128,7 +130,8 @@ def imported(run: Run) -> ImportedData | None:
             topic: {name: _channel(row) for name, row in rows.items()}
             for topic, rows in json.loads(values.get("channels", "{}")).items()
         }
-        return ImportedData(values.get("data", ""), bool(json.loads(values.get("static", "false"))), channels)
+        static, as_is = (json.loads(values.get(name, "false")) for name in ("static", "as_is"))
+        return ImportedData(values.get("data", ""), bool(static), channels, bool(as_is))
     except (ValueError, TypeError, AttributeError):
         raise InputError(
             f"{run.path} is damaged: its metadata '{IMPORT}' cannot be read; import the data again."

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import csv
+import io
+import itertools
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,32 +15,109 @@ from common.errors import InputError
 
 Columns = dict[str, NDArray[np.float64]]
 
-READABLE = (".csv", ".parquet", ".mat", ".npz")
+READABLE = (".csv", ".txt", ".tsv", ".parquet", ".mat", ".npz")
 WRITABLE = (".csv", ".parquet", ".mat")
 MAT_NAME = 63  # characters that MATLAB allows
 
 
+class TextForm(NamedTuple):
+    """How a text file writes its table."""
+
+    separator: str = ""  # empty: a comma, a semicolon where that is the decimal sign, a tab in .tsv
+    decimal: str = "."
+    skip_rows: int = 0  # before that of the names
+
+    def between(self, path: Path) -> str:
+        """What stands between columns."""
+        usual = "\t" if path.suffix.lower() == ".tsv" else ";" if self.decimal == "," else ","
+        return self.separator or usual
+
+
+class DataTable(NamedTuple):
+    """What a file holds."""
+
+    columns: Columns
+    units: dict[str, str]  # of the columns whose unit stands in a row below the names
+
+
+AS_WRITTEN = TextForm()
+
+
 def read(path: Path) -> Columns:
     """Numeric columns by name; raises InputError where the file cannot be read or holds none."""
-    readers = {".csv": _read_csv, ".parquet": _read_parquet, ".mat": _read_mat, ".npz": _read_npz}
+    return read_table(path).columns
+
+
+def read_table(path: Path, form: TextForm = AS_WRITTEN) -> DataTable:
+    """Numeric columns by name, with units where a text file has a row of them below the names.
+
+    Raises:
+        InputError: the file cannot be read, holds no numbers, or is no text though `form` says how one is written.
+    """
+    readers = {".parquet": _read_parquet, ".mat": _read_mat, ".npz": _read_npz}
     suffix = path.suffix.lower()
-    if suffix not in readers:
+    if suffix not in READABLE:
         raise InputError(f"Cannot tell the format of {path}: give a file that ends in {', '.join(READABLE)}.")
     if not path.is_file():
         raise InputError(f"There is no file {path}.")
+    if suffix in readers and form != AS_WRITTEN:
+        raise InputError(f"{path} is no text: leave out separator, decimal and skip_rows.")
+    hint = "" if suffix in readers else "; a map says what separator, decimal sign and rows to skip it has"
     try:
-        columns = readers[suffix](path)
+        found = DataTable(readers[suffix](path), {}) if suffix in readers else _read_text(path, form)
     except Exception as error:  # each library has its own exceptions for a damaged file
-        raise InputError(f"Cannot read {path}: {str(error).splitlines()[0]}.") from error
-    if not columns:
-        raise InputError(f"{path} holds no numeric column.")
-    return columns
+        raise InputError(f"Cannot read {path}: {str(error).splitlines()[0].rstrip('.')}{hint}.") from error
+    if not found.columns:
+        raise InputError(f"{path} holds no numeric column{hint}.")
+    return found
 
 
-def _read_csv(path: Path) -> Columns:
-    from pyarrow.csv import read_csv
+def _read_text(path: Path, form: TextForm) -> DataTable:
+    """A text file in UTF-8, or in Latin-1 as older loggers write it."""
+    from pyarrow import csv as arrow
 
-    return _numeric(read_csv(path))
+    encoding = _encoding(path)
+    units = _units(path, form, encoding)
+    table = arrow.read_csv(
+        path,
+        arrow.ReadOptions(
+            skip_rows=form.skip_rows, skip_rows_after_names=1 if units else 0, encoding=encoding
+        ),
+        arrow.ParseOptions(delimiter=form.between(path)),
+        arrow.ConvertOptions(decimal_point=form.decimal),
+    )
+    columns = _numeric(table)
+    return DataTable(columns, {name: unit for name, unit in units.items() if name in columns and unit})
+
+
+def _encoding(path: Path) -> str:
+    try:
+        with path.open(encoding="utf-8") as stream:
+            while stream.read(1 << 20):
+                pass
+    except UnicodeDecodeError:
+        return "latin-1"
+    return "utf-8"
+
+
+def _units(path: Path, form: TextForm, encoding: str) -> dict[str, str]:
+    """The row below the names where it holds texts and no number, by name: a row of units; empty where it is data."""
+    with path.open(encoding=f"{encoding}-sig" if encoding == "utf-8" else encoding, newline="") as stream:
+        text = "".join(itertools.islice(stream, form.skip_rows, form.skip_rows + 2))
+    rows = list(csv.reader(io.StringIO(text), delimiter=form.between(path)))
+    if len(rows) < 2 or not any(cell.strip() for cell in rows[1]):
+        return {}
+    if any(_is_number(cell, form.decimal) for cell in rows[1]):
+        return {}
+    return {name.strip(): unit.strip().strip("[]()") for name, unit in zip(*rows, strict=False)}
+
+
+def _is_number(cell: str, decimal: str) -> bool:
+    try:
+        float(cell.replace(decimal, "."))
+    except ValueError:
+        return False
+    return True
 
 
 def _read_parquet(path: Path) -> Columns:

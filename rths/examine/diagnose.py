@@ -146,6 +146,7 @@ def diagnose_slaves(
     from common.recording.reader import read
     from diagnosis.diagnose import diagnose
     from diagnosis.recorded import record
+    from diagnosis.recorded.slips import refuse_slips
     from report.gap import wording
 
     believed = plans.load(cli.plan_path(plan)) if plan else None
@@ -156,6 +157,8 @@ def diagnose_slaves(
         }
         for run in (recording, *map(read, validate))
     )
+    for one in own.values():
+        refuse_slips(one, recording.path)
     further = {role: [other[role] for other in others if role in other] for role in own}
     result = {}
     for role, report in diagnose(own, further, tell).items():

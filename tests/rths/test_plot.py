@@ -12,6 +12,8 @@ from common.roles import SLAVE
 from report.pictures import PICTURES
 from report.text import tabular
 from rths.examine import import_, plot
+from rths.examine.import_map import load_map
+from rths.examine.onto_ticks import on_ticks
 from tests.helpers import ROOT
 from tests.rths.pictures.made_up import RECORD, made_up
 from tests.rths.test_commands import rths
@@ -124,14 +126,11 @@ def test_help_says_what_to_look_for_in_each_picture(call: Any, capsys: Any) -> N
 
 def test_measurements_of_others_are_drawn_as_far_as_they_go(call: Any, tmp_path: Path) -> None:
     examples = ROOT / "examples" / "real_data"
-    chosen = import_.load_map(examples / "force_rig_map.toml")
-    t, values = import_.resampled(
-        chosen, tabular.read(examples / "force_rig.csv"), examples / "force_rig.csv"
-    )
-    part = slice(0, 4000)
-    import_.write(
-        tmp_path / "rig.mcap", chosen, t[part], {name: column[part] for name, column in values.items()}, "rig"
-    )
+    data, cut = examples / "force_rig.csv", tmp_path / "map.toml"
+    text = (examples / "force_rig_map.toml").read_text().replace('plan = "', f'plan = "{examples}/')
+    cut.write_text(text.replace("[signals]", "stop = 30.0\n[signals]"))
+    chosen = load_map(cut)
+    import_.write(tmp_path / "rig.mcap", chosen, on_ticks(chosen, tabular.read_table(data), data), "rig")
     assert call(tmp_path / "rig.mcap") == 0
     drawn = {path.stem for path in (tmp_path / "rig").iterdir()}
     assert drawn == {"histories", "synchronisation", "tracking", "spectra"}

@@ -12,6 +12,8 @@ from common.recording.reader import read
 from report.text import tabular
 from rths.examine import import_
 from rths.examine.diagnose import diagnose_file
+from rths.examine.import_map import load_map
+from rths.examine.onto_ticks import on_ticks
 from tests.helpers import ROOT
 
 EXAMPLES = ROOT / "examples" / "real_data"
@@ -22,10 +24,9 @@ NOMINAL_LAG = 0.010  # s, of its plan
 
 def imported(data: Path, mapping: str, folder: Path) -> Path:
     """A recording made of a data file."""
-    chosen = import_.load_map(EXAMPLES / f"{mapping}_map.toml")
-    t, values = import_.resampled(chosen, tabular.read(data), data)
+    chosen = load_map(EXAMPLES / f"{mapping}_map.toml")
     path = folder / f"{mapping}.mcap"
-    import_.write(path, chosen, t, values, data.name)
+    import_.write(path, chosen, on_ticks(chosen, tabular.read_table(data), data), data.name)
     return path
 
 

@@ -1,0 +1,126 @@
+"""Slips of units and signs: a reading that is hundreds of times what its command lets expect, or runs against it.
+
+A nominal model that is merely wrong is no slip: nobody plans a laboratory a hundred times too stiff, but everybody
+forgets that a column was in millimetres. So only factors count that no laboratory has, and signs of readings that
+otherwise resemble what is predicted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from common.errors import InputError
+from common.recording.imported import imported
+from diagnosis.recorded.laboratory import RecordedLaboratory
+from diagnosis.recorded.parts import ColumnAlone, LaboratoryPart
+from diagnosis.recorded.record import Record
+from models.registry import Array
+
+FAR = 90.0  # factor from which on it is a slip, as cm for m is; g for m/s² may be a wrong model
+ALIKE = 0.5  # correlation from which on two signals have one shape
+OPPOSED = 0.8  # of a reading that runs against its prediction; less may be a wrong phase
+LONGEST_LAG = 0.1  # s, by which a reading may be late and have the same shape
+ABOVE_NOISE = 10.0  # times the sensor's noise: below, a shape says nothing
+USUAL = {1e3: "a factor of 1000", 1e2: "a factor of 100", 1e6: "a factor of a million"}
+NEAR = 2.0  # factor within which a power of ten is named
+
+
+@dataclass(frozen=True)
+class Slip:
+    """A reading that does not fit its command."""
+
+    signal: str
+    commands: tuple[str, ...]
+    factor: float  # reading over prediction, negative where it runs against it
+
+    @property
+    def sentence(self) -> str:
+        """What is wrong, and where to look."""
+        names = " and ".join(self.commands)
+        if self.factor < 0.0 and not self.far:
+            return (
+                f"'{self.signal}' runs against what the plan predicts of {names}: "
+                f"look at the sign of its column, and of {names}"
+            )
+        times = (
+            f"{abs(self.factor):.3g} times"
+            if abs(self.factor) >= 1.0
+            else f"1/{1.0 / abs(self.factor):.3g} of"
+        )
+        return (
+            f"'{self.signal}' is {times} what the plan predicts of {names}{self._guess}: "
+            f"look at the units of its column, and of {names}"
+        )
+
+    @property
+    def far(self) -> bool:
+        """Whether the size is wrong, not only the sign."""
+        return not 1.0 / FAR < abs(self.factor) < FAR
+
+    @property
+    def _guess(self) -> str:
+        size = max(abs(self.factor), 1.0 / abs(self.factor))
+        found = next((text for ten, text in USUAL.items() if ten / NEAR < size < NEAR * ten), "")
+        return f", which is about {found}" if found else ""
+
+
+def refuse_slips(record: Record, data: Path) -> None:
+    """Raise InputError where imported `data` have a slip, unless they were imported as they are."""
+    stated = imported(record.run)
+    found = slips(record) if stated is not None and not stated.as_is else []
+    if found:
+        raise InputError(f"{data}: {found[0].sentence}; if it is right, import it with --as-is.")
+
+
+def slips(record: Record) -> list[Slip]:
+    """The slips of a recording, those of the largest factor first."""
+    found = [slip for lab in record.labs for slip in of_laboratory(record, lab)]
+    return sorted(found, key=lambda slip: -abs(np.log(abs(slip.factor))))
+
+
+def of_laboratory(record: Record, lab: RecordedLaboratory) -> Iterator[Slip]:
+    """The slips of one laboratory whose commands were recorded, or of a column whose deformation was."""
+    inputs = tuple(name for name in lab.commands if record.has(name) and np.ptp(record.signals[name]) > 0.0)
+    position = lab.signal(lab.kind.channels.position)
+    alone = any(machine.site == "column" for machine in lab.kind.machines(lab.plan)) and record.has(position)
+    if not inputs and not alone:
+        return
+    part = LaboratoryPart(record, lab) if inputs else ColumnAlone(record, lab)
+    commands = inputs or (position,)
+    predicted = part.predict(record.systems[lab.role])
+    most = round(LONGEST_LAG / record.plan.test.interval)
+    for place, name in enumerate(part.signals):
+        there = part.present[:, place]
+        if not record.has(name) or not there.all():
+            continue
+        factor = compared(part.measured[:, place], predicted[:, place], lab.noise.get(name, 0.0), most)
+        if factor is not None and (factor < 0.0 or not 1.0 / FAR < factor < FAR):
+            yield Slip(name, commands, factor)
+
+
+def compared(measured: Array, predicted: Array, noise: float, most: int) -> float | None:
+    """The factor between two signals of one shape, at most so many ticks apart; None where they have not.
+
+    It is negative where the shape is the opposite, which is only said of signals that are much alike.
+    """
+    read, wanted = (values - np.mean(values) for values in (measured, predicted))
+    sizes = np.sqrt(np.mean(read**2)), np.sqrt(np.mean(wanted**2))
+    if not np.all(np.isfinite(wanted)) or min(sizes) == 0.0 or max(sizes) < ABOVE_NOISE * noise:
+        return None
+    likeness = correlation(read / sizes[0], wanted / sizes[1], most)
+    factor = float(sizes[0] / sizes[1])
+    if likeness <= -OPPOSED:
+        return -factor
+    return factor if likeness >= ALIKE else None
+
+
+def correlation(one: Array, other: Array, most: int) -> float:
+    """The correlation of largest size within so many ticks of lag."""
+    size = 2 * one.size
+    product = np.fft.irfft(np.fft.rfft(one, size) * np.conj(np.fft.rfft(other, size)), size) / one.size
+    near = np.concatenate([product[: most + 1], product[-most:] if most else product[:0]])
+    return float(near[np.argmax(np.abs(near))])

@@ -1,0 +1,226 @@
+"""The map of an import: which column is which of our signals, and what the data logger did to it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from decimal import Decimal
+from pathlib import Path
+from typing import Any
+
+from common import signals
+from common.errors import InputError, PlanError
+from common.plan import read as plans
+from common.plan.plan import Plan
+from common.plan.schema import as_type, fill, key, nearest
+from common.plan.toml_file import load_tables
+from common.plan.units import converted
+from common.recording.imported import FILTERS, LoggerFilter
+from common.roles import MASTER, latency_topic, name_of
+from common.signals import FieldType, Signal
+
+Known = dict[str, tuple[str, Signal]]  # by our name of a signal its topic and its row there
+GIVEN = (FieldType.NUMBER, FieldType.STOREYS, FieldType.INDEX)
+STAMPS = (
+    "command_one_way",
+    "feedback_one_way",
+    "round_trip",
+)  # of a message, s: these three tell of the link
+
+
+def lab_signals(plan: Plan) -> Known:
+    """What can be given: our signals, those of a named slave as `NAME.signal`; numbers and stamps of messages too.
+
+    Where both ends know a signal, the slave's is meant. Of a slave without a name whose laboratory is of the master's
+    kind the signals are `slave.signal`.
+    """
+    from laboratories import kinds
+
+    found: Known = {}
+    kind = kinds.own(plan)
+    own = (kind.channels.target.name, *kind.channels.drives, *kind.channels.names) if kind else ()
+    stamped = tuple(map(latency_topic, plan.roles))
+    for topic, rows in kinds.topics(plan).items():
+        for row in rows if topic in (MASTER, *plan.roles) else ():
+            if row.kind in GIVEN and row is not signals.TIME:
+                name = prefix(topic) + row.name
+                found[f"{topic}.{name}" if topic != MASTER and name in own else name] = topic, row
+        for row in rows if topic in stamped else ():
+            if row.name in STAMPS:
+                found[prefix(topic) + row.name] = topic, row
+    return found
+
+
+def prefix(topic: str) -> str:
+    """What stands before a signal's name in the topic of a named slave."""
+    return f"{name_of(topic)}." if name_of(topic) else ""
+
+
+@dataclass(frozen=True)
+class FilterTable:
+    """The logger's low-pass filter."""
+
+    type: str = key("kind of filter", choices=FILTERS)
+    order: int = key("order", least=1, most=12)
+    cutoff: float = key("frequency at which 3 dB are lost", above=0.0, unit="Hz")
+
+
+@dataclass(frozen=True)
+class SignalSource:
+    """Where one of our signals comes from: ours = scale · theirs + offset, or a known value."""
+
+    column: str = key("name of a column in the data", default="")
+    scale: float = key("factor", default=1.0)
+    offset: float = key("offset", default=0.0)
+    unit: str = key("unit of the column, instead of a scale", default="")
+    delay: float = key("time by which the logger recorded it too late", default=0.0, unit="s")
+    calibration: float = key("relative tolerance of its gain", default=0.0, least=0.0, most=1.0)
+    resolution: float = field(default=0.0, metadata=key("step of the readings", default=0.0).metadata)
+    filter: LoggerFilter | None = field(default=None, metadata=key("low-pass filter", default=0.0).metadata)
+    value: float | None = field(default=None, metadata=key("known value", default=0.0).metadata)
+    scaled: bool = field(
+        default=False, metadata=key("whether scale or unit is given", default=False).metadata
+    )
+
+
+APART = ("value", "filter", "resolution")  # keys that are read by themselves
+OUR_OWN = ("scaled",)  # fields that are no keys
+
+
+@dataclass(frozen=True)
+class ImportTable:
+    """What a map says of the whole file."""
+
+    plan: str = key("file of the nominal models", default="")
+    time: str = key("column of the time, s", default="")
+    rate: float = key("samples per second, instead of a column of time", default=0.0, above=0.0, unit="Hz")
+    start: float = key("time in the data from which on it is read", default=0.0, unit="s")
+    stop: float = key("time in the data up to which it is read", default=0.0, unit="s")
+    static: bool = key("times without meaning: each row is a tick", default=False)
+    separator: str = key("character between columns", default="")
+    decimal: str = key("decimal sign", default=".", choices=(".", ","))
+    skip_rows: int = key("rows before that of the names", default=0, least=0)
+
+
+@dataclass(frozen=True)
+class ImportMap:
+    """A map file: nominal models, and where our signals come from."""
+
+    path: Path
+    plan: Plan
+    table: ImportTable
+    signals: dict[str, SignalSource]
+    start: float | None  # s, in the data's own time
+    stop: float | None
+
+    @property
+    def time(self) -> str:
+        """The column of the time, empty where there is none."""
+        return self.table.time
+
+    @property
+    def rate(self) -> float:
+        """Samples per second, 0 where a column holds the time."""
+        return self.table.rate
+
+    @property
+    def static(self) -> bool:
+        """Whether times have no meaning."""
+        return self.table.static
+
+
+def load_map(path: Path) -> ImportMap:
+    """A map file; raises InputError naming what is wrong in it."""
+    tables = load_tables(path, "map")
+    rows = tables.pop("signals", None)
+    for name in tables:
+        if name not in ImportTable.__dataclass_fields__:
+            hint = nearest(name, (*ImportTable.__dataclass_fields__, "signals"))
+            raise InputError(f"Unknown key '{name}' in {path}: {hint}")
+    if not tables.get("static") and ("time" in tables) == ("rate" in tables):
+        raise InputError(
+            f'{path}: give either time = "name of the time column" or rate = samples per second.'
+        )
+    if not isinstance(tables.get("plan"), str) or not isinstance(rows, dict) or not rows:
+        raise InputError(f'{path}: give plan = "file.toml" and a table [signals].')
+    try:
+        table = fill(ImportTable, tables, "map")
+    except PlanError as error:
+        raise InputError(f"{path}: {str(error).replace(' in [map]', '')}") from None
+    start, stop = (getattr(table, name) if name in tables else None for name in ("start", "stop"))
+    check(path, table, start, stop)
+    plan = plans.load(path.parent / table.plan)
+    known = lab_signals(plan)
+    sources = {name: source(path, name, entry, known) for name, entry in rows.items()}
+    for name in sources:
+        check_single(path, plan, name, known)
+    return ImportMap(path, plan, table, sources, start, stop)
+
+
+def check(path: Path, table: ImportTable, start: float | None, stop: float | None) -> None:
+    """Raise InputError for keys that do not go together."""
+    if (start is not None or stop is not None) and not (table.time or table.rate):
+        raise InputError(f'{path}: start and stop are times: give time = "name of the time column" too.')
+    if start is not None and stop is not None and not stop > start:
+        raise InputError(f"{path}: stop is {stop:g} s, but must be after start, which is {start:g} s.")
+    if len(table.separator) > 1:
+        raise InputError(f"{path}: separator is {table.separator!r}, but must be one character.")
+    if table.separator == table.decimal:
+        raise InputError(f"{path}: separator and decimal are both {table.decimal!r}: give each its own.")
+
+
+def check_single(path: Path, plan: Plan, name: str, known: Known) -> None:
+    """Raise InputError for a signal that has several values here."""
+    _, row = known[name]
+    per = "storey" if plan.storeys > 1 and row.kind is FieldType.STOREYS else ""
+    per = "slave" if len(plan.roles) > 1 and row.slaves else per
+    if per:
+        raise InputError(f"{path}: '{name}' has one value per {per} here and cannot be given as one column.")
+
+
+def source(path: Path, name: str, entry: Any, known: Known) -> SignalSource:
+    """One row of [signals]."""
+    if name not in known:
+        raise InputError(f"Unknown signal '{name}' in {path}: {nearest(name, known)}")
+    where, (_, row) = f"signals.{name}", known[name]
+    try:
+        values = dict(entry)
+        apart = {word: values.pop(word) for word in APART if word in values}
+        for word in OUR_OWN:
+            if word in values:
+                raise PlanError(f"Unknown key '{word}' in [{where}]: {nearest(word, APART)}")
+        found = fill(SignalSource, values, where)
+        if "unit" in values and "scale" in values:
+            raise PlanError(f"'{name}' in [signals] has both a unit and a scale: give one of them.")
+        scale = in_unit(found.unit, row, name) if found.unit else found.scale
+        step, low_pass = stated(apart, row, where)
+    except (PlanError, TypeError, ValueError) as error:
+        raise InputError(f"{path}: {error}") from None
+    value = apart.get("value")
+    if value is not None and (isinstance(value, bool) or not isinstance(value, int | float)):
+        raise InputError(f"{path}: value of '{name}' in [signals] must be a number, not {value!r}.")
+    if (value is None) == (not found.column):
+        raise InputError(f"{path}: '{name}' in [signals] must have either a column or a value.")
+    return replace(
+        found,
+        scale=scale,
+        resolution=step,
+        filter=low_pass,
+        value=None if value is None else float(value),
+        scaled="unit" in values or "scale" in values,
+    )
+
+
+def stated(apart: dict[str, Any], row: Signal, where: str) -> tuple[float, LoggerFilter | None]:
+    """Resolution and filter of a signal; raises PlanError."""
+    step = as_type("float", apart.get("resolution", 0.0), f"resolution in [{where}]", row.unit)
+    if not step >= 0.0:
+        raise PlanError(f"resolution in [{where}] is {step:g}, but must be at least 0 {row.unit}.")
+    if "filter" not in apart:
+        return step, None
+    found = fill(FilterTable, apart["filter"], f"{where}.filter")
+    return step, LoggerFilter(found.type, found.order, found.cutoff)
+
+
+def in_unit(unit: str, row: Signal, name: str) -> float:
+    """The factor from a unit to that of our signal; raises PlanError where it is one of another quantity."""
+    return converted(Decimal(1), unit, row.unit, f"'{name}' in [signals]")

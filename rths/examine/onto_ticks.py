@@ -1,0 +1,141 @@
+"""Columns of a data file as our signals on the ticks of a plan."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from common.errors import InputError, PlanError
+from common.plan.schema import nearest
+from common.recording.imported import ImportedChannel
+from common.signals import FieldType, Signal
+from models.registry import Array
+from report.text.tabular import DataTable
+from rths.examine.import_map import ImportMap, SignalSource, in_unit, lab_signals
+
+ON_TICKS = 1e-3  # of an interval: rows closer than this stand on the ticks
+
+
+@dataclass(frozen=True)
+class OnTicks:
+    """Our signals on the ticks, each with what is stated of it."""
+
+    t: Array  # s, from 0
+    values: dict[str, Array]  # by our name of the signal
+    stated: dict[str, ImportedChannel]
+    units: dict[str, str]  # taken from the file's row of units, by our name
+
+    @property
+    def interpolated(self) -> list[str]:
+        """The signals whose rows did not stand on the ticks."""
+        return [name for name, row in self.stated.items() if row.interpolated]
+
+
+def on_ticks(mapping: ImportMap, table: DataTable, data: Path) -> OnTicks:
+    """Our signals at the plan's interval, by linear interpolation; numbers of messages are held.
+
+    Raises:
+        InputError: a column is not there or has a gap, its unit is of another quantity, or time does not increase.
+    """
+    theirs, rows = time_base(mapping, table, data)
+    interval = mapping.plan.test.interval
+    if mapping.static:
+        t = np.arange(theirs.size, dtype=np.float64) * interval
+        theirs = t
+    else:
+        theirs = theirs - theirs[0]
+        t = np.arange(int(np.floor(theirs[-1] / interval + 1e-9)) + 1, dtype=np.float64) * interval
+    between = not stands_on(theirs, t, interval)
+    rate = 0.0 if mapping.static or theirs.size < 2 else 1.0 / float(np.median(np.diff(theirs)))
+    known = lab_signals(mapping.plan)
+    found = OnTicks(t, {}, {}, {})
+    for name, source in mapping.signals.items():
+        row = known[name][1]
+        if source.value is not None:
+            found.values[name] = np.full(t.size, source.value)
+            found.stated[name] = ImportedChannel(known=True)
+            continue
+        column = pick(table, source.column, data)[rows]
+        bad = np.flatnonzero(~np.isfinite(column))
+        if bad.size:
+            place = int(np.arange(rows.size)[rows][bad[0]]) + 1
+            raise InputError(
+                f"{data}: column '{source.column}' has no number in row {place}: fill or cut the gap."
+            )
+        scale, unit = scale_of(name, source, row, table, data)
+        if unit:
+            found.units[name] = unit
+        found.values[name] = moved(theirs, scale * column + source.offset, t, row)
+        found.stated[name] = channel(source, row, rate, between=between)
+    return found
+
+
+def stands_on(theirs: Array, t: Array, interval: float) -> bool:
+    """Whether every tick has a row of its own."""
+    after = np.clip(np.searchsorted(theirs, t), 1, max(theirs.size - 1, 1))
+    if theirs.size < 2:
+        return True
+    nearest_row = np.minimum(np.abs(theirs[after] - t), np.abs(theirs[after - 1] - t))
+    return bool(np.max(nearest_row, initial=0.0) <= ON_TICKS * interval)
+
+
+def moved(theirs: Array, values: Array, t: Array, row: Signal) -> Array:
+    """Values at the ticks: linear between rows, the last row's for the number of a message."""
+    if row.kind is FieldType.INDEX:
+        return values[np.clip(np.searchsorted(theirs, t + 1e-9, side="right") - 1, 0, None)]
+    return np.asarray(np.interp(t, theirs, values))
+
+
+def scale_of(name: str, source: SignalSource, row: Signal, table: DataTable, data: Path) -> tuple[float, str]:
+    """The factor to our unit; where the map gives none, by the unit that stands below the column's name."""
+    unit = table.units.get(source.column, "")
+    if source.scaled or not unit or row.kind is FieldType.INDEX:
+        return source.scale, ""
+    try:
+        return in_unit(unit, row, name), unit
+    except PlanError as error:
+        raise InputError(f"{data}: {error} Or give its scale in the map.") from None
+
+
+def channel(source: SignalSource, row: Signal, rate: float, *, between: bool) -> ImportedChannel:
+    """What is stated of a measured signal."""
+    counted = row.kind is FieldType.INDEX
+    return ImportedChannel(
+        source.filter,
+        source.delay,
+        source.resolution,
+        source.calibration,
+        interpolated=between and not counted,
+        rate=rate,
+    )
+
+
+def time_base(mapping: ImportMap, table: DataTable, data: Path) -> tuple[Array, Any]:
+    """Times of the rows that are read, s, and which rows those are; raises InputError where they do not increase."""
+    count = len(next(iter(table.columns.values())))
+    counted = np.arange(count, dtype=np.float64) / (mapping.rate or 1.0)
+    t = pick(table, mapping.time, data) if mapping.time else counted
+    bad = np.flatnonzero(~(np.diff(t) > 0.0))
+    if not mapping.static and (bad.size or t.size < 2):
+        row = int(bad[0]) + 2 if bad.size else t.size
+        raise InputError(f"{data}: the time in column '{mapping.time}' does not increase at row {row}.")
+    rows = np.ones(t.size, dtype=bool)
+    if mapping.start is not None:
+        rows &= t >= mapping.start
+    if mapping.stop is not None:
+        rows &= t <= mapping.stop
+    if np.count_nonzero(rows) < 2:
+        raise InputError(
+            f"{data}: fewer than two rows lie between start and stop; its times go from {t[0]:g} to {t[-1]:g} s."
+        )
+    return t[rows], rows
+
+
+def pick(table: DataTable, name: str, data: Path) -> Array:
+    """A column by name; raises InputError with the nearest name where there is none."""
+    if name not in table.columns:
+        raise InputError(f"{data} has no numeric column '{name}': {nearest(name, table.columns)}")
+    return table.columns[name]

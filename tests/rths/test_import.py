@@ -1,0 +1,202 @@
+"""The import map: units, what the logger did, the part of the file that is read, how it is written, slips."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from common.recording.imported import LoggerFilter, imported
+from common.recording.reader import Run, read
+
+PLAN = '[test]\ninterval = 0.01\nduration = 1.0\n[compensator]\nkind = "none"\n'
+TIMES = 0.01 * np.arange(400)
+COMMAND = 5.0 * np.sin(2.0 * np.pi * 0.7 * TIMES)  # mm
+LATE = 5.0 * np.sin(2.0 * np.pi * 0.7 * (TIMES - 0.045))
+FORCE = 12.5 * LATE  # kN at 12.5 kN/mm
+
+
+def table(
+    head: str, *columns: Any, between: str = ",", decimal: str = ".", below: str = "", above: str = ""
+) -> str:
+    rows = (
+        between.join(f"{value:.9f}".replace(".", decimal) for value in row)
+        for row in zip(*columns, strict=True)
+    )
+    return "\n".join([*([above] if above else []), head, *([below] if below else []), *rows]) + "\n"
+
+
+@pytest.fixture
+def bring(call: Any, tmp_path: Path) -> Any:
+    """Import data under a map; exit code and the recording, None where there is none."""
+
+    def brought(data: str, rows: str, top: str = 'time = "t"\n', *more: str) -> tuple[int, Run | None]:
+        (tmp_path / "plan.toml").write_text(PLAN)
+        (tmp_path / "data.csv").write_bytes(data.encode("latin-1"))
+        (tmp_path / "map.toml").write_text(f'plan = "plan.toml"\n{top}[signals]\n{rows}')
+        out = tmp_path / "a.mcap"
+        code = call(
+            "import", tmp_path / "data.csv", "--map", tmp_path / "map.toml", "-o", out, "--force", *more
+        )
+        return code, read(out) if code == 0 else None
+
+    return brought
+
+
+DRIVE = (
+    'actuator_command = { column = "u", unit = "mm" }\ncolumn_displacement = { column = "y", unit = "mm" }\n'
+)
+
+
+def test_units_stand_for_scales_and_what_the_logger_did_is_kept(bring: Any) -> None:
+    rows = DRIVE + (
+        'column_force = { column = "f", unit = "kN", delay = "2 ms", resolution = "0.1 kN", calibration = 0.01, '
+        'filter = { type = "butterworth", order = 4, cutoff = 100.0 } }\n'
+    )
+    code, run = bring(table("t,u,y,f", TIMES, COMMAND, LATE, FORCE), rows)
+    assert code == 0
+    assert np.allclose(run.columns["master"]["column_displacement"], 1e-3 * LATE, atol=1e-11)
+    assert np.allclose(run.columns["master"]["column_force"], 1e3 * FORCE, atol=1e-5)
+    stated = imported(run).channel("master", "column_force")
+    assert (stated.delay, stated.resolution, stated.calibration) == (0.002, 100.0, 0.01)
+    assert stated.filter == LoggerFilter("butterworth", 4, 100.0)
+    assert stated.rate == pytest.approx(100.0)
+    assert not stated.interpolated
+
+
+def test_rows_between_the_ticks_are_marked(bring: Any, capsys: Any) -> None:
+    code, run = bring(table("t,u,y", 1.05 * TIMES, COMMAND, LATE), DRIVE)
+    assert code == 0
+    assert imported(run).channel("master", "column_displacement").interpolated
+    said = capsys.readouterr().out
+    assert "interpolated onto the ticks, and marked so: actuator_command, column_displacement" in said
+    assert (
+        "link: the link cannot be judged, because the data hold no numbers and no stamps of messages" in said
+    )
+
+
+def test_semicolons_decimal_commas_a_preamble_and_a_row_of_units(bring: Any, capsys: Any) -> None:
+    text = table(
+        "t;u;y", TIMES, COMMAND, LATE, between=";", decimal=",", below="s;mm;mm", above="Logger Müller"
+    )
+    rows = 'actuator_command = { column = "u" }\ncolumn_displacement = { column = "y" }\n'
+    code, run = bring(text, rows, 'time = "t"\nseparator = ";"\ndecimal = ","\nskip_rows = 1\n')
+    assert code == 0
+    assert np.allclose(run.columns["master"]["column_displacement"], 1e-3 * LATE, atol=1e-11)
+    assert "units, from the row below the names: actuator_command in mm" in capsys.readouterr().out
+    assert bring(text.partition("\n")[2], rows)[0] == 2
+    assert "a map says what separator, decimal sign and rows to skip it has" in capsys.readouterr().err
+
+
+def test_start_and_stop_cut_the_data(bring: Any) -> None:
+    code, run = bring(table("t,u,y", TIMES, COMMAND, LATE), DRIVE, 'time = "t"\nstart = 1.0\nstop = 2.0\n')
+    assert code == 0
+    displacement = run.columns["master"]["column_displacement"]
+    assert displacement.size == 101
+    assert np.allclose(displacement, 1e-3 * LATE[100:201], atol=1e-9)
+    assert run.columns["master"]["t"][0] == 0.0
+
+
+def test_static_data_keep_their_rows_and_need_no_time(bring: Any) -> None:
+    code, run = bring(table("u,y,f", COMMAND, COMMAND, FORCE), DRIVE, "static = true\n")
+    assert code == 0
+    assert imported(run).static
+    assert run.ticks("master") == 400
+    assert not imported(run).channel("master", "column_displacement").interpolated
+
+
+def test_numbers_of_messages_are_held_and_stamps_belong_together(bring: Any, capsys: Any) -> None:
+    numbers = np.floor(TIMES / 0.02)
+    rows = (
+        DRIVE
+        + 'damper_force_seq = { column = "n" }\ncommand_seq = { column = "n" }\ncommand_one_way = { column = "w" }\n'
+    )
+    text = table("t,u,y,n,w", 1.01 * TIMES, COMMAND, LATE, numbers, 1e-3 + 0.0 * TIMES)
+    code, run = bring(text, rows)
+    assert code == 0
+    assert set(np.unique(run.columns["master"]["damper_force_seq"])) <= set(range(200))
+    assert np.all(run.columns["latency"]["command_one_way"] == 1e-3)
+    assert np.all(np.isnan(run.columns["latency"]["round_trip"]))
+    assert "link:" not in capsys.readouterr().out
+
+
+SLIPS = {
+    "millimetres for metres": (
+        1e3 * LATE,
+        FORCE,
+        "'column_displacement' is 1.01e+03 times what the plan predicts",
+    ),
+    "kilonewtons for newtons": (
+        LATE,
+        1e-3 * FORCE,
+        "about a factor of 1000: look at the units of its column",
+    ),
+    "a wrong sign": (
+        -LATE,
+        FORCE,
+        "'column_displacement' runs against what the plan predicts of actuator_command",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", SLIPS.values(), ids=SLIPS)
+def test_a_slip_of_unit_or_sign_stops_in_one_sentence(bring: Any, capsys: Any, case: Any) -> None:
+    position, force, message = case
+    text = table("t,u,y,f", TIMES, COMMAND, position, force)
+    rows = DRIVE + 'column_force = { column = "f", unit = "kN" }\n'
+    assert bring(text, rows)[0] == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert message in error
+    assert bring(text, rows, 'time = "t"\n', "--as-is")[0] == 0
+
+
+def test_a_column_without_a_command_is_held_against_its_deformation(bring: Any, capsys: Any) -> None:
+    rows = 'column_displacement = { column = "y" }\ncolumn_force = { column = "f", unit = "kN" }\n'
+    assert bring(table("t,y,f", TIMES, LATE, FORCE), rows)[0] == 2
+    assert (
+        "'column_force' is 1/1e+03 of what the plan predicts of column_displacement"
+        in capsys.readouterr().err
+    )
+
+
+WRONG = {
+    "unit of another quantity": (
+        'x = { column = "u", unit = "kN" }',
+        "",
+        "'actuator_command' in [signals] is in kN",
+    ),
+    "unit and scale": ('x = { column = "u", unit = "mm", scale = 1.0 }', "", "both a unit and a scale"),
+    "unknown filter": (
+        'x = { column = "u", filter = { type = "butter", order = 4, cutoff = 1.0 } }',
+        "",
+        "butterworth",
+    ),
+    "filter without cutoff": ('x = { column = "u", filter = { type = "bessel", order = 4 } }', "", "cutoff"),
+    "negative resolution": ('x = { column = "u", resolution = -1.0 }', "", "at least 0"),
+    "stop before start": ('x = { column = "u" }', "start = 3.0\nstop = 2.0\n", "must be after start"),
+    "no rows": ('x = { column = "u" }', "start = 30.0\n", "fewer than two rows"),
+    "long separator": ('x = { column = "u" }', 'separator = "::"\n', "one character"),
+    "one sign for two": ('x = { column = "u" }', 'separator = ","\ndecimal = ","\n', "give each its own"),
+    "unknown decimal sign": ('x = { column = "u" }', 'decimal = ";"\n', "decimal is ';'"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG.values(), ids=WRONG)
+def test_what_does_not_fit_is_one_sentence(bring: Any, capsys: Any, case: Any) -> None:
+    rows, top, message = case
+    text = table("t,u", TIMES, COMMAND)
+    assert bring(text, rows.replace("x =", "actuator_command =") + "\n", f'time = "t"\n{top}')[0] == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
+
+
+def test_the_report_as_json_says_what_was_done(bring: Any, capsys: Any) -> None:
+    assert bring(table("t,u,y", 1.05 * TIMES, COMMAND, LATE), DRIVE, 'time = "t"\n', "--json")[0] == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["interpolated"] == ["actuator_command", "column_displacement"]
+    assert found["link"].startswith("the link cannot be judged")
