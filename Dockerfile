@@ -33,6 +33,6 @@ COPY rths rths
 COPY examples examples
 # A plan's folder for recordings is `runs` unless it says otherwise: the one that is mounted.
 RUN pip install --no-cache-dir --no-index --no-deps --no-build-isolation -e . && ln -s /runs runs && \
-    python -m loop.warm && chmod -R a+rwX /var/cache/rths
+    python -m simulation.warm && chmod -R a+rwX /var/cache/rths
 USER rths
 CMD ["rths", "--help"]

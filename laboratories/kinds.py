@@ -1,8 +1,9 @@
 """The kinds of laboratory by name, those of users included, and the kernel that moves a laboratory of any kind on.
 
-A laboratory at work is a record of arrays. The compiled loop chooses the kernel by the record's class, so that
-laboratories of different kinds stand in one loop without a table of functions at run time. All kinds of users share one
-record, which carries its kernel as an address: no kernel of the loop has to be compiled anew for them.
+A laboratory at work is a record of arrays. Compiled code chooses the kernel by the record's class, so that it holds the
+kernels that it needs and no table of functions at run time. All kinds of users share one record, which carries its
+kernel as an address, and `AnyLab` holds a laboratory of whichever kind: a loop that is compiled for it serves every
+combination of kinds, and none has to be compiled anew.
 """
 
 from __future__ import annotations
@@ -12,6 +13,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+from numba import cfunc
 from numba.core import types
 from numba.extending import overload
 
@@ -23,29 +26,72 @@ from common.roles import MASTER
 from common.signals import Signal
 from laboratories import completeness
 from laboratories.column.kind import COLUMN
+from laboratories.column.model import ColumnLab
+from laboratories.completeness import KERNEL
 from laboratories.device import Device, DeviceRecord, advance_device
 from laboratories.kind import Kind
 from laboratories.table.kind import TABLE
+from laboratories.table.model import TableLab
 from models.compiled import MERGED
 from models.registry import Array
+from models.system import System
 
 KINDS: dict[str, Kind] = {kind.name: kind for kind in (COLUMN, TABLE)}
 """The kinds that ship, by the names that a plan gives them."""
 
 
-class NoLaboratory(NamedTuple):
-    """At the place of a master that has no laboratory."""
-
-    nothing: float
+COLUMN_AT, TABLE_AT, DEVICE_AT, NOTHING = range(4)  # places of the records of `AnyLab`
 
 
-def rest(lab: NoLaboratory, truth: Array, command: float, effort: float) -> None:
-    """Nothing moves where there is no laboratory."""
+class AnyLab(NamedTuple):
+    """A laboratory of whichever kind, or none: one record is at work, the others have no meaning."""
+
+    place: int  # which one it is; NOTHING where there is no laboratory
+    column: ColumnLab
+    table: TableLab
+    device: DeviceRecord
+
+
+def advance_any(lab: AnyLab, truth: Array, command: float, effort: float) -> None:
+    """One interval of the record that is at work."""
+    if lab.place == COLUMN_AT:
+        advance(lab.column, truth, command, effort)
+    elif lab.place == TABLE_AT:
+        advance(lab.table, truth, command, effort)
+    elif lab.place == DEVICE_AT:
+        advance(lab.device, truth, command, effort)
+
+
+def as_any(lab: Any) -> AnyLab:
+    """The record of a laboratory at work as one of whichever kind."""
+    if isinstance(lab, AnyLab):
+        return lab
+    place, name = PLACES[type(lab)]
+    return nothing()._replace(place=place, **{name: lab})
+
+
+@cache
+def nothing() -> AnyLab:
+    """No laboratory; its records are of the standard plan, and stand there for their types alone."""
+    system = System(Plan())
+    device = DeviceRecord(cfunc(KERNEL, cache=True)(still), np.zeros(1), np.zeros(0))
+    return AnyLab(NOTHING, COLUMN.build(system), TABLE.build(system), device)
+
+
+PLACES = {
+    ColumnLab: (COLUMN_AT, "column"),
+    TableLab: (TABLE_AT, "table"),
+    DeviceRecord: (DEVICE_AT, "device"),
+}
+
+
+def still(parameters: Array, state: Array, truth: Array, command: float, effort: float) -> None:
+    """The step of a device that is not there."""
 
 
 KERNELS: dict[type[Any], Callable[..., None]] = {kind.record: kind.advance for kind in KINDS.values()} | {
     DeviceRecord: advance_device,
-    NoLaboratory: rest,
+    AnyLab: advance_any,
 }
 
 

@@ -11,7 +11,6 @@ import numpy as np
 
 from laboratories import kinds
 from laboratories.kind import Kind
-from laboratories.kinds import NoLaboratory
 from laboratories.sensors import noise, readings
 from laboratories.sensors.readings import Readings
 from models.compiled import jit
@@ -40,7 +39,12 @@ def build(kind: Kind, system: System, errors: Array) -> Site:
 def none(ticks: int) -> Site:
     """In place of a laboratory where there is none: one channel that reads zero."""
     sensors = readings.build(1.0, ("none",), {})
-    return Site(NoLaboratory(0.0), sensors, np.zeros((ticks, 1)), np.zeros(1), np.zeros((ticks, 1)))
+    return Site(kinds.nothing(), sensors, np.zeros((ticks, 1)), np.zeros(1), np.zeros((ticks, 1)))
+
+
+def of_any(played: Site) -> Site:
+    """The same laboratory in the record that holds one of whichever kind."""
+    return played._replace(lab=kinds.as_any(played.lab))
 
 
 def errors(kind: Kind, system: System, ticks: int, seed: int | None = None) -> Array:

@@ -62,7 +62,9 @@ def ground(motion: GroundMotion, interval: float, duration: float) -> Array:
     whole = math.ceil((motion.duration + motion.interval) / interval) * interval
     acceleration = resample(motion, interval, max(whole, duration))
     displacement = ground_displacement(acceleration, interval)
-    return np.stack([acceleration, displacement])[:, : ticks + 1]
+    return np.stack(
+        [acceleration[: ticks + 1], displacement[: ticks + 1]]
+    )  # rows that kernels take as contiguous
 
 
 def integrate(acceleration: Array, interval: float) -> tuple[Array, Array]:

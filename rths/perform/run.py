@@ -213,7 +213,7 @@ def warm_up(progress: RunProgress) -> None:
 
     if not cache.warm():
         progress.say("compiling the kernels, once on this machine (about half a minute)")
-        from loop.warm import compile_all
+        from simulation.warm import compile_all
 
         compile_all()
 

@@ -1,0 +1,81 @@
+"""`python -m simulation.warm`: compile every kernel once, so that no test has to wait for it."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from common.plan.kinds import COLUMN
+from common.plan.plan import Plan
+from common.plan.read import parse, with_test
+from common.signals import default_topics
+from laboratories import completeness, device, kinds
+from laboratories.column import model as column_lab
+from laboratories.sensors import readings
+from laboratories.table import model as table_lab
+from loop import replay, site, substructure
+from loop.closed_loop import simulate
+from loop.nominal.response import response
+from models import cache, compensators, energy_balance
+from models.compiled import plain
+from models.registry import Array
+from models.system import System
+from recorder.encoding import RowEncoder
+
+SHORT = 0.01  # s
+TWO_TABLES = "[slave.a]\n[slave.b]\n"
+
+
+def compile_all() -> None:
+    """Compile what the loops, the simulation and the recorder call, and note that it is done."""
+    plan = with_test(Plan(), duration=SHORT)
+    ground = np.zeros((2, plan.ticks + 1))
+    closed_loops(plan, ground)
+    alone = replace(plan, control=replace(plan.control, amd=False))
+    response(alone, ground)
+    still, drive = np.zeros(plan.ticks), np.zeros((plan.ticks, 2))
+    for kind in kinds.KINDS.values():
+        replay.laboratory(kind, System(plan), drive)
+    replay.column(System(plan), still)
+    replay.building(System(plan), ground, still, still, still)
+    ticks(plan, ground)
+    of_users(drive)
+    topics = default_topics()
+    RowEncoder(topics, dict.fromkeys(topics, 1), plan.storeys)
+    (cache.folder() / cache.READY).touch()
+
+
+def closed_loops(plan: Plan, ground: Array) -> None:
+    """The rollouts that have a kernel of their own: one table at a slave, two, and laboratories of any kinds."""
+    tables = with_test(parse(TWO_TABLES, Path()), duration=SHORT)
+    columns = replace(plan, slave=replace(plan.slave, kind=COLUMN))
+    for one in (plan, tables, columns):
+        simulate(one, ground)
+
+
+def ticks(plan: Plan, ground: Array) -> None:
+    """What the real loops call at every tick."""
+    substructure.enter(plain(substructure.build(plan, ground)), 0, 0.0, 0.0)
+    balance = energy_balance.build(plan.test.interval, 0.5, 1.0, 1.0, np.ones(1))
+    energy_balance.enter(plain(balance), 0.0, 0.0, 0.0, 0.0)
+    column_lab.enter(plain(column_lab.build(plan.test.interval, plan.actuator, plan.column)), 0.0)
+    table_lab.enter(plain(table_lab.build(plan.test.interval, plan.table, plan.damper)), 0.0, 0.0)
+    readings.step(readings.build(plan.test.interval, ("any",), {}), 0, 0.0, 0.0, 0.0)
+    none = compensators.build("none", {}, plan.test.interval)
+    compensators.enter(plain(none), *compensators.STILL, plan.test.interval)
+
+
+def of_users(drive: Array) -> None:
+    """What calls a device of a user's, `drive` (ticks, 2) as `replay.laboratory` takes it."""
+    lab, truth = kinds.nothing().device, np.zeros(1)
+    device.enter_device(plain(lab), truth, 0.0, 0.0)
+    completeness.driven(lab.step, lab.parameters, lab.state, truth, 0.0, 1)
+    site.play(site.none(len(drive))._replace(lab=lab), drive, 1.0, 0, len(drive))
+
+
+if __name__ == "__main__":
+    compile_all()
+    sys.stderr.write(f"kernels compiled into {cache.folder()}\n")
