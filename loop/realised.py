@@ -53,15 +53,16 @@ def check(name: str, only: str, whole: Plan, known: dict[str, Effect]) -> None:
 
 def check_rig(one: Reality) -> None:
     """Raise InputError where an effect is in the laboratory of a role whose rig is a plug-in."""
-    rig = one.master if one.role == MASTER else one.slave
-    if not rig.class_ or one.role not in one.plan.kinds:
+    rig, plan = one.master if one.role == MASTER else one.slave, (one.whole or one).plan
+    if not rig.class_ or one.role not in plan.kinds:
         return
-    places = sites.of_kind(kind_of(one.plan, one.role))
+    places = sites.of_kind(kind_of(plan, one.role))
     for name, _ in one.effects:
         if name in CATALOGUE and CATALOGUE[name].site in places:
             raise InputError(
                 f"The effect '{name}' cannot be laid over the plug-in in [{one.role}.rig]: "
-                "put it into that rig, or leave the rig out of the reality and the plan."
+                "put it into that rig, name the laboratory that it is for, or leave the rig out of the reality and "
+                "the plan."
             )
 
 

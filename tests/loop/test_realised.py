@@ -252,6 +252,16 @@ def test_a_plug_in_of_the_plan_counts_too(plan: Plan) -> None:
         true_system(real(planned, effect("table.gain", factor=0.9)))
 
 
+def test_a_plug_in_of_a_named_slave_counts_too() -> None:
+    tables = Plan().tables() | {"slave": {"east": {"rig": {"class": "somewhere.else:Lab"}}, "west": {}}}
+    planned = from_tables(tables, Path())
+    truth = real(planned, effect("table.gain", factor=0.9))
+    for one in (truth, truth.of("slave.east")):
+        with pytest.raises(InputError, match=r"cannot be laid over the plug-in in \[slave\.east\.rig\]"):
+            true_system(one)
+    true_slaves(real(planned, effect("table.gain", factor=0.9, slave="west")))
+
+
 @pytest.mark.parametrize(
     ("entry", "words"),
     [
