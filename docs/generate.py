@@ -20,6 +20,8 @@ from diagnosis.report import schema
 from docs import reference_tables
 from docs.markdown import quantity, table
 
+EVERY_KIND = '[slave.a]\nkind = "table"\n[slave.b]\nkind = "column"\n'  # at slaves
+
 FOLDER = Path(__file__).resolve().parent
 
 # limits on what is no field of a command or a measurement
@@ -45,7 +47,7 @@ def parts() -> dict[str, dict[str, str]]:
         "explanation/safety.md": {
             "modes": f"```mermaid\n{mermaid()}\n```\n",
             "turns": turns(),
-            "patience": patient(parse("", Path())),
+            "patience": patient(parse(EVERY_KIND, Path())),
             "watchdog and ramp": keys(SafetyTable),
             "motion": motion(Plan()),
             "limits": limits(),

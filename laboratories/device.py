@@ -234,7 +234,11 @@ class Device(Kind):
         return np.array([rms.get(name, 0.0) for name in self.channels.names])
 
     def limits(self, plan: Plan) -> Mapping[str, float]:
-        """The class's, or the plan's where it gives them."""
+        """The class's, or the plan's where it gives them.
+
+        Where all laboratories are emulated, those of the class on how a command moves do not hold: after a pause of
+        the machine the newest command is ahead by as long a motion.
+        """
         channels, limited = self.channels, self.limited
         signals = (channels.target, channels.command, channels.effort, *channels.measured)
         units = {signal.name: signal.unit for signal in signals if signal}
@@ -242,7 +246,8 @@ class Device(Kind):
         units |= {
             name: unit for name, unit in zip(rates, ("m", "m/s", "m/s²", "N", "m"), strict=True) if name
         }
-        return dict(self.most) | self._given(plan.device.limits, units, "device.limits")
+        free = dict.fromkeys(filter(None, rates), math.inf) if plan.eased else {}
+        return dict(self.most) | free | self._given(plan.device.limits, units, "device.limits")
 
     def ramp(self, plan: Plan, last: tuple[float, ...], before: tuple[float, ...]) -> Ramp:
         """The command comes to a hold, then the device is unloaded."""

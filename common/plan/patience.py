@@ -13,7 +13,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
+from common.plan.kinds import COLUMN, OWN, TABLE, known_kind
 from common.plan.plan import OVERRUN, Plan
+from common.roles import MASTER
 
 # s. Pauses of 50 ms are to be borne; beside other load they were seen to reach 0.5 s, and four such may coincide.
 PATIENCE = 2.0
@@ -33,7 +35,7 @@ def intervals(seconds: float) -> Figure:
     return lambda plan: math.ceil(seconds / plan.test.interval - 1e-9)
 
 
-# A table whose commands were held up moves to the newest one within an interval: its rates then show the pause.
+# A slave whose commands were held up moves to the newest one within an interval: its rates then show the pause.
 FIGURES: Mapping[str, Figure] = {
     "link.loss_timeout": lambda _: 2.5 * PATIENCE,  # beyond a silence and a pause of one's own together
     "safety.hold_after": intervals(NOTICED),
@@ -49,6 +51,14 @@ FIGURES: Mapping[str, Figure] = {
     "limits.table_error": lambda _: math.inf,
     "limits.damper_step": lambda _: math.inf,
     "limits.table_acceleration": lambda plan: SHOCK * plan.limits.table_acceleration,
+    "limits.actuator_velocity": lambda _: math.inf,
+    "limits.actuator_acceleration": lambda _: math.inf,
+    "limits.actuator_step": lambda _: math.inf,
+    "limits.column_error": lambda _: math.inf,
+}
+OF_KIND = {  # the limits among them, by the kind of laboratory whose slaves they concern
+    TABLE: ("table_velocity", "table_step", "table_error", "damper_step", "table_acceleration"),
+    COLUMN: ("actuator_velocity", "actuator_acceleration", "actuator_step", "column_error"),
 }
 TABLES = tuple(dict.fromkeys(name.partition(".")[0] for name in FIGURES))
 TOGETHER = {"safety.hold_after", "safety.ramp_after"}  # each must suit the other
@@ -64,9 +74,19 @@ def eased(plan: Plan, given: Mapping[str, Any]) -> Plan:
     written = {f"{table}.{key}" for table in TABLES for key in given.get(table, {})}
     if written & TOGETHER:
         written |= TOGETHER
-    found = {name: FIGURES[name](plan) for name in FIGURES if name not in written}
+    foreign = foreign_to(plan)
+    found = {name: FIGURES[name](plan) for name in FIGURES if name not in written | foreign}
     found = {name: value for name, value in found.items() if value > figure(plan, name)}
     return replace(with_figures(plan, found), eased=tuple(found))
+
+
+def foreign_to(plan: Plan) -> set[str]:
+    """The figures of kinds of laboratory that no slave of the plan hosts.
+
+    The master's own laboratory misses no command: its late ticks are made up for one by one.
+    """
+    hosted = {kind for role, kind in plan.kinds.items() if role != MASTER}
+    return {f"limits.{name}" for kind, names in OF_KIND.items() if kind not in hosted for name in names}
 
 
 def strict(plan: Plan) -> Plan:
@@ -100,10 +120,12 @@ def with_figures(plan: Plan, figures: Mapping[str, float]) -> Plan:
 def sentence(plan: Plan) -> str:
     """Which figures were eased, their values beside those with a rig, and why."""
     figures = (f"{name.partition('.')[2]} {figure(plan, name):g} ({standard(name):g})" for name in plan.eased)
+    own = any(known_kind(kind) == OWN for kind in plan.kinds.values())
     return (
         "All laboratories are emulated, so a pause of this machine does no harm and does not end the test. "
         f"Figures that the plan does not set are larger than beside a rig (in brackets): {', '.join(figures)}. "
-        "A late tick is made up for and counted."
+        + "Limits of a kind of your own on how its command moves do not hold. " * own
+        + "A late tick is made up for and counted."
     )
 
 

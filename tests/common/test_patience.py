@@ -13,9 +13,9 @@ from common.host.realtime import NOTHING
 from common.lab import lacking
 from common.plan import patience, reality
 from common.plan import read as plans
+from common.plan.kinds import COLUMN, TABLE
 from common.plan.plan import OVERRUN, Plan
 from common.plan.read import from_tables, parse, with_test
-from common.safety.longest import resting
 from common.terminal import cli
 
 RIGS = {
@@ -35,6 +35,31 @@ def test_shipped_plans_bear_pauses_and_are_strict_beside_a_rig(name: str) -> Non
     assert shipped.link.loss_timeout > (safety.overrun + safety.ramp_after) * interval
     assert patience.strict(shipped).safety == Plan().safety
     assert patience.strict(shipped).preflight.lost == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "kinds"),
+    [
+        ("default", {TABLE}),
+        ("two_dampers", {TABLE}),
+        ("single_site", set()),
+        ("two_columns", {COLUMN}),
+        ("two_storeys", {COLUMN}),
+        ("two_slaves", {COLUMN, TABLE}),
+    ],
+)
+def test_limits_are_larger_for_the_kinds_that_slaves_host(name: str, kinds: set[str]) -> None:
+    eased = [figure for figure in plans.load(cli.plan_path(name)).eased if figure.startswith("limits.")]
+    assert eased == [
+        f"limits.{limit}" for kind, limits in patience.OF_KIND.items() if kind in kinds for limit in limits
+    ]
+
+
+def test_the_sentence_says_that_limits_of_a_kind_of_ones_own_do_not_hold() -> None:
+    said = patience.sentence(parse('[slave]\nkind = "lab.py:Lab"\n', HERE))
+    assert "Limits of a kind of your own on how its command moves do not hold." in said
+    assert "actuator" not in said
+    assert "kind of your own" not in patience.sentence(parse("", HERE))
 
 
 @pytest.mark.parametrize("whose", RIGS)
@@ -127,9 +152,3 @@ def test_beside_a_rig_it_is_said_what_the_machine_lacks(monkeypatch: pytest.Monk
     assert "ramp_after in [safety] is set to 50, less strict than 5" in lax
     found["late"] = 0.0
     assert len(lacking.lacks(planned, NOTHING)) == 1
-
-
-def test_the_longest_way_to_rest_is_bounded_without_a_limit_on_speed() -> None:
-    assert resting(parse("", HERE)) == resting(Plan())
-    free = parse("[limits]\nactuator_velocity = inf\nactuator_step = inf", HERE)
-    assert resting(free) == resting(Plan())

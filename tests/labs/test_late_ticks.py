@@ -9,11 +9,15 @@ import numpy as np
 import pytest
 
 from common.plan import patience, reality
+from common.plan import read as plans
+from common.plan.kinds import COLUMN
 from common.plan.plan import Plan
 from common.plan.read import parse
 from common.recording.reader import Run, read
 from common.roles import MASTER, SLAVE
+from common.terminal import cli
 from report.facts.summary import summarize
+from tests.helpers import ROOT
 from validation.faults.lab import Simulation, Surrounding
 
 EMULATED = parse("[test]\nduration = 2.6\n", Path())
@@ -62,6 +66,41 @@ def test_an_emulation_bears_pauses_of_50_ms_and_counts_them(
     column = run.columns["master"]["column_displacement"]
     still = undisturbed.columns["master"]["column_displacement"]
     assert np.max(np.abs(column - still)) < 0.2 * np.max(np.abs(still))  # the damper alone is late
+
+
+SLAVES_OF_OTHER_KINDS = {  # a plan, its slave, and the limits on how the command of that slave moves, beside a rig
+    "column": (
+        cli.plan_path("two_columns"),
+        "slave.east",
+        {"limits": {name: patience.standard(f"limits.{name}") for name in patience.OF_KIND[COLUMN]}},
+    ),
+    "device": (
+        ROOT / "examples" / "viscous_damper.toml",
+        SLAVE,
+        {"device": {"limits": {"piston_velocity": 1.0, "piston_error": 0.02}}},
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", SLAVES_OF_OTHER_KINDS)
+def test_a_slave_of_another_kind_bears_them_too(kind: str, tmp_path: Path) -> None:
+    file, role, _ = SLAVES_OF_OTHER_KINDS[kind]
+    plan = plans.with_test(plans.load(file), duration=EMULATED.test.duration)
+    summary = summarize(played(plan, tmp_path / "a.mcap", {MASTER: STRONG[::2], role: STRONG[1::2]}))
+    assert summary["recorder"]["cause"] == "completed"
+    assert summary["late_ticks"] >= 24 * len(STRONG)
+
+
+@pytest.mark.parametrize("kind", SLAVES_OF_OTHER_KINDS)
+def test_limits_that_the_plan_writes_out_stop_such_a_slave(kind: str, tmp_path: Path) -> None:
+    file, _, strict = SLAVES_OF_OTHER_KINDS[kind]
+    plan = plans.load(file)
+    tables = plan.written()
+    tables = tables | {name: tables[name] | values for name, values in strict.items()}
+    plan = plans.with_test(plans.from_tables(tables, plan.base), duration=EMULATED.test.duration)
+    run = played(plan, tmp_path / "a.mcap", {MASTER: STRONG})
+    (limit,) = [event for event in run.events if event["code"] == "limit"]
+    assert any(name.endswith("_velocity") for name in limit["values"])
 
 
 def test_what_is_patient_is_told_with_its_reason(undisturbed: Run) -> None:
