@@ -40,6 +40,7 @@ from common.safety.modes import Turn
 from common.safety.watchdog import WatchdogFinding
 from common.signals import alike
 from laboratories import kinds
+from laboratories.longest import resting
 from master.handshake import MasterHandshake
 from master.limits import MasterLimits
 from master.own import OwnLaboratory
@@ -79,6 +80,7 @@ class MasterLoop(RigLoop):
         self._sent_ns = 0  # when the newest command went out
         self._digest = plan.digest()
         self._late = lateness.LateTicks()
+        self._others_rest = resting(plan)
         self.lab.enter(session)
 
     # -- messages ---------------------------------------------------------------------------------
@@ -308,6 +310,11 @@ class MasterLoop(RigLoop):
         """Whether recorder and operator still reach a slave through this session: it is heard until it leaves."""
         now = self.lab.clock.now()
         return any(partner.there(now) for partner in self._partners)
+
+    @property
+    def others_rest(self) -> float:
+        """How long the slaves take at most to come to rest, s."""
+        return self._others_rest
 
     @property
     def awaited(self) -> str:

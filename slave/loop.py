@@ -300,6 +300,11 @@ class SlaveLoop(RigLoop):
         return False
 
     @property
+    def others_rest(self) -> float:
+        """Nobody comes to rest behind a slave."""
+        return 0.0
+
+    @property
     def awaited(self) -> str:
         """The master, until it has called."""
         return f"the {MASTER}" if self.lab.exchange.state is State.IDLE else ""

@@ -13,7 +13,6 @@ from common.lab.surroundings import Surroundings
 from common.link.endpoint import Received
 from common.plan.plan import Plan
 from common.protocol.exchange import State
-from common.safety.longest import resting
 from common.safety.modes import Mode
 
 # how often the handshake looks after itself: often beside its requests, which are repeated every 100 ms
@@ -85,6 +84,10 @@ class DrivenLoop(Protocol):
     @property
     def needed(self) -> bool:
         """Whether other laboratories that have not left yet are reached through this one alone."""
+
+    @property
+    def others_rest(self) -> float:
+        """How long the laboratories that are reached through this one take at most to come to rest, s."""
 
     @property
     def awaited(self) -> str:
@@ -225,7 +228,7 @@ def leave(loop: DrivenLoop, over: int) -> None:
     """
     lab = loop.lab
     begun, patience = lab.clock.now(), round(lab.plan.recording.patience * 1e9)
-    rest = over + round(resting(lab.plan) * 1e9) if lab.start_ns else begun
+    rest = over + round(loop.others_rest * 1e9) if lab.start_ns else begun
     while (routes := coming_to_rest(loop, rest)) or not loop.left:
         if routes:
             begun = lab.clock.now()

@@ -10,7 +10,7 @@ from common.errors import IncompleteError, InputError, InterlockError, LostError
 from common.lab.drive import LEAVE_NS, longest_leave
 from common.plan.plan import Plan
 from common.roles import MASTER, RECORDER, title
-from common.safety.longest import resting
+from laboratories.longest import resting
 from recorder.loop import CONSEQUENCE, ROWS_LOST, SILENCE_NS
 
 MARGIN_S = 1.0  # on what a process allows itself, for it to leave

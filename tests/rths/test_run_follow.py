@@ -23,8 +23,8 @@ from common.plan import reality
 from common.plan.plan import Plan
 from common.plan.tables import RigTable
 from common.protocol.exchange import State
-from common.safety.longest import resting
 from common.safety.ramp import MotionRamp
+from laboratories.longest import resting
 from recorder.loop import RecorderLoop
 from report.text.terminal import RunProgress
 from rths.perform.ending import KILL_S, LEAVE_S, MARGIN_S, SILENCE_S, WRITE_S, Ending, verdict
