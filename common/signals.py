@@ -138,6 +138,9 @@ NUMERICAL = Signal(
     FieldType.STOREYS,
 )
 
+OF_STOREYS = tuple(row.name for row in (*BUILDING, NUMERICAL) if row.kind is FieldType.STOREYS)
+"""What the master computes of each storey, in the order of the topic."""
+
 LATENCY = (
     SEQ,
     Signal("wake_lateness", "s", "start of the tick after its nominal time"),
@@ -296,16 +299,7 @@ def default_topics(slaves: Sequence[str] = (SLAVE_ROLE,)) -> dict[str, tuple[Sig
 
 TOPICS = default_topics()
 
-MEASURED = {"master": COLUMN_CHANNELS.names, "slave": TABLE_CHANNELS.names}
-
-# What the master computes at a tick, by name in the order of the table: of the building, for each slave, of each storey
-OF_BUILDING = tuple(
-    row.name
-    for row in TOPICS["master"]
-    if row.kind is FieldType.NUMBER and not row.slaves and row.name not in (TIME.name, *MEASURED["master"])
-)
 SENT = TABLE_CHANNELS.sent
-OF_STOREYS = tuple(row.name for row in TOPICS["master"] if row.kind is FieldType.STOREYS)
 
 
 def signal(topic: str, name: str) -> Signal:
@@ -314,11 +308,3 @@ def signal(topic: str, name: str) -> Signal:
         if row.name == name:
             return row
     raise KeyError(f"{topic}/{name}")
-
-
-def topic_of(name: str) -> str:
-    """Topic in which a signal is found first (master, slave, latency); raises KeyError where there is none."""
-    for topic in TICK_TOPICS:
-        if any(row.name == name for row in TOPICS[topic]):
-            return topic
-    raise KeyError(name)

@@ -21,6 +21,7 @@ from common.errors import InputError
 from common.plan.building import is_matrix
 from common.plan.plan import Plan, resolve
 from common.roles import MASTER, title
+from common.signals import OF_STOREYS
 from laboratories.kind import Coupling, Follows
 from laboratories.kinds import kinds_of
 from loop.names import sent_names
@@ -51,8 +52,9 @@ GROUND_ACCELERATION, TARGET, COMMAND, EFFORT = range(4)
 OF_SLAVES = 4  # first place of what is sent
 SENT_TARGET, SENT_EFFORT, SENT_VELOCITY, SENT_ACCELERATION, SENT_JERK = range(5)  # to one slave
 SENT_VALUES = 5
-OF_STOREYS = ("displacement", "velocity", "acceleration", "absolute_acceleration", "numerical_force")
-STOREY_DISPLACEMENT, STOREY_VELOCITY, STOREY_ACCELERATION, STOREY_ABSOLUTE, STOREY_FORCE = range(5)
+STOREY_DISPLACEMENT, STOREY_VELOCITY, STOREY_ACCELERATION, STOREY_ABSOLUTE, STOREY_FORCE = range(
+    5
+)  # `OF_STOREYS`
 STOREY_VALUES = 5
 
 

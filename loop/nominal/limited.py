@@ -9,10 +9,9 @@ import numpy as np
 from common.plan.plan import Plan
 from common.plan.tables import Limits
 from common.roles import MASTER
-from common.signals import UNITS_OF_RATES
+from common.signals import OF_STOREYS, UNITS_OF_RATES
 from laboratories.kind import Kind
 from laboratories.kinds import kinds_of
-from loop.substructure import OF_STOREYS
 from models.registry import Array
 
 PATIENCE = 3  # intervals for which an error must be beyond its limit

@@ -17,7 +17,7 @@ from common.plan.plan import Plan, ideal
 from common.plan.read import parse, with_test
 from common.plan.tables import CompensatorTable
 from common.roles import MASTER
-from common.signals import OF_BUILDING, OF_STOREYS
+from common.signals import OF_STOREYS
 from laboratories import effects
 from laboratories.column.kind import COLUMN
 from laboratories.sensors import noise
@@ -47,7 +47,13 @@ def alone(plan: Plan, ground: Array, **options: Any) -> Rollout:
 def assert_same(found: Rollout, whole: Rollout) -> None:
     assert (found.finite, found.ticks) == (whole.finite, whole.ticks)
     assert not found.slaves
-    for name in (*OF_BUILDING, *COLUMN.channels.names, *OF_STOREYS):
+    for name in (
+        "ground_acceleration",
+        "column_target",
+        "actuator_command",
+        *COLUMN.channels.names,
+        *OF_STOREYS,
+    ):
         assert np.array_equal(found.master[name], whole.master[name]), name
 
 

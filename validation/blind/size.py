@@ -14,9 +14,8 @@ import numpy as np
 
 from common.plan.plan import Plan
 from common.recording.reader import Run, Values, read
-from common.rig import ColumnCommand, TableCommand
+from common.rig import ColumnCommand, ColumnMeasurement, TableCommand, TableMeasurement
 from common.roles import MASTER, SLAVE
-from common.signals import MEASURED
 from validation.blind.draw import Case, Laid
 from validation.blind.library import role_at
 
@@ -65,7 +64,7 @@ def play_a(case: Case, laid: tuple[Laid, ...], run: Run) -> dict[str, Values]:
     from validation.blind.record import reality
 
     commands = [ColumnCommand(value) for value in run.columns["master"]["actuator_command"].tolist()]
-    return _played(build_rig(reality(case, laid, silent=True)), commands, MEASURED["master"])
+    return _played(build_rig(reality(case, laid, silent=True)), commands, ColumnMeasurement._fields)
 
 
 def play_b(case: Case, laid: tuple[Laid, ...], run: Run) -> dict[str, Values]:
@@ -76,7 +75,7 @@ def play_b(case: Case, laid: tuple[Laid, ...], run: Run) -> dict[str, Values]:
     columns = run.columns["slave"]
     pairs = zip(columns["table_command"].tolist(), columns["damper_command"].tolist(), strict=True)
     commands = [TableCommand(*pair) for pair in pairs]
-    return _played(build_rig(reality(case, laid, silent=True).of(SLAVE)), commands, MEASURED["slave"])
+    return _played(build_rig(reality(case, laid, silent=True).of(SLAVE)), commands, TableMeasurement._fields)
 
 
 def _played(rig: Any, commands: list[Any], names: tuple[str, ...]) -> dict[str, Values]:
