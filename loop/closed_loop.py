@@ -208,8 +208,8 @@ def compiled(mine: MasterLaboratory, slaves: list[Slave]) -> tuple[MasterLaborat
         return mine, slaves or [spare()]
     count = max(2, 1 << (len(slaves) - 1).bit_length())
     filled = [*slaves, *[spare()] * (count - len(slaves))]
-    mine, *filled = [one._replace(site=site.of_any(one.site)) for one in (mine, *filled)]
-    return mine, filled
+    mine = mine._replace(site=site.of_any(mine.site))
+    return mine, [one._replace(site=site.of_any(one.site)) for one in filled]
 
 
 @cache

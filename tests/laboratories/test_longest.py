@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from common.plan import plan as plans
-from common.plan.plan import Plan, parse
+from common.plan import read as plans
+from common.plan.plan import Plan
+from common.plan.read import parse
 from common.terminal import cli
 from laboratories.column.descent import ColumnRamp
 from laboratories.kinds import kind_of

@@ -68,7 +68,8 @@ def test_an_emulation_bears_pauses_of_50_ms_and_counts_them(
     assert np.max(np.abs(column - still)) < 0.2 * np.max(np.abs(still))  # the damper alone is late
 
 
-SLAVES_OF_OTHER_KINDS = {  # a plan, its slave, and the limits on how the command of that slave moves, beside a rig
+# a plan, its slave, and the limits on how the command of that slave moves, beside a rig
+SLAVES_OF_OTHER_KINDS: dict[str, tuple[Path, str, dict[str, Any]]] = {
     "column": (
         cli.plan_path("two_columns"),
         "slave.east",

@@ -30,6 +30,11 @@ def loop_of(plan: Plan) -> ClosedLoop:
     return closed_loop.at_rest(System(plan), systems, ground, exchange, drawn)
 
 
+def types(loop: ClosedLoop) -> str:
+    """The types for which code of a loop is compiled."""
+    return str(numba.typeof(loop))  # type: ignore[no-untyped-call]
+
+
 def of(text: str) -> Plan:
     return plans.parse(text, Path())
 
@@ -42,12 +47,12 @@ def test_a_new_combination_of_kinds_needs_no_new_loop(name: str) -> None:
         "table, column": lambda: of('[master]\nkind = "table"\n[slave]\nkind = "column"\n'),
     }.get(name, lambda: plans.load(cli.plan_path(name)))()
     known = loop_of(plans.load(cli.plan_path("two_columns")))
-    assert numba.typeof(loop_of(plan)) == numba.typeof(known)
+    assert types(loop_of(plan)) == types(known)
 
 
 def test_the_master_alone_moves_in_the_default_tests_loop() -> None:
     alone = loop_of(plans.load(cli.plan_path("single_site")))
-    assert numba.typeof(alone) == numba.typeof(loop_of(Plan()))
+    assert types(alone) == types(loop_of(Plan()))
     assert alone.traffic.used.shape[1] == 0
 
 
@@ -56,7 +61,7 @@ def test_three_and_four_slaves_share_a_loop() -> None:
         of(NONE + "".join(f'[slave.{name}]\nkind = "column"\n[slave.{name}.column]\n' for name in names))
         for names in ("abc", "abcd")
     )
-    assert numba.typeof(loop_of(three)) == numba.typeof(loop_of(four))
+    assert types(loop_of(three)) == types(loop_of(four))
 
 
 def test_the_length_of_a_test_changes_no_type() -> None:
