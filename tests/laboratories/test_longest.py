@@ -10,7 +10,6 @@ from common.plan import read as plans
 from common.plan.plan import Plan
 from common.plan.read import parse
 from common.terminal import cli
-from laboratories.column.descent import ColumnRamp
 from laboratories.kinds import kind_of
 from laboratories.longest import MARGIN_S, resting, way
 from tests.helpers import ROOT, with_table
@@ -42,10 +41,11 @@ def test_it_is_bounded_without_a_limit_on_speed() -> None:
 
 def test_no_ramp_within_the_limits_takes_longer() -> None:
     plan = Plan()
-    longest = way(kind_of(plan, "master"), plan)
+    column = kind_of(plan, "master")
+    longest = way(column, plan)
     for place in (0.01, 0.03, 0.05):
         for speed in (-0.5, 0.0, 0.5):
-            ramp = ColumnRamp(plan, (place,), (place - speed * plan.test.interval,))
+            ramp = column.ramp(plan, (place,), (place - speed * plan.test.interval,))
             seconds = 0.0
             while not ramp.done:
                 ramp.step((place, 1e5))  # the load stays until the command is at zero
