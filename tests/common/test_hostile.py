@@ -16,7 +16,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from common.link.endpoint import ALLOWED, CHANNELS, LARGEST, OPEN, SPOKEN, FrameEndpoint, channel_of
-from common.link.rejections import NEWS_NS, Rejections
+from common.link.rejections import NEWS_NS, RejectionCount, Rejections
 from common.link.transport import CONTROL, SAMPLES, TICK, Packet
 from common.protocol import codec
 from common.protocol.codec import MESSAGES, MOST_TEXT, Reject, RejectedFrame, decode, encode, session_key
@@ -340,7 +340,7 @@ def test_rejections_are_told_at_most_once_a_second_with_totals_and_what_is_new()
     )
     assert news["values"] == {"check": 2.0, "value": 10.0}
     assert found.news(10 + 5 * NEWS_NS) is None
-    assert found.seen["check"] == (5, 40, MASTER)
+    assert found.seen["check"] == RejectionCount(5, MASTER)
     assert found.seen["value"].first_ns == 20
 
 

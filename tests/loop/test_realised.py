@@ -66,8 +66,8 @@ def assert_equals_the_rollout(plan: Plan, truth: Reality, path: Path) -> Run:
     return recording
 
 
-def effect(name: str, **parameters: float) -> dict[str, Any]:
-    return {"name": name, **parameters}
+def effect(name: str, **values: float | str) -> dict[str, Any]:
+    return {"name": name, **values}
 
 
 FALSIFIED = [

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common.recording.imported import LoggerFilter, imported
+from common.recording.imported import ImportedData, LoggerFilter, imported
 from common.recording.reader import Run, read
 
 PLAN = '[test]\ninterval = 0.01\nduration = 1.0\n[compensator]\nkind = "none"\n'
@@ -27,6 +27,13 @@ def table(
         for row in zip(*columns, strict=True)
     )
     return "\n".join([*([above] if above else []), head, *([below] if below else []), *rows]) + "\n"
+
+
+def known(run: Run) -> ImportedData:
+    """What a recording states of its import."""
+    found = imported(run)
+    assert found is not None
+    return found
 
 
 @pytest.fixture
@@ -60,7 +67,7 @@ def test_units_stand_for_scales_and_what_the_logger_did_is_kept(bring: Any) -> N
     assert code == 0
     assert np.allclose(run.columns["master"]["column_displacement"], 1e-3 * LATE, atol=1e-11)
     assert np.allclose(run.columns["master"]["column_force"], 1e3 * FORCE, atol=1e-5)
-    stated = imported(run).channel("master", "column_force")
+    stated = known(run).channel("master", "column_force")
     assert (stated.delay, stated.resolution, stated.calibration) == (0.002, 100.0, 0.01)
     assert stated.filter == LoggerFilter("butterworth", 4, 100.0)
     assert stated.rate == pytest.approx(100.0)
@@ -70,7 +77,7 @@ def test_units_stand_for_scales_and_what_the_logger_did_is_kept(bring: Any) -> N
 def test_rows_between_the_ticks_are_marked(bring: Any, capsys: Any) -> None:
     code, run = bring(table("t,u,y", 1.05 * TIMES, COMMAND, LATE), DRIVE)
     assert code == 0
-    assert imported(run).channel("master", "column_displacement").interpolated
+    assert known(run).channel("master", "column_displacement").interpolated
     said = capsys.readouterr().out
     assert "interpolated onto the ticks, and marked so: actuator_command, column_displacement" in said
     assert (
@@ -103,9 +110,9 @@ def test_start_and_stop_cut_the_data(bring: Any) -> None:
 def test_static_data_keep_their_rows_and_need_no_time(bring: Any) -> None:
     code, run = bring(table("u,y,f", COMMAND, COMMAND, FORCE), DRIVE, "static = true\n")
     assert code == 0
-    assert imported(run).static
+    assert known(run).static
     assert run.ticks("master") == 400
-    assert not imported(run).channel("master", "column_displacement").interpolated
+    assert not known(run).channel("master", "column_displacement").interpolated
 
 
 def test_numbers_of_messages_are_held_and_stamps_belong_together(bring: Any, capsys: Any) -> None:

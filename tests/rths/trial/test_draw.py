@@ -21,7 +21,6 @@ from validation.blind import lots
 from validation.blind.draw import (
     KINDS,
     NOISE,
-    SHARES,
     UNCERTAIN,
     begin,
     between,
@@ -33,6 +32,7 @@ from validation.blind.draw import (
     peak_drift,
 )
 from validation.blind.library import Library, Stranger, shipped
+from validation.blind.sets import SHARES
 
 
 def softer(system: System, factor: float) -> System:
