@@ -103,6 +103,12 @@ def named_slaves(given: object) -> dict[str, dict[str, Any]]:
     """
     if not isinstance(given, dict) or given.keys() <= {"rig", "kind"}:
         return {}
+    if "kind" in given:
+        tables = ", ".join(f"[slave.NAME.{name}]" for name in given if name in INTERFACE)
+        raise PlanError(
+            "[slave] gives a kind beside tables, but a slave with tables of its own has a name: write the kind in "
+            f"[slave.NAME]{f', and {tables}' * bool(tables)}."
+        )
     for name, table in given.items():
         if not isinstance(table, dict):
             raise PlanError(

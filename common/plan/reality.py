@@ -142,7 +142,12 @@ def laboratories(tables: dict[str, Any], plan: Plan) -> dict[str, dict[str, Any]
             raise PlanError(f"[{role}] must be a table, not {lab!r}.")
         for name in lab:
             if name not in known:
-                raise PlanError(f"Unknown key '{name}' in [{role}]: {nearest(name, known)}")
+                hint = nearest(name, known)
+                if name in OF_LABORATORY and role == SLAVE:
+                    hint = (
+                        f"a slave without a name has [{name}] itself; name it in the plan for one of its own."
+                    )
+                raise PlanError(f"Unknown key '{name}' in [{role}]: {hint}")
     return labs
 
 

@@ -435,7 +435,10 @@ class DeviceTable:
 
 @dataclass(frozen=True)
 class LaboratoryTable:
-    """Master or slave: what stands in its laboratory."""
+    """Master or slave: what stands in its laboratory.
+
+    The slave without a name has the plan's own tables: of the master's kind it is a twin of the master's laboratory.
+    """
 
     rig: RigTable = field(default_factory=RigTable, metadata={"table": RigTable, "more": False})
     kind: str = key(

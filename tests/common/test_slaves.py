@@ -77,6 +77,11 @@ WRONG = {
         "[slave.roof.table]\ndelay = -1.0\n",
         r"delay in \[slave.roof.table\] is -1.0, but must be",
     ),
+    "a kind without a name beside tables": (
+        '[slave]\nkind = "column"\n[slave.column]\nstorey = 1\n',
+        r"write the kind in \[slave.NAME\], and \[slave.NAME.column\]",
+    ),
+    "a kind for all": ('[slave]\nkind = "table"\n[slave.a.rig]\n', r"write the kind in \[slave.NAME\]\."),
     "no table": ("[slave.roof]\ndamper = 3\n", r"\[slave.roof.damper\] must be a table, not 3"),
     "no slave": ("[slave]\nroof = 3\n", r"roof in \[slave\] is 3: give \[slave.rig\]"),
     "floor that is not there": (

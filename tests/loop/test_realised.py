@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common.errors import InputError, RthsError
+from common.errors import InputError, PlanError, RthsError
 from common.plan import reality
 from common.plan.plan import Plan
-from common.plan.read import from_tables, with_test
+from common.plan.read import from_tables, parse, with_test
 from common.plan.reality import Reality
 from common.recording.reader import Run, read
 from common.roles import MASTER, SLAVE, kind_of
@@ -250,6 +250,19 @@ def test_a_plug_in_of_the_plan_counts_too(plan: Plan) -> None:
     planned = from_tables(tables, plan.base)
     with pytest.raises(InputError, match=r"'table\.gain' cannot be laid over the plug-in in \[slave\.rig\]"):
         true_system(real(planned, effect("table.gain", factor=0.9)))
+
+
+def test_a_slave_without_a_name_of_the_masters_kind_is_its_twin() -> None:
+    planned = parse('[slave]\nkind = "column"\n', Path())
+    found = effect("column.friction", force=900.0, laboratory=SLAVE)
+    truth = real(planned, found, column={"stiffness": 13e6})
+    master, slave = true_system(truth), true_slaves(truth)[SLAVE]
+    assert master.plan.column.stiffness == slave.plan.column.stiffness == 13e6
+    assert (master.effects.column.friction, slave.effects.column.friction) == (0.0, 900.0)
+    with pytest.raises(
+        PlanError, match=r"'column' in \[slave\]: a slave without a name has \[column\] itself"
+    ):
+        real(planned, slave={"column": {"stiffness": 13e6}})
 
 
 def test_a_plug_in_of_a_named_slave_counts_too() -> None:
