@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 from common.plan.limits import Change, Frozen, Guard, Lasting, LimitViolation, Standstill
 from common.plan.plan import Plan
+from common.signals import UNITS_OF_RATES
 from laboratories.kind import Kind, Sensed
 
 
@@ -17,6 +18,16 @@ class SensorPart(NamedTuple):
     readings: Callable[[Any], Any]
     drive: int
     frozen: Frozen
+
+
+def quantities(kind: Kind) -> dict[str, str]:
+    """The units of what a kind of laboratory may limit, by name."""
+    channels, limited = kind.channels, kind.limited
+    found = {signal.name: signal.unit for signal in (*channels.driving, channels.command, *channels.measured)}
+    found |= dict(zip(channels.rates, UNITS_OF_RATES, strict=True))
+    found |= {limited.step: "m", limited.velocity: "m/s", limited.acceleration: "m/s²"}
+    found |= {limited.effort_step: "N", limited.error: "m"}
+    return {name: unit for name, unit in found.items() if name}
 
 
 class LaboratoryLimits:
@@ -29,10 +40,9 @@ class LaboratoryLimits:
         limits, channels, interval = kind.limits(plan), kind.channels, plan.test.interval
         limited, self._plan = kind.limited, plan
         noise = dict(zip(channels.names, kind.noise(plan).tolist(), strict=True))
-        signals = (*channels.driving, channels.command, *channels.measured)
-        units = {signal.name: signal.unit for signal in signals}
-        self._measurements = Guard(limits, channels.names, units=units)
-        self._commands = Guard(limits, channels.drives, units=units)
+        self._units = quantities(kind)
+        self._measurements = Guard(limits, channels.names, units=self._units)
+        self._commands = Guard(limits, channels.drives, units=self._units)
         self._changes = [
             Change(
                 limits,
@@ -74,7 +84,7 @@ class LaboratoryLimits:
         for part in self._parts:  # each has to see every reading
             frozen = part.frozen.violation(part.readings(measured), self._wrote[part.drive])
             found = found or frozen
-        return found
+        return found._replace(unit=self._units[found.name]) if isinstance(found, LimitViolation) else found
 
     def written(self, command: tuple[float, ...]) -> None:
         """The rig was given this command."""
@@ -111,5 +121,4 @@ def sent_guard(kind: Kind, plan: Plan) -> Guard:
     """The limits on what a laboratory of a kind is told at a tick: target, motor's force, the target's rates."""
     channels = kind.channels
     effort = channels.effort.name if channels.effort else ""
-    signals = {signal.name: signal.unit for signal in channels.driving}
-    return Guard(kind.limits(plan), (channels.target.name, effort, *channels.rates), units=signals)
+    return Guard(kind.limits(plan), (channels.target.name, effort, *channels.rates), units=quantities(kind))

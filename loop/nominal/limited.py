@@ -9,9 +9,10 @@ import numpy as np
 from common.plan.plan import Plan
 from common.plan.tables import Limits
 from common.roles import MASTER
-from common.signals import OF_STOREYS, UNITS_OF_RATES
+from common.signals import OF_STOREYS
 from laboratories.kind import Kind
 from laboratories.kinds import kinds_of
+from laboratories.limits import quantities
 from models.registry import Array
 
 PATIENCE = 3  # intervals for which an error must be beyond its limit
@@ -30,16 +31,6 @@ def most(plan: Plan) -> dict[str, float]:
                 found[name] = min(limits[name], found.get(name, limits[name]))
     order = {name: place for place, name in enumerate(given)}
     return dict(sorted(found.items(), key=lambda one: order.get(one[0], len(order))))
-
-
-def quantities(kind: Kind) -> dict[str, str]:
-    """The units of what a kind of laboratory may limit, by name."""
-    channels, limited = kind.channels, kind.limited
-    found = {signal.name: signal.unit for signal in (*channels.driving, channels.command, *channels.measured)}
-    found |= dict(zip(channels.rates, UNITS_OF_RATES, strict=True))
-    found |= {limited.step: "m", limited.velocity: "m/s", limited.acceleration: "m/s²"}
-    found |= {limited.effort_step: "N", limited.error: "m"}
-    return {name: unit for name, unit in found.items() if name}
 
 
 def unit_of(plan: Plan, name: str) -> str:

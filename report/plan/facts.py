@@ -10,10 +10,11 @@ from common.lab.preflight import PreflightCheck
 from common.plan.kinds import COLUMN, TABLE
 from common.plan.plan import Plan
 from common.roles import MASTER
-from laboratories.kinds import kind_of, kinds_of
+from laboratories.kinds import kind_of
 from loop import substructure
+from loop.nominal import limited
 from loop.nominal.partition import felt, matrices, taken_over
-from loop.nominal.preflight import LIMITS, Findings, expected_delay, findings
+from loop.nominal.preflight import Findings, expected_delay, findings
 from models.ground_motion import GroundMotion
 from models.structures import shear_building
 from recorder import space
@@ -152,19 +153,13 @@ def peaks(plan: Plan, found: Findings) -> dict[str, Any]:
     """Peaks of the simulated test and their limits; none of a loop that is unstable."""
     if found.unstable or found.peaks is None:
         return {}
-    limits: dict[str, float] = dict(vars(plan.limits))
-    units = {name: one.unit for name, one in LIMITS.items()}
-    for role, kind in kinds_of(plan).items():
-        limits |= kind.limits(plan.of(role))
-        channels = kind.channels
-        units |= {row.name: row.unit for row in (*channels.driving, channels.command, *channels.measured)}
+    most = limited.most(plan)
     return {
         name: {
             "peak": peak,
-            "limit": finite(limits[name]),
-            "share": peak / limits[name],
-            "unit": units.get(name, ""),
+            "limit": finite(most[name]),
+            "share": peak / most[name],
+            "unit": limited.unit_of(plan, name),
         }
         for name, peak in found.peaks.every.items()
-        if name in limits
     }

@@ -102,6 +102,7 @@ def test_limits_that_the_plan_writes_out_stop_such_a_slave(kind: str, tmp_path: 
     run = played(plan, tmp_path / "a.mcap", {MASTER: STRONG})
     (limit,) = [event for event in run.events if event["code"] == "limit"]
     assert any(name.endswith("_velocity") for name in limit["values"])
+    assert limit["text"].endswith(" m/s.")
 
 
 def test_what_is_patient_is_told_with_its_reason(undisturbed: Run) -> None:

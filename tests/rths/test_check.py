@@ -13,6 +13,7 @@ from common.terminal import cli
 from loop.nominal import preflight
 from report.plan import classes
 from rths.perform.run import checks
+from tests.helpers import ROOT
 
 SHORT = "[test]\nduration = 4.0\n[control]\namd = false\n"
 
@@ -33,6 +34,19 @@ def test_the_default_plan_in_figures(call: Any, capsys: Any) -> None:
     assert facts["delay"]["margin"] == pytest.approx(facts["delay"]["critical"] / facts["delay"]["expected"])
     assert facts["peaks"]["damper_stroke"]["peak"] == pytest.approx(0.048, abs=1e-3)
     assert facts["recording"]["bytes"] == pytest.approx(10e6, rel=0.2)
+
+
+def test_every_peak_of_a_kind_of_ones_own_has_its_unit(call: Any, capsys: Any) -> None:
+    code, facts = checked(call, capsys, ROOT / "examples" / "viscous_damper.toml")
+    units = {name: peak["unit"] for name, peak in facts["peaks"].items() if name.startswith("piston")}
+    assert code == 0
+    assert units == {
+        "piston_command": "m",
+        "piston_displacement": "m",
+        "piston_force": "N",
+        "piston_velocity": "m/s",
+        "piston_error": "m",
+    }
 
 
 def test_it_computes_what_pre_flight_computes(tmp_path: Path) -> None:
