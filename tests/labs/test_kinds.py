@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from common.plan import read as plans
 from common.plan.plan import Plan
 from common.plan.reality import as_planned
 from common.recording.reader import Run, read
@@ -17,22 +16,18 @@ from loop import substructure
 from loop.closed_loop import rows, simulate
 from simulation import virtual
 from tests.helpers import with_table
+from tests.shapes import plan_of
 
-SHORT = "[test]\nduration = 0.6\n[ground_motion]\nscale = 3.0\n[control]\namd = false\n"
-TWO = "[structure]\nmass = [160e3, 160e3]\nstiffness = [25e6, 25e6]\ndamping = [1e5, 1e5]\n"
-PLANS = {
-    "single site": SHORT + '[slave]\nkind = "none"\n',
-    "two columns": SHORT + '[slave]\nkind = "column"\n',
-    "two storeys": SHORT + TWO + '[slave.up]\nkind = "column"\n[slave.up.column]\nstorey = 2\n',
-    "no rig at the master": SHORT
-    + '[master]\nkind = "none"\n[slave.a]\nkind = "column"\n[slave.b]\nkind = "table"\n',
-    "swapped": "[test]\nduration = 0.6\n[ground_motion]\nscale = 3.0\n"
-    + '[master]\nkind = "table"\n[slave]\nkind = "column"\n',
-}
+SHAPES = ("two_columns", "two_storeys", "single_site", "two_slaves", "swapped")
 
 
-def plan_of(name: str) -> Plan:
-    return plans.parse(PLANS[name], Path(), name)
+def short(shape: str) -> Plan:
+    return plan_of(
+        shape,
+        test={"duration": 0.7},
+        ground_motion={"scale": 3.0},
+        control={"amd": shape == "swapped"},
+    )
 
 
 def played(plan: Plan, path: Path, *, completed: bool = True) -> tuple[virtual.VirtualTest, Run]:
@@ -42,9 +37,9 @@ def played(plan: Plan, path: Path, *, completed: bool = True) -> tuple[virtual.V
     return bench, read(path)
 
 
-@pytest.mark.parametrize("name", PLANS)
+@pytest.mark.parametrize("name", SHAPES)
 def test_every_shape_of_test_equals_the_compiled_rollout_and_ends_at_rest(name: str, tmp_path: Path) -> None:
-    plan = plan_of(name)
+    plan = short(name)
     bench, found = played(plan, tmp_path / "a.mcap")
     ground = substructure.ground_rows(plan, substructure.motion(plan))
     expected: dict[str, list[tuple[object, ...]]] = {}
@@ -64,11 +59,11 @@ def test_every_shape_of_test_equals_the_compiled_rollout_and_ends_at_rest(name: 
             assert abs(ramp["column_force"][-1]) < 0.1 * abs(found.columns[role]["column_force"]).max()
 
 
-@pytest.mark.parametrize("role", ["slave", "master"])
+@pytest.mark.parametrize("role", ["slave.east", "master"])
 def test_a_limit_of_either_column_brings_both_to_rest_unloaded(role: str, tmp_path: Path) -> None:
-    plan = plan_of("two columns")
+    plan = short("two_columns")
     _, whole = played(plan, tmp_path / "a.mcap")
-    force = {lab: abs(whole.columns[lab]["column_force"]).max() for lab in ("master", "slave")}
+    force = {lab: abs(whole.columns[lab]["column_force"]).max() for lab in ("master", "slave.east")}
     few = with_table(plan, "limits", column_force=0.5 * force[role])
     bench, found = played(few, tmp_path / "b.mcap", completed=False)
     assert {loop.lab.safety.mode for loop in bench.loops.values()} == {Mode.SAFE}
@@ -80,11 +75,11 @@ def test_a_limit_of_either_column_brings_both_to_rest_unloaded(role: str, tmp_pa
 
 
 def test_a_slave_without_a_word_ends_the_test_and_the_other_column_unloads(tmp_path: Path) -> None:
-    plan = with_table(plan_of("two columns"), "link", loss_timeout=0.1)
+    plan = with_table(short("two_columns"), "link", loss_timeout=0.1)
     plan = with_table(plan, "recording", patience=0.5)
     bench = virtual.assemble(plan, as_planned(plan), tmp_path / "a.mcap")
     virtual.play(bench, pause=lambda: bench.master.ticks >= 200)
-    bench.world.process("slave").kill()
+    bench.world.process("slave.east").kill()
     virtual.play(bench)
     assert bench.master.lab.safety.mode is Mode.SAFE
     ramp = read(tmp_path / "a.mcap").ramps["master"]

@@ -20,7 +20,7 @@ from report.pictures.figure import figure
 from rths.examine import layout
 from rths.examine.export import flat
 from rths.examine.import_map import lab_signals
-from tests.rths import shapes
+from tests.rths import sines
 
 A, B = "column A", "column B"
 NAMES = {  # of the laboratories, by shape
@@ -34,10 +34,10 @@ NAMES = {  # of the laboratories, by shape
 }
 SYSTEMS = {
     "default": {"actuator", "table"},
-    "two_columns": {"actuator", "actuator.slave"},
-    "two_storeys": {"actuator", "actuator.upper"},
+    "two_columns": {"actuator", "actuator.east"},
+    "two_storeys": {"actuator", "actuator.above"},
     "single_site": {"actuator"},
-    "two_slaves": {"actuator.west", "table.east"},
+    "two_slaves": {"actuator.columns", "table.dampers"},
     "own": {"actuator", "piston"},
     "own_lost": {"actuator", "piston"},
 }
@@ -48,10 +48,10 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]
     """The recording of a shape, written once."""
     folder = tmp_path_factory.mktemp("shapes")
     made: dict[str, Path] = {}
-    return lambda shape: made.setdefault(shape, made.get(shape) or shapes.write(shape, folder))
+    return lambda shape: made.setdefault(shape, made.get(shape) or sines.write(shape, folder))
 
 
-@pytest.fixture(params=shapes.SHAPES)
+@pytest.fixture(params=sines.SHAPES)
 def shape(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 
@@ -70,7 +70,7 @@ def test_the_summary_says_how_every_laboratory_followed(shape: str, run: Run) ->
     json.dumps(found)
     assert set(found["tracking"]) == SYSTEMS[shape]
     # every laboratory measures one tick late; a slave's target is for the end of its interval
-    assert {name: round(facts["delay"] / shapes.INTERVAL) for name, facts in found["tracking"].items()} == {
+    assert {name: round(facts["delay"] / sines.INTERVAL) for name, facts in found["tracking"].items()} == {
         name: 1 if name == "actuator" else 0 for name in SYSTEMS[shape]
     }
     assert len(found["force_paths"]) == sum(name.startswith("column") for name in NAMES[shape])
@@ -144,7 +144,7 @@ def test_layout_and_export_hold_every_laboratory(
 
 
 def test_an_import_map_can_name_the_signals_of_both_columns() -> None:
-    known = lab_signals(shapes.plan_of("two_columns"))
+    known = lab_signals(sines.plan_of("two_columns"))
     assert known["column_force"][0] == "master"
-    assert known["slave.column_force"][0] == "slave"
-    assert lab_signals(shapes.plan_of("two_slaves"))["west.column_force"][0] == "slave.west"
+    assert known["east.column_force"][0] == "slave.east"
+    assert lab_signals(sines.plan_of("two_slaves"))["columns.column_force"][0] == "slave.columns"

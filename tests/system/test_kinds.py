@@ -7,19 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from common.plan import read as plans
 from common.recording.reader import Run, read
-from tests.helpers import PATIENT
-from tests.labs.test_kinds import PLANS
+from tests.shapes import SHIPPED, plan_of
 from tests.system.test_real_time import finish, start, wait_for_ticks
 
 pytestmark = pytest.mark.slow
-
-
-def plan_file(name: str, folder: Path) -> Path:
-    path = folder / "plan.toml"
-    path.write_text(PLANS[name] + PATIENT)
-    return path
 
 
 def unloaded(recording: Run, role: str) -> bool:
@@ -31,12 +23,12 @@ def unloaded(recording: Run, role: str) -> bool:
     return bool(abs(left) < 0.1 * largest)
 
 
-@pytest.mark.parametrize("name", PLANS)
+@pytest.mark.parametrize("name", SHIPPED)
 def test_a_real_test_of_every_shape_is_complete(name: str, tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
-    code, out, err = finish(start("run", plan_file(name, tmp_path), "-o", path))
+    code, out, err = finish(start("run", SHIPPED[name], "--duration", "1", "-o", path))
     assert code == 0, out + err
-    plan, recording = plans.load(tmp_path / "plan.toml"), read(path)
+    plan, recording = plan_of(name, test={"duration": 1.0}), read(path)
     assert recording.finished
     assert recording.metadata["summary"]["cause"] == "completed"
     assert recording.roles == plan.roles
@@ -47,13 +39,11 @@ def test_a_real_test_of_every_shape_is_complete(name: str, tmp_path: Path) -> No
 
 def test_ctrl_c_unloads_the_column_of_a_slave(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
-    process = start(
-        "run", plan_file("two columns", tmp_path), "--duration", "60", "--scale", "0.5", "-o", path
-    )
-    wait_for_ticks(path, 1500)
+    process = start("run", "two_columns", "--scale", "0.5", "-o", path)
+    wait_for_ticks(path, 1000)
     process.send_signal(signal.SIGINT)
     code, out, err = finish(process, 20.0)
     assert code == 3, out + err
     recording = read(path)
     assert unloaded(recording, "master")
-    assert unloaded(recording, "slave")
+    assert unloaded(recording, "slave.east")

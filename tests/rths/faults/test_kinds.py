@@ -11,7 +11,7 @@ from common.plan.reality import as_planned
 from common.protocol import codec
 from common.safety.modes import Mode
 from tests.helpers import with_table, without_recorder
-from tests.labs.test_kinds import plan_of
+from tests.shapes import plan_of
 from validation.faults import hostile
 from validation.faults.invariants import judge
 from validation.faults.lab import Simulation
@@ -19,12 +19,12 @@ from validation.faults.wire import INSIDER
 
 
 def simulation_of(name: str) -> Simulation:
-    plan = without_recorder(plan_of(name))
+    plan = without_recorder(plan_of(name, test={"duration": 0.6}))
     plan = with_table(replace(plan, eased=()), "safety", hold_after=3, ramp_after=5, overrun=5)
     return Simulation(plan, as_planned(plan))
 
 
-@pytest.mark.parametrize("name", ["single site", "two columns", "no rig at the master"])
+@pytest.mark.parametrize("name", ["single_site", "two_columns", "two_slaves"])
 def test_in_a_perfect_world_every_shape_of_test_keeps_what_must_hold(name: str) -> None:
     simulation = simulation_of(name)
     simulation.run()
@@ -33,18 +33,20 @@ def test_in_a_perfect_world_every_shape_of_test_keeps_what_must_hold(name: str) 
 
 
 def test_a_killed_column_slave_leaves_the_master_at_rest() -> None:
-    simulation = simulation_of("two columns")
-    simulation.world.at(round(0.6e9), simulation.world.processes["slave"].kill)
+    simulation = simulation_of("two_columns")
+    simulation.world.at(round(0.6e9), simulation.world.processes["slave.east"].kill)
     simulation.run()
     assert judge(simulation) == []
     assert simulation.loops["master"].lab.safety.mode is Mode.SAFE
 
 
 def test_a_feedback_of_another_count_of_channels_is_rejected() -> None:
-    simulation = simulation_of("two columns")
+    simulation = simulation_of("two_columns")
     plan = simulation.plan
     route = next(
-        one for one in simulation.wire.directions if one.route.role == "slave" and one.route.channel == TICK
+        one
+        for one in simulation.wire.directions
+        if one.route.role == "slave.east" and one.route.channel == TICK
     )
     key = codec.session_key(1, plan.digest())
     four = hostile.letter(hostile.feedback(1, 100_000, 1e9, channels=4), key, INSIDER)

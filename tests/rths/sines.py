@@ -8,41 +8,24 @@ from pathlib import Path
 import numpy as np
 
 from common.plan.plan import Plan
-from common.plan.read import parse
 from common.recording.reader import CLOCK
 from common.recording.writer import Recording
 from common.signals import LATENCY as LATENCY_ROWS
 from common.signals import FieldType, Signal
 from laboratories import kinds
-from tests.helpers import ROOT
+from tests import shapes
 
 TICKS = 1500
 INTERVAL = 2e-3
 SIZES = {"m": 5e-3, "m/s": 0.06, "m/s²": 0.8, "m/s³": 9.0, "N": 40.0}  # amplitudes by unit
 FREQUENCY = 2.0  # Hz
 LATE = 1  # ticks by which a measurement follows its target
-TWO_STOREYS = """
-[structure]
-mass = [160e3, 150e3]
-stiffness = [25e6, 20e6]
-damping = [200e3, 180e3]
-"""
-OWN = f'kind = "{ROOT / "examples/viscous_damper.py"}:ViscousDamper"'
-SHAPES = {
-    "default": "",
-    "two_columns": '[slave]\nkind = "column"\n',
-    "two_storeys": TWO_STOREYS + '[slave.upper]\nkind = "column"\n[slave.upper.column]\nstorey = 2\n',
-    "single_site": '[slave]\nkind = "none"\n',
-    "two_slaves": '[master]\nkind = "none"\n[slave.west]\nkind = "column"\n[slave.east]\nkind = "table"\n',
-    "own": f"[slave]\n{OWN}\n",
-    "own_lost": '[slave]\nkind = "nowhere.py:Device"\n',
-}
+SHAPES = ("default", "two_columns", "two_storeys", "single_site", "two_slaves", "own", "own_lost")
 
 
 def plan_of(shape: str) -> Plan:
     """The plan of a shape, over the ticks of its recording."""
-    text = f'[test]\nname = "{shape}"\nduration = {TICKS * INTERVAL}\n{SHAPES[shape]}'
-    return parse(text, ROOT)
+    return shapes.plan_of(shape, test={"name": shape, "duration": TICKS * INTERVAL})
 
 
 def write(shape: str, folder: Path) -> Path:
