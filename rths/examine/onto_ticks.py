@@ -115,8 +115,7 @@ def channel(source: SignalSource, row: Signal, rate: float, *, between: bool) ->
 
 def time_base(mapping: ImportMap, table: DataTable, data: Path) -> tuple[Array, Any]:
     """Times of the rows that are read, s, and which rows those are; raises InputError where they do not increase."""
-    count = len(next(iter(table.columns.values())))
-    counted = np.arange(count, dtype=np.float64) / (mapping.rate or 1.0)
+    counted = np.arange(length(mapping, table, data), dtype=np.float64) / (mapping.rate or 1.0)
     t = pick(table, mapping.time, data) if mapping.time else counted
     bad = np.flatnonzero(~(np.diff(t) > 0.0))
     if not mapping.static and (bad.size or t.size < 2):
@@ -132,6 +131,16 @@ def time_base(mapping: ImportMap, table: DataTable, data: Path) -> tuple[Array, 
             f"{data}: fewer than two rows lie between start and stop; its times go from {t[0]:g} to {t[-1]:g} s."
         )
     return t[rows], rows
+
+
+def length(mapping: ImportMap, table: DataTable, data: Path) -> int:
+    """How many rows the columns of the map have; raises InputError where they differ."""
+    names = [*([mapping.time] if mapping.time else []), *(row.column for row in mapping.signals.values())]
+    sizes = {name: pick(table, name, data).size for name in names if name}
+    if len(set(sizes.values())) > 1:
+        said = ", ".join(f"'{name}' {size}" for name, size in sizes.items())
+        raise InputError(f"{data}: the columns of the map have different numbers of rows: {said}.")
+    return next(iter(sizes.values()), 0)
 
 
 def pick(table: DataTable, name: str, data: Path) -> Array:

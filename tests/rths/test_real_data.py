@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import runpy
 from pathlib import Path
 from typing import Any
 
@@ -82,3 +83,15 @@ def test_a_fibre_column_yields_and_softens_with_the_drift_it_has_seen(name: str,
     assert set(report["which"][0]["effects"]) == {"column.yielding", "column.degradation"}
     assert report["status"] == "partly_explained"
     assert report["how_far"]["after"] < 0.15 * report["how_far"]["before"]
+
+
+@pytest.mark.slow  # compiles the kind; the page of the documents runs the same commands
+def test_a_friction_damper_fitted_to_three_sines_predicts_the_others(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    runpy.run_path(str(EXAMPLES / "friction_damper_fits.py"), run_name="__main__")
+    rows = [line.split() for line in capsys.readouterr().out.splitlines() if "mm" in line]
+    missed = {(float(row[0]), float(row[2])): float(row[5]) for row in rows if row[4] == "predicted"}
+    assert len(missed) == 10
+    assert max(value for (frequency, _), value in missed.items() if frequency <= 1.0) < 20.0
+    assert 30.0 < missed[2.0, 19.0] < 45.0  # it chatters, which no law from displacement to force can hold
