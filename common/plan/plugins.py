@@ -47,7 +47,8 @@ def find(reference: str, base: Path, where: str) -> type[Any]:
 def _from_file(path: Path) -> ModuleType:
     if not path.is_file():
         raise InputError(
-            f"There is no file {path}: a plug-in's path starts from the folder of the plan or reality."
+            f"There is no file {path}: a plug-in's path starts from the folder of the plan, reality or recording "
+            "that names it."
         )
     digest = hashlib.blake2b(bytes(path.resolve()), digest_size=8).hexdigest()
     name = f"rths_plugin_{path.stem}_{digest}"  # the same in every process, as what is compiled of it is kept by name

@@ -125,6 +125,10 @@ def figures(run: Run) -> Figures:
         InputError: it has no latency of any tick.
     """
     topics = [latency_topic(role) for role in run.roles]
+    if not topics:
+        raise InputError(
+            f"{run.path} is of a test without slaves, which has no latency: a budget judges the exchange with them."
+        )
     if not any(run.has(topic) for topic in topics):
         raise InputError(
             f"{run.path} holds no latency of any tick: give one of a whole test, as rths run makes it."

@@ -5,22 +5,23 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from common.errors import InputError
 from common.roles import MASTER, SLAVE, latency_topic, title
-from common.signals import SENT
 from common.terminal import cli
 from common.terminal.printable import shown
 from common.terminal.telling import Tell, untold
 from report.text.progress import Progress
 
 if TYPE_CHECKING:
+    from common.plan.plan import Plan
     from common.recording.reader import Run
     from master.step import Outputs
 
-HELD = ("actuator_command", *SENT)
+NOWHERE = (0.0, 0.0)  # position and force of a laboratory that is not there
 
 
 @dataclass
@@ -46,6 +47,11 @@ class Match:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `replay`."""
     cli.recording_argument(parser)
+    parser.add_argument(
+        "--plan",
+        metavar="PLAN",
+        help="a plan file beside which the classes of its own kinds of laboratory are (default: beside FILE)",
+    )
     cli.json_argument(parser, "write the result as JSON on standard output")
 
 
@@ -55,7 +61,10 @@ def run(args: argparse.Namespace) -> int:
         from common.recording.reader import read
 
         recording = read(args.file)
-        matches = {**replay_master(recording, progress.tell), **replay_slave(recording, progress.tell)}
+        plan = planned(recording, args.plan)
+        matches = replay_master(recording, plan, progress.tell) | replay_slaves(
+            recording, plan, progress.tell
+        )
     result = {name: vars(match) for name, match in matches.items()}
     same = all(match.differing == 0 for match in matches.values())
     if args.json:
@@ -68,60 +77,109 @@ def run(args: argparse.Namespace) -> int:
     return 0 if same else 1
 
 
-def replay_master(recording: Run, tell: Tell = untold) -> dict[str, Match]:
-    """The building, the compensator and the damper's control again, from the first tick to the first hole."""
-    from master.step import MasterStep
-    from report.facts.laboratories import plan_of
+def planned(recording: Run, place: str | None = None) -> Plan:
+    """The whole plan in a recording; the files of its own kinds stand beside the recording, or the plan at `place`.
 
-    plan = plan_of(recording)
+    Raises:
+        InputError: the recording holds no plan, or one that cannot be read.
+    """
+    from report.facts.laboratories import whole_plan
+
+    plan = whole_plan(recording)
     if plan is None or not recording.has(MASTER):
         raise InputError(f"{recording.path} holds no plan and master's signals to replay.")
-    columns = {name: values.tolist() for name, values in recording.columns["master"].items()}
-    step = MasterStep(plan, ground_of(recording))
-    held = held_ticks(recording)
+    return plan if place is None else replace(plan, base=cli.plan_path(place).parent)
+
+
+def replay_master(recording: Run, plan: Plan, tell: Tell = untold) -> dict[str, Match]:
+    """The building and what all laboratories are told, from the first tick to the first hole."""
+    from laboratories import kinds
+    from master.step import MasterStep
+
+    columns = {name: values.tolist() for name, values in recording.columns[MASTER].items()}
+    step, host = MasterStep(plan, ground_of(recording)), kinds.own(plan)
+    own = host.channels if host else None
+    felt = [columns[name] for name in (own.position, own.force)] if own else []
+    used, names = forces_used(plan, columns), Told(plan)
+    held = held_ticks(recording, columns[own.command.name] if own else [])
     matches: dict[str, Match] = {}
-    command = dict.fromkeys(HELD, 0.0)
+    command = dict.fromkeys(names.held, 0.0)
     for tick, seq in enumerate(columns["seq"]):
         if seq != tick:
             break
         tell("the master's ticks", tick, len(columns["seq"]))
-        outputs = named(
-            step(
-                tick,
-                columns["column_displacement"][tick],
-                columns["column_force"][tick],
-                per_slave(columns["damper_force_used"][tick]),
-            )
-        )
+        here = [values[tick] for values in felt] or NOWHERE
+        outputs = names.of(step(tick, here[0], here[1], [values[tick] for values in used]))
         if tick in held:
             outputs |= command
-        command = {name: outputs[name] for name in HELD}
+        command = {name: outputs[name] for name in names.held}
         for name, value in outputs.items():
             matches.setdefault(name, Match()).take(columns["t"][tick], value, columns[name][tick])
-    return {f"master/{name}": match for name, match in matches.items()}
+    return {f"{MASTER}/{name}": match for name, match in matches.items()}
 
 
-def named(outputs: Outputs) -> dict[str, Any]:
-    """What the master computed, by the signals of its topic."""
-    sent = outputs.sent[0] if len(outputs.sent) == 1 else map(list, zip(*outputs.sent, strict=True))
-    storeys = outputs.of_storeys
-    return {
-        "ground_acceleration": outputs.ground_acceleration,
-        "column_target": outputs.target,
-        "actuator_command": outputs.command,
-        **dict(zip(SENT, sent, strict=True)),
-        **{name: values[0] if len(values) == 1 else values for name, values in storeys.items()},
-    }
+class Told:
+    """What the master computes, by the signals of its topic; those of `held` stay where a tick moves nothing."""
+
+    def __init__(self, plan: Plan) -> None:
+        from laboratories import kinds
+        from loop.names import sent_names
+
+        own, sent = kinds.own(plan), sent_names(plan)
+        self._own = own.channels if own else None
+        self._groups = [(group, sent[group[0][1]]) for group in slaves_alike(plan)]
+        written = self._own.drives if self._own else ()
+        self.held = (*written, *(name for _, names in self._groups for name in names))
+
+    def of(self, outputs: Outputs) -> dict[str, Any]:
+        """One tick's; of several slaves of a kind, and of several storeys, a value of each."""
+        found: dict[str, Any] = {"ground_acceleration": outputs.ground_acceleration}
+        if self._own:
+            found |= {self._own.target.name: outputs.target, self._own.command.name: outputs.command}
+            found |= {self._own.effort.name: outputs.effort} if self._own.effort else {}
+        for group, names in self._groups:
+            rows = [told(outputs.sent[place], names) for place, _ in group]
+            columns = rows[0] if len(rows) == 1 else map(list, zip(*rows, strict=True))
+            found |= dict(zip(names, columns, strict=True))
+        for name, values in outputs.of_storeys.items():
+            found[name] = values[0] if len(values) == 1 else values
+        return found
 
 
-def per_slave(values: float | list[float]) -> list[float]:
-    """What the master's topic has as one value where there is one slave, and as a list of several."""
-    return values if isinstance(values, list) else [values]
+def told(sent: tuple[float, ...], names: Sequence[str]) -> tuple[float, ...]:
+    """What a slave was sent, without the motor's force where its kind has none."""
+    return sent if len(names) == len(sent) else (sent[0], *sent[2:])
 
 
-def held_ticks(recording: Run) -> set[int]:
-    """Ticks in which the master moved nothing, because it came too late or stopped; then no slave was sent anything."""
-    topic = latency_topic(recording.roles[0]) if recording.roles else ""
+def slaves_alike(plan: Plan) -> list[list[tuple[int, str]]]:
+    """The slaves of each kind that share fields of the master's topic: place among all slaves, and role."""
+    from common.signals import alike
+    from laboratories.kinds import kind_of
+
+    groups = alike({role: kind_of(plan, role).channels for role in plan.roles})
+    return [[(plan.roles.index(role), role) for role in roles] for roles in groups.values()]
+
+
+def forces_used(plan: Plan, columns: dict[str, Any]) -> list[Any]:
+    """The force of each slave that the master used, tick by tick, in the plan's order of the slaves."""
+    from laboratories.kinds import kind_of
+
+    found: dict[int, Any] = {}
+    for group in slaves_alike(plan):
+        values = columns[f"{kind_of(plan, group[0][1]).channels.force}_used"]
+        several = [values] if len(group) == 1 else list(zip(*values, strict=True))
+        found |= {place: one for (place, _), one in zip(group, several, strict=False)}
+    return [found.get(place, ()) for place in range(len(plan.roles))]
+
+
+def held_ticks(recording: Run, commands: Sequence[float]) -> set[int]:
+    """Ticks in which the master moved nothing, because it came too late or stopped; then no slave was sent anything.
+
+    A test without slaves records no latency: there it is where the command for the master's own rig is the last one.
+    """
+    if not recording.roles:
+        return {tick for tick in range(1, len(commands)) if commands[tick] == commands[tick - 1]}
+    topic = latency_topic(recording.roles[0])
     if not recording.has(topic):
         return set()
     latency = recording.columns[topic]
@@ -141,61 +199,63 @@ def ground_of(recording: Run) -> Any:
     return np.frombuffer(recording.attachments[GROUND], dtype="<f8").reshape(2, -1).copy()
 
 
-def replay_slave(recording: Run, tell: Tell = untold) -> dict[str, Match]:
+def replay_slaves(recording: Run, plan: Plan, tell: Tell = untold) -> dict[str, Match]:
     """What each slave did with the commands it had, and the master with the feedbacks it had."""
+    from laboratories.kinds import kind_of
+
     matches: dict[str, Match] = {}
     for role in recording.roles:
         if recording.has(role):
             tell(f"what the {title(role)} did", 0, 0)
-            suffix = role.removeprefix(SLAVE)
-            for name, match in replay_exchange(recording, role).items():
-                place = f"{MASTER}/{name}{suffix}" if name == "damper_force_used" else f"{role}/{name}"
-                matches[place] = match
+            used, suffix = f"{kind_of(plan, role).channels.force}_used", role.removeprefix(SLAVE)
+            for name, match in replay_exchange(recording, plan, role).items():
+                matches[f"{MASTER}/{name}{suffix}" if name == used else f"{role}/{name}"] = match
     return matches
 
 
-def replay_exchange(whole: Run, role: str) -> dict[str, Match]:
-    """Both directions of the exchange with one slave, and its table's command."""
-    recording = whole.of(role)
-    slave = {name: values.tolist() for name, values in recording.columns["slave"].items()}
-    master = {name: values.tolist() for name, values in recording.columns["master"].items()}
+def replay_exchange(whole: Run, plan: Plan, role: str) -> dict[str, Match]:
+    """Both directions of the exchange with one slave, and the command of its transfer system."""
+    from laboratories.kinds import kind_of
+    from loop.names import sent_names
+
+    recording, channels = whole.of(role), kind_of(plan, role).channels
+    slave = {name: values.tolist() for name, values in recording.columns[SLAVE].items()}
+    master = {name: values.tolist() for name, values in recording.columns[MASTER].items()}
     sent = {seq: place for place, seq in enumerate(master["seq"])}
     read = {seq: place for place, seq in enumerate(slave["seq"])}
-    matches = {name: Match() for name in (*SENT, "table_command", "damper_force_used")}
+    pairs = list(zip(sent_names(plan)[role], channels.sent, strict=True))
+    force, used = channels.force, f"{channels.force}_used"
+    matches = {name: Match() for name in (*channels.sent, channels.command.name, used)}
     ramp = whole.ramps.get(role, {}).get("seq", ())
-    replay_table(recording, slave, matches["table_command"], set(map(int, ramp)))
+    replay_command(plan, role, slave, matches[channels.command.name], set(map(int, ramp)))
     for place, t in enumerate(slave["t"]):
         if (source := sent.get(slave["command_seq"][place])) is not None:
-            for name in SENT:
-                matches[name].take(t, master[name][source], slave[name][place])
+            for there, here in pairs:
+                matches[here].take(t, master[there][source], slave[here][place])
     for place, t in enumerate(master["t"]):
-        if (source := read.get(master["damper_force_seq"][place])) is not None:
-            matches["damper_force_used"].take(
-                t, slave["damper_force"][source], master["damper_force_used"][place]
-            )
+        if (source := read.get(master[f"{force}_seq"][place])) is not None:
+            matches[used].take(t, slave[force][source], master[used][place])
     return matches
 
 
-def replay_table(recording: Run, slave: dict[str, Any], match: Match, ramped: set[int]) -> None:
-    """The table's compensator again, from the first tick to the first hole; not where it was `ramped` to rest."""
+def replay_command(plan: Plan, role: str, slave: dict[str, Any], match: Match, ramped: set[int]) -> None:
+    """The slave's compensator again, from the first tick to the first hole; not where it was `ramped` to rest."""
     from common.protocol.messages import Command
-    from common.rig import TableMeasurement
-    from laboratories.table.kind import TABLE
-    from report.facts.laboratories import plan_of
+    from laboratories.kinds import kind_of
     from slave.step import SlaveStep
 
-    plan = plan_of(recording)
-    if plan is None:
-        return
-    step = SlaveStep(plan, TABLE)
+    kind = kind_of(plan, role)
+    channels, step = kind.channels, SlaveStep(plan.of(role), kind)
     for place, (t, seq) in enumerate(zip(slave["t"], slave["seq"], strict=True)):
         if seq != place:
             break
-        command = Command(0, seq, 0, 0, -1, *(slave[name][place] for name in SENT))
-        measured = TableMeasurement(*(slave[name][place] for name in TableMeasurement._fields))
-        computed = step(command, measured)
+        target, *rates = (slave[name][place] for name in (channels.target.name, *channels.rates))
+        command = Command(
+            0, seq, 0, 0, -1, target, 0.0, *rates
+        )  # a motor's force does not pass the compensator
+        computed = step(command, tuple(slave[name][place] for name in channels.names))
         if seq not in ramped:
-            match.take(t, computed, slave["table_command"][place])
+            match.take(t, computed, slave[channels.command.name][place])
 
 
 def show(matches: dict[str, Match], same: bool) -> None:

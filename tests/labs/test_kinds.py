@@ -14,6 +14,7 @@ from common.safety.modes import Mode
 from laboratories.kinds import topics
 from loop import substructure
 from loop.closed_loop import rows, simulate
+from rths.examine.replay import replay_master, replay_slaves
 from simulation import virtual
 from tests.helpers import with_table
 from tests.shapes import plan_of
@@ -52,6 +53,8 @@ def test_every_shape_of_test_equals_the_compiled_rollout_and_ends_at_rest(name: 
             column = np.array([line[place] for line in lines])
             assert np.array_equal(found.columns[topic][signal.name], column), f"{topic}/{signal.name}"
     assert found.roles == plan.roles
+    matches = replay_master(found, plan) | replay_slaves(found, plan)
+    assert all(match.differing == 0 and match.compared >= plan.ticks - 1 for match in matches.values())
     assert set(found.ramps) == set(plan.kinds)
     assert {loop.lab.safety.mode for loop in bench.loops.values()} == {Mode.IDLE}
     for role, ramp in found.ramps.items():

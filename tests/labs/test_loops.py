@@ -24,7 +24,7 @@ from common.safety.modes import Mode
 from common.signals import TOPICS
 from loop import substructure
 from loop.closed_loop import rows, signals, simulate
-from rths.examine.replay import replay_master, replay_slave
+from rths.examine.replay import planned, replay_master, replay_slaves
 from simulation import virtual
 from simulation.virtual import VirtualTest
 from simulation.world import Drift
@@ -80,7 +80,7 @@ def test_the_loops_equal_the_rollout_with_every_correction(
 def replay_matches(path: Path) -> bool:
     """Whether master's and table's computations come out again."""
     recording = read(path)
-    matches = replay_master(recording) | replay_slave(recording)
+    matches = replay_master(recording, planned(recording)) | replay_slaves(recording, planned(recording))
     assert {"slave/table_command", "master/actuator_command"} <= matches.keys()
     return all(match.differing == 0 and match.compared > 0 for match in matches.values())
 

@@ -25,7 +25,7 @@ from common.recording.reader import Run, read
 from common.terminal import cli
 from loop import substructure
 from loop.closed_loop import signals, simulate
-from rths.examine.replay import replay_master, replay_slave
+from rths.examine.replay import planned, replay_master, replay_slaves
 from simulation import virtual
 from simulation.virtual import VirtualTest
 from slave.assembly import build_loop as build_slave
@@ -68,7 +68,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Run:
 
 
 def replays(found: Run) -> bool:
-    matches = replay_master(found) | replay_slave(found)
+    matches = replay_master(found, planned(found)) | replay_slaves(found, planned(found))
     assert {f"{role}/table_command" for role in found.roles} <= matches.keys()
     return all(match.differing == 0 and match.compared > 0 for match in matches.values())
 

@@ -78,7 +78,7 @@ def test_replay_finds_one_bit_of_one_slave(call: Any, recording: Path, monkeypat
     found = read(recording)
     values = found.columns["master"]["damper_force_used"]
     values[700, 1] = np.nextafter(values[700, 1], np.inf)
-    matches = replay.replay_slave(found)
+    matches = replay.replay_slaves(found, replay.planned(found))
     assert matches["master/damper_force_used.cellar"].differing == 1
     assert matches["master/damper_force_used.roof"].differing == 0
 

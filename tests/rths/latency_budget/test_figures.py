@@ -130,6 +130,8 @@ def test_a_recording_without_latency_is_refused() -> None:
     ):
         figures(run)
     run.columns["latency"], run.sequences["latency"] = {"round_trip": np.array([])}, np.array([])
+    with pytest.raises(InputError, match=r"a.mcap is of a test without slaves, which has no latency"):
+        figures(Run(Path("a.mcap"), roles=()))
     with pytest.raises(InputError, match="holds no latency"):
         figures(run)
 

@@ -1,0 +1,60 @@
+"""`rths replay` of tests of other kinds of laboratory: to the last bit, and no further."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from common.plan.read import load, with_test
+from common.plan.reality import as_planned
+from common.recording.reader import Run, read
+from rths.examine import replay
+from simulation import virtual
+from tests.helpers import ROOT
+
+DEVICE = ROOT / "examples" / "viscous_damper.toml"
+
+
+@pytest.fixture(scope="module")
+def device(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("device") / "a.mcap"
+    plan = with_test(load(DEVICE), duration=1.0)
+    assert virtual.run(virtual.assemble(plan, as_planned(plan), path), str) is None
+    return path
+
+
+def test_a_kind_of_ones_own_is_computed_again_where_its_class_is(
+    call: Any, capsys: Any, device: Path
+) -> None:
+    assert call("replay", device) == 2
+    assert "There is no file" in capsys.readouterr().err
+    assert call("replay", device, "--plan", DEVICE, "--json") == 0
+    signals = json.loads(capsys.readouterr().out)["signals"]
+    assert {"slave/piston_command", "master/piston_force_used", "master/piston_target_jerk"} <= signals.keys()
+    assert min(match["compared"] for match in signals.values()) == 499
+
+
+@pytest.mark.parametrize(
+    ("topic", "name", "differs"),
+    [
+        ("master", "piston_force_used", "master/piston_force_used"),
+        ("slave", "piston_target", "slave/piston_target"),
+        ("slave", "piston_command", "slave/piston_command"),
+    ],
+)
+def test_one_bit_of_it_is_found(topic: str, name: str, differs: str, device: Path) -> None:
+    found = read(device)
+    values = found.columns[topic][name]
+    values[200] = np.nextafter(values[200], np.inf)
+    plan = replay.planned(found, str(DEVICE))
+    matches = replay.replay_master(found, plan) | replay.replay_slaves(found, plan)
+    assert matches[differs].differing
+
+
+def test_a_master_alone_held_still_where_its_command_is_the_one_before() -> None:
+    alone = Run(Path("a.mcap"), roles=())
+    assert replay.held_ticks(alone, [0.1, 0.2, 0.2, 0.3]) == {2}
