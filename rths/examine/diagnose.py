@@ -127,6 +127,13 @@ def diagnose_file(
     return next(iter(reports.values()))
 
 
+def diagnose_recording(path: Path) -> dict[str, Report]:
+    """The reports on a recording by the name of the slave, as `diagnose_slaves`; raises InputError likewise."""
+    from common.recording.reader import read
+
+    return diagnose_slaves(read(path))
+
+
 def diagnose_slaves(
     recording: Run,
     *,

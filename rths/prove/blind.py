@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from common.errors import InputError
+from common.plan import read as plans
+from common.roles import title
 from common.terminal import cli, outputs
 from common.terminal.telling import Tell
 from report.text.progress import Progress
@@ -20,7 +22,8 @@ from validation.blind.worker import DIAGNOSIS
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from validation.blind.draw import Case
+    from validation.blind.cases.basis import TrialBasis
+    from validation.blind.cases.case import Case
     from validation.blind.measures import Measure
     from validation.blind.record import RecordedCase
     from validation.blind.scoring import Outcome
@@ -29,6 +32,9 @@ if TYPE_CHECKING:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `blind`."""
     which = parser.add_argument_group("cases")
+    which.add_argument(
+        "--plan", metavar="PLAN", help="the test whose laboratories are diagnosed (default: the default test)"
+    )
     which.add_argument("--cases", type=int, default=300, metavar="N", help="how many (default: 300)")
     which.add_argument(
         "--set",
@@ -52,7 +58,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--diagnosis",
         default=DIAGNOSIS,
         metavar="MODULE:FUNCTION",
-        help="judge another diagnosis: a function from a recording's path to a diagnosis.report.records.Report",
+        help="judge another diagnosis: a function from a recording's path to a diagnosis.report.records.Report, "
+        "or to one by the name of each slave",
     )
     parser.add_argument(
         "-o",
@@ -74,18 +81,15 @@ def words(text: str) -> list[str]:
 
 def run(args: argparse.Namespace) -> int:
     """Draw, record, diagnose, score; 1 where a goal is missed, which a few cases cannot show."""
+    from validation.blind.cases.basis import basis
     from validation.blind.draw import draw
     from validation.blind.measures import measures
     from validation.blind.scoring import judge_all
 
     check(args)
-    cases = draw(
-        args.cases, args.seed, args.set, duration=args.duration, only=args.only, effects=args.effects
-    )
-    about = (
-        f"{len(cases)} cases of the set '{args.set}', seed {args.seed}, {args.duration:g} s each, "
-        f"{', '.join(args.only) or 'all kinds'}; diagnosis {args.diagnosis}."
-    )
+    trial = basis(plans.load(cli.plan_path(args.plan)), args.duration)
+    cases = draw(args.cases, args.seed, args.set, trial=trial, only=args.only, effects=args.effects)
+    about = said_of(args, trial)
     with (
         outputs.folder(args.output, args.force) as folder,
         tempfile.TemporaryDirectory(prefix="rths-recordings-") as place,
@@ -103,6 +107,24 @@ def run(args: argparse.Namespace) -> int:
         show(measures(outcomes), outcomes)
         sys.stdout.write(f"page: {folder / 'index.html'}\n")
     return 1 if any(item.passed is False for item in measures(outcomes)) else 0
+
+
+def said_of(args: argparse.Namespace, trial: TrialBasis) -> str:
+    """How the cases are made, in a sentence or two."""
+    from validation.blind.library import own_kernels
+
+    plan = f"of the plan '{args.plan}', " if args.plan else ""
+    text = (
+        f"{args.cases} cases {plan}of the set '{args.set}', seed {args.seed}, {args.duration:g} s each, "
+        f"{', '.join(args.only) or 'all kinds'}; diagnosis {args.diagnosis}."
+    )
+    own = " and ".join(map(title, own_kernels(trial.plan)))
+    if own:
+        text += (
+            f" The laboratory of the {own} is of a user's kind, of which there is no second code: it is played by "
+            "its own kernel, with parameters inside their tolerances."
+        )
+    return text
 
 
 def check(args: argparse.Namespace) -> None:

@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -26,13 +26,13 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 class DiagnosisAnswer(NamedTuple):
     """What a diagnosis said of one recording, and how long it took."""
 
-    report: Report | None  # None where it failed
+    reports: Mapping[str, Report]  # by the slave's name, empty for the one without; none where it failed
     seconds: float
     error: str = ""
 
 
 GRACE = 3.0  # s, in which an interrupted process may end those that it started
-NONE = DiagnosisAnswer(None, float("nan"), "the diagnosis gave no answer")
+NONE = DiagnosisAnswer({}, float("nan"), "the diagnosis gave no answer")
 
 
 def diagnose_all(
@@ -100,6 +100,6 @@ def environment(jobs: int) -> dict[str, str]:
 
 def _answer(path: Path) -> DiagnosisAnswer:
     data = json.loads(path.read_text(encoding="utf-8"))
-    said = data.get("report")
-    report = None if said is None else read.report(said, f"What the diagnosis said of {path.stem}")
-    return DiagnosisAnswer(report, float(data["seconds"]), data.get("error", ""))
+    where = f"What the diagnosis said of {path.stem}"
+    reports = {name: read.report(said, where) for name, said in data.get("reports", {}).items()}
+    return DiagnosisAnswer(reports, float(data["seconds"]), data.get("error", ""))

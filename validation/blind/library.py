@@ -2,19 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
 
+from common.errors import InputError
+from common.plan.kinds import COLUMN, OWN, TABLE, TABLES_OF_KIND, known_kind
 from common.plan.plan import Plan
+from laboratories import effects
+from laboratories.effects import sites
 from laboratories.effects.effect import Effect
-from laboratories.effects.sites import holders
+from laboratories.kinds import kind_of
 
 LABS = {
-    "master": "validation.blind.labs.column_lab:ColumnLab",
-    "slave": "validation.blind.labs.table_lab:TableLab",
+    COLUMN: "validation.blind.labs.column_lab:TrueColumnLab",
+    TABLE: "validation.blind.labs.table_lab:TrueTableLab",
+    OWN: "validation.blind.labs.device_lab:OwnKernelLab",
 }
-PARTS = {"master": ("actuator", "column", "sensors"), "slave": ("table", "damper", "sensors")}
+PARTS = {
+    COLUMN: ("actuator", "column", "sensors"),
+    TABLE: ("table", "damper", "sensors"),
+    OWN: TABLES_OF_KIND[OWN],
+}
+OWN_KERNEL = "own kernel"  # in place of a formula: nobody has written this laboratory a second time
+REPLACED = ("formula", "unknown")  # kinds of cases in which a rig stands in for the emulated laboratory
+
+Reached = Mapping[str, Mapping[str, float]]  # largest magnitudes by role and signal
 
 
 class Stranger(NamedTuple):
@@ -26,30 +39,110 @@ class Stranger(NamedTuple):
 
 @dataclass(frozen=True)
 class Library:
-    """Effects to draw from."""
+    """Effects to draw from, and where a plan's test can have them."""
 
     catalogue: Mapping[str, Effect]
     formulas: Mapping[str, tuple[str, ...]]  # of the independent laboratories, by effect
     strangers: Mapping[str, Stranger]
+    places: Mapping[str, tuple[str, ...]] = field(
+        default_factory=dict
+    )  # roles by effect, none for the building's
+    rigs: tuple[str, ...] = ()  # roles in whose place a rig of the trial can stand
 
     @property
     def names(self) -> tuple[str, ...]:
         """Every effect there is."""
         return (*self.catalogue, *self.strangers)
 
+    def roles(self, name: str, *, replaced: bool) -> tuple[str, ...]:
+        """The roles that can have an effect, of those with `replaced` that a rig of the trial can stand in for."""
+        return tuple(role for role in self.places.get(name, ()) if role in self.rigs or not replaced)
 
-def role_at(site: str, plan: Plan) -> str:
-    """The role whose laboratory has a site, the first of several; empty where it is in no laboratory."""
-    return next(iter(holders(plan, site)), "")
+
+def parts_of(kind: str) -> tuple[str, ...]:
+    """The tables of a plan that the rig in the place of a laboratory takes as options, by the kind's text."""
+    return PARTS[known_kind(kind)]
 
 
-def shipped() -> Library:
-    """What the catalogue and the independent laboratories of this package let a trial hide."""
-    from laboratories.effects import CATALOGUE
-    from validation.blind.labs import FORMULAS, UNCATALOGUED
+def rig_of(kind: str, options: Mapping[str, Any]) -> dict[str, Any]:
+    """The table of the rig that stands in for a laboratory of a kind; one of a user's kind is told which."""
+    told = {"kind": kind} if known_kind(kind) == OWN else {}
+    return {"class": LABS[known_kind(kind)], "options": {**told, **options}}
 
+
+def of_plan(plan: Plan, reached: Callable[[], Reached]) -> Library:
+    """What the catalogue and the laboratories of the trial let the cases of a plan hide.
+
+    `reached` computes what the signals of the plan's own test reach, by which effects on users' kinds are sized.
+
+    Raises:
+        InputError: a kind of the plan cannot be loaded.
+    """
+    known, held = effects.of_plan(plan), {role: fitting(plan, role) for role in plan.kinds}
+    places = {
+        name: plan.roles if effect.site == sites.LINK else having(name, held)
+        for name, effect in known.items()
+    }
+    found = Library(
+        {name: effect for name, effect in known.items() if places[name] or effect.site in sites.BUILDING},
+        *of_rigs(plan, reached),
+        places,
+        tuple(role for role in plan.kinds if replaceable(plan, role)),
+    )
+    places |= {name: sites.holders(plan, stranger.site) for name, stranger in found.strangers.items()}
+    formulas = {name: those for name, those in found.formulas.items() if found.roles(name, replaced=True)}
+    strangers = {name: one for name, one in found.strangers.items() if found.roles(name, replaced=True)}
+    return Library(found.catalogue, formulas, strangers, places, found.rigs)
+
+
+def fitting(plan: Plan, role: str) -> set[str]:
+    """The names of the effects that the laboratory of a role can have."""
+    seen = plan.of(role)
+    return {name for name, one in effects.of_kind(kind_of(plan, role), seen).items() if one.fits(seen)}
+
+
+def having(name: str, held: Mapping[str, set[str]]) -> tuple[str, ...]:
+    """The roles whose laboratory can have an effect."""
+    return tuple(role for role, names in held.items() if name in names)
+
+
+def of_rigs(
+    plan: Plan, reached: Callable[[], Reached]
+) -> tuple[dict[str, tuple[str, ...]], dict[str, Stranger]]:
+    """Formulas by effect, and effects of no catalogue, of all rigs that can stand in for a laboratory of the plan."""
+    from validation.blind.labs import FORMULAS, UNCATALOGUED, device_lab
+
+    formulas = dict(FORMULAS)
     strangers = {
         name: Stranger(site, dict(zip(parameters, ranges, strict=True)))
         for name, (site, parameters, ranges) in UNCATALOGUED.items()
     }
-    return Library(CATALOGUE, FORMULAS, strangers)
+    for role in own_kernels(plan):
+        kind = kind_of(plan, role)
+        formulas |= {effect.name: (OWN_KERNEL,) for effect in kind.effects} | device_lab.formulas(
+            kind.channels
+        )
+        around = device_lab.uncatalogued(kind.channels, reached()[role])
+        strangers |= {name: Stranger(*found) for name, found in around.items()}
+    return formulas, strangers
+
+
+def own_kernels(plan: Plan) -> tuple[str, ...]:
+    """The roles with a laboratory of a user's kind, which the trial plays by that kind's own kernel."""
+    return tuple(role for role, kind in plan.kinds.items() if known_kind(kind) == OWN)
+
+
+def replaceable(plan: Plan, role: str) -> bool:
+    """Whether a rig of the trial can stand in for a role's laboratory: it knows the models that the plan chooses."""
+    from validation.blind.labs import column_lab, table_lab
+
+    seen = plan.of(role)
+    try:
+        match known_kind(plan.kinds[role]):
+            case "column":
+                column_lab.true_values(seen.actuator, seen.column)
+            case "table":
+                table_lab.true_values(seen.table, seen.damper)
+    except InputError:
+        return False
+    return True

@@ -13,8 +13,10 @@ import numpy as np
 from diagnosis.findings.calibration import clopper_pearson, expected_calibration_error, wilson
 from diagnosis.findings.calibration import reliability as stated_and_observed
 from report.text.formats import percent, quantity
+from validation.blind.cases.names import NAMING
+from validation.blind.library import OWN_KERNEL
 from validation.blind.rows import case_rows
-from validation.blind.scoring import NAMING, JudgedEstimate, Outcome
+from validation.blind.scoring import JudgedEstimate, Outcome
 from validation.blind.stated import brier_score, in_columns, stated_verdicts
 
 ABSTAINING = ("unknown_effect", "not_enough_data", "ambiguous")
@@ -157,9 +159,13 @@ def further(outcomes: Sequence[Outcome]) -> list[Measure]:
     right = [one for item in outcomes for one in item.estimates]
     stated = [one for one in right if one.inside is not None]
     verdicts = stated_verdicts(outcomes)
+    own = [item for item in visible if item.kind == "formula" and OWN_KERNEL in item.formulas]
+    seen = {
+        name: [item for item in kind(visible, name) if item not in own] for name in ("catalogue", "formula")
+    }
+    seen |= {OWN_KERNEL: own} if own else {}
     by_kind = [
-        rate(f"right effect first, {name}", [i for i in kind(outcomes, name) if i.visible], lambda i: i.named)
-        for name in ("catalogue", "formula")
+        rate(f"right effect first, {name}", those, lambda item: item.named) for name, those in seen.items()
     ]
     strange = [item for item in kind(outcomes, "unknown") if item.visible]
     pairs = [item for item in kind(outcomes, "pair") if item.visible]

@@ -14,7 +14,7 @@ from common.errors import InputError, InterlockError
 from common.plan import read as plans
 from common.plan import reality as realities
 from common.plan.reality import Reality
-from validation.blind.draw import Case, Laid
+from validation.blind.cases.case import Case, Laid, levels
 from validation.blind.loggers import LOGGERS
 from validation.blind.relogging import relog
 from validation.spread import spread
@@ -52,7 +52,7 @@ def record(case: Case, folder: Path) -> RecordedCase:
     if ended is not None and not isinstance(ended, InterlockError):
         raise InputError(f"Case {case.index} ({truth(case)}) cannot be recorded: {ended}")
     if case.logger:
-        relog(played, path, plan, LOGGERS[case.logger], case.truths["sensors"], case.seed)
+        relog(played, path, plan, LOGGERS[case.logger], levels(case.truths), case.seed)
         played.unlink()
     return RecordedCase(case.index, path.name, sizes(case, path), str(ended or ""))
 

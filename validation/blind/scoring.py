@@ -9,19 +9,19 @@ beside the effect, or where there is none: it is really there.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
-from diagnosis.report.records import Candidate
+from common.plan import read as plans
 from diagnosis.report.values import Value
-from laboratories.effects import CATALOGUE, of_site
-from validation.blind.draw import Case, Laid
+from validation.blind.cases.case import Case, Laid
+from validation.blind.cases.names import NAMING, CaseNames, Heard
 from validation.blind.judge import NONE, DiagnosisAnswer
 from validation.blind.loggers import LOGGERS
 from validation.blind.record import RecordedCase
 
 QUIET = ("no_gap", "within_tolerances")
-NAMING = ("explained", "partly_explained", "ambiguous")
 UNKNOWN = ("unknown_effect", "partly_explained")
 VISIBLE = 2.0  # residual to noise from which an effect must be found: below it noise may hide an effect
 AS_MUCH = {"butterworth": "delay"}  # a maximally flat low-pass is as much a delay as the catalogue's lag
@@ -49,6 +49,7 @@ class Outcome:
     truth: list[str]
     formulas: list[str]
     sites: list[str]
+    laboratories: list[str]  # the role that has each effect, empty for the building's
     parameters: dict[str, dict[str, float]]
     size: float  # residual to noise, of a pair the smaller one's; NaN for a clean laboratory
     inside: bool
@@ -88,97 +89,141 @@ def judge_all(
 
 
 def judge(case: Case, recorded: RecordedCase, answer: DiagnosisAnswer) -> Outcome:
-    """One case judged."""
-    report = answer.report
-    status = report.status if report else "error"
-    verdict = report.which[0] if report and report.which and status in NAMING else None
-    names = list(verdict.effects) if verdict else []
-    sets = [set(group) for group in report.equivalent] if report else []
-    truth = [item.name for item in case.laid]
-    site = report.where[0].site if report and report.where else ""
-    located = any(site in sites_of(item, names, sets) for item in case.laid)
-    own = [name for name in names if not is_distortion(case, name) or name in truth]
+    """One case judged.
+
+    Of a test with several slaves each effect counts as named where the report on its laboratory says so.
+    """
+    names = CaseNames(plans.from_tables(case.plan, Path()))
+    heard = [names.heard(slave, report) for slave, report in answer.reports.items()]
+    asked = consulted(case, heard)
+    status = status_of(case, asked)
+    verdict = list(dict.fromkeys(name for one in heard for name in one.names))
+    sets = [set(those) for one in heard for those in one.sets]
+    located = [
+        one.site
+        for item in case.laid
+        if (one := report_on(item, heard)) and one.site in right_sites(item, one, names)
+    ]
+    truth = [names.effect(item) for item in case.laid]
+    own = [name for name in verdict if not is_distortion(case, name, names) or name in truth]
     wrong = [name for name in own if not any(same(item, name, sets) for item in truth)]
-    named = is_named(case, status, names, sets)
-    right = named and (located or not case.laid or case.inside)
-    duration = float(case.plan["test"]["duration"])
+    named = is_named(case, status, heard, names)
+    right = named and (bool(located) or not case.laid or case.inside)
     outcome = Outcome(
         index=case.index,
         kind=case.kind,
         truth=truth,
         formulas=[item.formula for item in case.laid],
-        sites=[item.site for item in case.laid],
-        parameters={item.name: item.parameters for item in case.laid},
+        sites=[names.site(item) for item in case.laid],
+        laboratories=[item.role for item in case.laid],
+        parameters={names.effect(item): item.parameters for item in case.laid},
         size=min(recorded.sizes, default=math.nan),
         inside=case.inside,
         stopped=recorded.stopped,
         recording=recorded.name,
         status=status,
-        verdict=names,
-        verdict_site=site,
-        probability=number(verdict.probability) if verdict else math.nan,
+        verdict=verdict,
+        verdict_site=next((one for one in located), next((one.site for one in asked if one.site), "")),
+        probability=min((number(one.probability) for one in asked if one.names), default=math.nan),
         named=named,
-        located=located,
+        located=bool(located),
         surplus=len(wrong),
         right=right,
         why="",
         logger=case.logger,
         first=bool(own) and own[0] not in wrong,
-        estimates=estimates(case, verdict) if named and verdict else [],
-        shrinkage=number(report.how_far.closed if report else None) / best_closed(case),
-        seconds=answer.seconds * STANDARD_LENGTH / duration,
+        estimates=estimates(case, heard, names) if named else [],
+        shrinkage=min((number(one.closed) for one in asked), default=math.nan) / best_closed(case),
+        seconds=answer.seconds * STANDARD_LENGTH / float(case.plan["test"]["duration"]),
     )
     return outcome if right else replace(outcome, why=why(outcome, answer.error))
 
 
-def is_named(case: Case, status: str, names: list[str], sets: list[set[str]]) -> bool:
+def report_on(item: Laid, heard: Sequence[Heard]) -> Heard | None:
+    """The report that shows the laboratory of an effect; of the master's, which all show, the first with a gap."""
+    own = [one for one in heard if one.role == item.role]
+    return next(iter(own or alarmed(heard)), None)
+
+
+def alarmed(heard: Sequence[Heard]) -> list[Heard]:
+    """The reports that see a gap first."""
+    return sorted(heard, key=lambda one: one.status in QUIET)
+
+
+def consulted(case: Case, heard: Sequence[Heard]) -> list[Heard]:
+    """The reports that a case is judged by: those on its effects, of a clean one all."""
+    found = [one for item in case.laid if (one := report_on(item, heard))]
+    return [one for one in heard if one in found] if case.laid else alarmed(heard)
+
+
+def status_of(case: Case, asked: Sequence[Heard]) -> str:
+    """The status in one word: of several reports the first that names nothing, of a clean case the first alarm."""
+    denied = [one.status for one in asked if case.laid and one.status not in NAMING]
+    return next(iter([*denied, *(one.status for one in asked)]), "error")
+
+
+def is_named(case: Case, status: str, heard: Sequence[Heard], names: CaseNames) -> bool:
     """Whether the verdict says what there is."""
     if case.kind == "clean":
-        return status in QUIET or (bool(names) and all(is_distortion(case, name) for name in names))
+        return bool(heard) and all(is_quiet(case, one, names) for one in heard)
     if case.kind == "unknown":
         return status in UNKNOWN
     if case.inside and status in QUIET:
         return True
-    return all(any(same(true, name, sets) for true in truths(item) for name in names) for item in case.laid)
+    return all((one := report_on(item, heard)) and names_it(item, one, names) for item in case.laid)
 
 
-def is_distortion(case: Case, name: str) -> bool:
+def is_quiet(case: Case, one: Heard, names: CaseNames) -> bool:
+    """Whether a report sees no gap but what the case's logger made."""
+    logged = bool(one.names) and all(is_distortion(case, name, names) for name in one.names)
+    return one.status in QUIET or logged
+
+
+def is_distortion(case: Case, name: str, names: CaseNames) -> bool:
     """Whether a name says what the case's logger did to a signal."""
-    if not case.logger or not name.startswith("sensor."):
-        return False
-    return name.rpartition(".")[2] in LOGGERS[case.logger].distortions
+    return bool(case.logger) and names.faults.get(name) in LOGGERS[case.logger].distortions
 
 
-def truths(item: Laid) -> set[str]:
+def names_it(item: Laid, one: Heard, names: CaseNames) -> bool:
+    """Whether a report names an effect."""
+    return any(same(true, name, one.sets) for true in truths(item, names) for name in one.names)
+
+
+def truths(item: Laid, names: CaseNames) -> set[str]:
     """Names that are right for an effect: its own, and the fault of the same reading that its formula is as much."""
-    fault = AS_MUCH.get(item.formula, "")
-    return {item.name} | {effect.name for effect in of_site(item.site) if fault and effect.fault == fault}
+    fault, site = AS_MUCH.get(item.formula), names.site(item)
+    alike = {name for name, there in names.sites.items() if there == site and names.faults[name] == fault}
+    return {names.effect(item)} | alike
 
 
-def same(true: str, name: str, sets: Iterable[set[str]]) -> bool:
+def same(true: str, name: str, sets: Iterable[Collection[str]]) -> bool:
     """Whether a name says the true effect, by itself or by a set of equivalents that holds both."""
     return true == name or any(true in group and name in group for group in sets)
 
 
-def sites_of(item: Laid, names: Sequence[str], sets: Iterable[set[str]]) -> set[str]:
-    """Sites that are right: the effect's own, and that of an equivalent that is named in its place."""
-    named = [name for name in names if name in CATALOGUE and same(item.name, name, sets)]
-    return {item.site} | {CATALOGUE[name].site for name in named}
+def right_sites(item: Laid, one: Heard, names: CaseNames) -> set[str]:
+    """Sites that are right: the effect's own, and that of an equivalent that a report names in its place."""
+    true = names.effect(item)
+    named = [name for name in one.names if name in names.sites and same(true, name, one.sets)]
+    return {names.site(item)} | {names.sites[name] for name in named}
 
 
-def estimates(case: Case, verdict: Candidate) -> list[JudgedEstimate]:
+def estimates(case: Case, heard: Sequence[Heard], names: CaseNames) -> list[JudgedEstimate]:
     """The strength parameters of the true effects that the verdict itself names."""
-    found = verdict.parameters
-    return [
-        estimate(item, name, found[item.name].get(name))
-        for item in case.laid
-        if item.name in found and not is_distortion(case, item.name)
-        for name in item.nulls
-        if name in item.parameters
-    ]
+    result = []
+    for item in case.laid:
+        one, true = report_on(item, heard), names.effect(item)
+        if one is None or true not in one.parameters or is_distortion(case, true, names):
+            continue
+        result += [
+            estimate(item, true, name, one.parameters[true].get(name))
+            for name in item.nulls
+            if name in item.parameters
+        ]
+    return result
 
 
-def estimate(item: Laid, name: str, said: Value | None) -> JudgedEstimate:
+def estimate(item: Laid, called: str, name: str, said: Value | None) -> JudgedEstimate:
     """One parameter; relative to its distance from the null value where that is finite."""
     true, null = item.parameters[name], item.nulls[name]
     value = number(said.value if said else None)
@@ -187,7 +232,7 @@ def estimate(item: Laid, name: str, said: Value | None) -> JudgedEstimate:
     low, high = (said.interval if said else None) or (None, None)
     inside = None if low is None or high is None else low <= true <= high
     return JudgedEstimate(
-        f"{item.name}.{name}", true, value, miss / strength, miss / abs(true) if true else miss, inside
+        f"{called}.{name}", true, value, miss / strength, miss / abs(true) if true else miss, inside
     )
 
 

@@ -1,6 +1,6 @@
 """How large an effect is on its own: what it does to a part that is given the recorded inputs, over the noise.
 
-Both laboratories and the building are played with and without the effect, sensors silent, on the inputs
+The laboratory that has it, or the building, is played with and without the effect, sensors silent, on the inputs
 that the recording holds. Of each signal the rms of the difference is divided by the rms of its true
 noise; the largest counts. The size of an effect of the link is measured by the messages that it changed.
 """
@@ -8,24 +8,19 @@ noise; the largest counts. The size of an effect of the link is measured by the 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from common.plan.plan import Plan
+from common.plan import read as plans
 from common.recording.reader import Run, Values, read
-from common.rig import ColumnCommand, ColumnMeasurement, TableCommand, TableMeasurement
-from common.roles import MASTER, SLAVE
-from validation.blind.draw import Case, Laid
-from validation.blind.library import role_at
+from common.rig import command_of
+from common.roles import MASTER
+from laboratories.effects.sites import LINK
+from laboratories.kinds import kind_of, kinds_of
+from loop.names import sent_names
+from validation.blind.cases.case import Case, Laid, of_role
 
-FORCE_NOISE = "damper_force"
-# a signal that is computed, not read, is compared with the noise of the reading beside it
-COMPUTED = {
-    "column_target": "column_displacement",
-    "table_target": "table_displacement",
-    "ground_acceleration": "table_acceleration",
-}
+Differences = list[tuple[Values, float]]  # each with the rms noise that it is compared with
 
 
 def sizes(case: Case, path: Path) -> tuple[float, ...]:
@@ -38,84 +33,106 @@ def sizes(case: Case, path: Path) -> tuple[float, ...]:
 
 def size(case: Case, item: Laid, run: Run) -> float:
     """Residual to noise of one effect."""
-    if not (run.has("master") and run.has("slave")):
+    plan = plans.from_tables(case.plan, Path())
+    if not all(map(run.has, (MASTER, *plan.roles))):
         return float("nan")
-    noise = case.truths["sensors"]
-    if item.site == "link":
-        return max(_ratios(_messages(run), noise), default=0.0)
-    play = {MASTER: play_a, SLAVE: play_b}.get(role_at(item.site, Plan()), play_building)
-    with_effect, without = play(case, (item,), run), play(case, (), run)
-    difference = {name: values - without[name] for name, values in with_effect.items()}
-    return max(_ratios(difference, noise), default=0.0)
+    if item.site == LINK:
+        found = messages(case, run, item.role)
+    elif item.role:
+        found = of_laboratory(case, item, run)
+    else:
+        found = of_building(case, item, run)
+    ratios = (
+        float(np.sqrt(np.mean(values**2))) / level for values, level in found if values.size and level > 0.0
+    )
+    return max(ratios, default=0.0)
 
 
-def _ratios(difference: dict[str, Values], noise: dict[str, Any]) -> list[float]:
-    result = []
-    for name, values in difference.items():
-        level = noise[COMPUTED.get(name, name)]
-        if values.size and level > 0.0:
-            result.append(float(np.sqrt(np.mean(values**2))) / level)
-    return result
+def levels(case: Case, role: str) -> dict[str, float]:
+    """True rms noise of the readings of a role's laboratory."""
+    kind = kind_of(plans.from_tables(case.plan, Path()), role)
+    own = of_role(case.truths, role).get("device", {}).get("noise", {})
+    return {name: own.get(name, case.truths["sensors"].get(name, 0.0)) for name in kind.channels.names}
 
 
-def play_a(case: Case, laid: tuple[Laid, ...], run: Run) -> dict[str, Values]:
-    """Laboratory A's readings on the recorded commands."""
-    from master.assembly import build_rig
+def of_laboratory(case: Case, item: Laid, run: Run) -> Differences:
+    """What an effect does to the readings of the laboratory that has it, on the recorded commands."""
+    with_effect, without = (play(case, laid, run, item.role) for laid in ((item,), ()))
+    noise = levels(case, item.role)
+    return [(values - without[name], noise[name]) for name, values in with_effect.items()]
+
+
+def play(case: Case, laid: tuple[Laid, ...], run: Run, role: str) -> dict[str, Values]:
+    """A laboratory's readings on the recorded commands."""
+    from loop import rigs
     from validation.blind.record import reality
 
-    commands = [ColumnCommand(value) for value in run.columns["master"]["actuator_command"].tolist()]
-    return _played(build_rig(reality(case, laid, silent=True)), commands, ColumnMeasurement._fields)
-
-
-def play_b(case: Case, laid: tuple[Laid, ...], run: Run) -> dict[str, Values]:
-    """Laboratory B's readings on the recorded commands."""
-    from slave.assembly import build_rig
-    from validation.blind.record import reality
-
-    columns = run.columns["slave"]
-    pairs = zip(columns["table_command"].tolist(), columns["damper_command"].tolist(), strict=True)
-    commands = [TableCommand(*pair) for pair in pairs]
-    return _played(build_rig(reality(case, laid, silent=True).of(SLAVE)), commands, TableMeasurement._fields)
-
-
-def _played(rig: Any, commands: list[Any], names: tuple[str, ...]) -> dict[str, Values]:
+    kind = kind_of(plans.from_tables(case.plan, Path()), role)
+    rig = rigs.build(reality(case, laid, silent=True).of(role), role)
+    drives = (run.columns[role][name].tolist() for name in kind.channels.drives)
     rig.arm()
     readings = []
-    for command in commands:
+    for values in zip(*drives, strict=True):
         readings.append(rig.read())
-        rig.write(command)
+        rig.write(command_of(kind.channels)(*values))
     rig.disarm()
-    table = np.array(readings, dtype=np.float64).reshape(len(commands), len(names))
-    return {name: table[:, place] for place, name in enumerate(names)}
+    table = np.array(readings, dtype=np.float64).reshape(len(readings), len(kind.channels.names))
+    return {name: table[:, place] for place, name in enumerate(kind.channels.names)}
+
+
+def of_building(case: Case, item: Laid, run: Run) -> Differences:
+    """What an effect does to what the building wants, on the recorded measurements.
+
+    A target is computed, not read, so it is compared with the noise of the position beside it.
+    """
+    with_effect, without = (play_building(case, laid, run) for laid in ((item,), ()))
+    kinds = kinds_of(plans.from_tables(case.plan, Path()))
+    noise = {role: levels(case, role)[kind.channels.position] for role, kind in kinds.items()}
+    noise[""] = case.truths["sensors"]["table_acceleration"]
+    return [(values - without[role], noise[role]) for role, values in with_effect.items()]
 
 
 def play_building(case: Case, laid: tuple[Laid, ...], run: Run) -> dict[str, Values]:
-    """What the building wants, on the recorded measurements."""
+    """What the building wants of each role's laboratory, and the ground's acceleration (no role)."""
     from master.assembly import master_step
     from validation.blind.record import reality
 
-    step = master_step(reality(case, laid, silent=True))
-    columns = run.columns["master"]
-    inputs = zip(
-        columns["column_displacement"].tolist(),
-        columns["column_force"].tolist(),
-        ([force] for force in columns["damper_force_used"].tolist()),
-        strict=True,
-    )
+    plan = plans.from_tables(case.plan, Path())
+    kinds, columns = kinds_of(plan), run.columns[MASTER]
+    step, ticks = master_step(reality(case, laid, silent=True)), run.ticks(MASTER)
+    nothing = np.zeros(ticks)
+    felt = [nothing, nothing]
+    if MASTER in kinds:
+        own = kinds[MASTER].channels
+        felt = [columns[own.position], columns[own.force]]
+    used = [share_of(run, role, f"{kinds[role].channels.force}_used") for role in plan.roles]
+    forces = np.stack(used, axis=1) if used else np.zeros((ticks, 0))
+    inputs = zip(*(values.tolist() for values in (*felt, forces)), strict=True)
     outputs = [step(tick, *values) for tick, values in enumerate(inputs)]
-    return {
-        "column_target": np.array([row.target for row in outputs]),
-        "table_target": np.array([row.sent[0][0] for row in outputs]),
-        "ground_acceleration": np.array([row.ground_acceleration for row in outputs]),
-    }
+    found = {"": np.array([row.ground_acceleration for row in outputs])}
+    if MASTER in kinds:
+        found[MASTER] = np.array([row.target for row in outputs])
+    for place, role in enumerate(plan.roles):
+        found[role] = np.array([row.sent[place][0] for row in outputs])
+    return found
 
 
-def _messages(run: Run) -> dict[str, Values]:
-    """The messages that arrived minus those that would have arrived in time."""
-    master, slave = run.columns["master"], run.columns["slave"]
-    ticks = min(run.ticks("master"), run.ticks("slave"))
-    on_time = np.concatenate([[0.0], slave["damper_force"][: ticks - 1]]) if ticks else np.zeros(0)
-    return {
-        FORCE_NOISE: master["damper_force_used"][:ticks] - on_time,
-        "table_target": slave["table_target"][:ticks] - master["table_target"][:ticks],
-    }
+def share_of(run: Run, role: str, name: str) -> Values:
+    """The column of a slave among the master's."""
+    return run.of(role).columns[MASTER][name]
+
+
+def messages(case: Case, run: Run, role: str) -> Differences:
+    """The messages of a link that arrived minus those that would have arrived in time."""
+    plan = plans.from_tables(case.plan, Path())
+    channels, noise, slave = kind_of(plan, role).channels, levels(case, role), run.columns[role]
+    ticks = min(run.ticks(MASTER), run.ticks(role))
+    on_time = np.concatenate([[0.0], slave[channels.force][: ticks - 1]]) if ticks else np.zeros(0)
+    target = sent_names(plan)[role][0]
+    return [
+        (share_of(run, role, f"{channels.force}_used")[:ticks] - on_time, noise[channels.force]),
+        (
+            slave[channels.target.name][:ticks] - share_of(run, role, target)[:ticks],
+            noise[channels.position],
+        ),
+    ]

@@ -1,7 +1,7 @@
 """The process that diagnoses: `python -m validation.blind.worker FOLDER OUT`. It knows recordings, nothing else.
 
-For every recording it leaves `OUT/<name>.json`: the report or the error, and the seconds it took. One line per
-recording on standard output says that it is done.
+For every recording it leaves `OUT/<name>.json`: the reports by slave or the error, and the seconds it took. One line
+per recording on standard output says that it is done.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import json
 import sys
 import time
 import traceback
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -21,11 +22,11 @@ from common.terminal import cli
 from diagnosis.report.records import Report
 from validation.spread import spread
 
-DIAGNOSIS = "rths.examine.diagnose:diagnose_file"
+DIAGNOSIS = "rths.examine.diagnose:diagnose_recording"
 
 
 def find(reference: str) -> Any:
-    """The diagnosing function 'module:function': the path of a recording in, the `Report` out."""
+    """The diagnosing function 'module:function': the path of a recording in, the `Report` or reports by slave out."""
     module, _, name = reference.partition(":")
     try:
         return getattr(importlib.import_module(module), name)
@@ -38,8 +39,9 @@ def diagnose(path: Path, reference: str, out: Path) -> str:
     function = find(reference)
     started = time.perf_counter()
     try:
-        found: Report = function(path)
-        answer: dict[str, Any] = {"report": found.plain()}
+        found: Report | Mapping[str, Report] = function(path)
+        reports = {"": found} if isinstance(found, Report) else found
+        answer: dict[str, Any] = {"reports": {name: report.plain() for name, report in reports.items()}}
     except RthsError as error:
         answer = {"error": str(error)}
     except Exception as error:  # one failure must not take the other cases with it

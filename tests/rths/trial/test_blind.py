@@ -10,7 +10,7 @@ import signal
 import sys
 import time
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ import pytest
 
 from common.errors import InputError
 from common.recording.reader import read
+from common.roles import MASTER, SLAVE
 from common.terminal import cli
 from diagnosis.report.read import report as read_report
 from diagnosis.report.records import Report
@@ -25,7 +26,9 @@ from laboratories.effects import CATALOGUE
 from rths.prove import blind
 from tests.rths.diagnosis_report.reports import bare
 from validation.blind import library as libraries
-from validation.blind.draw import Case, draw
+from validation.blind.cases.basis import basis
+from validation.blind.cases.case import Case
+from validation.blind.draw import draw as draw_of
 from validation.blind.judge import diagnose_all
 from validation.blind.library import Library
 from validation.blind.record import record, record_all
@@ -33,7 +36,11 @@ from validation.spread import spread
 
 HERE = "tests.rths.trial.test_blind"
 LIBRARY = Library(
-    {name: CATALOGUE[name] for name in ("damper.friction", "column.stiffness", "structure.mass")}, {}, {}
+    {name: CATALOGUE[name] for name in ("damper.friction", "column.stiffness", "structure.mass")},
+    {},
+    {},
+    {"damper.friction": (SLAVE,), "column.stiffness": (MASTER,)},
+    (MASTER, SLAVE),
 )
 
 
@@ -60,11 +67,12 @@ def broken(_path: Path) -> Report:
 
 @pytest.fixture(autouse=True)
 def _small(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(libraries, "shipped", lambda: LIBRARY)
+    monkeypatch.setattr(libraries, "of_plan", lambda _plan, _reached: LIBRARY)
 
 
-def cases(count: int, *only: str) -> list[Case]:
-    return draw(count, 3, "tune", duration=1.5, only=only, library=LIBRARY)
+def cases(count: int, *only: str, duration: float = 1.5, effects: Sequence[str] = ()) -> list[Case]:
+    trial = basis(duration=duration, library=LIBRARY)
+    return draw_of(count, 3, "tune", trial=trial, only=only, effects=effects)
 
 
 def command(*words: str) -> int:
@@ -87,12 +95,10 @@ def test_a_recording_says_nothing_of_what_it_hides(tmp_path: Path) -> None:
 
 
 def test_the_size_is_that_of_the_effect(tmp_path: Path) -> None:
-    made = draw(4, 3, "tune", duration=4.0, effects=["damper.friction"], only=["catalogue"], library=LIBRARY)
+    made = cases(4, "catalogue", duration=4.0, effects=["damper.friction"])
     sizes = {case.laid[0].parameters["force"]: record(case, tmp_path).sizes[0] for case in made}
     assert sizes[max(sizes)] > sizes[min(sizes)] > 0.0
-    (mass,) = draw(
-        1, 3, "tune", duration=2.0, effects=["structure.mass"], only=["catalogue"], library=LIBRARY
-    )
+    (mass,) = cases(1, "catalogue", duration=2.0, effects=["structure.mass"])
     assert record(mass, tmp_path).sizes[0] > 1.0
     (clean,) = cases(1, "clean")
     assert record(clean, tmp_path).sizes == ()
@@ -106,8 +112,7 @@ def test_the_diagnosing_process_sees_recordings_only(tmp_path: Path, monkeypatch
     assert set(answers) == found == {f"{name}.mcap" for name in done}
     for answer in answers.values():
         assert answer.seconds > 0.0
-        assert answer.report is not None
-        seen = json.loads(answer.report.warnings[0])
+        seen = json.loads(answer.reports[""].warnings[0])
         assert seen["beside"] == sorted(found)
         assert "RTHS_TRUTH" not in seen["environment"]
         assert str(tmp_path) in seen["words"]

@@ -14,8 +14,8 @@ from common.signals import COLUMN_CHANNELS, Signal
 from models.registry import Array
 from tests.rths.trial.test_scoring import RUB, case, judged, said
 from validation.blind import logged
+from validation.blind.cases.basis import basis
 from validation.blind.draw import begin, draw
-from validation.blind.library import shipped
 from validation.blind.loggers import LOGGERS, Logger
 from validation.blind.record import record
 from validation.blind.rows import case_rows
@@ -89,7 +89,7 @@ def test_a_logger_of_another_rate_keeps_the_signal_and_its_length() -> None:
 
 
 def test_cases_take_the_loggers_in_turn_and_kinds_in_rounds() -> None:
-    count, library = len(LOGGERS), shipped()
+    count, library = len(LOGGERS), basis().library
     begun = [begin(index, 5, "loggers", library) for index in range(2 * count)]
     assert [SETS["loggers"].logger(item.lot) for item in begun] == 2 * list(LOGGERS)
     assert {item.kind for item in begun[:count]} == {"clean"}
@@ -98,7 +98,7 @@ def test_cases_take_the_loggers_in_turn_and_kinds_in_rounds() -> None:
 
 
 def test_a_relogged_recording_is_an_import_that_does_not_name_its_logger(tmp_path: Path) -> None:
-    hidden = replace(draw(1, 5, "loggers", duration=1.0)[0], logger="late_forces")
+    hidden = replace(draw(1, 5, "loggers", trial=basis(duration=1.0))[0], logger="late_forces")
     assert not any(hidden.reality()["sensors"].values())  # the noise is the logger's
     recorded = record(hidden, tmp_path)
     assert [path.suffix for path in tmp_path.iterdir()] == [".mcap"]

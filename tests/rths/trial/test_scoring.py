@@ -9,11 +9,12 @@ from typing import Any
 
 import pytest
 
+from common.roles import MASTER, SLAVE
 from diagnosis.findings.calibration import clopper_pearson
 from diagnosis.report import read
 from tests.rths.diagnosis_report.reports import bare
 from tests.rths.report.pages import check_alone, check_in_browser
-from validation.blind.draw import Case, Laid
+from validation.blind.cases.case import Case, Laid
 from validation.blind.judge import DiagnosisAnswer
 from validation.blind.measures import (
     binned,
@@ -32,10 +33,10 @@ from validation.blind.page import page
 from validation.blind.record import RecordedCase
 from validation.blind.scoring import Outcome, judge, judge_all, same
 
-SLIP = Laid("column.slip", "column", {"gap": 2e-4}, {"gap": 0.0})
-SOFT = Laid("column.stiffness", "column", {"factor": 0.9}, {"factor": 1.0})
-RUB = Laid("damper.friction", "damper", {"force": 3.0}, {"force": 0.0})
-CABLE = Laid("damper.cable", "damper", {"force": 1.0}, {})
+SLIP = Laid("column.slip", "column", {"gap": 2e-4}, {"gap": 0.0}, role=MASTER)
+SOFT = Laid("column.stiffness", "column", {"factor": 0.9}, {"factor": 1.0}, role=MASTER)
+RUB = Laid("damper.friction", "damper", {"force": 3.0}, {"force": 0.0}, role=SLAVE)
+CABLE = Laid("damper.cable", "damper", {"force": 1.0}, {}, role=SLAVE)
 
 
 def case(kind: str, *laid: Laid, inside: bool = False, index: int = 0) -> Case:
@@ -72,7 +73,9 @@ def value(number: float, *interval: float) -> dict[str, Any]:
 def judged(what: Case, report: dict[str, Any], *sizes: float, seconds: float = 2.0) -> Outcome:
     sizes = sizes or tuple(10.0 for _ in what.laid)
     return judge(
-        what, RecordedCase(what.index, "a.mcap", sizes, ""), DiagnosisAnswer(read.report(report), seconds)
+        what,
+        RecordedCase(what.index, "a.mcap", sizes, ""),
+        DiagnosisAnswer({"": read.report(report)}, seconds),
     )
 
 
@@ -143,7 +146,7 @@ def test_an_unknown_effect_is_said_to_be_unknown_at_its_site() -> None:
 
 
 def test_a_diagnosis_that_fails_is_wrong() -> None:
-    failed = DiagnosisAnswer(None, 2.0, "ValueError: no")
+    failed = DiagnosisAnswer({}, 2.0, "ValueError: no")
     outcome = judge(case("catalogue", RUB), RecordedCase(0, "a.mcap", (10.0,), ""), failed)
     assert outcome.why == "ValueError: no"
     missing = judge_all([case("clean", index=7)], {7: RecordedCase(7, "x.mcap", (), "")}, {})

@@ -1,0 +1,109 @@
+"""A case of the blind trial: the plan that everybody knows, and what its laboratories really are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from common.plan import read as plans
+from common.roles import MASTER, SLAVE, name_of
+from validation.blind.library import REPLACED, parts_of, rig_of
+
+
+@dataclass(frozen=True)
+class Laid:
+    """An effect that a case hides."""
+
+    name: str
+    site: str
+    parameters: dict[str, float]
+    nulls: dict[str, float]  # of the parameters that say how strong it is, where it has a null value
+    formula: str = ""  # of the independent laboratory, empty for the catalogue's own
+    role: str = ""  # in whose laboratory, or over which slave's link, it is; empty for the building
+    alone: bool = False  # whether other laboratories of the test could have it too
+
+
+@dataclass(frozen=True)
+class Case:
+    """One laboratory: the plan that everybody knows, and the truth that is withheld."""
+
+    index: int
+    kind: str
+    plan: dict[str, Any]
+    truths: dict[str, Any]  # true parameters, in the plan's tables
+    seed: int
+    laid: tuple[Laid, ...] = ()
+    inside: bool = False  # with its effect every parameter is still inside its tolerance: there is no gap
+    logger: str = ""  # through which it is recorded, empty where the controllers' own readings are
+
+    def reality(self, laid: tuple[Laid, ...] | None = None, *, silent: bool = False) -> dict[str, Any]:
+        """The tables of the reality, with other effects or without noise where asked for.
+
+        The noise of a case with a logger is the logger's.
+        """
+        laid = self.laid if laid is None else laid
+        tables = quiet(self.truths) if silent or self.logger else self.truths
+        if self.kind in REPLACED:
+            return {"seed": self.seed, **with_rig(tables, self.laid[0].role, self._rig(tables, laid))}
+        effects = [written(item) for item in laid]
+        return {"seed": self.seed, **tables, **({"effect": effects} if effects else {})}
+
+    def _rig(self, tables: Mapping[str, Any], laid: tuple[Laid, ...]) -> dict[str, Any]:
+        """The table of the rig that stands in for a laboratory, with the true parameters among its options."""
+        role = self.laid[0].role
+        kind = plans.from_tables(self.plan, Path()).kinds[role]
+        planned, true = of_role(self.plan, role), of_role(tables, role)
+        options: dict[str, Any] = {
+            name: planned.get(name, {}) | true.get(name, {}) for name in parts_of(kind)
+        }
+        options["effects"] = [
+            {"name": item.name, "formula": item.formula, "parameters": item.parameters} for item in laid
+        ]
+        return rig_of(kind, options)
+
+
+def written(item: Laid) -> dict[str, Any]:
+    """An effect of the catalogue as a reality has it, with its laboratory where others could have it too."""
+    return {
+        "name": item.name,
+        **item.parameters,
+        **({"laboratory": item.role} if item.alone else {}),
+    }
+
+
+def of_role(tables: Mapping[str, Any], role: str) -> dict[str, Any]:
+    """The tables that hold for a role's laboratory: the plan's or the reality's own, or before them a named slave's."""
+    name = name_of(role)
+    return dict(tables) | (tables.get(SLAVE, {}).get(name, {}) if name else {})
+
+
+def with_rig(tables: Mapping[str, Any], role: str, rig: dict[str, Any]) -> dict[str, Any]:
+    """The tables of a reality with a rig in the place of a role's laboratory."""
+    if role in (MASTER, SLAVE):
+        return {**tables, role: {"rig": rig}}
+    slaves = dict(tables.get(SLAVE, {}))
+    slaves[name_of(role)] = {**slaves.get(name_of(role), {}), "rig": rig}
+    return {**tables, SLAVE: slaves}
+
+
+def quiet(truths: Mapping[str, Any]) -> dict[str, Any]:
+    """True parameters with sensors that have no noise."""
+    tables = dict(truths)
+    for key, table in truths.items():
+        if key == "sensors":
+            tables[key] = dict.fromkeys(table, 0.0)
+        elif key == SLAVE:
+            tables[key] = {name: quiet(own) for name, own in table.items()}
+        elif "noise" in table:
+            tables[key] = table | {"noise": dict.fromkeys(table["noise"], 0.0)}
+    return tables
+
+
+def levels(truths: Mapping[str, Any]) -> dict[str, float]:
+    """True rms noise of all readings by signal, those of users' kinds included."""
+    found: dict[str, float] = dict(truths.get("sensors", {})) | truths.get("device", {}).get("noise", {})
+    for own in truths.get(SLAVE, {}).values():
+        found |= levels(own)
+    return found

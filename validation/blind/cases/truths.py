@@ -1,0 +1,163 @@
+"""True parameters of a case: inside the plan's tolerances, as noisy as it happens, and what an effect makes of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from common.plan import reality as realities
+from common.plan.kinds import TABLES_OF_KIND, known_kind
+from common.plan.plan import Plan
+from common.plan.schema import plain
+from common.roles import MASTER, SLAVE, name_of
+from laboratories.kind import Kind
+from laboratories.kinds import KINDS, kind_of, kinds_of
+from models.system import Effects, System
+from validation.blind import lots
+from validation.blind.cases.basis import log_uniform
+from validation.blind.cases.case import Laid
+from validation.blind.library import Library
+from validation.blind.lots import Lot
+
+# drawn one after the other from one generator, as the published cases were; every other parameter has one of its own
+UNCERTAIN = {
+    "structure": ("mass", "stiffness", "damping"),
+    "column": ("stiffness",),
+    "actuator": ("gain", "delay", "time_constant"),
+    "table": ("frequency", "damping_ratio", "delay"),
+    "damper": ("mass", "stiffness", "damping", "motor_time_constant"),
+}
+NOISE = (0.5, 3.0)  # factor on the plan's noise, all sensors alike
+ROUNDING = 1e-12
+
+
+def draw_truths(lot: Lot, plan: Plan) -> dict[str, Any]:
+    """True parameters inside the plan's tolerances, and the true noise, in the tables of a reality."""
+    generator, tables = lots.generator(*lot, "truths"), plan.tables()
+    building = {
+        name: varied(tables["structure"][name], tolerance(plan, "structure", name), generator)
+        for name in of_building(plan)
+    }
+    factors = {
+        f"{table}.{name}": varied(1.0, tolerance(plan, table, name), generator)
+        for table, names in UNCERTAIN.items()
+        for name in names
+        if table != "structure"
+    }
+    noise = log_uniform(generator, *NOISE)
+    truths = {
+        "structure": building,
+        "sensors": {name: noise * level for name, level in tables["sensors"].items()},
+    }
+    for role, kind in kinds_of(plan).items():
+        place = truths
+        if role not in (MASTER, SLAVE):
+            place = truths.setdefault(SLAVE, {}).setdefault(name_of(role), {})
+        place |= of_laboratory(lot, plan, role, kind, factors, noise)
+    return truths
+
+
+def of_laboratory(
+    lot: Lot, plan: Plan, role: str, kind: Kind, factors: Mapping[str, float], noise: float
+) -> dict[str, Any]:
+    """The tables of a laboratory whose parameters differ in truth, each by a factor.
+
+    `factors` are those of the plan's own tables that are drawn for all laboratories together.
+    """
+    seen = plan.of(role)
+    system = System(seen)
+    for name in parameters(kind, seen):
+        factor = factors.get(name) if role in (MASTER, SLAVE) else None
+        if factor is None:
+            own = lots.generator(*lot, "truths", name_of(role), name)
+            factor = varied(1.0, kind.tolerance(seen, name), own)
+        system = kind.scaled(system, name, factor)
+    if kind.name not in KINDS:
+        levels = zip(kind.channels.names, kind.noise(seen).tolist(), strict=True)
+        system = kind.noisy(system, {name: noise * level for name, level in levels if level > 0.0})
+    tables = {}
+    for name in TABLES_OF_KIND[known_kind(plan.kinds[role])]:
+        before, after = (plain(getattr(one, name)) for one in (seen, system.plan))
+        tables[name] = changed(before, after)
+    return {name: table for name, table in tables.items() if table}
+
+
+def changed(before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Any]:
+    """The entries of a table that are not what they were."""
+    found = {}
+    for name, value in after.items():
+        new = changed(before.get(name, {}), value) if isinstance(value, dict) else value
+        if new != ({} if isinstance(value, dict) else before.get(name)):
+            found[name] = new
+    return found
+
+
+def of_building(plan: Plan) -> Sequence[str]:
+    """The uncertain parameters of the building: its dashpots, or the damping ratio in their place."""
+    ratio = plan.structure.damping_ratio > 0.0
+    names = UNCERTAIN["structure"]
+    return [("damping_ratio" if ratio and name == "damping" else name) for name in names]
+
+
+def parameters(kind: Kind, plan: Plan) -> list[str]:
+    """The uncertain parameters of a laboratory that are there at all; `plan` as its role sees it."""
+    names = (name for machine in kind.machines(plan) for name in machine.parameters)
+    return [name for name in names if kind.planned(plan, name) != 0.0]
+
+
+def varied(value: Any, width: float, generator: np.random.Generator) -> Any:
+    """A value, or each of several, within a relative width of itself; a matrix as a whole, which stays symmetric."""
+    if isinstance(value, list) and isinstance(value[0], list):
+        factor = varied(1.0, width, generator)
+        return [[factor * item for item in row] for row in value]
+    if isinstance(value, list):
+        return [varied(item, width, generator) for item in value]
+    return value * (1.0 + width * generator.uniform(-1.0, 1.0))
+
+
+def tolerance(plan: Plan, table: str, name: str) -> float:
+    """How well a nominal parameter of one of the plan's own tables is known, relative."""
+    return plan.tolerances.parameters.get(f"{table}.{name}", plan.tolerances.default)
+
+
+def is_inside(laid: Iterable[Laid], truths: dict[str, Any], plan: Plan, library: Library) -> bool:
+    """Whether effects of the catalogue move nothing but known parameters, none of them out of its tolerance."""
+    true = realities.true_plan(truths, plan)
+    moved: dict[str, System] = {}
+    for item in laid:
+        effect, role = library.catalogue[item.name], item.role or MASTER
+        system = moved.get(role, System(true.of(role)))
+        moved[role] = effect.apply(system, **effect.values(item.parameters))
+    return bool(moved) and all(
+        stays_inside(plan, role, true.of(role), system) for role, system in moved.items()
+    )
+
+
+def stays_inside(plan: Plan, role: str, true: Plan, moved: System) -> bool:
+    """Whether what effects make of a role's true plan is inside the tolerances of the whole plan's nominal one."""
+    if moved.effects != Effects():
+        return False
+    nominal, there = plan.of(role), moved.plan.tables()
+    close = [
+        near(
+            there["structure"][name], nominal.tables()["structure"][name], tolerance(plan, "structure", name)
+        )
+        for name in of_building(plan)
+    ]
+    if role in plan.kinds:
+        kind = kind_of(plan, role)
+        close += [
+            near(kind.planned(moved.plan, name), kind.planned(nominal, name), kind.tolerance(nominal, name))
+            for name in parameters(kind, nominal)
+        ]
+    return all(close) and all(
+        there[name] == table for name, table in true.tables().items() if name not in UNCERTAIN
+    )
+
+
+def near(value: Any, nominal: Any, width: float) -> bool:
+    """Whether a value, or each of several, is within a relative width of the nominal one."""
+    ratio = np.asarray(value) / np.asarray(nominal)
+    return bool(np.all(np.abs(ratio - 1.0) <= width + ROUNDING))
