@@ -490,7 +490,8 @@ def test_a_virtual_run_is_played_in_them(
     reality, path = tmp_path / "reality.toml", tmp_path / "real.mcap"
     reality.write_text(
         REALITY.format(
-            master=place.format("column_lab") + ":ColumnLab", slave=place.format("table_lab") + ":TableLab"
+            master=place.format("column_lab") + ":TrueColumnLab",
+            slave=place.format("table_lab") + ":TrueTableLab",
         )
     )
     words = ["run", "--virtual", "--duration", "4", "--reality", str(reality), "-o", str(path), "--json"]
@@ -510,8 +511,8 @@ def test_a_virtual_run_in_clean_laboratories_has_no_gap(
 ) -> None:
     reality, path = tmp_path / "reality.toml", tmp_path / "real.mcap"
     reality.write_text(
-        '[master.rig]\nclass = "validation.blind.labs.column_lab:ColumnLab"\n'
-        '[slave.rig]\nclass = "validation.blind.labs.table_lab:TableLab"\n'
+        '[master.rig]\nclass = "validation.blind.labs.column_lab:TrueColumnLab"\n'
+        '[slave.rig]\nclass = "validation.blind.labs.table_lab:TrueTableLab"\n'
     )
     words = ["run", "--virtual", "--duration", "4", "--reality", str(reality), "-o", str(path)]
     monkeypatch.setattr(sys, "argv", ["rths", *words])
