@@ -18,6 +18,7 @@ from diagnosis.findings.where import SiteTrace
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data, Fit
 from diagnosis.fits.search import remaining
+from diagnosis.recorded.laboratory import RecordedLaboratory
 from diagnosis.recorded.loop import simulated
 from diagnosis.recorded.paths import force_path, paths
 from diagnosis.recorded.record import Record
@@ -25,6 +26,7 @@ from diagnosis.report.evidence import (
     Abscissa,
     Details,
     Evidence,
+    LaboratorySeen,
     Left,
     NaturalCurve,
     NextTest,
@@ -39,6 +41,7 @@ from diagnosis.report.evidence import (
 )
 from diagnosis.report.records import Candidate
 from diagnosis.signals import windows
+from laboratories.effects import sites
 from models.registry import Array
 
 LISTED = 5  # tests
@@ -54,6 +57,7 @@ def details(
     record = found.record
     return Details(
         test=facts(record),
+        laboratories=tuple(map(laboratory, record.labs)),
         parts=tuple(part(found, trace) for trace in far.traces if trace.series.size),
         paths=paths(record, nominal_signals(found)),
         force_path=force_path(record),
@@ -87,6 +91,14 @@ def facts(record: Record) -> TestFacts:
         ),
         outcome=outcome(summary),
         file=record.run.path.name,
+    )
+
+
+def laboratory(lab: RecordedLaboratory) -> LaboratorySeen:
+    """What a laboratory consists of, under the names of the report."""
+    machines, read = lab.kind.sites, sites.sensors(lab.kind)
+    return LaboratorySeen(
+        role=lab.role, sites=tuple(map(lab.site, machines)), sensors=tuple(map(lab.site, read))
     )
 
 

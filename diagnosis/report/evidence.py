@@ -27,6 +27,15 @@ class TestFacts(Entry):
 
 
 @dataclass(frozen=True, kw_only=True)
+class LaboratorySeen(Entry):
+    """A laboratory of the test that the report is of."""
+
+    role: str = noted("Role of the process that drives it")
+    sites: tuple[Site, ...] = noted("Its sites, sensors apart, from the command to the force")
+    sensors: tuple[Site, ...] = noted("The sites of its sensors")
+
+
+@dataclass(frozen=True, kw_only=True)
 class Reading(Entry):
     """A reading of a part, measured and predicted, in its strongest seconds."""
 
@@ -257,6 +266,7 @@ class Details(Entry):
     """Everything that a page shows beside the report itself."""
 
     test: TestFacts = noted("What was tested", default=TestFacts)
+    laboratories: tuple[LaboratorySeen, ...] = noted("The laboratories of the test", default=())
     parts: tuple[PartSeen, ...] = noted("Sites with their residuals", default=())
     paths: Paths = noted("What the paths of the loop cost", default=Paths)
     force_path: ForcePathEntry | None = noted(

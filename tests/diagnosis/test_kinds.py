@@ -13,7 +13,7 @@ from common.plan.read import with_test
 from common.recording.reader import read
 from diagnosis.report.records import Report
 from loop import substructure
-from report.gap import terminal
+from report.gap import rig, terminal
 from rths.examine.diagnose import diagnose_slaves
 from rths.prepare.simulate import really, write
 from tests.shapes import plan_of
@@ -39,6 +39,13 @@ def diagnosed(plan: Plan, path: Path, *hidden: dict[str, Any]) -> dict[str, Repo
     return diagnose_slaves(recording)
 
 
+def boxes(report: Report) -> list[str]:
+    """The parts on the diagram of the rig."""
+    drawn = rig.rig(report)
+    assert drawn is not None
+    return [box.name for box in drawn["boxes"]]
+
+
 def named(report: Report) -> tuple[str, ...]:
     return report.which[0].effects
 
@@ -59,6 +66,7 @@ def test_a_test_without_slaves_gives_one_report(tmp_path: Path) -> None:
     assert list(reports) == [""]
     assert named(reports[""]) == ("actuator.delay",)
     assert reports[""].gap.signals.keys() == {"column_displacement", "column_force"}
+    assert boxes(reports[""]) == ["ground", "structure", "actuator", "column"]
 
 
 def test_a_master_without_a_rig_gives_a_report_per_slave(tmp_path: Path) -> None:
@@ -68,6 +76,8 @@ def test_a_master_without_a_rig_gives_a_report_per_slave(tmp_path: Path) -> None
     assert named(reports["columns"]) == ("actuator.delay",)
     assert named(reports["dampers"]) == ("damper.friction",)
     assert "structure.stiffness" in reports["columns"].tolerances
+    assert boxes(reports["columns"]) == ["ground", "structure", "link", "actuator", "column"]
+    assert boxes(reports["dampers"]) == ["ground", "structure", "link", "table", "damper"]
 
 
 def test_a_fault_of_a_users_device_is_named(tmp_path: Path) -> None:
@@ -76,7 +86,21 @@ def test_a_fault_of_a_users_device_is_named(tmp_path: Path) -> None:
     found = report.which[0].parameters["device.leak"]["share"]
     assert found.value == pytest.approx(0.2, abs=0.03)
     assert report.where[0].site == "device"
+    assert boxes(report) == ["ground", "structure", "link", "device"]
 
 
 def test_a_test_that_is_as_planned_has_no_gap(tmp_path: Path) -> None:
     assert diagnosed(TWO, tmp_path)["east"].status == "no_gap"
+
+
+def test_the_diagram_colours_the_part_and_the_reading_of_the_laboratory_that_has_the_gap(
+    tmp_path: Path,
+) -> None:
+    hidden = {"name": "sensor.column_force.delay", "delay": 0.004, "laboratory": "slave.east"}
+    report = diagnosed(TWO, tmp_path, hidden)["east"]
+    drawn = rig.rig(report)
+    assert drawn is not None
+    assert [box.name for box in drawn["boxes"]].count("column") == 2
+    (coloured,) = (circle for circle in drawn["circles"] if circle.share)
+    assert (coloured.sensor.label, coloured.share) == ("force", "100 %")
+    assert coloured.sensor.y > rig.LINK[1]  # in the slave's laboratory

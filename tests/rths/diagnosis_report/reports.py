@@ -215,6 +215,7 @@ def details() -> Report:
     falsified = {"sensor.damper_force.gain": {"factor": value(1.08, 1.071, 1.089, "–")}}
     return {
         "test": facts_of_test(),
+        "laboratories": laboratories(),
         "parts": parts(),
         "paths": {
             "command": path(0.0012, 0.998, -0.19, 0.0004, -0.06),
@@ -269,6 +270,27 @@ def details() -> Report:
     }
 
 
+def laboratories() -> list[dict[str, Any]]:
+    """The default test's."""
+    return [
+        {
+            "role": "master",
+            "sites": ["actuator", "column"],
+            "sensors": ["sensor.column_displacement", "sensor.column_force"],
+        },
+        {
+            "role": "slave",
+            "sites": ["table", "damper"],
+            "sensors": [
+                "sensor.table_displacement",
+                "sensor.table_acceleration",
+                "sensor.damper_stroke",
+                "sensor.damper_force",
+            ],
+        },
+    ]
+
+
 def explained() -> Report:
     return bare("explained") | {
         "verdict": (
@@ -314,7 +336,7 @@ def explained() -> Report:
 
 def no_gap() -> Report:
     found = details()
-    kept = {name: found[name] for name in ("test", "paths")}
+    kept = {name: found[name] for name in ("test", "laboratories", "paths")}
     kept["parts"] = [part("damper", 0.05, []), part("column", 0.04, [])]
     return bare("no_gap") | {
         "tolerances": {"column.stiffness": {"factor": 1.004, "z": 0.2}},
