@@ -39,7 +39,7 @@ def test_the_critical_delay_of_a_storey_solves_its_characteristic_equation(
     def excess(omega: float) -> float:
         return abs(complex(k_n - m * omega**2, c * omega)) - k_e
 
-    middle = math.sqrt(k_n / m - 0.5 * (c / m) ** 2)  # where the modulus is least
+    middle = math.sqrt(max(k_n / m - 0.5 * (c / m) ** 2, 0.0))  # where the modulus is least
     delays = []
     for low, high in ((1e-6, middle), (middle, 10.0 * math.sqrt(k / m))):
         if excess(low) * excess(high) < 0.0:
