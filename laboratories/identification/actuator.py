@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from common.errors import InputError
 from laboratories.identification import checks, estimate
-from laboratories.identification.estimate import Estimate
+from laboratories.identification.estimate import Identified
 from models.compiled import jit
 from models.registry import Array
 from models.transfer_systems import delay, first_order
@@ -19,18 +17,6 @@ UNITS = ("s", "s", "")
 LONGEST = 0.5  # s, for either time: an actuator that is slower cannot take part in a test in real time
 SHORTEST = 1e-6  # s, of a time constant: below it the lag is none at any interval
 HOPELESS = 0.9  # nrmse above which nothing was identified: a constant leaves 1
-
-
-@dataclass(frozen=True)
-class ActuatorFit:
-    """What was identified: `parameters` has delay (s), time_constant (s) and gain."""
-
-    parameters: dict[str, Estimate]
-    nrmse: float
-    fitted: Array  # (n,) m, as the measurement
-
-    def __getitem__(self, name: str) -> Estimate:
-        return self.parameters[name]
 
 
 @jit
@@ -99,8 +85,8 @@ def first_guess(
     return *place, best
 
 
-def least_squares(command: Array, measured: Array, interval: float, *, held: bool = False) -> ActuatorFit:
-    """Dead time L (s), time constant T (s) and gain K of `T·ẏ + y = K·u(t − L)` from a record of any motion.
+def least_squares(command: Array, measured: Array, interval: float, *, held: bool = False) -> Identified:
+    """Dead time `delay` L (s), `time_constant` T (s) and `gain` K of `T·ẏ + y = K·u(t − L)` from any motion.
 
     `command` (m) and `measured` (m) have one value per tick of `interval` (s): the command written at tick k
     is ramped and reached at tick k + 1, or where `held` acts as a step. The sensor's level and the state at the
@@ -140,8 +126,7 @@ def least_squares(command: Array, measured: Array, interval: float, *, held: boo
         xtol=1e-12,
         ftol=1e-12,
     )
-    fitted = model(result.x)
-    misfit = estimate.nrmse(measured, fitted)
+    misfit = estimate.nrmse(measured, model(result.x))
     if misfit > HOPELESS:
         raise InputError("The measured displacement does not follow the command: check sensor and cabling.")
-    return ActuatorFit(estimate.of_fit(result, NAMES, UNITS, scales), misfit, fitted)
+    return Identified(estimate.of_fit(result, NAMES, UNITS, scales), misfit)

@@ -38,8 +38,6 @@ class DamperFit:
     parameters: dict[str, Estimate]
     stroke_nrmse: float
     force_nrmse: float  # nan without a force
-    stroke: Array  # (n,) m, fitted
-    force: Array  # (n,) N, fitted
 
     def __getitem__(self, name: str) -> Estimate:
         return self.parameters[name]
@@ -206,6 +204,4 @@ def fit(
     parameters = estimate.of_fit(result, names, units, scales[places], blocks)
     fitted_stroke, fitted_force = model(x)
     misfit = estimate.nrmse(outputs[1], fitted_force) if len(outputs) > 1 else float("nan")
-    return DamperFit(
-        parameters, estimate.nrmse(outputs[0], fitted_stroke), misfit, fitted_stroke, fitted_force
-    )
+    return DamperFit(parameters, estimate.nrmse(outputs[0], fitted_stroke), misfit)

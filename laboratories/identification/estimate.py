@@ -23,10 +23,16 @@ class Estimate:
     high: float
     unit: str
 
-    @property
-    def half_width(self) -> float:
-        """Half the interval's width, in `unit`."""
-        return (self.high - self.low) / 2.0
+
+@dataclass(frozen=True)
+class Identified:
+    """What was identified: the estimates by name, and the misfit over the measurement's standard deviation."""
+
+    parameters: dict[str, Estimate]
+    nrmse: float
+
+    def __getitem__(self, name: str) -> Estimate:
+        return self.parameters[name]
 
 
 def quantile(freedom: float) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +9,7 @@ import numpy as np
 from common.errors import InputError
 from common.plan.tables import Damper, ShakingTable
 from laboratories.identification import checks, estimate
-from laboratories.identification.estimate import Estimate
+from laboratories.identification.estimate import Identified
 from laboratories.table import model as table_lab
 from models.compiled import jit
 from models.registry import Array
@@ -22,18 +21,6 @@ LOW = (0.2, 0.02, 0.0)
 HIGH = (200.0, 5.0, 0.5)
 HOPELESS = 0.8  # nrmse above which nothing was identified: a constant leaves 1
 COHERENT = 0.8  # least coherence of a frequency that is read: there a fifth of the power is noise
-
-
-@dataclass(frozen=True)
-class TableFit:
-    """What was identified: `parameters` has frequency (Hz), damping_ratio and delay (s)."""
-
-    parameters: dict[str, Estimate]
-    nrmse: float
-    fitted: Array  # (n,) m, as the measurement
-
-    def __getitem__(self, name: str) -> Estimate:
-        return self.parameters[name]
 
 
 class FrequencyResponse(NamedTuple):
@@ -68,8 +55,8 @@ def response(command: Array, interval: float, table: ShakingTable) -> Array:
     return result
 
 
-def least_squares(command: Array, displacement: Array, interval: float) -> TableFit:
-    """Frequency (Hz), damping ratio and dead time (s) of the table from a record of any motion.
+def least_squares(command: Array, displacement: Array, interval: float) -> Identified:
+    """`frequency` (Hz), `damping_ratio` and dead time `delay` (s) of the table from a record of any motion.
 
     `command` (m) and `displacement` (m) have one value per tick of `interval` (s): the command written at
     tick k is ramped and reached at tick k + 1. The record begins at rest; the sensor's level is fitted
@@ -125,7 +112,7 @@ def least_squares(command: Array, displacement: Array, interval: float) -> Table
     misfit = estimate.nrmse(displacement, fitted)
     if misfit > HOPELESS:
         raise InputError("The table's displacement does not follow the command: check sensor and cabling.")
-    return TableFit(estimate.of_fit(result, NAMES, UNITS, np.ones(len(NAMES))), misfit, fitted)
+    return Identified(estimate.of_fit(result, NAMES, UNITS, np.ones(len(NAMES))), misfit)
 
 
 def reached(command: Array) -> Array:
@@ -133,14 +120,12 @@ def reached(command: Array) -> Array:
     return np.concatenate([command[:1], command[:-1]])
 
 
-def frequency_response(
-    command: Array, measured: Array, interval: float, length: int | None = None
-) -> FrequencyResponse:
+def frequency_response(command: Array, measured: Array, interval: float) -> FrequencyResponse:
     """Frequency response from the ramped command to the measurement, with coherence; frequencies in Hz.
 
     Arrays have one value per tick of `interval` (s), the command written at tick k being reached at tick
-    k + 1. Averaged over Hann windows of `length` ticks that overlap by half (default: a quarter of the
-    record, at most 2048); the spectrum of the ramp's straight pieces (sinc²) is divided out.
+    k + 1. Averaged over Hann windows of a quarter of the record, at most 2048 ticks, that overlap by half;
+    the spectrum of the ramp's straight pieces (sinc²) is divided out.
 
     Raises:
         InputError: too short, unequal lengths, not finite, constant.
@@ -153,13 +138,8 @@ def frequency_response(
     command, measured = checks.signals(4 * LEAST, command=command, measured=measured)
     checks.moves("command", command)
     checks.moves("measured", measured)
-    window = length if length is not None else min(command.size // 4, 2048)
-    if not LEAST <= window <= command.size // 2:
-        raise InputError(
-            f"A window of {window} ticks does not fit: give {LEAST} to {command.size // 2} ticks."
-        )
     given = reached(command)
-    options = {"fs": 1.0 / interval, "nperseg": window}
+    options = {"fs": 1.0 / interval, "nperseg": min(command.size // 4, 2048)}
     frequency, own = signal.welch(given, **options)
     _, cross = signal.csd(given, measured, **options)
     _, other = signal.welch(measured, **options)

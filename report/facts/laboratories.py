@@ -6,10 +6,10 @@ is data: nothing here runs a class that its plan names, and it opens where that 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from common.plan.kinds import COLUMN, TABLE, planned
 from common.plan.plan import Plan
@@ -100,6 +100,14 @@ def lettered(labs: list[LaboratoryFacts]) -> list[LaboratoryFacts]:
         lab._replace(letter=LETTERS[kind_of(lab.topic)]) if lab.pictured.name in alike else lab
         for lab in labs
     ]
+
+
+def alike(labs: Iterable[LaboratoryFacts]) -> list[list[LaboratoryFacts]]:
+    """The laboratories, those of slaves with the same signals together."""
+    found: dict[Any, list[LaboratoryFacts]] = {}
+    for lab in labs:
+        found.setdefault((lab.topic == MASTER, lab.channels, lab.letter), []).append(lab)
+    return list(found.values())
 
 
 def laboratory(role: str, topic: str, plan: Plan | None, units: Mapping[str, str]) -> LaboratoryFacts | None:

@@ -115,15 +115,28 @@ def logarithmic(axis: Any, lowest: float | None = None) -> None:
 
 def residual_time(parts: Sequence[PartSeen]) -> str:
     """Residual over noise of every part over time; empty where no part has windows."""
-    drawn = [(part, *pair(part.windows.t, part.windows.ratio)) for part in parts]
-    drawn = [item for item in drawn if item[1].size][:MOST_PARTS]
+    return ratios([(part.site, *pair(part.windows.t, part.windows.ratio)) for part in parts], "time, s")
+
+
+def residual_amplitude(parts: Sequence[PartSeen]) -> str:
+    """Residual over noise against the amplitude of the motion; empty where no part has it."""
+    found = [(part.site, *pair(part.amplitudes.amplitude, part.amplitudes.ratio)) for part in parts]
+    shares = [
+        (site, 100.0 * x / (np.nanmax(np.abs(x), initial=0.0) or 1.0), ratio) for site, x, ratio in found
+    ]
+    return ratios(shares, "amplitude of the part's motion, % of its largest")
+
+
+def ratios(curves: Sequence[tuple[str, Values, Values]], across: str) -> str:
+    """Residual over noise of sites over something; empty where none has any."""
+    drawn = [curve for curve in curves if curve[1].size][:MOST_PARTS]
     if not drawn:
         return ""
-    canvas = figure(WIDTH, 2.5)
+    canvas = figure(WIDTH, 2.4)
     axis = canvas.subplots()
-    for part, t, ratio in drawn:
-        axis.plot(t, ratio, marker="." if t.size < 40 else "", label=literal(wording.site(part.site)))
-    axis.set(xlabel="time, s", ylabel="residual / noise floor")
+    for site, x, ratio in drawn:
+        axis.plot(x, ratio, "o-" if x.size < 40 else "-", markersize=3, label=literal(wording.site(site)))
+    axis.set(xlabel=across, ylabel="residual / noise floor")
     logarithmic(axis, 0.3)
     floor_line(axis, 1.0, "noise floor")
     legend(canvas, axis)
@@ -161,30 +174,6 @@ def density_unit(part: PartSeen, most: float) -> tuple[float, str]:
         return 1.0, "SI"
     factor, unit = scale(most, units.pop())
     return factor, f"{unit or '1'}/√Hz"
-
-
-def residual_amplitude(parts: Sequence[PartSeen]) -> str:
-    """Residual over noise against the amplitude of the motion; empty where no part has it."""
-    drawn = [(part, *pair(part.amplitudes.amplitude, part.amplitudes.ratio)) for part in parts]
-    drawn = [item for item in drawn if item[1].size][:MOST_PARTS]
-    if not drawn:
-        return ""
-    canvas = figure(WIDTH, 2.3)
-    axis = canvas.subplots()
-    for part, amplitude, ratio in drawn:
-        top = np.nanmax(np.abs(amplitude)) or 1.0
-        axis.plot(
-            100.0 * amplitude / top,
-            ratio,
-            "o-",
-            markersize=3,
-            label=literal(wording.site(part.site)),
-        )
-    axis.set(xlabel="amplitude of the part's motion, % of its largest", ylabel="residual / noise floor")
-    logarithmic(axis, 0.3)
-    floor_line(axis, 1.0, "noise floor")
-    legend(canvas, axis)
-    return svg(canvas)
 
 
 def worst(t: Values, error: Values) -> slice:

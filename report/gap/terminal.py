@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from diagnosis.report.records import Report
 from report.gap import wording
-from report.text.formats import as_float, percent, percent_interval, probability, span, times
+from report.text.formats import as_float, blocks, percent, percent_interval, probability, span, times
 
 WIDTH = 100
 LABEL = 12
@@ -79,12 +79,6 @@ def gap(report: Report) -> list[str]:
     return rows("gap", lines or ["not determined"])
 
 
-def bar(share: float) -> str:
-    """A share as a bar."""
-    filled = round(BAR * min(max(share, 0.0), 1.0))
-    return "█" * filled + "·" * (BAR - filled)
-
-
 def where(report: Report) -> list[str]:
     """The foremost sites with their shares."""
     lines = []
@@ -94,7 +88,7 @@ def where(report: Report) -> list[str]:
         facts += [span(window, "s") for window in item.when[:2]]
         facts.append(span(item.frequency_band, "Hz"))
         interval = percent_interval(item.share_interval)
-        head = f"{wording.site(item.site):<{width}} {bar(item.share or 0.0)} {percent(item.share)}"
+        head = f"{wording.site(item.site):<{width}} {blocks(item.share or 0.0, BAR)} {percent(item.share)}"
         lines.append(
             head + (f" ({interval})" if interval else "") + "".join(f"  {fact}" for fact in facts if fact)
         )

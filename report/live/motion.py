@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from common.roles import MASTER
 from laboratories.kind import Hysteresis
-from report.facts.laboratories import LaboratoryFacts
+from report.facts.laboratories import LaboratoryFacts, alike
 from report.live.chart import ChartCurve, draw, history, plot
 from report.live.stream import Stream, Streams
 from report.pictures.figure import COLOURS
@@ -27,7 +27,7 @@ def motions(streams: Streams, labs: Iterable[LaboratoryFacts], window: float | N
     imposes is shown by its loop; a motion of its own, as a damper's stroke, over time.
     """
     found: dict[str, Plot] = {}
-    each = apart(labs)
+    each = [labs[0] for labs in alike(labs)]
     for lab in each:
         add(found, lab.name, lab, beside_target(streams, lab, window))
     for lab in each:
@@ -51,17 +51,9 @@ def motions(streams: Streams, labs: Iterable[LaboratoryFacts], window: float | N
     return found
 
 
-def apart(labs: Iterable[LaboratoryFacts]) -> list[LaboratoryFacts]:
-    """The laboratories without those slaves' whose signals another slave's has as well."""
-    found: dict[Any, LaboratoryFacts] = {}
-    for lab in labs:
-        found.setdefault((lab.topic == MASTER, lab.channels, lab.letter), lab)
-    return list(found.values())
-
-
 def looks(labs: Iterable[LaboratoryFacts]) -> list[Any]:
     """What makes the plots of laboratories differ from those of others."""
-    return [(lab.topic == MASTER, lab.channels, lab.letter) for lab in apart(labs)]
+    return [(lab.topic == MASTER, lab.channels, lab.letter) for lab, *_ in alike(labs)]
 
 
 def add(found: dict[str, Plot], name: str, lab: LaboratoryFacts, figure: Any) -> None:

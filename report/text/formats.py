@@ -110,6 +110,12 @@ def bare_percent(value: float) -> str:
     return f"{hundredth:.1f}" if abs(hundredth) >= 1.0 else f"{hundredth:.2g}"
 
 
+def blocks(share: float, width: int) -> str:
+    """A share between 0 and 1 as a bar of so many characters."""
+    filled = round(width * min(max(share, 0.0), 1.0))
+    return "█" * filled + "·" * (width - filled)
+
+
 def percent(value: object, places: int | None = None) -> str:
     """A share in percent, with two digits, or with so many decimals where a limit stands beside it."""
     number = as_float(value)

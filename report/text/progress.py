@@ -11,6 +11,7 @@ from types import TracebackType
 from typing import Self, TextIO
 
 from common.terminal.printable import behind, shown
+from report.text.formats import blocks
 
 BAR = 24
 UNSAID = 2.0  # s that go by without a word
@@ -73,8 +74,7 @@ class Progress:
         what, done, total = self._now
         counted = f"{done} of {total}" if total else ""
         parts = ", ".join(part for part in (what, counted, f"{spent:.0f} s") if part)
-        filled = round(BAR * min(done / total, 1.0)) if total else 0
-        bar = f"[{'█' * filled}{'·' * (BAR - filled)}] " if self._live and total else ""
+        bar = f"[{blocks(done / total, BAR)}] " if self._live and total else ""
         return f"{bar}{self._doing}: {parts}"
 
     def leave(self, *, wipe: bool) -> None:

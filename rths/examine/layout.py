@@ -61,7 +61,8 @@ def run(args: argparse.Namespace) -> int:
 class Subject:
     """What a layout is made for: a test's name, its slaves' roles, its interval in s, its last tick.
 
-    `fields` are the names of what its topics hold, `labs` its laboratories.
+    `fields` are the names of what its topics hold, `labs` its laboratories, those that are
+    alike together.
     """
 
     test: str
@@ -69,7 +70,7 @@ class Subject:
     interval: float
     last: int
     fields: dict[str, frozenset[str]]
-    labs: Sequence[LaboratoryFacts]
+    labs: Sequence[Sequence[LaboratoryFacts]]
 
     def topics(self, kind: str) -> list[str]:
         """Its topics of a kind: one, or one per slave."""
@@ -87,12 +88,12 @@ def of_default_test() -> Subject:
     from common.plan import read as plans
     from common.recording.reader import Run
     from laboratories import kinds
-    from report.facts.laboratories import laboratories
+    from report.facts.laboratories import alike, laboratories
 
     path = cli.plan_path(None)
     test = plans.load(path)
     fields = {topic: frozenset(row.name for row in rows) for topic, rows in kinds.topics(test).items()}
-    labs = laboratories(Run(path, roles=test.roles, columns={topic: {} for topic in fields}))
+    labs = alike(laboratories(Run(path, roles=test.roles, columns={topic: {} for topic in fields})))
     return Subject(test.test.name, test.roles, test.test.interval, test.ticks - 1, fields, labs)
 
 
@@ -100,10 +101,10 @@ def of_recording(path: Path) -> Subject:
     """What a recording holds; raises InputError where it cannot be read."""
     from common.plan.plan import Plan
     from common.recording.reader import read
-    from report.facts.laboratories import laboratories, plan_of
+    from report.facts.laboratories import alike, laboratories, plan_of
 
     found = read(path)
-    plan, labs = plan_of(found) or Plan(), laboratories(found)
+    plan, labs = plan_of(found) or Plan(), alike(laboratories(found))
     fields = {topic: frozenset(columns) for topic, columns in found.columns.items() if found.has(topic)}
     if found.events:
         fields[EVENT] = frozenset(found.events[0])
@@ -211,14 +212,14 @@ def motions(subject: Subject) -> dict[str, dict[str, Any]]:
             labs,
             (labs[0].channels.target.name, labs[0].channels.position),
         )
-        for labs in alike(subject.labs)
+        for labs in subject.labs
     }
 
 
 def forces(subject: Subject) -> dict[str, dict[str, Any]]:
     """What each laboratory tests: force over the motion that is imposed, or its own motion and force over time."""
     found: dict[str, dict[str, Any]] = {}
-    for labs in alike(subject.labs):
+    for labs in subject.labs:
         channels = labs[0].channels
         effort = (channels.effort.name,) if channels.effort else ()
         for loop in labs[0].pictured.loops:
@@ -241,14 +242,6 @@ def forces(subject: Subject) -> dict[str, dict[str, Any]]:
 def unlike(name: str, others: Iterable[str]) -> str:
     """A panel's name that no other has."""
     return unlike(f"{name}'", others) if name in others else name
-
-
-def alike(labs: Iterable[LaboratoryFacts]) -> list[list[LaboratoryFacts]]:
-    """The laboratories, those of slaves with the same signals together."""
-    found: dict[Any, list[LaboratoryFacts]] = {}
-    for lab in labs:
-        found.setdefault((lab.topic == MASTER, lab.channels), []).append(lab)
-    return list(found.values())
 
 
 def over_time(

@@ -190,7 +190,6 @@ def test_least_squares_finds_any_actuator_from_any_motion(kind: str) -> None:
         assert fit["time_constant"].value == pytest.approx(constant, abs=3e-4)
         assert fit["gain"].value == pytest.approx(gain, abs=2e-3)
         assert fit.nrmse < 0.02
-        assert fit.fitted.shape == t.shape
 
 
 def test_least_squares_agrees_with_the_continuous_equation() -> None:
@@ -228,7 +227,8 @@ def test_a_steady_sine_says_by_its_intervals_that_it_carries_less() -> None:
     late = emulated(sine)[500:] + noise(4, 1000)
     alone = actuator.least_squares(sine[500:], late, DT)
     rich = actuator.least_squares(random_motion(1000), emulated(random_motion(1000)) + noise(4, 1000), DT)
-    assert alone["delay"].half_width > 5.0 * rich["delay"].half_width
+    (low, high), (least, most) = ((fit["delay"].low, fit["delay"].high) for fit in (rich, alone))
+    assert most - least > 5.0 * (high - low)
 
 
 def test_least_squares_refuses_what_carries_nothing() -> None:

@@ -121,8 +121,6 @@ def test_tables_records_that_carry_nothing_are_refused() -> None:
     for given, taken, what in cases:
         with pytest.raises(InputError, match=what):
             table.least_squares(given, taken, DT)
-    with pytest.raises(InputError, match="window"):
-        table.frequency_response(command, moved, DT, length=399)
     with pytest.raises(InputError, match="constant"):
         table.frequency_response(np.zeros(400), moved, DT)
     with pytest.raises(InputError, match="not coherent"):
@@ -146,7 +144,6 @@ def test_the_damper_is_found_and_its_intervals_cover() -> None:
         assert fits[0][name].value == pytest.approx(true, rel=5e-3)
     assert fits[0].stroke_nrmse < 1e-3
     assert fits[0].force_nrmse < 0.05
-    assert fits[0].force.shape == motor.shape
 
 
 def test_without_a_force_mass_and_gain_are_not_separable() -> None:
