@@ -34,6 +34,7 @@ from models.ground_motion import GroundMotion, ground, load
 from models.integrators.state import ACCELERATION, DISPLACEMENT, NEXT_DISPLACEMENT, NEXT_VELOCITY, VELOCITY
 from models.registry import Array
 from models.structures import shear_building
+from models.transfer_systems import delay
 
 Codes = NDArray[np.int64]
 
@@ -265,7 +266,7 @@ def tell(building: Substructure, lab: int, tick: int, told: Array, first: int) -
     interval, ratio, ground = building.scalars[INTERVAL], labs[RATIO, lab], building.ground
     if followed == DRIFT:
         rate = shear_building.storey_drift(state[NEXT_VELOCITY], place)
-        trend.remember(past, ratio * shear_building.storey_drift(state[ACCELERATION], place))
+        delay.remember(past, ratio * shear_building.storey_drift(state[ACCELERATION], place))
         told[first + SENT_TARGET] = ratio * shear_building.storey_drift(state[NEXT_DISPLACEMENT], place)
         told[first + SENT_VELOCITY] = ratio * rate
         told[first + SENT_ACCELERATION] = trend.ahead(past)
@@ -273,7 +274,7 @@ def tell(building: Substructure, lab: int, tick: int, told: Array, first: int) -
     else:
         rate = state[NEXT_VELOCITY, place]
         here, ahead = ground[1, tick], ground[1, tick + 1]
-        trend.remember(past, state[ACCELERATION, place])
+        delay.remember(past, state[ACCELERATION, place])
         told[first + SENT_TARGET] = ratio * (state[NEXT_DISPLACEMENT, place] + ahead)
         told[first + SENT_VELOCITY] = ratio * (
             rate + (ahead - here) / interval + 0.5 * interval * ground[0, tick + 1]

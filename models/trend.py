@@ -14,14 +14,6 @@ RECENT = 6  # 12 ms at the default interval
 
 
 @jit
-def remember(recent: Array, value: float) -> None:
-    """Put the newest value in front."""
-    for i in range(recent.size - 1, 0, -1):
-        recent[i] = recent[i - 1]
-    recent[0] = value
-
-
-@jit
 def steepness(recent: Array) -> float:
     """Slope of the line per tick, towards the newest value."""
     middle = 0.5 * (recent.size - 1)

@@ -29,6 +29,7 @@ from models.compensators import (
     series,
     taylor,
 )
+from models.compensators.wanted import Wanted
 from models.compiled import jit
 from models.registry import Array
 
@@ -82,17 +83,6 @@ class Built(NamedTuple):
     state: Array
 
 
-class Wanted(NamedTuple):
-    """What a compensator is asked for at t_k: the target at t_{k+1} with its rates, and where the system is."""
-
-    target: float  # m, at t_{k+1}, as its rates
-    rate: float  # m/s
-    acceleration: float  # m/s²
-    jerk: float  # m/s³
-    present: float  # m, target at t_k
-    measured: float  # m, displacement at t_k
-
-
 STILL = Wanted(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -121,16 +111,15 @@ def build(kind: str, parameters: Mapping[str, float], interval: float, table: st
 def fed_forward(compensator: Built, wanted: Wanted) -> float:
     """Command (m) of a method that does without the measurement; the target where the code is of none."""
     code, p, s = compensator.code, compensator.params, compensator.state
-    target, rate, acceleration, jerk = wanted.target, wanted.rate, wanted.acceleration, wanted.jerk
-    command = target
+    command = wanted.target
     if code == 2:
-        command = taylor.step(p, target, rate, acceleration, jerk)
+        command = taylor.step(p, wanted)
     elif code == 4:
-        command = horiuchi.step(p, s, target, wanted.present)
+        command = horiuchi.step(p, s, wanted)
     elif code == 5:
-        command = inverse.step(p, target, rate, acceleration, jerk)
+        command = inverse.step(p, wanted)
     elif code == 9:
-        command = series.step(p, target, rate, acceleration, jerk)
+        command = series.step(p, wanted)
     return command
 
 
@@ -138,21 +127,19 @@ def fed_forward(compensator: Built, wanted: Wanted) -> float:
 def fed_back(compensator: Built, wanted: Wanted, interval: float) -> float:
     """Command (m) of a method that takes the measurement."""
     code, p, s = compensator.code, compensator.params, compensator.state
-    target, rate, acceleration, jerk = wanted.target, wanted.rate, wanted.acceleration, wanted.jerk
-    present, measured = wanted.present, wanted.measured
-    command = target
+    command = wanted.target
     if code == 1:
-        command = pid.step(p, s, target, present - measured, interval)
+        command = pid.step(p, s, wanted, interval)
     elif code == 3:
-        command = pid_taylor.step(p, s, target, rate, acceleration, jerk, present - measured, interval)
+        command = pid_taylor.step(p, s, wanted, interval)
     elif code == 6:
-        command = pid_inverse.step(p, s, target, rate, acceleration, jerk, present - measured, interval)
+        command = pid_inverse.step(p, s, wanted, interval)
     elif code == 7:
-        command = ats.step(p, s, target, rate, acceleration, present, measured, interval)
+        command = ats.step(p, s, wanted, interval)
     elif code == 8:
-        command = pi_lead.step(p, s, present, measured, interval)
+        command = pi_lead.step(p, s, wanted, interval)
     elif code == 10:
-        command = amb.step(p, s, target, present, measured, interval)
+        command = amb.step(p, s, wanted, interval)
     return command
 
 

@@ -30,6 +30,7 @@ import numpy as np
 
 from common.plan.schema import Rule
 from models.compensators import low_pass, series
+from models.compensators.wanted import Wanted
 from models.compiled import jit, jit_apart
 from models.registry import Array
 
@@ -168,14 +169,14 @@ def adapt(p: Array, s: Array, interval: float) -> None:
 
 
 @jit_apart
-def step(p: Array, s: Array, target: float, present: float, measured: float, interval: float) -> float:
+def step(p: Array, s: Array, wanted: Wanted, interval: float) -> float:
     """Command (m); before the first tick, command and measurement count as still."""
     if s[TICKS] == 0.0:
-        rest(p, s, present, measured)
+        rest(p, s, wanted.present, wanted.measured)
     s[TICKS] += 1.0
-    observe(p, s, measured, interval)
+    observe(p, s, wanted.measured, interval)
     if s[QUIET] < p[MEMORY]:
         adapt(p, s, interval)
-    remember(s, TARGETS, target)
+    remember(s, TARGETS, wanted.target)
     s[COMMAND] = series_of(s, TARGETS, interval)
     return s[COMMAND]

@@ -32,6 +32,7 @@ import numpy as np
 from common.errors import InputError
 from common.plan.schema import Rule
 from models.compensators import low_pass
+from models.compensators.wanted import Wanted
 from models.compiled import jit
 from models.registry import Array
 
@@ -218,17 +219,9 @@ def adapt(p: Array, s: Array, interval: float) -> None:
 
 
 @jit
-def step(
-    p: Array,
-    s: Array,
-    target: float,
-    rate: float,
-    acceleration: float,
-    present: float,
-    measured: float,
-    interval: float,
-) -> float:
+def step(p: Array, s: Array, wanted: Wanted, interval: float) -> float:
     """Command (m); before the first tick, command and measurement count as still."""
+    present, measured = wanted.present, wanted.measured
     if s[TICKS] == 0.0:
         s[COMMAND] = present
         low_pass.settle(p, SOS, SECTIONS, s, COMMAND_FILTER, present)
@@ -241,6 +234,6 @@ def step(
     observe(p, s, measured, interval)
     if moving(p, s):
         adapt(p, s, interval)
-    command = s[0] * target + s[1] * rate + s[2] * acceleration
+    command = s[0] * wanted.target + s[1] * wanted.rate + s[2] * wanted.acceleration
     s[COMMAND] = command
     return command

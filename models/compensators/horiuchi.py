@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from common.plan.schema import Rule
+from models.compensators.wanted import Wanted
 from models.compiled import jit
 from models.registry import Array
 
@@ -65,15 +66,15 @@ def state(params: Array, _interval: float) -> Array:
 
 
 @jit
-def step(p: Array, s: Array, target: float, present: float) -> float:
+def step(p: Array, s: Array, wanted: Wanted) -> float:
     """Command (m); the target joins the history."""
     size = s.size - HISTORY
     if s[STARTED] == 0.0:
         s[STARTED] = 1.0
         for i in range(size):
-            s[HISTORY + i] = present
+            s[HISTORY + i] = wanted.present
     head = int(s[HEAD])
-    s[HISTORY + head] = target
+    s[HISTORY + head] = wanted.target
     command = 0.0
     for i in range(int(p[TAPS])):
         at = head - int(p[FIRST + 2 * i])

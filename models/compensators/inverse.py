@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from common.plan.schema import Rule
+from models.compensators.wanted import Wanted
 from models.compiled import jit
 from models.registry import Array
 
@@ -52,12 +53,13 @@ def pack(params: Array, _interval: float) -> Array:
 
 
 @jit
-def series(p: Array, at: int, target: float, rate: float, acceleration: float, jerk: float) -> float:
+def series(p: Array, at: int, wanted: Wanted) -> float:
     """Command (m) from the coefficients that stand at `at`."""
-    return p[at] * target + p[at + 1] * rate + p[at + 2] * acceleration + p[at + 3] * jerk
+    early = p[at] * wanted.target + p[at + 1] * wanted.rate
+    return early + p[at + 2] * wanted.acceleration + p[at + 3] * wanted.jerk
 
 
 @jit
-def step(p: Array, target: float, rate: float, acceleration: float, jerk: float) -> float:
+def step(p: Array, wanted: Wanted) -> float:
     """Command (m)."""
-    return series(p, 4, target, rate, acceleration, jerk)
+    return series(p, 4, wanted)

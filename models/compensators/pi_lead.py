@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from common.plan.schema import Rule
+from models.compensators.wanted import Wanted
 from models.compiled import jit
 from models.registry import Array
 
@@ -55,11 +56,11 @@ def state(_params: Array, _interval: float) -> Array:
 
 
 @jit
-def step(p: Array, s: Array, present: float, measured: float, interval: float) -> float:
+def step(p: Array, s: Array, wanted: Wanted, interval: float) -> float:
     """Command (m) from target and measurement of one instant."""
-    s[LED] = p[NOW] * present + p[BEFORE] * s[PREVIOUS_TARGET] + p[KEPT] * s[LED]
-    s[PREVIOUS_TARGET] = present
-    error = s[LED] - measured
+    s[LED] = p[NOW] * wanted.present + p[BEFORE] * s[PREVIOUS_TARGET] + p[KEPT] * s[LED]
+    s[PREVIOUS_TARGET] = wanted.present
+    error = s[LED] - wanted.measured
     s[INTEGRAL] += 0.5 * interval * (s[PREVIOUS_ERROR] + error)
     s[PREVIOUS_ERROR] = error
     return p[0] * error + p[1] * s[INTEGRAL]

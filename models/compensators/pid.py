@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from common.plan.schema import Rule
+from models.compensators.wanted import Wanted
 from models.compiled import jit
 from models.registry import Array
 
@@ -39,9 +40,16 @@ def state(_params: Array, _interval: float) -> Array:
 
 
 @jit
-def step(p: Array, s: Array, target: float, error: float, interval: float) -> float:
-    """Command (m); the integral takes the trapezoid rule, the derivative the backward difference."""
+def around(p: Array, s: Array, ahead: float, wanted: Wanted, interval: float) -> float:
+    """Command (m) around what is fed forward; the integral by the trapezoid rule, the derivative backward."""
+    error = wanted.present - wanted.measured
     s[INTEGRAL] += 0.5 * interval * (s[PREVIOUS_ERROR] + error)
     slope = (error - s[PREVIOUS_ERROR]) / interval
     s[PREVIOUS_ERROR] = error
-    return target + p[0] * error + p[1] * s[INTEGRAL] + p[2] * slope
+    return ahead + p[0] * error + p[1] * s[INTEGRAL] + p[2] * slope
+
+
+@jit
+def step(p: Array, s: Array, wanted: Wanted, interval: float) -> float:
+    """Command (m) around the target."""
+    return around(p, s, wanted.target, wanted, interval)

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from models.compensators import inverse, pid
+from models.compensators.wanted import Wanted
 from models.compiled import jit
 from models.registry import Array
 
@@ -38,15 +39,6 @@ def pack(params: Array, _interval: float) -> Array:
 
 
 @jit
-def step(
-    p: Array,
-    s: Array,
-    target: float,
-    rate: float,
-    acceleration: float,
-    jerk: float,
-    error: float,
-    interval: float,
-) -> float:
+def step(p: Array, s: Array, wanted: Wanted, interval: float) -> float:
     """Command (m)."""
-    return pid.step(p, s, inverse.series(p, 7, target, rate, acceleration, jerk), error, interval)
+    return pid.around(p, s, inverse.series(p, 7, wanted), wanted, interval)

@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from models.compensators import pid, taylor
+from models.compensators.wanted import Wanted
 from models.compiled import jit
 from models.registry import Array
 
@@ -28,16 +29,6 @@ RULES = {**pid.RULES, **taylor.RULES}
 
 
 @jit
-def step(
-    p: Array,
-    s: Array,
-    target: float,
-    rate: float,
-    acceleration: float,
-    jerk: float,
-    error: float,
-    interval: float,
-) -> float:
+def step(p: Array, s: Array, wanted: Wanted, interval: float) -> float:
     """Command (m)."""
-    ahead = taylor.predict(p[3], p[4], target, rate, acceleration, jerk)
-    return pid.step(p, s, ahead, error, interval)
+    return pid.around(p, s, taylor.predict(p[3], p[4], wanted), wanted, interval)

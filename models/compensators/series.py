@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 from common.plan.schema import Rule
 from models.compensators import inverse
+from models.compensators.wanted import Wanted
 from models.compiled import jit
 from models.registry import Array
 
@@ -37,6 +38,6 @@ RULES = {
 
 
 @jit
-def step(p: Array, target: float, rate: float, acceleration: float, jerk: float) -> float:
+def step(p: Array, wanted: Wanted) -> float:
     """Command (m)."""
-    return inverse.series(p, 0, target, rate, acceleration, jerk)
+    return inverse.series(p, 0, wanted)

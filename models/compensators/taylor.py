@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from common.plan.schema import Rule
+from models.compensators.wanted import Wanted
 from models.compiled import jit
 from models.registry import Array
 
@@ -29,17 +30,17 @@ RULES = {
 
 
 @jit
-def predict(lead: float, order: float, target: float, rate: float, acceleration: float, jerk: float) -> float:
+def predict(lead: float, order: float, wanted: Wanted) -> float:
     """Target (m) predicted `lead` seconds ahead."""
-    predicted = target + lead * rate
+    predicted = wanted.target + lead * wanted.rate
     if order >= 2.0:
-        predicted += 0.5 * lead * lead * acceleration
+        predicted += 0.5 * lead * lead * wanted.acceleration
     if order >= 3.0:
-        predicted += lead * lead * lead / 6.0 * jerk
+        predicted += lead * lead * lead / 6.0 * wanted.jerk
     return predicted
 
 
 @jit
-def step(p: Array, target: float, rate: float, acceleration: float, jerk: float) -> float:
+def step(p: Array, wanted: Wanted) -> float:
     """Target (m) predicted `lead` seconds ahead."""
-    return predict(p[0], p[1], target, rate, acceleration, jerk)
+    return predict(p[0], p[1], wanted)

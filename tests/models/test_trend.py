@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from models import trend
+from models.transfer_systems import delay
 
 FINITE = st.floats(-1e3, 1e3)
 
@@ -16,7 +17,7 @@ FINITE = st.floats(-1e3, 1e3)
 def test_a_straight_line_is_continued_exactly(level: float, slope: float) -> None:
     recent = np.zeros(trend.RECENT)
     for k in range(trend.RECENT):
-        trend.remember(recent, level + slope * 0.002 * k)
+        delay.remember(recent, level + slope * 0.002 * k)
     assert trend.slope(recent, 0.002) == pytest.approx(slope, abs=1e-6)
     assert trend.ahead(recent) == pytest.approx(level + slope * 0.002 * trend.RECENT, abs=1e-8)
 
@@ -24,7 +25,7 @@ def test_a_straight_line_is_continued_exactly(level: float, slope: float) -> Non
 def test_a_sine_is_read_ahead_within_a_hundredth() -> None:
     omega, recent, errors = 4.0 * np.pi, np.zeros(trend.RECENT), []
     for k in range(500):
-        trend.remember(recent, np.sin(omega * 0.002 * k))
+        delay.remember(recent, np.sin(omega * 0.002 * k))
         if k > trend.RECENT:
             errors.append(trend.ahead(recent) - np.sin(omega * 0.002 * (k + 1)))
     assert np.max(np.abs(errors)) < 0.01
