@@ -42,7 +42,7 @@ from loop.substructure import (
 )
 from models import compensators
 from models.compensators import Built as Compensator
-from models.compensators import Wanted
+from models.compensators.wanted import Wanted
 from models.compiled import MERGED, jit
 from models.registry import Array
 from models.system import Effects, System

@@ -28,7 +28,7 @@ from loop.names import sent_names
 from loop.nominal import partition
 from models import compensators, force_correction, integrators, specimens, trend
 from models.compensators import Built as Compensator
-from models.compensators import Wanted
+from models.compensators.wanted import Wanted
 from models.compiled import jit
 from models.ground_motion import GroundMotion, ground, load
 from models.integrators.state import ACCELERATION, DISPLACEMENT, NEXT_DISPLACEMENT, NEXT_VELOCITY, VELOCITY

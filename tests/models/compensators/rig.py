@@ -12,7 +12,8 @@ import numpy as np
 from common.plan.tables import Actuator, Column
 from laboratories.column import model as column_lab
 from models import compensators
-from models.compensators import Built, Wanted
+from models.compensators import Built
+from models.compensators.wanted import Wanted
 from models.registry import Array
 
 DT = 0.002

@@ -7,7 +7,7 @@ import pytest
 from scipy import signal
 
 from models import compensators
-from models.compensators import Wanted
+from models.compensators.wanted import Wanted
 from models.registry import Array
 from tests.models.compensators.rig import DT
 
