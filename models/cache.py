@@ -17,11 +17,11 @@ READY = "ready"
 ROOMS = ("models", "laboratories", "loop")
 
 
-def fingerprint(root: Path, rooms: tuple[str, ...] = ROOMS) -> str:
-    """Sixteen hex digits that change with the name or content of any Python file in these folders of `root`."""
+def fingerprint(*folders: Path) -> str:
+    """Sixteen hex digits that change with the name or content of any Python file in these folders."""
     digest = hashlib.blake2b(sys.version.encode(), digest_size=8)
-    for path in sorted(path for room in rooms for path in (root / room).rglob("*.py")):
-        digest.update(path.relative_to(root).as_posix().encode())
+    for path, beside in sorted((path, one.parent) for one in folders for path in one.rglob("*.py")):
+        digest.update(path.relative_to(beside).as_posix().encode())
         digest.update(path.read_bytes())
     return digest.hexdigest()
 
@@ -29,7 +29,8 @@ def fingerprint(root: Path, rooms: tuple[str, ...] = ROOMS) -> str:
 @cache
 def folder() -> Path:
     """Folder for compiled kernels: in the user's cache, or in a temporary folder where that is not writable."""
-    name = fingerprint(Path(__file__).parent.parent)
+    root = Path(__file__).parent.parent
+    name = fingerprint(*(root / room for room in ROOMS))
     chosen = of_user(name)
     if chosen is None:
         chosen = Path(tempfile.gettempdir()) / f"rths-kernels-{os.getuid()}-{name}"

@@ -231,11 +231,6 @@ def fit(message: Message) -> Message:
     return fitting
 
 
-def genuine(frame: bytes, key: Key) -> bool:
-    """Whether a frame's check is that of a key."""
-    return _check(key, frame[:-CHECK_SIZE]) == frame[-CHECK_SIZE:]
-
-
 def decode(frame: bytes, key: Key, *, allowed: Container[type] = KINDS, largest: int = MOST_FRAME) -> Message:
     """The message of a frame; raises RejectedFrame with the reason if it is not valid.
 

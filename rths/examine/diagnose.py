@@ -106,14 +106,7 @@ def chosen(recording: Run, args: argparse.Namespace) -> list[str]:
     return [args.name] if args.name else names
 
 
-def diagnose_file(
-    path: Path,
-    *,
-    plan: str | None = None,
-    validate: Sequence[Path] = (),
-    against_ideal: bool = False,
-    tell: Tell = untold,
-) -> Report:
+def diagnose_file(path: Path, *, validate: Sequence[Path] = ()) -> Report:
     """The report on a recording of a test with one slave, or without.
 
     Raises:
@@ -121,10 +114,7 @@ def diagnose_file(
     """
     from common.recording.reader import read
 
-    reports = diagnose_slaves(
-        read(path), plan=plan, validate=validate, against_ideal=against_ideal, tell=tell
-    )
-    return next(iter(reports.values()))
+    return next(iter(diagnose_slaves(read(path), validate=validate).values()))
 
 
 def diagnose_recording(path: Path) -> dict[str, Report]:
