@@ -44,9 +44,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     which.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the set (default: 1)")
     which.add_argument(
-        "--only", type=words, default=[], metavar="KIND,…", help="catalogue, formula, unknown, pair or clean"
+        "--only",
+        type=cli.words,
+        default=[],
+        metavar="KIND,…",
+        help="catalogue, formula, unknown, pair or clean",
     )
-    which.add_argument("--effects", type=words, default=[], metavar="NAME,…", help="cases with these effects")
+    which.add_argument(
+        "--effects", type=cli.words, default=[], metavar="NAME,…", help="cases with these effects"
+    )
     which.add_argument(
         "--duration", type=float, default=30.0, metavar="S", help="length of each test (default: 30)"
     )
@@ -61,22 +67,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="judge another diagnosis: a function from a recording's path to a diagnosis.report.records.Report, "
         "or to one by the name of each slave",
     )
-    parser.add_argument(
-        "-o",
-        "--output",
-        type=Path,
+    cli.output_argument(
+        parser,
+        "FOLDER",
+        "where the page and the results go (default: runs/blind)",
         default=Path("runs/blind"),
-        metavar="FOLDER",
-        help="where the page and the results go (default: runs/blind)",
     )
     parser.add_argument("--keep", action="store_true", help="keep recordings, plans and realities there too")
     cli.force_argument(parser)
     cli.json_argument(parser, "write the results as JSON on standard output")
-
-
-def words(text: str) -> list[str]:
-    """A comma-separated list."""
-    return [word.strip() for word in text.split(",") if word.strip()]
 
 
 def run(args: argparse.Namespace) -> int:
