@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -13,21 +12,8 @@ import pytest
 from common.plan.read import load, with_test
 from common.recording.reader import read
 from common.terminal.cli import plan_path
-from rths.__main__ import EXAMPLES, MODULES, VERBS, main, parser_for
+from rths.__main__ import EXAMPLES, MODULES, VERBS, parser_for
 from tests.helpers import ROOT
-
-
-def rths(monkeypatch: Any, *words: str | Path) -> int:
-    monkeypatch.setattr(sys, "argv", ["rths", *map(str, words)])
-    try:
-        return main()
-    except SystemExit as error:
-        return int(error.code or 0)
-
-
-@pytest.fixture
-def call(monkeypatch: Any) -> Any:
-    return lambda *words: rths(monkeypatch, *words)
 
 
 def test_the_overview_names_every_command(call: Any, capsys: Any) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +17,11 @@ from rths.examine.import_map import load_map
 from rths.examine.onto_ticks import on_ticks
 from tests.helpers import ROOT
 from tests.rths.pictures.made_up import RECORD, made_up
-from tests.rths.test_commands import rths
 
 
 @pytest.fixture
-def call(monkeypatch: Any) -> Any:
-    return lambda *words: rths(monkeypatch, "plot", *words)
+def call(call: Any) -> Any:
+    return partial(call, "plot")
 
 
 LONG_NAME = "slave.a_table_with_quite_a_long_name_of_its_own"

@@ -13,7 +13,6 @@ import pytest
 
 from common.recording.reader import read
 from common.terminal.telling import untold
-from rths.__main__ import main
 from tests.rths.report.pages import check_alone, check_in_browser
 from validation.paper import experiments
 from validation.paper.experiments import PaperEvidence
@@ -48,24 +47,20 @@ def test_a_row_fails_where_its_number_is_wrong(evidence: PaperEvidence) -> None:
 
 @pytest.mark.slow
 def test_the_command_ends_with_1_where_a_row_fails(
-    evidence: PaperEvidence, tmp_path: Path, monkeypatch: Any, capsys: Any
+    evidence: PaperEvidence, tmp_path: Path, monkeypatch: Any, call: Any, capsys: Any
 ) -> None:
     wrong = copy.copy(evidence)
     wrong.critical_delay = (0.040, 0.0401)
     monkeypatch.setattr(experiments, "gather", lambda _folder, _say: wrong)
-    monkeypatch.setattr("sys.argv", ["rths", "reproduce", "-o", str(tmp_path)])
-    assert main() == 1
+    assert call("reproduce", "-o", tmp_path) == 1
     out = capsys.readouterr().out
     assert "FAIL  critical delay" in out
     assert out.count("FAIL") == 1
 
 
 @pytest.mark.slow
-def test_the_command_leaves_recordings_pictures_and_one_page(
-    tmp_path: Path, monkeypatch: Any, capsys: Any
-) -> None:
-    monkeypatch.setattr("sys.argv", ["rths", "reproduce", "-o", str(tmp_path), "--json"])
-    assert main() == 0
+def test_the_command_leaves_recordings_pictures_and_one_page(tmp_path: Path, call: Any, capsys: Any) -> None:
+    assert call("reproduce", "-o", tmp_path, "--json") == 0
     report = json.loads(capsys.readouterr().out)
     assert all(row["passed"] for row in report["rows"])
     text = Path(report["page"]).read_text(encoding="utf-8")
@@ -90,8 +85,7 @@ def test_the_page_stands_alone_and_in_a_browser(evidence: PaperEvidence, tmp_pat
     check_in_browser(tmp_path / "index.html", tmp_path)
 
 
-def test_a_folder_that_cannot_be_written_is_said(tmp_path: Path, monkeypatch: Any, capsys: Any) -> None:
+def test_a_folder_that_cannot_be_written_is_said(tmp_path: Path, call: Any, capsys: Any) -> None:
     (tmp_path / "file").touch()
-    monkeypatch.setattr("sys.argv", ["rths", "reproduce", "-o", str(tmp_path / "file" / "x")])
-    assert main() == 2
+    assert call("reproduce", "-o", tmp_path / "file" / "x") == 2
     assert "give another folder with -o" in capsys.readouterr().err

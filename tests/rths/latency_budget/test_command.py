@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,6 @@ import pytest
 from common.plan import reality
 from common.plan.plan import Plan
 from common.plan.read import with_test
-from rths.__main__ import main
 from simulation import virtual
 from tests.helpers import ROOT
 
@@ -28,12 +28,8 @@ class Link:
 
 
 @pytest.fixture
-def call(monkeypatch: Any) -> Any:
-    def run(*words: str | Path) -> int:
-        monkeypatch.setattr(sys, "argv", ["rths", "budget", *map(str, words)])
-        return main()
-
-    return run
+def call(call: Any) -> Any:
+    return partial(call, "budget")
 
 
 def recorded(plan: Plan, folder: Path, options: str) -> Path:

@@ -12,13 +12,7 @@ import pytest
 
 from common.recording.reader import length
 from report.live.feed import Feed
-from rths.__main__ import main
 from tests.helpers import ROOT
-
-
-def rths(monkeypatch: Any, *words: str | Path) -> int:
-    monkeypatch.setattr(sys, "argv", ["rths", *map(str, words)])
-    return main()
 
 
 @pytest.mark.parametrize(
@@ -31,21 +25,21 @@ def rths(monkeypatch: Any, *words: str | Path) -> int:
         (["run", "--virtual", "--live"], "--live shows a test in real time: leave out --virtual"),
     ],
 )
-def test_a_mistake_is_one_sentence(words: list[str], sentence: str, monkeypatch: Any, capsys: Any) -> None:
-    assert rths(monkeypatch, *words) == 2
+def test_a_mistake_is_one_sentence(words: list[str], sentence: str, call: Any, capsys: Any) -> None:
+    assert call(*words) == 2
     err = capsys.readouterr().err
     assert err.startswith(f"rths: {sentence}")
     assert err.count("\n") == 1
 
 
 def test_what_is_no_recording_is_said_before_anything_is_served(
-    tmp_path: Path, monkeypatch: Any, capsys: Any
+    tmp_path: Path, monkeypatch: Any, call: Any, capsys: Any
 ) -> None:
     path = tmp_path / "a.mcap"
     path.write_text("no recording at all")
     monkeypatch.setattr("os.nice", lambda _more: 0)
     monkeypatch.setattr(signal, "signal", lambda *_: None)
-    assert rths(monkeypatch, "live", path, "--no-browser") == 2
+    assert call("live", path, "--no-browser") == 2
     assert "is not a readable MCAP recording" in capsys.readouterr().err
 
 
@@ -54,7 +48,7 @@ def test_what_is_no_recording_is_said_before_anything_is_served(
     [((), True, 4.5), (("--window", "2"), False, 2.0), (("--wait",), False, 10.0)],
 )
 def test_a_finished_recording_is_shown_whole_unless_a_window_is_given(
-    options: tuple[str, ...], whole: bool, window: float, virtual_recording: Path, monkeypatch: Any
+    options: tuple[str, ...], whole: bool, window: float, virtual_recording: Path, monkeypatch: Any, call: Any
 ) -> None:
     shown: list[Feed] = []
 
@@ -70,7 +64,7 @@ def test_a_finished_recording_is_shown_whole_unless_a_window_is_given(
     monkeypatch.setattr("os.nice", lambda _more: 0)
     monkeypatch.setattr(signal, "signal", lambda *_: None)
     monkeypatch.setattr("report.live.server.Server", Server)
-    assert rths(monkeypatch, "live", virtual_recording, "--no-browser", *options) == 0
+    assert call("live", virtual_recording, "--no-browser", *options) == 0
     assert [feed.whole for feed in shown] == [whole]
     assert shown[0].window == pytest.approx(window, abs=0.5)
 
