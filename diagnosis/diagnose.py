@@ -13,7 +13,7 @@ from common.plan.kinds import COLUMN
 from common.terminal.telling import Tell, untold
 from diagnosis.findings import readings, report
 from diagnosis.findings.found import Diagnosis
-from diagnosis.findings.verdict import judge
+from diagnosis.findings.verdict import PartVerdict, judge
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data
 from diagnosis.fits.scales import Scales
@@ -82,8 +82,8 @@ def examine(record: Record, tell: Tell = untold) -> Diagnosis:
     for number, part in enumerate(parts, 1):
         tell(part.name, number, len(parts))
         datas.append(fitting.prepare(part, record, rounded))
-        shift = part.shift() if isinstance(part, Ground) else 0.0
-        verdicts.append(judge(Searcher(datas[-1], Scales(record, shift)).run()))
+        scales = Scales(record, part.shift() if isinstance(part, Ground) else 0.0)
+        verdicts.append(judged(datas[-1], scales))
     white, held = readings.levels(datas), readings.held(record, rounded)
     return Diagnosis(
         record,
@@ -91,9 +91,21 @@ def examine(record: Record, tell: Tell = untold) -> Diagnosis:
         readings.findings(record, white, rounded),
         exchanged(record),
         held,
-        white,
+        readings.levels([item.search.data for item in verdicts]),
         [*of_plan(record), *not_recorded(record), *reversed_signs(datas), *repeating(held)],
     )
+
+
+def judged(data: Data, scales: Scales) -> PartVerdict:
+    """The verdict on a part; a building that no effect makes exact is judged as one whose forces a logger recorded."""
+    verdict = judge(Searcher(data, scales).run())
+    if isinstance(data.part, Building) and data.part.exact and verdict.outcome in ("partly", "unknown"):
+        part = data.part.logged()
+        again = fitting.measured_by(
+            replace(data, part=part), fitting.noise(part.measured - part.predict(data.system))
+        )
+        return judge(Searcher(again, scales).run())
+    return verdict
 
 
 def exchanged(record: Record) -> list[LinkFinding]:

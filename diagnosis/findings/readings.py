@@ -7,12 +7,14 @@ from typing import NamedTuple
 import numpy as np
 
 from diagnosis.fits.fitting import Data
+from diagnosis.recorded.parts import Building
 from diagnosis.recorded.record import Record
 from diagnosis.signals.noise import quantum
 from models.registry import Array
 
 LOUDER = 2.5  # noise over what the plan and the other sensors' noise make expected
 REPEATED, STOOD = 1e-3, 0.5  # share of repeated samples: missed by the sensor, or a signal that stood still
+UNLIKE = 5.0  # steps over the range, times those of the other channels: more than a digit does not differ by chance
 LEAST = 2.0  # noise over the plan's, whatever the others do
 
 
@@ -71,10 +73,23 @@ def levels(searches: list[Data]) -> dict[str, float]:
     return {
         name: float(white)
         for data in searches
-        if not data.part.exact
+        if not data.part.exact and not isinstance(data.part, Building)
         for name, white, there in zip(data.part.signals, data.white, data.part.present.T, strict=True)
         if there.any()
     }
+
+
+def coarsest(record: Record, rounded: dict[str, float]) -> dict[str, float]:
+    """Step up to which a reading is rounded by the logger, by signal; empty where it does not round most of them.
+
+    A converter, or a text, rounds all channels to about as many digits; a sensor that steps does so by itself.
+    """
+    read = [name for name in read_by(record) if record.has(name) and np.ptp(record.signals[name]) > 0.0]
+    if len(rounded) < 2 or len(rounded) <= len(read) / 2:
+        return {}
+    shares = {name: step / float(np.ptp(record.signals[name])) for name, step in rounded.items()}
+    usual = float(np.median(list(shares.values())))
+    return {name: UNLIKE * usual * float(np.ptp(record.signals[name])) for name in rounded}
 
 
 def findings(record: Record, white: dict[str, float], rounded: dict[str, float]) -> list[SensorFinding]:
@@ -84,9 +99,10 @@ def findings(record: Record, white: dict[str, float], rounded: dict[str, float])
     ratios = {name: white[name] / planned[name] for name in plain}
     usual = max(float(np.median(list(ratios.values()))) if ratios else 1.0, 1e-3)
     result = []
+    coarse = coarsest(record, rounded)
     for name, step in rounded.items():
         noise = planned.get(name, 0.0) * usual
-        if step > noise:
+        if step > max(noise, coarse.get(name, 0.0)):
             size = step / np.sqrt(12.0) / noise if noise > 0.0 else 0.0
             result.append(
                 SensorFinding(effect_on(record, name, "quantization"), "step", step, (step, step), size)

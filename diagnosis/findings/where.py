@@ -12,7 +12,7 @@ import numpy as np
 from common.plan.kinds import COLUMN, TABLE
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data, Fit
-from diagnosis.fits.search import gap
+from diagnosis.fits.search import gaps
 from diagnosis.recorded.parts import ColumnAlone, LaboratoryPart
 from diagnosis.recorded.record import Record
 from diagnosis.signals import windows
@@ -60,7 +60,7 @@ def shown(site: str, data: Data, change: Array) -> SiteTrace:
 def unexplained(data: Data, fit: Fit) -> SiteTrace:
     """What a fit leaves, at the site where it most likely arises."""
     residual = data.residual(fitting.lay(data, fit.z, fit.values)) / data.sigma
-    left = [gap(column, data.group).ratio for column in fit.reduced.T]
+    left = [item.ratio for item in gaps(fit, data.group)]
     site = culprit(data, residual, left)
     kept = residual[:, int(np.argmax(left))]
     return SiteTrace(

@@ -19,9 +19,12 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from common.errors import InputError
-from diagnosis.recorded.parts import EXACT, MODEL_ERROR, Part
+from diagnosis.recorded.parts import EXACT, MODEL_ERROR, Building, Part
 from diagnosis.recorded.record import Record
+from diagnosis.signals import colour
+from diagnosis.signals.ceiling import Crosswise
 from diagnosis.signals.mask import Mask
+from diagnosis.signals.noise_model import NoiseModel
 from laboratories.effects import CATALOGUE
 from laboratories.effects.effect import Effect, Parameter
 from models.registry import Array
@@ -30,9 +33,9 @@ from models.system import System
 AVERAGED = 0.008  # s, over which residuals are averaged: the laboratories move much more slowly
 BLOCK = 1.0  # s, of the blocks that are held out in turn: longer than a model's error is correlated
 HELD_OUT = (2, 4)  # of every five blocks, these
-SHARPER = 0.9  # of the noise first found, from which on a lower one is believed
 COARSE = 3.0  # steps that count as noise where a reading is rounded to more than its noise
 SHORTEST, LONGEST = 6.0, 0.7  # of a beginning: seconds, and share of the test
+SPARSE = 0.5  # of an averaged sample's ticks that must be there
 FAR = 1e6  # residual, in σ, of a hypothesis that diverges: worse than any that does not
 TOLERANCES = 3.0  # most that a nominal parameter is moved: beyond it the plan is wrong
 STEP, FINE_STEP = 0.4, 2e-3  # tolerances between differences: over the kinks of friction, or exactly
@@ -54,6 +57,10 @@ class Data:
     train: Mask  # (groups,) fitted on; the others judge
     rounded: Array  # (signals,) step that a reading is rounded to, 0 for none
     catalogue: Mapping[str, Effect] = field(default_factory=lambda: CATALOGUE)  # the effects of the test
+    noise: tuple[NoiseModel, ...] = ()  # of each signal; none: white, of rms `white`
+    lines: Array | None = None  # (ticks, signals) what the sensors pick up
+    spikes: Mask | None = None  # (ticks, signals) single samples that do not count
+    related: Crosswise | None = None  # what may follow from the part's inputs
 
     @property
     def groups(self) -> int:
@@ -61,11 +68,42 @@ class Data:
         return self.part.measured.shape[0] // self.group
 
     def residual(self, system: System) -> Array:
-        """Recorded minus predicted, (ticks, signals), zero where nothing was recorded."""
+        """Recorded minus predicted, (ticks, signals), zero where nothing was recorded and where a reading has a spike.
+
+        Narrow lines that the sensors pick up are taken away.
+        """
         with np.errstate(all="ignore"):
             result = self.part.measured - self.part.predict(system)
-        result[~self.part.present] = 0.0
+        if self.lines is not None:
+            result -= self.lines[: len(result)]
+        result[~self.there] = 0.0
         return result
+
+    @cached_property
+    def there(self) -> Mask:
+        """Where readings count, (ticks, signals)."""
+        present = self.part.present
+        return present if self.spikes is None else present & ~self.spikes[: len(present)]
+
+    @cached_property
+    def factors(self) -> Array | None:
+        """Factors (groups, signals) on the residuals' spectra that make the noise white; None where it is white."""
+        if all(item.density is None for item in self.noise):
+            return None
+        columns = np.ones((self.groups, self.sigma.size))
+        for place, item in enumerate(self.noise):
+            if item.density is not None:
+                others = (
+                    self.sigma[place] ** 2 - self.white[place] ** 2
+                )  # what a model may err by, and rounding
+                columns[:, place] = self.sigma[place] * colour.gains(item.density + others, self.groups)
+        return columns
+
+    def averaged(self, raw: Array) -> Array:
+        """Means of ticks (ticks, …) over groups (groups, …), scaled so that white noise keeps its rms."""
+        count = self.groups * self.group
+        sums = raw[:count].reshape(self.groups, self.group, *raw.shape[1:]).sum(axis=1)
+        return np.asarray(sums / math.sqrt(self.group))
 
     def reduced(self, system: System) -> Array:
         """Residuals in σ averaged over groups, (groups, signals), each of unit variance for white noise."""
@@ -73,9 +111,25 @@ class Data:
             raw = self.residual(system) / self.sigma
         except InputError:  # a hypothesis that this plan's model cannot have
             return np.full((self.groups, self.sigma.size), FAR)
-        count = self.groups * self.group
-        mean = raw[:count].reshape(self.groups, self.group, -1).sum(axis=1) / math.sqrt(self.group)
-        return np.clip(np.nan_to_num(mean, nan=FAR, posinf=FAR, neginf=-FAR), -FAR, FAR)
+        if self.factors is None:
+            return finite(self.averaged(raw))
+        for place in np.flatnonzero(~self.there.all(axis=0)):
+            raw[:, place] = filled(raw[:, place], self.there[:, place])
+        result = finite(colour.whitened(finite(self.averaged(raw)), self.factors))
+        result[self.averaged(self.there.astype(np.float64)) < SPARSE * math.sqrt(self.group)] = 0.0
+        return result
+
+
+def finite(values: Array) -> Array:
+    """Residuals of which none is further away than `FAR`."""
+    return np.clip(np.nan_to_num(values, nan=FAR, posinf=FAR, neginf=-FAR), -FAR, FAR)
+
+
+def filled(x: Array, there: Mask) -> Array:
+    """A series (n,) with straight lines where nothing is there; zero where there is nothing at all."""
+    if there.all() or not there.any():
+        return x if there.all() else np.zeros_like(x)
+    return np.asarray(np.interp(np.arange(x.size), np.flatnonzero(there), x[there]))
 
 
 def prepare(part: Part, record: Record, steps: Mapping[str, float] | None = None) -> Data:
@@ -119,22 +173,13 @@ def measured_by(data: Data, white: Array) -> Data:
     return replace(data, sigma=np.sqrt(white**2 + least**2 + rounding**2), white=white)
 
 
-def sharpened(fit: Fit) -> Data | None:
-    """The data with the noise that a better fit shows, None where it is that of before: kinks look like noise."""
-    data = fit.data
-    if data.part.exact:
-        return None
-    white = noise(data.residual(lay(data, fit.z, fit.values)))
-    return measured_by(data, white) if np.any(white < SHARPER * data.white) else None
-
-
 def beginning(data: Data, fit: Fit, share: float) -> Data:
     """The beginning of a test that holds a share of what a fit leaves; the whole test where that is long."""
     energy = np.cumsum(np.sum(np.square(fit.reduced), axis=1))
     groups = int(np.searchsorted(energy, share * energy[-1])) + 1
     least = round(SHORTEST / (data.system.plan.test.interval * data.group))
     groups = max(groups, least)
-    if groups > LONGEST * data.groups or data.part.exact:
+    if groups > LONGEST * data.groups or data.part.exact or isinstance(data.part, Building):
         return data
     return replace(data, part=data.part.first(groups * data.group), train=data.train[:groups])
 

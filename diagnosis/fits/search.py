@@ -13,10 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from diagnosis.fits import contact, fitting
+from diagnosis.fits import contact, fitting, sensor_noise
 from diagnosis.fits.fitting import Data, Fit, Values, excess
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.screening import WORKERS, ScreenedEffect, screen
+from diagnosis.fits.sensor_noise import Foreseen, quieter
+from diagnosis.signals.noise_model import NoiseModel
 from models.registry import Array
 
 # The figures below were set on draws of `rths blind --set tune` (docs/decisions/0012-diagnosis.md), as a compromise
@@ -38,6 +40,7 @@ MOSTLY = (
 LEVELS = (1, 4, 16)  # averaged samples in a sum, from fast to slow systematic errors
 MATERIAL = 0.12  # systematic residual over noise below which a gap would interest nobody
 PRIOR_GAIN, DATA_GAIN = 6.25, 25.0  # 2.5 tolerances squared; 5 standard deviations squared
+SETTLING = 4  # rounds in which a fit and the noise that it leaves are found in turn
 SUSPICIOUS = 8.0  # of Σ z²: nominal parameters that are all off together imitate an effect
 NEAR = 1.0  # tolerances within which fits begin: a parameter that is further away imitates an effect
 LOST = 100.0  # mean square residual in σ² from which on fitted nominal parameters mean nothing
@@ -65,15 +68,20 @@ class SystematicGap(NamedTuple):
     significance: float  # standard deviations above white noise
 
 
-def gap(reduced: Array, group: int) -> SystematicGap:
-    """Systematic part of averaged residuals (groups,) in σ: what their sums over time exceed noise by."""
+def gap(reduced: Array, group: int, noise: NoiseModel | None = None) -> SystematicGap:
+    """Systematic part of averaged residuals (groups,) in σ: what their sums over time exceed noise by.
+
+    How well the noise itself is known, and how heavy its tails are, goes into the standard error.
+    """
+    known, tails = (noise.samples, noise.tails) if noise else (math.inf, 1.0)
     ratio, significance = 0.0, 0.0
     for level in LEVELS:
         count = reduced.size // level
         if count < 8:
             continue
         sums = reduced[: count * level].reshape(count, level).sum(axis=1) / math.sqrt(level)
-        excess, error = float(np.mean(sums**2)) - 1.0, math.sqrt(2.0 / count)
+        excess = float(np.mean(sums**2)) - 1.0
+        error = math.sqrt(2.0 * tails**2 / count + 2.0 * tails**2 * level / known)
         significance = max(significance, excess / error)
         ratio = max(ratio, math.sqrt(max(0.0, excess - 3.0 * error) / (level * group)))
     return SystematicGap(ratio, significance)
@@ -81,7 +89,8 @@ def gap(reduced: Array, group: int) -> SystematicGap:
 
 def gaps(fit: Fit, group: int) -> list[SystematicGap]:
     """The systematic part of the residual of every signal."""
-    return [gap(column, group) for column in fit.reduced.T]
+    noises = fit.data.noise or (None,) * fit.reduced.shape[1]
+    return [gap(column, group, noise) for column, noise in zip(fit.reduced.T, noises, strict=True)]
 
 
 def remaining(fit: Fit) -> float:
@@ -118,23 +127,66 @@ class Searcher:
 
     def run(self) -> Search:
         """Commission, select, exchange, prune, and fit what else might be."""
-        commissioned = fitting.fit(self.data, {})
+        commissioned = self.settled(fitting.fit(self.data, {}))
         if not self.is_gap(commissioned):
             return Search(self.data, commissioned, commissioned, ())
         first = self.extended(commissioned)
         chosen, better = commissioned, first
         while better and self.worth(commissioned, chosen, better[0]):
-            chosen = self.exchanged(better[0]) if len(better[0].names) > 1 else better[0]
-            if (data := fitting.sharpened(chosen)) is not None:
-                self.data = data
-                commissioned, chosen, *first = (
-                    fitting.at(data, fit.values, fit.z) for fit in (commissioned, chosen, *first)
-                )
+            before = self.data
+            chosen = self.settled(self.exchanged(better[0]) if len(better[0].names) > 1 else better[0])
+            if self.data is not before:
+                commissioned, *first = (self.again(fit) for fit in (commissioned, *first))
+                if len(chosen.names) == 1 and not self.worth(commissioned, commissioned, chosen):
+                    chosen = commissioned
+                    break
             if len(chosen.names) >= MOST or self.enough(commissioned, chosen):
                 break
             better = self.extended(chosen)
+        if not chosen.names:
+            return Search(self.data, commissioned, chosen, ())
         chosen = self.pruned(commissioned, chosen)
         return physical(Search(self.data, commissioned, chosen, self.alternatives(chosen, first)))
+
+    def settled(self, fit: Fit) -> Fit:
+        """The fit under the noise that it leaves, which the search goes on with.
+
+        Where much of what it leaves follows from the inputs, the quiet part holds a gap as well as noise: the noise is
+        then taken to be white, of the level of the highest frequencies.
+        """
+        if self.data.part.exact:
+            return fit
+        found, data = fit, sensor_noise.remodelled(fit)
+        for _ in range(SETTLING):
+            if all(item.density is None for item in data.noise):
+                break
+            found = self.again(found, data)
+            better = sensor_noise.remodelled(found)
+            if not quieter(better, data):
+                break
+            data = better
+        else:
+            found = self.again(found, data)
+        if any(item.density is not None for item in data.noise):
+            if not hidden(found):
+                self.data = data
+                return found
+            data = sensor_noise.remodelled(fit)
+            data = replace(data, noise=(), lines=None, spikes=None)
+        return self.white(found, data)
+
+    def white(self, fit: Fit, data: Data) -> Fit:
+        """The fit under white noise: that of before where it is no lower."""
+        changed = bool(self.data.noise) or data.lines is not None or data.spikes is not None
+        self.data = data if changed or quieter(data, self.data) else replace(self.data, related=data.related)
+        return fitting.at(self.data, fit.values, fit.z)
+
+    def again(self, fit: Fit, data: Data | None = None) -> Fit:
+        """A fit moved to the best parameters under another noise, that of the search where none is given."""
+        data = data or self.data
+        if any(item.density is not None for item in data.noise):
+            return fitting.fit(data, fit.values, fit.z, STEPS, rounds=1)
+        return fitting.at(data, fit.values, fit.z)
 
     def enough(self, bare: Fit, fit: Fit) -> bool:
         """Whether the residual is too small for a further effect to be worth it."""
@@ -142,7 +194,9 @@ class Searcher:
 
     def is_gap(self, fit: Fit) -> bool:
         """Whether a fit leaves anything to explain: beyond noise, or beyond its tolerances."""
-        found = gaps(fit, self.data.group)
+        found: list[SystematicGap | Foreseen] = [*gaps(fit, self.data.group)]
+        if any(item.density is not None for item in self.data.noise):
+            found = [*found, *sensor_noise.foreseen(fit)]
         visible = any(item.ratio > MATERIAL and item.significance > 5.0 for item in found)
         return (
             visible or fit.prior > SUSPICIOUS or float(np.max(np.abs(fit.z), initial=0.0)) ** 2 > PRIOR_GAIN
@@ -256,6 +310,11 @@ class Searcher:
             base = self.without(fit, name)
             result += [other for other in self.extended(base) if set(other.names) != set(fit.names)]
         return tuple(sorted(result, key=lambda item: item.cost))
+
+
+def hidden(fit: Fit) -> bool:
+    """Whether inputs foresee so much of what a fit leaves that the noise it was measured by may hold a gap."""
+    return any(item.ratio > MATERIAL and item.significance > 5.0 for item in sensor_noise.foreseen(fit))
 
 
 def refines(bare: Fit, before: Fit, after: Fit) -> bool:

@@ -141,6 +141,7 @@ class LaboratoryPart:
         self.units = {name: record.unit(name) for name in self.devices}
         none = np.zeros(record.ticks)
         self.inputs = {name: record.signals.get(name, none) for name in self.devices}
+        self.wanted = self.inputs | self.targets(record)
         self.measured, self.present = outputs(record, self.signals)
         machines = [machine for machine in lab.kind.machines(lab.plan) if self.moves(record, machine)]
         names = tuple(name for machine in machines for name in machine.parameters)
@@ -155,6 +156,12 @@ class LaboratoryPart:
         command = self.inputs[next(iter(self.inputs))]
         first, most = command[0], np.max(np.abs(command))
         self._start = float(first) if abs(first) > UNREST * most else 0.0
+
+    def targets(self, record: Record) -> dict[str, Array]:
+        """What commands were to bring about, by command: free of the sensors' noise that a controller feeds back."""
+        channels = self.lab.kind.channels
+        command, target = self.lab.signal(channels.command.name), self.lab.signal(channels.target.name)
+        return {command: record.signals[target]} if command in self.inputs and record.has(target) else {}
 
     def moves(self, record: Record, machine: Machine) -> bool:
         """Whether a machine is driven at all."""
@@ -235,7 +242,11 @@ class ColumnAlone:
 
 
 class Building:
-    """The numerical substructure from the ground motion and the forces that the master used."""
+    """The numerical substructure from the ground motion and the forces that the master used.
+
+    It is exact where the forces recorded are those that the master used to the last bit, else they came through a
+    logger of their own.
+    """
 
     name = "structure"
     role = MASTER
@@ -273,6 +284,16 @@ class Building:
         """Displacement, velocity and acceleration of every storey."""
         rows = replay.building(system, self._ground, *self._inputs)
         return np.column_stack([rows[name] for name in type(self).signals])
+
+    @property
+    def ground(self) -> Array:
+        """Ground acceleration (ticks,)."""
+        return self._ground[0, :-1]
+
+    def logged(self) -> Building:
+        """The same building, of which the forces that the master used are known up to a logger's noise only."""
+        result: Building = with_fields(self, {"exact": False})
+        return result
 
     def first(self, ticks: int) -> Building:
         """The whole of it, because it is computed and cheap."""

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from common.errors import InputError
 from diagnosis.signals.features import features
@@ -68,8 +69,7 @@ def ridge(x: Array, y: Array) -> Array:
 
     All weights are zero where nothing predicts better than zero.
     """
-    edges = np.linspace(0, y.size, CHUNKS * FOLDS + 1).astype(np.int64)
-    fold = np.repeat(np.arange(CHUNKS * FOLDS) % FOLDS, np.diff(edges))
+    fold = folds(y.size)
     gram = [x[fold == k].T @ x[fold == k] for k in range(FOLDS)]
     product = [x[fold == k].T @ y[fold == k] for k in range(FOLDS)]
     whole, wanted = np.sum(gram, axis=0), np.sum(product, axis=0)
@@ -82,6 +82,48 @@ def ridge(x: Array, y: Array) -> Array:
     if lost[best] >= float(y @ y):
         return np.zeros(x.shape[1])
     return np.asarray(along(whole, wanted, y.size)[:, best])
+
+
+class Crosswise:
+    """Predictions of series from features x (n, q), each block's without a look at it."""
+
+    def __init__(self, x: Array) -> None:
+        self._x = x
+        self._fold = folds(len(x))
+        gram = [x[self._fold == k].T @ x[self._fold == k] for k in range(FOLDS)]
+        whole = np.sum(gram, axis=0)
+        self._turned = [np.linalg.eigh(whole - one) for one in gram]
+
+    @property
+    def count(self) -> int:
+        """Samples of a series."""
+        return len(self._x)
+
+    def predict(self, y: Array) -> Array:
+        """Predictions (n, m) of the columns of y (n, m).
+
+        Each column has the penalty that predicts withheld blocks best, and zeros where nothing predicts better than
+        zero.
+        """
+        product = [self._x[self._fold == k].T @ y[self._fold == k] for k in range(FOLDS)]
+        wanted = np.sum(product, axis=0)
+        said = np.zeros((PENALTIES.size, *y.shape))
+        for k, (values, vectors) in enumerate(self._turned):
+            here = self._fold == k
+            turned, wants = self._x[here] @ vectors, vectors.T @ (wanted - product[k])
+            for i, penalty in enumerate(PENALTIES * int(np.sum(~here))):
+                said[i, here] = turned @ (wants / (np.maximum(values, 0.0)[:, None] + penalty))
+        lost = np.sum((y - said) ** 2, axis=1)
+        best = np.argmin(lost, axis=0)
+        columns = np.arange(y.shape[1])
+        worth = lost[best, columns] < np.sum(y**2, axis=0)
+        return np.asarray(np.where(worth, said[best, :, columns].T, 0.0))
+
+
+def folds(count: int) -> NDArray[np.int64]:
+    """The fold (count,) that each sample belongs to: chunks of time in turn."""
+    edges = np.linspace(0, count, CHUNKS * FOLDS + 1).astype(np.int64)
+    return np.repeat(np.arange(CHUNKS * FOLDS) % FOLDS, np.diff(edges))
 
 
 def along(gram: Array, product: Array, count: int) -> Array:

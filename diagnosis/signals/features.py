@@ -18,17 +18,18 @@ WAVES = 6  # cosines over the record
 PAIRED = 4  # inputs, up to which their products with each other are taken
 
 
-def features(inputs: Array, interval: float, fit: Mask) -> Array:
+def features(inputs: Array, interval: float, fit: Mask, *, timeless: bool = False) -> Array:
     """Standardised features (n, q) of inputs (n, p) sampled every `interval` s; constants are left out.
 
-    Mean and scale are those where `fit` (n,) is true. The first column is one everywhere.
+    Mean and scale are those where `fit` (n,) is true. The first column is one everywhere. With `timeless`, functions of
+    time alone are left out, which slow noise may well be.
     """
     scale = np.maximum(np.std(inputs, axis=0), np.finfo(np.float64).tiny)
     moving = np.ptp(inputs, axis=0) > 0.0
     u = ((inputs - inputs.mean(axis=0)) / scale)[:, moving]
     rate = scaled(np.gradient(u, axis=0))
     parts = [
-        slow(len(inputs)),
+        slow(len(inputs))[:, : 0 if timeless else None],
         lagged(u, interval),
         *(bent(x) for x in (u, rate)),
         calm(u, interval),

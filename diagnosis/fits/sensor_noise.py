@@ -1,0 +1,225 @@
+"""The noise of a part's sensors, from what no model of the part could explain: its colour, lines, spikes and level.
+
+What depends on the part's inputs is no noise. So a flexible model takes it away first, each stretch of time without a
+look at it; what is left at rest, or else where the part moves least, is the noise of the sensors.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from diagnosis.fits import fitting
+from diagnosis.fits.fitting import Data, Fit
+from diagnosis.recorded.parts import Building, ColumnAlone, LaboratoryPart, Part
+from diagnosis.signals import colour, pickup
+from diagnosis.signals.ceiling import Crosswise
+from diagnosis.signals.features import features
+from diagnosis.signals.mask import Mask
+from diagnosis.signals.noise_model import NoiseModel, Source
+from diagnosis.signals.spikes import spikes
+from models.registry import Array
+from models.system import System
+
+WINDOW = 0.5  # s, of a stretch that counts as quiet or as loud
+REST = 2e-3  # of the largest motion of a window, below which it is at rest
+QUIET = 0.1  # below which it is quiet
+ENOUGH = 5.0  # s of quiet windows that suffice
+SHARE = 0.35  # of the windows, the quietest, where fewer than `ENOUGH` seconds are quiet
+SLACK = 0.06  # by which the variance of white noise may differ from that at the highest frequencies
+SURE = 4.0  # standard errors beyond which noise is not white
+SLOWER = (1, 4, 16)  # averaged samples in the sums by which that is decided
+LEAST = 500  # averaged samples without which no flexible model is asked
+LOWER = 0.9  # of the noise first found, from which on a lower one is believed
+
+
+class Remainder(NamedTuple):
+    """What of a part's residuals no model of the part could explain."""
+
+    noise: Array  # (groups, signals) averaged, in the signals' units
+    single: Array  # (groups·group, signals) sample by sample
+    lines: Array  # (ticks, signals)
+    found: tuple[tuple[pickup.Pickup, ...], ...]  # by signal
+    spikes: Mask  # (ticks, signals)
+
+
+def quieter(after: Data, before: Data) -> bool:
+    """Whether the noise of any signal is lower than it was."""
+    return bool(np.any(after.white < LOWER * before.white))
+
+
+def remodelled(fit: Fit) -> Data:
+    """The data of a fit with the noise that it leaves."""
+    data, system = fit.data, fitting.lay(fit.data, fit.z, fit.values)
+    if data.part.exact:
+        return data
+    return modelled(fitting.measured_by(data, fitting.noise(data.residual(system))), system)
+
+
+def modelled(data: Data, system: System) -> Data:
+    """The data with noise as a hypothesis leaves it."""
+    if data.related is None:
+        data = replace(data, related=related(data, system))
+    rest = remainder(data, system)
+    quiet, source = quiet_part(data, system)
+    models = tuple(model(data, rest, quiet, source, place) for place in range(len(data.part.signals)))
+    white = np.array([item.rms for item in models])
+    lines = rest.lines if rest.lines.any() else None
+    spiky = rest.spikes if rest.spikes.any() else None
+    return fitting.measured_by(replace(data, noise=models, lines=lines, spikes=spiky), white)
+
+
+def remainder(data: Data, system: System) -> Remainder:
+    """Lines, spikes and what inputs predict taken away from the residuals of a hypothesis."""
+    part, interval = data.part, data.system.plan.test.interval
+    raw = part.measured - part.predict(system)
+    there = part.present & np.isfinite(raw)
+    spiky, lines = np.zeros_like(there), np.zeros_like(raw)
+    found: list[tuple[pickup.Pickup, ...]] = []
+    for place in range(raw.shape[1]):
+        seen = there[:, place]
+        if seen.mean() < 0.5:
+            raw[:, place] = 0.0
+            found.append(())
+            continue
+        whole = fitting.filled(raw[:, place], seen)
+        spiky[:, place] = spikes(whole) & seen
+        whole = fitting.filled(whole, ~spiky[:, place])
+        found.append(tuple(pickup.pickups(whole, interval)))
+        if found[-1]:
+            lines[:, place] = pickup.waves(whole, found[-1], interval)
+        raw[:, place] = whole - lines[:, place]
+    averaged = data.averaged(raw)
+    said = predictable(data, averaged)
+    single = raw[: data.groups * data.group] - np.repeat(said, data.group, axis=0) / math.sqrt(data.group)
+    return Remainder(averaged - said, single, lines, tuple(found), spiky)
+
+
+def related(data: Data, system: System) -> Crosswise | None:
+    """A flexible model of averaged residuals from the part's inputs, None where too little was recorded for one."""
+    columns = [data.averaged(values) for values in inputs(data.part, system).T]
+    if not columns or data.groups < LEAST:
+        return None
+    everywhere = np.ones(data.groups, dtype=bool)
+    interval = data.system.plan.test.interval * data.group
+    return Crosswise(features(np.column_stack(columns), interval, everywhere, timeless=True))
+
+
+def predictable(data: Data, averaged: Array) -> Array:
+    """What of averaged residuals (groups, signals) follows from the part's inputs, stretch by stretch unseen."""
+    if data.related is None or data.related.count != len(averaged):
+        return np.zeros_like(averaged)
+    return data.related.predict(averaged / data.sigma) * data.sigma
+
+
+class Foreseen(NamedTuple):
+    """How much of a residual follows from what the part was given, whatever model it takes."""
+
+    ratio: float  # rms over that of the noise
+    significance: float  # standard deviations above noise
+
+
+def foreseen(fit: Fit) -> list[Foreseen]:
+    """What the inputs say of the residuals of every signal that no model of the noise can have.
+
+    The prediction ŷ of a stretch of time has not seen it, so with white noise y of unit variance Σyŷ/√Σŷ² is a standard
+    normal number.
+    """
+    data = fit.data
+    if data.related is None or data.related.count != data.groups:
+        return [Foreseen(0.0, 0.0)] * data.sigma.size
+    said = data.related.predict(fit.reduced)
+    energy = np.sum(said**2, axis=0)
+    along = np.sum(fit.reduced * said, axis=0)
+    tails = np.array([item.tails for item in data.noise]) if data.noise else np.ones(data.sigma.size)
+    sure = np.where(energy > 0.0, along / np.sqrt(np.maximum(energy, 1e-300)) / tails, 0.0)
+    ratio = np.sqrt(np.maximum(2.0 * along - energy, 0.0) / (data.groups * data.group))
+    return [Foreseen(float(r), float(z)) for r, z in zip(ratio, sure, strict=True)]
+
+
+def inputs(part: Part, system: System) -> Array:
+    """What a part's residuals may depend on, (ticks, inputs): its commands and its readings as predicted.
+
+    Where the targets were recorded, they stand in for the commands: these hold noise that a controller fed back. A
+    building that was not computed from the very forces recorded is predicted from these forces' noise as well: its own
+    motion stands in for the prediction.
+    """
+    if isinstance(part, Building):
+        return np.column_stack([part.ground, part.measured])
+    if isinstance(part, LaboratoryPart):
+        part = part.replaced(inputs=part.wanted)
+        columns = list(part.wanted.values())
+    else:
+        columns = [part.inputs] if isinstance(part, ColumnAlone) else []
+    columns += list(np.nan_to_num(part.predict(system)).T)
+    moving = [column for column in columns if np.ptp(column) > 0.0]
+    return np.column_stack(moving) if moving else np.zeros((len(part.measured), 0))
+
+
+def quiet_part(data: Data, system: System) -> tuple[Mask, Source]:
+    """Averaged samples (groups,) in which a part is at rest, or moves least, and which of the two it is."""
+    moving = inputs(data.part, system)
+    size = max(1, round(WINDOW / (data.system.plan.test.interval * data.group)))
+    count = max(1, data.groups // size)
+    edges = np.round(np.linspace(0, data.groups, count + 1)).astype(np.int64)
+    starts = edges[:-1] * data.group
+    energy = np.add.reduceat(np.square(moving - moving[0]), starts, axis=0)
+    level = np.sqrt(np.max(energy / np.maximum(energy.max(axis=0), 1e-300), axis=1, initial=0.0))
+    enough = max(1, round(ENOUGH / WINDOW))
+    source: Source = "quiet part"
+    if np.count_nonzero(level < REST) >= enough:
+        chosen, source = level < REST, "at rest"
+    elif np.count_nonzero(level < QUIET) >= enough:
+        chosen = level < QUIET
+    else:
+        chosen, source = level <= np.quantile(level, SHARE), "residual"
+    return np.repeat(chosen, np.diff(edges)), source
+
+
+def model(data: Data, rest: Remainder, quiet: Mask, source: Source, place: int) -> NoiseModel:
+    """The noise of one signal: white where nothing speaks against the level at the highest frequencies."""
+    flat = float(data.white[place])
+    lines = pickup.named(rest.found[place])
+    resolution = float(data.rounded[place])
+    segments = stretches(rest.noise[:, place], quiet)
+    if not segments or not np.any(rest.noise[:, place]) or is_white(segments, flat, resolution):
+        return NoiseModel(flat, lines=lines, resolution=resolution)
+    segments = [piece - piece.mean() for piece in segments]
+    density, order = colour.density(segments)
+    samples = sum(piece.size for piece in segments)
+    rms = float(rest.single[:, place][np.repeat(quiet, data.group)].std())
+    tails = heaviness(
+        colour.whitened(rest.noise[:, [place]], colour.gains(density, data.groups)[:, None])[quiet, 0]
+    )
+    return NoiseModel(rms, "ar", order, source, lines, resolution, density, samples, tails)
+
+
+def stretches(noise: Array, quiet: Mask) -> list[Array]:
+    """The quiet stretches of noise (groups,) that are long enough to show its colour."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], quiet, [False]]).astype(np.int8)))
+    pieces = [noise[a:b] for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    return [piece for piece in pieces if piece.size >= colour.SEGMENT]
+
+
+def is_white(segments: list[Array], rms: float, resolution: float) -> bool:
+    """Whether sums over a few averaged samples have the variance of white noise of an rms."""
+    variance = rms**2 + resolution**2 / 12.0
+    for size in SLOWER:
+        sums = [piece[: piece.size // size * size].reshape(-1, size).sum(axis=1) for piece in segments]
+        every = np.concatenate(sums) / math.sqrt(size)
+        if every.size < 8:
+            continue
+        spread = float(np.mean((every - np.median(every)) ** 2)) / max(variance, 1e-300) - 1.0
+        if abs(spread) > SLACK + SURE * math.sqrt(2.0 / every.size):
+            return False
+    return True
+
+
+def heaviness(noise: Array) -> float:
+    """How much more the energy of whitened noise (n,) varies than that of normal noise, from its fourth moment."""
+    variance = float(np.mean(noise**2))
+    kurtosis = float(np.mean(noise**4)) / variance**2 if variance > 0.0 else 3.0
+    return math.sqrt(max(1.0, (kurtosis - 1.0) / 2.0))
