@@ -33,12 +33,15 @@ AGAINST = -0.7  # correlation from which on a sign is doubted
 
 
 def diagnose(
-    records: Mapping[str, Record], validation: Mapping[str, Sequence[Record]], tell: Tell = untold
+    records: Mapping[str, Record],
+    validation: Mapping[str, Sequence[Record]],
+    tell: Tell = untold,
+    require: float | None = None,
 ) -> dict[str, Report]:
     """The reports on a test by role of the slave (contract, section 8), but for their verdicts in words.
 
     Each is of the master and of one slave; in its closed loop the other slaves are what they were found to be. The one
-    on a test without slaves is the master's.
+    on a test without slaves is the master's. `require` is the gap that may be left in each part.
 
     Raises:
         InputError: the recording holds nothing that a model of the plan could predict.
@@ -53,6 +56,7 @@ def diagnose(
                 replace(item, record=among(item.record, systems)),
                 [among(other, systems) for other in validation.get(role, ())],
                 tell,
+                require,
             )
             for role, item in found.items()
         }

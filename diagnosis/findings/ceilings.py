@@ -48,7 +48,7 @@ def ceilings(found: Diagnosis) -> tuple[Ceiling, ...]:
     result = []
     for verdict in found.verdicts:
         search = verdict.search
-        if verdict.outcome == "none" or search.data.part.exact:
+        if verdict.outcome in ("none", "tolerances") or search.data.part.exact:
             continue
         flexible = flexible_share(found, search)
         if flexible is not None:
@@ -81,27 +81,28 @@ def flexible_share(found: Diagnosis, search: Search) -> float | None:
         return None
 
 
-def unknown(found: Diagnosis) -> Unknown | None:
-    """A description of a residual that no effect of the catalogue explains; None where there is none."""
-    for verdict in found.verdicts:
-        search = verdict.search
-        if verdict.outcome not in ("unknown", "partly"):
-            continue
-        data = search.data
-        place = worst(search, search.chosen)
-        residual = data.residual(fitting.lay(data, search.chosen.z, search.chosen.values))[:, place]
-        interval = found.record.plan.test.interval
-        shares = dependence(found, search, residual, float(data.sigma[place]))
-        spectrum = windows.bands(residual, float(data.white[place]), interval)
-        peak = int(np.argmax(spectrum.residual[1:])) + 1 if spectrum.residual.size > 1 else 0
-        return Unknown(
-            site=where.unexplained(data, search.chosen).site,
-            depends_on=tuple(item for item in shares if (item.share or 0.0) > FAINT),
-            frequency=float(spectrum.frequency[peak]),
-            amplitude=float(np.sqrt(2.0 * np.mean(residual**2))),
-            unit=found.record.unit(data.part.signals[place]),
-        )
-    return None
+def unknowns(found: Diagnosis) -> tuple[Unknown, ...]:
+    """Descriptions of the residuals that no effect of the catalogue explains, the largest over its noise first."""
+    left = [item for item in found.verdicts if item.outcome in ("unknown", "partly")]
+    return tuple(described(found, item.search) for item in sorted(left, key=lambda item: -item.search.left))
+
+
+def described(found: Diagnosis, search: Search) -> Unknown:
+    """What is left in one part."""
+    data = search.data
+    place = worst(search, search.chosen)
+    residual = data.residual(fitting.lay(data, search.chosen.z, search.chosen.values))[:, place]
+    interval = found.record.plan.test.interval
+    shares = dependence(found, search, residual, float(data.sigma[place]))
+    spectrum = windows.bands(residual, float(data.white[place]), interval)
+    peak = int(np.argmax(spectrum.residual[1:])) + 1 if spectrum.residual.size > 1 else 0
+    return Unknown(
+        site=where.unexplained(data, search.chosen).site,
+        depends_on=tuple(item for item in shares if (item.share or 0.0) > FAINT),
+        frequency=float(spectrum.frequency[peak]),
+        amplitude=float(np.sqrt(2.0 * np.mean(residual**2))),
+        unit=found.record.unit(data.part.signals[place]),
+    )
 
 
 def dependence(found: Diagnosis, search: Search, residual: Array, noise: float) -> list[Dependence]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from common.recording.outcome import outcome
 from diagnosis.findings import where
-from diagnosis.findings.ceilings import ceilings, unknown
+from diagnosis.findings.ceilings import ceilings, unknowns
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.how_far import Response
 from diagnosis.findings.next_test import ChosenTest
@@ -54,7 +54,7 @@ def details(
     found: Diagnosis, far: Response, which: Sequence[Candidate], tests: Sequence[ChosenTest]
 ) -> Details:
     """Everything that a page shows beside the report itself."""
-    record = found.record
+    record, strange = found.record, unknowns(found)
     return Details(
         test=facts(record),
         laboratories=tuple(map(laboratory, record.labs)),
@@ -67,7 +67,8 @@ def details(
         curves=tuple(item for verdict in found.verdicts for item in curves(found, verdict)),
         waterfall=far.waterfall,
         histories=far.histories,
-        unknown=unknown(found),
+        unknown=strange[0] if strange else None,
+        unknowns=strange,
         remaining=remains(found, far),
         next=tuple(
             NextTest(test=item.test, separation=item.separation, pair=item.pair) for item in tests[:LISTED]

@@ -65,7 +65,7 @@ def laid(system: System, verdict: PartVerdict, values: Values) -> System:
     """A system with a part's parameters moved and some of its effects laid over it."""
     part, z = verdict.search.data.part, verdict.search.chosen.z
     for nuisance, place in zip(part.nuisances, z, strict=True):
-        system = nuisance.moved(system, float(place))
+        system = system if nuisance.of_record else nuisance.moved(system, float(place))
     for name, given in values.items():
         system = verdict.search.data.catalogue[name].apply(system, **given)
     return system

@@ -29,6 +29,8 @@ LIKE_MISSED = (
     "table",
     "device",
 )  # machines that a search blames for samples that are missed
+INTERLEAVED, OTHERS = "interleaved (interpolation)", "other recordings"  # what was judged on
+LEAVING = ("unknown", "partly")  # outcomes of parts with something left
 DRAWS = 200  # of the bootstrap
 
 
@@ -131,7 +133,7 @@ def judge(found: Diagnosis, validation: Sequence[Record]) -> Response:
         closed=closed_share(overall(gap_before), overall(gap_after), floor),
         closed_interval=closed_interval(own, before, after, floor),
         noise_floor=floor,
-        judged_on="held-out time windows",
+        judged_on=INTERLEAVED,
     )
     others = validated(found, validation, summary) if validation else summary
     share, rows = shares(own, traces)
@@ -141,7 +143,7 @@ def judge(found: Diagnosis, validation: Sequence[Record]) -> Response:
         traces,
         share,
         rows,
-        waterfall(own, traces, others or summary),
+        waterfall(own, traces, summary),
         histories(own, before, after),
         () if others else ("The recordings given for validation hold no closed loop to judge by.",),
     )
@@ -264,14 +266,16 @@ def closed_interval(
 
 def validated(found: Diagnosis, validation: Sequence[Record], own: HowFar) -> HowFar | None:
     """The same on other recordings of the laboratories, None where none of them holds a closed loop."""
-    before, after, floor = [], [], []
+    before, after, floor, alone = [], [], [], []
     for record in validation:
         judge_ = Judge(found, record, np.ones(record.ticks, dtype=bool))
         if judge_.loop is None:
             continue
-        before.append(overall(judge_.gap(judge_.signals(frozenset()))))
-        after.append(overall(judge_.gap(judge_.signals(None))))
+        bare_, whole = judge_.signals(frozenset()), judge_.signals(None)
+        before.append(overall(judge_.gap(bare_)))
+        after.append(overall(judge_.gap(whole)))
         floor.append(overall(judge_.floor()))
+        alone.append(closed_interval(judge_, bare_, whole, floor[-1]))
     if not before:
         return None
     b, a, f = (float(np.mean(values)) for values in (before, after, floor))
@@ -281,9 +285,9 @@ def validated(found: Diagnosis, validation: Sequence[Record], own: HowFar) -> Ho
         before=b,
         after=a,
         closed=closed_share(b, a, f),
-        closed_interval=(min(spread), max(spread)),
+        closed_interval=(min(spread), max(spread)) if len(spread) > 1 else alone[0],
         noise_floor=f,
-        judged_on="recordings given",
+        judged_on=OTHERS,
     )
 
 
@@ -292,9 +296,10 @@ def all_traces(found: Diagnosis) -> list[SiteTrace]:
     result: list[SiteTrace] = []
     for verdict in found.verdicts:
         result += where.traces(verdict.search.data, verdict.search.chosen)
-        if verdict.outcome in ("unknown", "partly"):
+        if verdict.outcome in LEAVING:
             extra = where.unexplained(verdict.search.data, verdict.search.chosen)
-            result = [*(item for item in result if item.site != extra.site), extra]
+            if all(item.site != extra.site for item in result):  # a named site keeps what its effects do
+                result.append(extra)
     for reading in found.readings:
         site = found.record.catalogue[reading.effect].site
         result = [
@@ -303,6 +308,10 @@ def all_traces(found: Diagnosis) -> list[SiteTrace]:
         ]
     for name, share in found.held.items():
         lab = next(lab for lab in found.record.labs if name in lab.measured)
+        if not any(
+            name in item.search.data.part.signals and item.outcome in LEAVING for item in found.verdicts
+        ):
+            continue  # samples that repeat explain nothing where nothing is left
         site = lab.site(f"sensor.{name.removeprefix(lab.ahead)}")
         gone = {site, *(one.site(place) for one in found.record.labs for place in LIKE_MISSED)}
         result = [

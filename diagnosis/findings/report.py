@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from common.terminal.telling import Tell, untold
-from diagnosis.findings import details, exercise, how_far, next_test, where
+from diagnosis.findings import details, exercise, how_far, next_test, parts_table, where
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.which import which
 from diagnosis.recorded.record import Record
@@ -16,15 +16,17 @@ from diagnosis.report.records import Place, Report, Status, Tolerance
 STILL = 5.0  # rms of a signal over its noise below which it hardly moved
 
 
-def build(found: Diagnosis, validation: Sequence[Record], tell: Tell = untold) -> Report:
-    """The whole report, but for its verdict in words."""
+def build(
+    found: Diagnosis, validation: Sequence[Record], tell: Tell = untold, require: float | None = None
+) -> Report:
+    """The whole report, but for its verdict in words; `require` is the gap that may be left in each part."""
     tell("how far the gap closes", 0, 0)
     far = how_far.judge(found, validation)
     named = which(found)
     tell("the next test", 0, 0)
     tests = next_test.choices(found)
     return Report(
-        version=1,
+        version=2,
         status=status_of(found),
         tolerances=tolerances(found),
         gap=far.gap,
@@ -35,22 +37,23 @@ def build(found: Diagnosis, validation: Sequence[Record], tell: Tell = untold) -
         not_exercised=exercise.not_exercised(found),
         next_test=next_test.sentence(tests),
         warnings=(*found.warnings, *far.warnings, *named.warnings),
+        parts=parts_table.parts(found, require),
         details=details.details(found, far, named.candidates, tests),
     )
 
 
 def status_of(found: Diagnosis) -> Status:
-    """The status in one word."""
+    """The status in one word; what is not known of one part takes nothing away from what is named in another."""
     if not found.verdicts or not moved(found):
         return "not_enough_data"
     outcomes = {verdict.outcome for verdict in found.verdicts}
     named = any(verdict.effects for verdict in found.verdicts) or found.readings or found.link
-    if "unknown" in outcomes or found.held:
+    if "unknown" in outcomes and not named:
         return "unknown_effect"
-    if "partly" in outcomes:
+    if outcomes & {"unknown", "partly"}:
         return "partly_explained"
     if not named:
-        return "no_gap"
+        return "within_tolerances" if "tolerances" in outcomes else "no_gap"
     if any(verdict.effects and verdict.probability < 0.5 for verdict in found.verdicts):
         return "ambiguous"
     return "explained"
@@ -72,6 +75,8 @@ def tolerances(found: Diagnosis) -> dict[str, Tolerance]:
     for verdict in found.verdicts:
         fit = verdict.search.chosen
         for nuisance, z in zip(verdict.search.data.part.nuisances, fit.z, strict=True):
+            if nuisance.of_record:
+                continue
             result[nuisance.name] = Tolerance(factor=1.0 + float(z) * nuisance.tolerance, z=float(z))
     return result
 

@@ -4,28 +4,24 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
-from diagnosis.fits.fitting import Fit, Problem
-from diagnosis.fits.search import DATA_GAIN, PRIOR_GAIN, Search, exchanged_pair, gaps, tied
+from diagnosis.fits import fitting
+from diagnosis.fits.fitting import TOLERANCES, Fit, Problem
+from diagnosis.fits.search import DATA_GAIN, PRIOR_GAIN, Search, exchanged_pair, leaves, tied
+from diagnosis.report.records import Outcome
 from models.registry import Array
 
-Outcome = Literal["none", "explained", "partly", "unknown"]
-
-LEFT, WELL, HALF = (
-    0.5,
-    0.15,
-    0.5,
-)  # residual over noise, share of a signal's that is left, of energy explained
-# set on draws of `rths blind --set tune` (docs/decisions/0012-diagnosis.md)
-SMALL = 0.05  # of a signal's rms that may be left where a gap is called explained
+HALF = 0.5  # share of a gap's energy from which on effects that leave something are named
 TEMPERATURE = 3.0  # by which score differences are divided before they are odds
 # probability that the cause is not in the catalogue
 DOUBT = {"explained": 0.02, "partly": 0.12, "unknown": 0.9}
 CORRELATED = 2.0  # s, longer than what a model leaves is correlated
 COVER = 1.96  # standard deviations of an interval of 95 %
+
+
+PINNED = 1e-3  # tolerances from the bound within which a nominal parameter counts as pinned there
 
 
 @dataclass(frozen=True)
@@ -58,8 +54,7 @@ class PartVerdict:
 def judge(search: Search) -> PartVerdict:
     """The verdict on a part."""
     if not search.chosen.names:
-        outcome: Outcome = "unknown" if search.left > MISSED else "none"
-        return PartVerdict(search, outcome, 1.0, (), ())
+        return PartVerdict(search, without_effects(search), 1.0, (), ())
     outcome = how_well(search)
     if outcome == "unknown":
         return unnamed(search)
@@ -102,24 +97,28 @@ def unnamed(search: Search) -> PartVerdict:
 MISSED = 0.3  # systematic residual over noise that is unknown where no effect was found
 
 
+def without_effects(search: Search) -> Outcome:
+    """The outcome where no effect is named: unknown, or what tolerances explain, or nothing above the noise."""
+    if search.left > MISSED:
+        return "unknown"
+    nominal = fitting.at(search.data, {}, np.zeros(search.chosen.z.size))
+    return "tolerances" if leaves(nominal) else "none"
+
+
 def how_well(search: Search) -> Outcome:
-    """How much of the gap the chosen effects explain, in the signal in which they explain least."""
-    if search.left < LEFT:
-        return "explained"
-    group = search.data.group
-    before, after = gaps(search.commissioned, group), gaps(search.chosen, group)
-    worst = max(
-        new.ratio / max(old.ratio, LEFT) for old, new in zip(before, after, strict=True) if new.ratio >= LEFT
-    )
-    level = np.sqrt(np.mean(np.square(search.data.part.measured), axis=0))
-    left = max(
-        new.ratio * sigma / size
-        for new, sigma, size in zip(after, search.data.sigma, level, strict=True)
-        if size > 0.0
-    )
-    if worst < WELL and left < SMALL:
+    """Explained where the noise accepts what is left and no nominal parameter is pinned; else partly, or not at all.
+
+    A law that stands in for another one leaves something that no noise makes, however much of the gap it closes.
+    """
+    if not leaves(search.chosen) and not pinned(search.chosen):
         return "explained"
     return "partly" if search.explained > HALF else "unknown"
+
+
+def pinned(fit: Fit) -> tuple[str, ...]:
+    """Nominal parameters that a fit leaves at the bound of their range."""
+    far = np.abs(fit.z) > TOLERANCES - PINNED
+    return tuple(item.name for item, yes in zip(fit.data.part.nuisances, far, strict=True) if yes)
 
 
 def certainty(search: Search) -> float:

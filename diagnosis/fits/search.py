@@ -39,6 +39,9 @@ MOSTLY = (
 # Whether there is a gap: in sums over averaged samples, because noise averages out and systematic errors do not.
 LEVELS = (1, 4, 16)  # averaged samples in a sum, from fast to slow systematic errors
 MATERIAL = 0.12  # systematic residual over noise below which a gap would interest nobody
+SIGNIFICANT = (
+    5.0  # standard deviations from which on it is no chance, with all signals and time scales looked at
+)
 PRIOR_GAIN, DATA_GAIN = 6.25, 25.0  # 2.5 tolerances squared; 5 standard deviations squared
 SETTLING = 4  # rounds in which a fit and the noise that it leaves are found in turn
 SUSPICIOUS = 8.0  # of Σ z²: nominal parameters that are all off together imitate an effect
@@ -194,13 +197,8 @@ class Searcher:
 
     def is_gap(self, fit: Fit) -> bool:
         """Whether a fit leaves anything to explain: beyond noise, or beyond its tolerances."""
-        found: list[SystematicGap | Foreseen] = [*gaps(fit, self.data.group)]
-        if any(item.density is not None for item in self.data.noise):
-            found = [*found, *sensor_noise.foreseen(fit)]
-        visible = any(item.ratio > MATERIAL and item.significance > 5.0 for item in found)
-        return (
-            visible or fit.prior > SUSPICIOUS or float(np.max(np.abs(fit.z), initial=0.0)) ** 2 > PRIOR_GAIN
-        )
+        far = float(np.max(np.abs(fit.z), initial=0.0)) ** 2 > PRIOR_GAIN
+        return leaves(fit) or fit.prior > SUSPICIOUS or far
 
     def worth(self, bare: Fit, before: Fit, after: Fit) -> bool:
         """Whether one more effect is worth its parameters."""
@@ -312,9 +310,22 @@ class Searcher:
         return tuple(sorted(result, key=lambda item: item.cost))
 
 
+def leaves(fit: Fit) -> bool:
+    """Whether a fit leaves more than noise: the test of a residual that is white, of unit variance, where it is noise.
+
+    Its sums over time must not exceed noise, and where the noise is coloured nothing of it may follow from the inputs.
+    """
+    found: list[SystematicGap | Foreseen] = [*gaps(fit, fit.data.group)]
+    if any(item.density is not None for item in fit.data.noise):
+        found += sensor_noise.foreseen(fit)
+    return any(item.ratio > MATERIAL and item.significance > SIGNIFICANT for item in found)
+
+
 def hidden(fit: Fit) -> bool:
     """Whether inputs foresee so much of what a fit leaves that the noise it was measured by may hold a gap."""
-    return any(item.ratio > MATERIAL and item.significance > 5.0 for item in sensor_noise.foreseen(fit))
+    return any(
+        item.ratio > MATERIAL and item.significance > SIGNIFICANT for item in sensor_noise.foreseen(fit)
+    )
 
 
 def refines(bare: Fit, before: Fit, after: Fit) -> bool:

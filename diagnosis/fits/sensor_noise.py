@@ -187,6 +187,9 @@ def model(data: Data, rest: Remainder, quiet: Mask, source: Source, place: int) 
     segments = stretches(rest.noise[:, place], quiet)
     if not segments or not np.any(rest.noise[:, place]) or is_white(segments, flat, resolution):
         return NoiseModel(flat, lines=lines, resolution=resolution)
+    if alike(rest.noise[:, place], quiet):
+        quiet, source = np.ones_like(quiet), "residual"
+        segments = stretches(rest.noise[:, place], quiet)
     segments = [piece - piece.mean() for piece in segments]
     density, order = colour.density(segments)
     samples = sum(piece.size for piece in segments)
@@ -195,6 +198,27 @@ def model(data: Data, rest: Remainder, quiet: Mask, source: Source, place: int) 
         colour.whitened(rest.noise[:, [place]], colour.gains(density, data.groups)[:, None])[quiet, 0]
     )
     return NoiseModel(rms, "ar", order, source, lines, resolution, density, samples, tails)
+
+
+def alike(noise: Array, quiet: Mask) -> bool:
+    """Whether noise (groups,) is no louder where the part moves more: all of it then tells its colour.
+
+    The variances of its sums over time are held against each other; that of slow sums is known least.
+    """
+    for size in SLOWER:
+        still, loud = (summed(stretches(noise, mask), size) for mask in (quiet, ~quiet))
+        if min(still.size, loud.size) < 8:
+            continue
+        more = float(np.var(loud)) / max(float(np.var(still)), 1e-300) - 1.0
+        if more > SURE * math.sqrt(2.0 / still.size + 2.0 / loud.size):
+            return False
+    return True
+
+
+def summed(segments: list[Array], size: int) -> Array:
+    """Sums of noise over so many averaged samples, scaled so that white noise keeps its rms."""
+    sums = [piece[: piece.size // size * size].reshape(-1, size).sum(axis=1) for piece in segments]
+    return np.concatenate([np.zeros(0), *sums]) / math.sqrt(size)
 
 
 def stretches(noise: Array, quiet: Mask) -> list[Array]:
@@ -208,8 +232,7 @@ def is_white(segments: list[Array], rms: float, resolution: float) -> bool:
     """Whether sums over a few averaged samples have the variance of white noise of an rms."""
     variance = rms**2 + resolution**2 / 12.0
     for size in SLOWER:
-        sums = [piece[: piece.size // size * size].reshape(-1, size).sum(axis=1) for piece in segments]
-        every = np.concatenate(sums) / math.sqrt(size)
+        every = summed(segments, size)
         if every.size < 8:
             continue
         spread = float(np.mean((every - np.median(every)) ** 2)) / max(variance, 1e-300) - 1.0

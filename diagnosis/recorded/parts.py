@@ -27,6 +27,8 @@ from models.system import System
 EXACT = 1e-4  # share of a computed signal's rms below which a difference is rounding, not gap
 UNREST = 0.05  # share of its largest value from which on a first value is no rest
 PIECE, REACH = 1.0, 10  # s between beginnings of a free damper, ticks to each side that they are read from
+LATE = 4e-3  # s, by which a logger's filters usually make a force late
+CALIBRATED = 0.01  # by which a logger's calibration usually differs
 MODEL_ERROR = 1e-3  # share of a measured signal's rms that two good solutions of one model may differ by
 
 
@@ -37,6 +39,7 @@ class Nuisance:
     parameter: str  # table.name of the plan
     tolerance: float
     lab: RecordedLaboratory | None = None
+    of_record = False  # whether it says something of the recording alone, and nothing of the test
 
     @property
     def name(self) -> str:
@@ -52,6 +55,21 @@ class Nuisance:
             return self.lab.kind.scaled(system, self.parameter, factor)
         table, _, key = self.parameter.partition(".")
         return system.scaled(table, key, factor)
+
+
+@dataclass(frozen=True)
+class LoggedForce(Nuisance):
+    """How late a logger recorded a force that the master used, in seconds, or by what factor."""
+
+    of_record = True
+    signal: str = ""  # of the force's reading
+
+    def moved(self, system: System, z: float) -> System:
+        """The system whose reading of that force says what the logger did to it."""
+        value = z * self.tolerance
+        return system.sensed(
+            self.signal, **({"delay": value} if self.parameter == "delay" else {"gain": 1.0 + value})
+        )
 
 
 class Part(Protocol):
@@ -265,6 +283,8 @@ class Building:
         names = (own.kind.channels.position, own.kind.channels.force) if own else ()
         read = [record.signals[name] for name in names] or [none, none]
         self._inputs = (read[0], read[1], used)
+        self._force = own.kind.channels.force if own else ""
+        self._interval = record.plan.test.interval
         here = record.signals["ground_acceleration"]
         self._ground = np.zeros((2, record.ticks + 1))
         self._ground[0, :-1] = here
@@ -282,7 +302,7 @@ class Building:
 
     def predict(self, system: System) -> Array:
         """Displacement, velocity and acceleration of every storey."""
-        rows = replay.building(system, self._ground, *self._inputs)
+        rows = replay.building(system, self._ground, *self.forces(system))
         return np.column_stack([rows[name] for name in type(self).signals])
 
     @property
@@ -290,9 +310,23 @@ class Building:
         """Ground acceleration (ticks,)."""
         return self._ground[0, :-1]
 
+    def forces(self, system: System) -> tuple[Array, Array, Array]:
+        """Position and force of the master's laboratory and the forces of the others, as the master used them."""
+        position, force, used = self._inputs
+        logger = None if self.exact else system.effects.sensors.get(self._force)
+        if logger is None:
+            return position, force, used
+        ticks = np.arange(force.size)
+        return position, np.interp(ticks + logger.delay / self._interval, ticks, force) / logger.gain, used
+
     def logged(self) -> Building:
         """The same building, of which the forces that the master used are known up to a logger's noise only."""
-        result: Building = with_fields(self, {"exact": False})
+        logger = tuple(
+            LoggedForce(name, tolerance, None, self._force)
+            for name, tolerance in (("delay", LATE), ("gain", CALIBRATED))
+            if self._force
+        )
+        result: Building = with_fields(self, {"exact": False, "nuisances": (*self.nuisances, *logger)})
         return result
 
     def first(self, ticks: int) -> Building:

@@ -283,5 +283,8 @@ class Details(Entry):
     unknown: Unknown | None = noted(
         "What no effect of the catalogue explains", default=None, absent=Absent.EMPTY
     )
+    unknowns: tuple[Unknown, ...] = noted(
+        "The same of every part with something left, the largest over its noise first", default=()
+    )
     remaining: Remaining | None = noted("What the verdict leaves", default=None, absent=Absent.EMPTY)
     next: tuple[NextTest, ...] = noted("Tests that would tell candidates apart, the best first", default=())

@@ -91,7 +91,7 @@ def required(field: dataclasses.Field[Any]) -> bool:
 class Shape:
     """The type of a field, taken apart."""
 
-    kind: Literal["number", "integer", "string", "choice", "entry", "list", "object"]
+    kind: Literal["number", "integer", "string", "boolean", "choice", "entry", "list", "object"]
     nullable: bool = False
     item: Shape | None = None  # of a list or an object
     length: int | None = None  # of a list, None: any
@@ -100,7 +100,12 @@ class Shape:
     rule: FieldRule = FieldRule()
 
 
-PLAIN: dict[Any, Literal["number", "integer", "string"]] = {float: "number", int: "integer", str: "string"}
+PLAIN: dict[Any, Literal["number", "integer", "string", "boolean"]] = {
+    float: "number",
+    int: "integer",
+    str: "string",
+    bool: "boolean",
+}
 
 
 def shape(hint: Any) -> Shape:

@@ -46,7 +46,7 @@ def report(values: object, name: str = "The report") -> Report:
         found: Report = entry(Report, values, "")
     except ValueError as error:
         raise InputError(
-            f"{name} is no diagnosis report of version 1: {error}; write one with rths diagnose --json."
+            f"{name} is no diagnosis report: {error}; write one with rths diagnose --json."
         ) from None
     return found
 
@@ -109,6 +109,10 @@ def members(shape: Shape, given: object, place: str) -> dict[str, Any]:
 def single(shape: Shape, given: object, place: str) -> float | int | str:
     """A number or a text within its rule."""
     rule = shape.rule
+    if shape.kind == "boolean":
+        if not isinstance(given, bool):
+            raise ValueError(f"{place} must be true or false, not {given!r}")
+        return given
     if isinstance(given, str) and shape.kind == "string":
         if not re.fullmatch(rule.pattern or ".*", given, re.DOTALL):
             raise ValueError(f"{place} cannot be {given!r}")

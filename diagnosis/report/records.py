@@ -10,7 +10,16 @@ from diagnosis.report.evidence import Details
 from diagnosis.report.fields import Absent, EffectName, Ends, Entry, FieldRule, Number, Share, Site, noted
 from diagnosis.report.values import Parameters
 
-Status = Literal["no_gap", "explained", "partly_explained", "ambiguous", "unknown_effect", "not_enough_data"]
+Status = Literal[
+    "no_gap",
+    "within_tolerances",
+    "explained",
+    "partly_explained",
+    "ambiguous",
+    "unknown_effect",
+    "not_enough_data",
+]
+Outcome = Literal["none", "tolerances", "explained", "partly", "unknown"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,6 +72,47 @@ class Candidate(Entry):
 
 
 @dataclass(frozen=True, kw_only=True)
+class NoiseEntry(Entry):
+    """The noise of one sensor, as its part's residual shows it."""
+
+    kind: Literal["white", "ar"] = noted("White, or coloured: an autoregression")
+    order: int = noted("Order of the autoregression, 0 of white noise")
+    rms: Number = noted("Rms in the signal's unit, lines aside")
+    from_: Literal["at rest", "quiet part", "residual"] = noted(
+        "Where it was found: readings at rest, the part's quiet time, or all that no model could explain"
+    )
+    lines: tuple[float, ...] = noted("Narrow lines that the sensor picks up", unit="Hz", default=())
+    resolution: Number = noted("Step of the readings in the signal's unit, null for none", default=None)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PartOfGap(Entry):
+    """What the gap of one part is made of: tolerances + named + learned + left = gap, relative to its signals' rms."""
+
+    part: str = noted("Ground, structure, or a laboratory")
+    outcome: Outcome = noted("What is said of this part alone")
+    effects: tuple[EffectName, ...] = noted("The effects named in it", default=())
+    gap: Number = noted("The gap of nominal models above the noise")
+    tolerances: Number = noted("What parameters moved within their tolerances take away")
+    named: Number = noted("What the effects named take away")
+    learned: Number = noted("What a model without a name takes away", default=0.0)
+    left: Number = noted("What nothing takes away")
+    noise: Number = noted("What the sensors' noise alone makes")
+    adequate: bool | None = noted("Whether what is left is no more than was required, null where nothing was")
+    noise_model: Mapping[str, NoiseEntry] = noted("The noise of its sensors, by signal", default={})
+
+
+@dataclass(frozen=True, kw_only=True)
+class LearnedGap(Entry):
+    """How far what was learnt without a name closes the gap that named effects leave."""
+
+    before: Number = noted("Overall gap with the named effects alone")
+    after: Number = noted("Overall gap with what was learnt as well")
+    closed: Number = noted("Share of the gap above the noise that it closes")
+    sites: tuple[Site, ...] = noted("Where something was learnt", default=())
+
+
+@dataclass(frozen=True, kw_only=True)
 class HowFar(Entry):
     """How far the gap closes: closed = (before - after)/(before - noise_floor)."""
 
@@ -77,13 +127,14 @@ class HowFar(Entry):
     closed_interval: Ends | None = noted("Its interval of 90 %, or its range over the recordings given")
     noise_floor: Number = noted("Overall gap that the sensors' noise alone makes")
     judged_on: str | None = noted("The data, not used for the fit, on which this was judged")
+    learned: LearnedGap | None = noted("What was learnt without a name", default=None, absent=Absent.LEFT_OUT)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Report(Entry):
     """Where the gap between a recorded test and its simulation arises, which effect makes it, how far it closes."""
 
-    version: Literal[1] = noted("Version of this format")
+    version: Literal[1, 2] = noted("Version of this format; the fields of version 1 are all in version 2")
     status: Status = noted("The outcome in one word")
     tolerances: Mapping[str, Tolerance] = noted("Nominal parameters moved inside their tolerances, by name")
     gap: Gap = noted("The gap between the recording and the simulation with nominal models")
@@ -96,6 +147,10 @@ class Report(Entry):
     not_exercised: tuple[EffectName, ...] = noted("Effects that this recording could not have shown")
     next_test: str | None = noted("What to run to tell the remaining candidates apart, and why")
     warnings: tuple[str, ...] = noted("What a reader should know before believing this report")
+    parts: tuple[PartOfGap, ...] = noted("What the gap of each part is made of", default=())
+    found: str | None = noted(
+        "The file with what was found as a reality, null where none was written", default=None
+    )
     details: Details = noted(
         "The evidence: what the page draws; every entry may be absent or empty", default=Details
     )

@@ -14,13 +14,13 @@ PUBLISHED = Path(__file__).with_name("schema.json")
 
 
 def schema() -> dict[str, Any]:
-    """The schema (draft 2020-12) of version 1."""
+    """The schema (draft 2020-12) of version 2."""
     definitions: dict[str, Any] = {}
     whole = described(Report, definitions)
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "$id": "urn:rths:diagnosis-report:1",
-        "title": "Diagnosis report of rths, version 1",
+        "$id": "urn:rths:diagnosis-report:2",
+        "title": "Diagnosis report of rths, version 2",
         **whole,
         "description": f"{whole['description']} SI units. null: not determined.",
         "$defs": dict(sorted(definitions.items())),

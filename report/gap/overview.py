@@ -24,7 +24,7 @@ def tiles(report: Report) -> list[tuple[str, str, str]]:
 def place(report: Report) -> tuple[str, str]:
     """The foremost site."""
     if not report.where:
-        return MISSING, "no site" if report.status == "no_gap" else "not determined"
+        return MISSING, "no site" if report.status in wording.QUIET else "not determined"
     first = report.where[0]
     return wording.site(first.site), f"{percent(first.share)} of the gap"
 
@@ -42,7 +42,7 @@ def closed(report: Report) -> str:
     share = wording.closed(report)
     if share:
         return f"closed {share}"
-    return "nothing to close" if report.status == "no_gap" else "not determined"
+    return "nothing to close" if report.status in wording.QUIET else "not determined"
 
 
 def facts(report: Report) -> str:

@@ -99,7 +99,7 @@ def where(report: Report) -> list[str]:
 
 def placed(report: Report) -> bool:
     """Whether an empty list of sites means that there is no gap."""
-    return report.status == "no_gap"
+    return report.status in wording.QUIET
 
 
 def which(report: Report) -> list[str]:

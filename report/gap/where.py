@@ -29,7 +29,7 @@ def sites(report: Report) -> Rows:
 
 def unplaced(report: Report) -> str:
     """Why no site is listed."""
-    if report.status == "no_gap":
+    if report.status in wording.QUIET:
         return "No part leaves a residual above its noise: there is nothing to place."
     return (
         "The gap could not be placed, because the recording holds input and output together of no part that "

@@ -60,6 +60,7 @@ def kinds(report: Report) -> list[tuple[str, str, list[Card]]]:
 def nothing(report: Report) -> str:
     """Why no effect is named."""
     reasons = {
+        "within_tolerances": "Parameters within their tolerances explain the gap: no effect is needed.",
         "no_gap": "There is no gap to explain: no effect was searched for.",
         "not_enough_data": "No effect is named: the recording does not hold enough to tell one from another.",
         "unknown_effect": "No effect of the catalogue explains the gap.",

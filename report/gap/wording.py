@@ -7,7 +7,7 @@ from typing import TypeVar
 
 from common.roles import MASTER, SLAVE, title
 from diagnosis.report.evidence import Evidence
-from diagnosis.report.records import Candidate, Report, SignalGap, Tolerance
+from diagnosis.report.records import Candidate, PartOfGap, Report, SignalGap, Tolerance
 from laboratories import effects as catalogue
 from laboratories.effects import CATALOGUE
 from report.text.force_path import sentence as force_sentence
@@ -18,13 +18,17 @@ Named = TypeVar("Named", Candidate, Evidence)
 FAULTS = {fault.name: fault for fault in catalogue.FAULTS}
 STATUS = {
     "no_gap": "no gap",
+    "within_tolerances": "within tolerances",
     "explained": "explained",
     "partly_explained": "partly explained",
     "ambiguous": "ambiguous",
     "unknown_effect": "unknown effect",
     "not_enough_data": "not enough data",
 }
+QUIET = ("no_gap", "within_tolerances")  # statuses that leave nothing to explain
 JUDGED = {
+    "interleaved (interpolation)": "On seconds not used for fitting, between those that were",
+    "other recordings": "On the recordings given for validation",
     "held-out time windows": "On data not used for fitting",
     "recordings given": "On the recordings given for validation",
 }
@@ -149,12 +153,41 @@ def verdict(report: Report) -> str:
     size = f"{percent(report.gap.overall)} (noise floor {percent(report.gap.overall_noise_floor)})"
     sentences = {
         "no_gap": f"No gap beyond noise and tolerances: {size}.",
+        "within_tolerances": f"No gap beyond tolerances: {size}; {within(report)}.",
+        "partly_explained": f"The gap of {size}{place(report)}: {by_part(report) or cause(report)}.",
         "not_enough_data": "This recording holds too little to place or name a gap.",
         "unknown_effect": f"The gap of {size}{place(report)} is made by something that the catalogue lacks.",
         "ambiguous": f"The gap of {size}{place(report)} has several causes that fit alike: {rivals(report)}.",
     }
     fallback = f"The gap of {size}{place(report)}: {cause(report)}."
     return sentences.get(report.status, fallback)
+
+
+def within(report: Report) -> str:
+    """The parameters within their tolerances that explain a gap, the farthest moved by name."""
+    moved = [f"{name} ×{item.factor:.4g}" for name, item in by_move(report)[:2] if item.factor is not None]
+    return (
+        f"parameters moved within them explain it, farthest {joined(moved)}" if moved else "nothing is left"
+    )
+
+
+def by_part(report: Report) -> str:
+    """What is said of each part with a gap; nothing of a report without parts."""
+    left = [entry for entry in report.parts if entry.outcome in ("explained", "partly", "unknown")]
+    named = {name for entry in left for name in entry.effects}
+    texts = [f"in {entry.part} {of_part(entry)}" for entry in left]
+    further = [name for item in report.which[:1] for name in item.effects if name not in named]
+    texts += [f"{effects(further)} besides"] if further and texts else []
+    return "; ".join(texts)
+
+
+def of_part(entry: PartOfGap) -> str:
+    """What is said of one part."""
+    if entry.outcome == "unknown":
+        return "it is made by something that the catalogue lacks"
+    if entry.outcome == "explained":
+        return f"{effects(entry.effects)} explains it"
+    return f"{effects(entry.effects)} stands in for what leaves {percent(entry.left)} of {percent(entry.gap)}"
 
 
 def place(report: Report) -> str:
@@ -187,7 +220,7 @@ def closed(report: Report) -> str:
     What is left may by chance be below the noise floor: no more than all of the gap is said to be closed.
     """
     share = report.how_far.closed
-    if share is None or report.status == "no_gap":
+    if share is None or report.status in QUIET:
         return ""
     ends = [min(end, 1.0) for end in report.how_far.closed_interval or () if end is not None]
     interval = percent_interval(ends)

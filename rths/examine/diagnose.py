@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
+import math
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -43,6 +44,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--html", type=Path, metavar="OUT", help="write the report as one HTML page")
     cli.force_argument(parser)
     parser.add_argument(
+        "--require",
+        type=float,
+        metavar="GAP",
+        help="the gap that may be left in each part, such as 0.02: the report says of each whether it is good enough",
+    )
+    parser.add_argument(
         "--validate",
         type=Path,
         nargs="+",
@@ -61,7 +68,12 @@ def run(args: argparse.Namespace) -> int:
         recording = read(args.file)
         names = chosen(recording, args)
         found = diagnose_slaves(
-            recording, plan=args.plan, validate=args.validate, against_ideal=args.ideal, tell=progress.tell
+            recording,
+            plan=args.plan,
+            validate=args.validate,
+            against_ideal=args.ideal,
+            tell=progress.tell,
+            require=args.require,
         )
         reports = [found[name] for name in names]
         report = reports[0]
@@ -89,6 +101,10 @@ def check(args: argparse.Namespace) -> None:
     inputs = [args.file, *args.validate, *([cli.plan_path(args.plan)] if args.plan else [])]
     for path in files:
         outputs.checked(path, args.force, inputs)
+    if any(path.resolve() == args.file.resolve() for path in args.validate):
+        raise InputError(f"{args.file} cannot validate its own diagnosis: give --validate another recording.")
+    if args.require is not None and not 0.0 < args.require < math.inf:
+        raise InputError(f"--require {args.require:g} is no gap: give a share above 0, such as 0.02.")
     if len({outputs.target(path) for path in files}) < len(files):
         raise InputError(f"--html and --json both name {args.html}: give each a file of its own.")
 
@@ -131,6 +147,7 @@ def diagnose_slaves(
     validate: Sequence[Path] = (),
     against_ideal: bool = False,
     tell: Tell = untold,
+    require: float | None = None,
 ) -> dict[str, Report]:
     """The reports on a recording by the name of the slave, empty where there is one without or none.
 
@@ -158,7 +175,7 @@ def diagnose_slaves(
         refuse_slips(one, recording.path)
     further = {role: [other[role] for other in others if role in other] for role in own}
     result = {}
-    for role, report in diagnose(own, further, tell).items():
+    for role, report in diagnose(own, further, tell, require).items():
         name, words = name_of(role), wording.verdict(report)
         verdict = f"Laboratory {name}: {words}" if name else words
         result[name] = dataclasses.replace(report, verdict=verdict)

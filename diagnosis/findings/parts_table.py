@@ -1,0 +1,97 @@
+"""What the gap of each part is made of: tolerances, effects with a name, what is left, and noise."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from diagnosis.findings.found import Diagnosis
+from diagnosis.findings.verdict import PartVerdict
+from diagnosis.fits import fitting
+from diagnosis.fits.fitting import Data
+from diagnosis.recorded.parts import LaboratoryPart
+from diagnosis.report.records import NoiseEntry, PartOfGap
+from models.registry import Array
+from models.system import System
+
+QUIET = 0.2  # noise over a signal's rms from which on a part is not judged by it
+
+
+def parts(found: Diagnosis, require: float | None = None) -> tuple[PartOfGap, ...]:
+    """The parts in the order of the test; `require` is the gap that may be left in each."""
+    return tuple(part(verdict, require) for verdict in found.verdicts)
+
+
+def part(verdict: PartVerdict, require: float | None) -> PartOfGap:
+    """One part: each step's gap above noise less the next one's."""
+    search = verdict.search
+    data, bare, fit = search.data, search.commissioned, search.chosen
+    noise = rms(data.white / levels(data), data)
+    steps = [
+        above(data, system, noise)
+        for system in (data.system, fitting.lay(data, bare.z, {}), fitting.lay(data, fit.z, fit.values))
+    ]
+    nominal, moved, left = steps[0], min(steps[:2]), min(steps)
+    return PartOfGap(
+        part=name_of(data),
+        outcome=verdict.outcome,
+        effects=verdict.effects,
+        gap=nominal,
+        tolerances=nominal - moved,
+        named=moved - left,
+        left=left,
+        noise=noise,
+        adequate=None if require is None else left <= require,
+        noise_model=noises(data),
+    )
+
+
+def name_of(data: Data) -> str:
+    """What a part is called; a laboratory of a role with a name by that role."""
+    return data.part.lab.title if isinstance(data.part, LaboratoryPart) else data.part.name
+
+
+def levels(data: Data) -> Array:
+    """Rms of each reading (signals,) that stands out of its noise; infinite for the others, where any does."""
+    level = np.sqrt(np.mean(np.square(data.part.measured), axis=0))
+    heard = (level > 0.0) & (data.white < QUIET * level)
+    return np.where(heard, level, np.inf) if heard.any() else np.where(level > 0.0, level, np.inf)
+
+
+def above(data: Data, system: System, noise: float) -> float:
+    """Rms over the readings of rms(recorded - predicted)/rms(recorded), without the noise's share."""
+    residual = np.nan_to_num(data.residual(system), nan=fitting.FAR, posinf=fitting.FAR, neginf=-fitting.FAR)
+    whole = rms(np.sqrt(np.mean(np.square(residual), axis=0)) / levels(data), data)
+    return math.sqrt(max(0.0, whole**2 - noise**2))
+
+
+def rms(shares: Array, data: Data) -> float:
+    """Rms over the readings that count."""
+    counted = np.isfinite(levels(data))
+    return float(np.sqrt(np.mean(shares[counted] ** 2))) if counted.any() else 0.0
+
+
+def noises(data: Data) -> dict[str, NoiseEntry]:
+    """The noise of a part's sensors by signal; none of what is computed."""
+    if data.part.exact:
+        return {}
+    models = data.noise or (None,) * len(data.part.signals)
+    result = {}
+    for name, model, white, there in zip(
+        data.part.signals, models, data.white, data.part.present.T, strict=True
+    ):
+        if not there.any():
+            continue
+        if model is None:
+            result[name] = NoiseEntry(kind="white", order=0, rms=float(white), from_="residual")
+            continue
+        result[name] = NoiseEntry(
+            kind=model.kind,
+            order=model.order,
+            rms=model.rms,
+            from_=model.source,
+            lines=model.lines,
+            resolution=model.resolution or None,
+        )
+    return result
