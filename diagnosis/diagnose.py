@@ -85,7 +85,7 @@ def examine(record: Record, tell: Tell = untold) -> Diagnosis:
     datas, verdicts = [], []
     for number, part in enumerate(parts, 1):
         tell(part.name, number, len(parts))
-        datas.append(fitting.prepare(part, record, rounded))
+        datas.append(fitting.prepare(part, record, readings.resolutions(record, rounded)))
         scales = Scales(record, part.shift() if isinstance(part, Ground) else 0.0)
         verdicts.append(judged(datas[-1], scales))
     white, held = readings.levels(datas), readings.held(record, rounded)

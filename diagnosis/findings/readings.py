@@ -50,6 +50,19 @@ def steps(record: Record) -> dict[str, float]:
     return found
 
 
+def resolutions(record: Record, rounded: dict[str, float]) -> dict[str, float]:
+    """The steps that were found, and the resolution that is stated of a channel where none was."""
+    stated = record.stated
+    if stated is None:
+        return rounded
+    rows = {
+        given: stated.channel(lab.role, name).resolution
+        for lab in record.labs
+        for name, given in zip(lab.kind.channels.names, lab.measured, strict=True)
+    }
+    return {name: step for name, step in rows.items() if step > 0.0} | rounded
+
+
 def held(record: Record, rounded: dict[str, float]) -> dict[str, float]:
     """Share of samples that repeat the one before to the last bit, of sensors whose noise rules that out."""
     found = {}
@@ -99,10 +112,10 @@ def findings(record: Record, white: dict[str, float], rounded: dict[str, float])
     ratios = {name: white[name] / planned[name] for name in plain}
     usual = max(float(np.median(list(ratios.values()))) if ratios else 1.0, 1e-3)
     result = []
-    coarse = coarsest(record, rounded)
+    coarse = coarsest(record, rounded) | resolutions(record, {})
     for name, step in rounded.items():
         noise = planned.get(name, 0.0) * usual
-        if step > max(noise, coarse.get(name, 0.0)):
+        if step > max(noise, 1.01 * coarse.get(name, 0.0)):
             size = step / np.sqrt(12.0) / noise if noise > 0.0 else 0.0
             result.append(
                 SensorFinding(effect_on(record, name, "quantization"), "step", step, (step, step), size)

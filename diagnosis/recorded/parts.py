@@ -14,6 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from common.plan.plan import Plan
+from common.recording.imported import NOTHING_STATED, ImportedChannel
 from common.roles import MASTER
 from diagnosis.recorded.laboratory import RecordedLaboratory
 from diagnosis.recorded.record import Record
@@ -55,6 +56,24 @@ class Nuisance:
             return self.lab.kind.scaled(system, self.parameter, factor)
         table, _, key = self.parameter.partition(".")
         return system.scaled(table, key, factor)
+
+
+@dataclass(frozen=True)
+class ChannelGain(Nuisance):
+    """The calibration of one channel of a logger, within the tolerance stated for it."""
+
+    of_record = True
+    signal: str = ""  # of the reading in its laboratory
+
+    @property
+    def name(self) -> str:
+        """The name in reports."""
+        site = f"sensor.{self.signal}"
+        return f"{self.lab.site(site) if self.lab else site}.calibration"
+
+    def moved(self, system: System, z: float) -> System:
+        """The system whose reading has that gain."""
+        return system if z == 0.0 else system.sensed(self.signal, gain=1.0 + z * self.tolerance)
 
 
 @dataclass(frozen=True)
@@ -147,6 +166,26 @@ def of_sites(record: Record, sites: Collection[str], plan: Plan) -> tuple[Effect
     return tuple(effect for effect in found if not effect.in_samples)
 
 
+def channels(record: Record, lab: RecordedLaboratory) -> tuple[ImportedChannel, ...]:
+    """What is stated of the logger's channels of a laboratory's readings, nothing where rths recorded them."""
+    stated = record.stated
+    if stated is None:
+        return (NOTHING_STATED,) * len(lab.measured)
+    return tuple(stated.channel(lab.role, name) for name in lab.kind.channels.names)
+
+
+def calibrations(
+    record: Record, lab: RecordedLaboratory, stated: tuple[ImportedChannel, ...]
+) -> tuple[ChannelGain, ...]:
+    """Gains of the channels that were recorded, within the tolerances stated."""
+    rows = zip(lab.kind.channels.names, lab.measured, stated, strict=True)
+    return tuple(
+        ChannelGain("gain", channel.calibration, lab, name)
+        for name, given, channel in rows
+        if channel.calibration > 0.0 and record.has(given)
+    )
+
+
 class LaboratoryPart:
     """A laboratory from its recorded commands."""
 
@@ -163,7 +202,9 @@ class LaboratoryPart:
         self.measured, self.present = outputs(record, self.signals)
         machines = [machine for machine in lab.kind.machines(lab.plan) if self.moves(record, machine)]
         names = tuple(name for machine in machines for name in machine.parameters)
-        self.nuisances = nuisances(lab, names)
+        self.channels = channels(record, lab)
+        self._interval = record.plan.test.interval
+        self.nuisances = (*nuisances(lab, names), *calibrations(record, lab, self.channels))
         pairs = zip(self.signals, lab.kind.channels.names, self.measured.T, strict=True)
         sites = [
             f"sensor.{channel}" for name, channel, read in pairs if np.ptp(read) > 0.0 and record.has(name)
@@ -195,7 +236,11 @@ class LaboratoryPart:
         none = np.zeros(max(values.size for values in self.inputs.values()))
         drive = [self.inputs.get(name, none) for name in self.devices]
         drive += [none] * (2 - len(drive))
-        return replay.laboratory(self.lab.kind, system, np.stack(drive, axis=1), self._start, self.anew)
+        found = replay.laboratory(self.lab.kind, system, np.stack(drive, axis=1), self._start, self.anew)
+        for place, channel in enumerate(self.channels):
+            if channel.filter is not None or channel.delay != 0.0:
+                found[:, place] = channel.through(found[:, place], self._interval)
+        return found
 
     def beginnings(self, record: Record) -> Array | None:
         """Ticks, places and rates from which a motion that nothing brings back is replayed anew.

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from common.errors import InputError
 from common.plan.plan import Plan, ideal
 from common.plan.read import parse
+from common.recording.imported import ImportedData, imported
 from common.recording.reader import GROUND, Run
 from common.roles import MASTER, SLAVE, title
 from common.signals import BUILDING as OF_BUILDING
@@ -58,6 +59,11 @@ class Record:
     whole: WholeTest | None = None  # the test around it, where that has several slaves
     plans: dict[str, Plan] = field(default_factory=dict)  # by role, as each sees it
     labs: tuple[RecordedLaboratory, ...] = ()  # the laboratories that it shows, the master's first
+
+    @cached_property
+    def stated(self) -> ImportedData | None:
+        """What is stated of the logger's channels, None where rths recorded the test itself."""
+        return imported(self.run)
 
     @cached_property
     def catalogue(self) -> dict[str, Effect]:

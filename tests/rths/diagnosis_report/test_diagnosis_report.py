@@ -74,7 +74,7 @@ def test_reports_fit_the_schema(name: str) -> None:
 @pytest.mark.parametrize(
     "change",
     [
-        {"version": 2},
+        {"version": 3},
         {"status": "fine"},
         {"where": [{"site": "roof"}]},
         {"equivalent": [["column.stiffness"]]},
@@ -90,7 +90,7 @@ def test_the_schema_refuses(change: Report) -> None:
 
 def test_the_schema_asks_for_every_key_of_the_contract() -> None:
     assert set(bare("no_gap")) == set(schema()["required"])
-    assert {"verdict", "details"} == set(schema()["properties"]) - set(schema()["required"])
+    assert {"verdict", "details", "parts", "found"} == set(schema()["properties"]) - set(schema()["required"])
 
 
 @pytest.mark.parametrize("name", REPORTS)
