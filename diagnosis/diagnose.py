@@ -83,11 +83,14 @@ def examine(record: Record, tell: Tell = untold) -> Diagnosis:
         )
     rounded = readings.steps(record)
     datas, verdicts = [], []
-    for number, part in enumerate(parts, 1):
+    logged = False
+    for number, given in enumerate(parts, 1):
+        part = given.logged() if logged and isinstance(given, LaboratoryPart) else given
         tell(part.name, number, len(parts))
         datas.append(fitting.prepare(part, record, readings.resolutions(record, rounded)))
         scales = Scales(record, part.shift() if isinstance(part, Ground) else 0.0)
         verdicts.append(judged(datas[-1], scales))
+        logged |= isinstance(part, Building) and not verdicts[-1].search.data.part.exact
     white, held = readings.levels(datas), readings.held(record, rounded)
     return Diagnosis(
         record,

@@ -10,7 +10,7 @@ from common.terminal.telling import Tell, untold
 from diagnosis.findings import details, exercise, how_far, next_test, parts_table, where
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.which import which
-from diagnosis.recorded.parts import LoggedForce
+from diagnosis.recorded.parts import LoggedForce, LoggedReadings
 from diagnosis.recorded.record import Record
 from diagnosis.report.records import Place, Report, Status, Tolerance
 
@@ -76,7 +76,7 @@ def tolerances(found: Diagnosis) -> dict[str, Tolerance]:
     for verdict in found.verdicts:
         fit = verdict.search.chosen
         for nuisance, z in zip(verdict.search.data.part.nuisances, fit.z, strict=True):
-            if isinstance(nuisance, LoggedForce):
+            if isinstance(nuisance, LoggedForce | LoggedReadings):
                 continue
             result[nuisance.name] = Tolerance(factor=1.0 + float(z) * nuisance.tolerance, z=float(z))
     return result

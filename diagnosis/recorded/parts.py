@@ -91,6 +91,20 @@ class LoggedForce(Nuisance):
         )
 
 
+@dataclass(frozen=True)
+class LoggedReadings(Nuisance):
+    """How late a logger recorded all readings of a laboratory, in seconds."""
+
+    of_record = True
+    signals: tuple[str, ...] = ()  # of the readings in their laboratory
+
+    def moved(self, system: System, z: float) -> System:
+        """The system whose readings all come that late; none comes early."""
+        for name in self.signals if z > 0.0 else ():
+            system = system.sensed(name, delay=z * self.tolerance)
+        return system
+
+
 class Part(Protocol):
     """A piece of the test with its recorded inputs and outputs."""
 
@@ -271,6 +285,13 @@ class LaboratoryPart:
         if self.anew is not None:
             result.anew = self.anew[self.anew[:, 0] < ticks]
         return result
+
+    def logged(self) -> LaboratoryPart:
+        """The same laboratory, whose readings came through a logger that may have made all of them late."""
+        if any(channel.filter is not None or channel.delay != 0.0 for channel in self.channels):
+            return self  # what the logger did is stated
+        late = LoggedReadings("delay", LATE, self.lab, self.lab.kind.channels.names)
+        return self.replaced(nuisances=(*self.nuisances, late))
 
     def replaced(self, **fields: Any) -> LaboratoryPart:
         """The same laboratory in another test: other inputs, or other readings."""
