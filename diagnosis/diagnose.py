@@ -13,7 +13,7 @@ from common.plan.kinds import COLUMN
 from common.terminal.telling import Tell, untold
 from diagnosis.findings import readings, report
 from diagnosis.findings.found import Diagnosis
-from diagnosis.findings.verdict import PartVerdict, judge
+from diagnosis.findings.verdict import PartVerdict, heard, judge
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data
 from diagnosis.fits.scales import Scales
@@ -91,14 +91,14 @@ def examine(record: Record, tell: Tell = untold) -> Diagnosis:
         scales = Scales(record, part.shift() if isinstance(part, Ground) else 0.0)
         verdicts.append(judged(datas[-1], scales))
         logged |= isinstance(part, Building) and not verdicts[-1].search.data.part.exact
-    white, held = readings.levels(datas), readings.held(record, rounded)
+    white, held = readings.levels([(data, data.white) for data in datas]), readings.held(record, rounded)
     return Diagnosis(
         record,
         verdicts,
         readings.findings(record, white, rounded),
         exchanged(record),
         held,
-        readings.levels([item.search.data for item in verdicts]),
+        readings.levels([(item.search.data, heard(item.search)) for item in verdicts]),
         [*of_plan(record), *not_recorded(record), *reversed_signs(datas), *repeating(held)],
     )
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from diagnosis.findings.found import Diagnosis
-from diagnosis.findings.verdict import PartVerdict
+from diagnosis.findings.verdict import PartVerdict, heard
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data
 from diagnosis.recorded.parts import LaboratoryPart
@@ -27,7 +27,7 @@ def part(verdict: PartVerdict, require: float | None) -> PartOfGap:
     """One part: each step's gap above noise less the next one's."""
     search = verdict.search
     data, bare, fit = search.data, search.commissioned, search.chosen
-    noise = rms(data.white / levels(data), data)
+    noise = rms(heard(search) / levels(data), data)
     steps = [
         above(data, system, noise)
         for system in (data.system, fitting.lay(data, bare.z, {}), fitting.lay(data, fit.z, fit.values))

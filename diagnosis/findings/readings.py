@@ -81,13 +81,13 @@ def printed(values: Array) -> bool:
     return all(float(f"{value:.7g}") == value for value in some.tolist())
 
 
-def levels(searches: list[Data]) -> dict[str, float]:
-    """White noise of every reading, rms."""
+def levels(searches: list[tuple[Data, Array]]) -> dict[str, float]:
+    """Noise of every reading, rms, from those of the parts (signals,)."""
     return {
-        name: float(white)
-        for data in searches
+        name: float(noise)
+        for data, noises in searches
         if not data.part.exact and not isinstance(data.part, Building)
-        for name, white, there in zip(data.part.signals, data.white, data.part.present.T, strict=True)
+        for name, noise, there in zip(data.part.signals, noises, data.part.present.T, strict=True)
         if there.any()
     }
 

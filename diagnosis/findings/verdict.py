@@ -9,7 +9,8 @@ import numpy as np
 
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import TOLERANCES, Fit, Problem
-from diagnosis.fits.search import DATA_GAIN, PRIOR_GAIN, Search, exchanged_pair, leaves, tied
+from diagnosis.fits.search import DATA_GAIN, MATERIAL, PRIOR_GAIN, Search, exchanged_pair, gaps, leaves, tied
+from diagnosis.recorded.parts import MODEL_ERROR
 from diagnosis.report.records import Outcome
 from models.registry import Array
 
@@ -21,6 +22,8 @@ CORRELATED = 2.0  # s, longer than what a model leaves is correlated
 COVER = 1.96  # standard deviations of an interval of 95 %
 
 
+BOTH = 2.0  # solutions that err, the laboratory's and the replay's
+OWN = 0.4  # of a gap's rms that may be coloured noise where only the residual tells of it: a sixth of its energy
 PINNED = 1e-3  # tolerances from the bound within which a nominal parameter counts as pinned there
 
 
@@ -110,9 +113,36 @@ def how_well(search: Search) -> Outcome:
 
     A law that stands in for another one leaves something that no noise makes, however much of the gap it closes.
     """
-    if not leaves(search.chosen) and not pinned(search.chosen):
+    if not (beyond_model_error(search.chosen) or pinned(search.chosen) or unproven(search)):
         return "explained"
     return "partly" if search.explained > HALF else "unknown"
+
+
+def beyond_model_error(fit: Fit) -> bool:
+    """Whether a fit leaves more than noise, and more than two good solutions of one model may differ by."""
+    level = np.sqrt(np.mean(np.square(fit.data.part.measured), axis=0))
+    allowed = BOTH * MODEL_ERROR * level / fit.data.sigma
+    return leaves(fit, np.zeros_like(allowed) if fit.data.part.exact else allowed)
+
+
+def heard(search: Search) -> Array:
+    """Rms noise (signals,) of a part's sensors as far as it is sure, else that of the highest frequencies."""
+    data, fit = search.data, search.chosen
+    if not unproven(search):
+        return data.white
+    return np.minimum(data.white, fitting.noise(data.residual(fitting.lay(data, fit.z, fit.values))))
+
+
+def unproven(search: Search) -> bool:
+    """Whether much of a gap is taken for noise that nothing but the residual itself speaks for."""
+    before, after = search.commissioned, search.chosen
+    left = [
+        np.sqrt(np.mean(np.square(fit.data.residual(fitting.lay(fit.data, fit.z, fit.values))), axis=0))
+        for fit in (before, after)
+    ]
+    seen = [item.ratio > MATERIAL for item in gaps(before, search.data.group)]
+    own = [item.density is not None and item.source == "residual" for item in search.data.noise]
+    return bool(own) and bool(np.any(np.array(seen) & np.array(own) & (left[1] > OWN * left[0])))
 
 
 def pinned(fit: Fit) -> tuple[str, ...]:

@@ -43,6 +43,10 @@ SIGNIFICANT = (
     5.0  # standard deviations from which on it is no chance, with all signals and time scales looked at
 )
 PRIOR_GAIN, DATA_GAIN = 6.25, 25.0  # 2.5 tolerances squared; 5 standard deviations squared
+LOUDEST = (
+    10.0  # noise at its loudest frequency over that at the highest ones: pink noise of a whole test has less
+)
+POLISHED = 12  # steps of a fit that leaves something, before that counts
 SETTLING = 4  # rounds in which a fit and the noise that it leaves are found in turn
 SUSPICIOUS = 8.0  # of Σ z²: nominal parameters that are all off together imitate an effect
 NEAR = 1.0  # tolerances within which fits begin: a parameter that is further away imitates an effect
@@ -182,7 +186,19 @@ class Searcher:
         """The fit under white noise: that of before where it is no lower."""
         changed = bool(self.data.noise) or data.lines is not None or data.spikes is not None
         self.data = data if changed or quieter(data, self.data) else replace(self.data, related=data.related)
-        return fitting.at(self.data, fit.values, fit.z)
+        found = fitting.at(self.data, fit.values, fit.z)
+        return self.polished(found) if found.names and leaves(found) else found
+
+    def polished(self, fit: Fit) -> Fit:
+        """A fit that leaves something moved on to its end, from where it is and with its laws in their usual shape."""
+        usual = {
+            name: values
+            | {item.name: item.default for item in fit.data.catalogue[name].parameters if item.default}
+            for name, values in fit.values.items()
+        }
+        starts = [fit.values, usual] if usual != fit.values else [fit.values]
+        fits = [fitting.fit(self.data, values, fit.z, POLISHED, rounds=3) for values in starts]
+        return min([fit, *fits], key=lambda item: item.cost)
 
     def again(self, fit: Fit, data: Data | None = None) -> Fit:
         """A fit moved to the best parameters under another noise, that of the search where none is given."""
@@ -310,22 +326,31 @@ class Searcher:
         return tuple(sorted(result, key=lambda item: item.cost))
 
 
-def leaves(fit: Fit) -> bool:
+def leaves(fit: Fit, allowed: Array | None = None) -> bool:
     """Whether a fit leaves more than noise: the test of a residual that is white, of unit variance, where it is noise.
 
     Its sums over time must not exceed noise, and where the noise is coloured nothing of it may follow from the inputs.
+    What is `allowed` in each signal (signals,), over σ, does not count.
     """
-    found: list[SystematicGap | Foreseen] = [*gaps(fit, fit.data.group)]
+    least = np.maximum(MATERIAL, np.zeros(fit.data.sigma.size) if allowed is None else allowed)
+    found: list[tuple[SystematicGap | Foreseen, float]] = [
+        *zip(gaps(fit, fit.data.group), least, strict=True)
+    ]
     if any(item.density is not None for item in fit.data.noise):
-        found += sensor_noise.foreseen(fit)
-    return any(item.ratio > MATERIAL and item.significance > SIGNIFICANT for item in found)
+        found += zip(sensor_noise.foreseen(fit), least, strict=True)
+    return any(item.ratio > limit and item.significance > SIGNIFICANT for item, limit in found)
 
 
 def hidden(fit: Fit) -> bool:
-    """Whether inputs foresee so much of what a fit leaves that the noise it was measured by may hold a gap."""
-    return any(
+    """Whether the noise that a fit is measured by may hold a gap.
+
+    Something is left beside that noise, and either the inputs foresee it or the noise is far louder at some frequency
+    than at the highest ones, as the noise of no sensor is.
+    """
+    seen = any(
         item.ratio > MATERIAL and item.significance > SIGNIFICANT for item in sensor_noise.foreseen(fit)
     )
+    return seen or (sensor_noise.loudest(fit) > LOUDEST and leaves(fit))
 
 
 def refines(bare: Fit, before: Fit, after: Fit) -> bool:

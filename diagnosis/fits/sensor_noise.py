@@ -115,6 +115,18 @@ def predictable(data: Data, averaged: Array) -> Array:
     return data.related.predict(averaged / data.sigma) * data.sigma
 
 
+def loudest(fit: Fit) -> float:
+    """Largest rms density of a sensor's noise over that at the highest frequencies."""
+    white = fitting.noise(fit.data.residual(fitting.lay(fit.data, fit.z, fit.values)))
+    pairs = zip(fit.data.noise, white, strict=True)
+    ratios = (
+        math.sqrt(float(item.density.max())) / max(flat, 1e-300)
+        for item, flat in pairs
+        if item.density is not None
+    )
+    return max(ratios, default=1.0)
+
+
 class Foreseen(NamedTuple):
     """How much of a residual follows from what the part was given, whatever model it takes."""
 

@@ -27,7 +27,7 @@ STATUS = {
 }
 QUIET = ("no_gap", "within_tolerances")  # statuses that leave nothing to explain
 JUDGED = {
-    "interleaved (interpolation)": "On seconds not used for fitting, between those that were",
+    "interleaved (interpolation)": "On seconds between those used for fitting",
     "other recordings": "On the recordings given for validation",
     "held-out time windows": "On data not used for fitting",
     "recordings given": "On the recordings given for validation",

@@ -35,7 +35,7 @@ def test_the_right_effect_closes_the_gap_down_to_the_noise(cases: Cases, kind: s
     assert far["closed"] == pytest.approx(
         (far["before"] - far["after"]) / (far["before"] - far["noise_floor"]), rel=1e-6
     )
-    assert far["judged_on"] == "held-out time windows"
+    assert far["judged_on"] == "interleaved (interpolation)"
 
 
 def test_the_waterfall_goes_down_site_by_site(cases: Cases) -> None:
@@ -75,7 +75,7 @@ def test_another_recording_of_the_laboratories_judges(cases: Cases) -> None:
     effects = FOUND["column"]
     other = cases.file(effects, scale=0.15, duration=8.0)
     far = diagnose_file(cases.file(effects), validate=[other]).how_far.plain()
-    assert far["judged_on"] == "recordings given"
+    assert far["judged_on"] == "other recordings"
     assert far["closed"] > 0.9
     assert far["before"] > far["after"]
     assert far["nominal"] > 0.0
@@ -105,7 +105,7 @@ def test_without_a_loop_the_parts_are_judged_by_themselves(cases: Cases) -> None
     assert closed["after"] == pytest.approx(closed["noise_floor"], rel=0.15)
     assert not far.warnings
     warned = how_far.judge(found, [without_table_target(cases)])
-    assert warned.how_far.judged_on == "held-out time windows"
+    assert warned.how_far.judged_on == "interleaved (interpolation)"
     assert any("no closed loop" in text for text in warned.warnings)
 
 

@@ -66,7 +66,7 @@ def test_what_is_left_of_the_force_rigs_gap_is_said(rig: tuple[Path, dict[str, A
     _, report = rig
     far = report["how_far"]
     assert report["status"] in ("partly_explained", "unknown_effect")
-    assert far["judged_on"] == "held-out time windows"
+    assert far["judged_on"] == "interleaved (interpolation)"
     assert 5.0 * far["noise_floor"] < far["after"] < 0.025
     assert report["where"][0]["site"] == "actuator"
 

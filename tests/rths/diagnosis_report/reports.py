@@ -88,7 +88,7 @@ def far(before: float | None, after: float | None, closed: float | None, interva
         "closed": closed,
         "closed_interval": interval,
         "noise_floor": None if before is None else 0.0061,
-        "judged_on": None if before is None else "held-out time windows",
+        "judged_on": None if before is None else "interleaved (interpolation)",
     }
 
 

@@ -1,0 +1,122 @@
+"""Noise of any colour: what whitens it, what lines and spikes it has, and what its model costs a gap."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from diagnosis.fits.search import gap
+from diagnosis.signals import colour, pickup
+from diagnosis.signals.ceiling import Crosswise
+from diagnosis.signals.features import features
+from diagnosis.signals.noise_model import NoiseModel
+from diagnosis.signals.spikes import spikes
+from models.registry import Array
+from tests.diagnosis.cases import white
+
+INTERVAL, GROUP, TICKS = 0.002, 4, 12_000
+RATE = 1.0 / INTERVAL
+
+
+def low_passed(cutoff: float) -> Array:
+    """White noise behind a filter of fourth order."""
+    sections = signal.butter(4, cutoff, fs=RATE, output="sos")
+    return np.asarray(signal.sosfilt(sections, white(1, TICKS)))
+
+
+def pink() -> Array:
+    """Noise whose density falls with the frequency."""
+    lines = np.fft.rfft(white(2, TICKS))
+    return np.asarray(
+        np.fft.irfft(lines / np.sqrt(np.maximum(np.fft.rfftfreq(TICKS, INTERVAL), 0.05)), TICKS)
+    )
+
+
+COLOURS: dict[str, Array] = {
+    "white": white(3, TICKS),
+    "50 Hz": low_passed(50.0),
+    "100 Hz": low_passed(100.0),
+    "200 Hz": low_passed(200.0),
+    "AR(1)": np.asarray(signal.lfilter([1.0], [1.0, -0.9], white(4, TICKS))),
+    "pink": pink(),
+    "heavy tails": np.random.default_rng(5).standard_t(3, TICKS),
+    "12 bit": np.round(white(6, TICKS) / 0.5) * 0.5,
+}
+
+
+def averaged(x: Array) -> Array:
+    """Sums over groups of ticks that keep the rms of white noise."""
+    return np.asarray(x[: x.size // GROUP * GROUP].reshape(-1, GROUP).sum(axis=1) / np.sqrt(GROUP))
+
+
+def without_spikes(x: Array) -> Array:
+    """Noise with straight lines in place of its spikes."""
+    there = ~spikes(x)
+    return np.asarray(np.interp(np.arange(x.size), np.flatnonzero(there), x[there]))
+
+
+def whitened(noise: Array, known: list[Array]) -> tuple[Array, NoiseModel]:
+    """Noise whitened with the model of some stretches of it, and that model."""
+    density, order = colour.density(known)
+    count = sum(piece.size for piece in known)
+    model = NoiseModel(1.0, "ar", order, density=density, samples=count)
+    return colour.whitened(noise[:, None], colour.gains(density, noise.size)[:, None])[:, 0], model
+
+
+@pytest.mark.parametrize("name", COLOURS)
+def test_noise_of_any_colour_is_no_gap(name: str) -> None:
+    noise = averaged(without_spikes(COLOURS[name]))
+    flat, model = whitened(noise, [noise[:500], noise[1500:2000]])
+    assert gap(flat, GROUP, model).significance < 5.0
+    assert np.var(flat) == pytest.approx(1.0, abs=0.15)
+    assert np.abs(np.corrcoef(flat[1:], flat[:-1])[0, 1]) < 0.1
+
+
+@pytest.mark.parametrize("name", ["50 Hz", "AR(1)", "pink"])
+def test_what_moves_stands_out_of_coloured_noise(name: str) -> None:
+    noise = averaged(COLOURS[name])
+    t = np.arange(noise.size) * INTERVAL * GROUP
+    moving = np.where(t > 10.0, 2.5 * np.std(noise), 0.0) * np.sin(2.0 * np.pi * 3.0 * t)
+    found, model = whitened(noise + moving, [noise[:1000]])
+    assert gap(found, GROUP, model).significance > 10.0
+
+
+def test_a_model_is_the_one_that_made_the_noise() -> None:
+    made = np.array([1.0, -1.2, 0.6])
+    model = colour.autoregression([np.asarray(signal.lfilter([1.0], made, white(7, 4000)))], careful=True)
+    assert model.weights == pytest.approx(made, abs=0.05)
+    assert model.variance == pytest.approx(1.0, abs=0.06)
+    assert colour.autoregression([white(8, 4000)], careful=True).order == 0
+
+
+def test_lines_of_constant_amplitude_are_pickup_and_those_of_a_motion_are_not() -> None:
+    t = np.arange(TICKS) * INTERVAL
+    hum = 0.5 * np.sin(2.0 * np.pi * 50.01 * t) + 0.2 * np.sin(2.0 * np.pi * 150.0 * t)
+    found = pickup.pickups(white(9, TICKS) + hum, INTERVAL)
+    assert pickup.named(found) == (50.0, 150.0)
+    assert found[0].amplitude == pytest.approx(0.5, rel=0.1)
+    left = white(9, TICKS) + hum - pickup.waves(white(9, TICKS) + hum, found, INTERVAL)
+    assert np.std(left) == pytest.approx(1.0, rel=0.02)
+    burst = np.exp(-(((t - 12.0) / 2.0) ** 2)) * np.sin(2.0 * np.pi * 20.0 * t)
+    assert pickup.pickups(white(9, TICKS) + 3.0 * burst, INTERVAL) == []
+
+
+def test_single_samples_are_spikes_and_what_moves_is_none() -> None:
+    noise = white(10, 3000)
+    struck = noise.copy()
+    struck[[500, 900, 1400]] += 30.0
+    assert np.flatnonzero(spikes(struck)).tolist() == [500, 900, 1400]
+    kick = noise + np.where(np.arange(3000) // 10 == 150, 30.0, 0.0)
+    assert not spikes(kick).any()
+    assert not spikes(low_passed(50.0)).any()
+
+
+def test_what_follows_from_the_inputs_is_foreseen_and_noise_is_not() -> None:
+    drive = np.asarray(signal.lfilter([1.0], [1.0, -1.95, 0.96], white(11, 2500)))
+    x = features(drive[:, None], 0.008, np.ones(2500, dtype=bool), timeless=True)
+    rubbing = 2.0 * np.std(drive) * np.sign(np.gradient(drive))
+    noise = np.asarray(signal.lfilter([1.0], [1.0, -0.9], white(12, 2500)))
+    said = Crosswise(x).predict(np.column_stack([rubbing + noise, noise]))
+    assert np.corrcoef(said[:, 0], rubbing)[0, 1] > 0.8
+    assert np.std(said[:, 1]) < 0.2 * np.std(noise)
