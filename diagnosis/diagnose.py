@@ -83,22 +83,24 @@ def examine(record: Record, tell: Tell = untold) -> Diagnosis:
         )
     rounded = readings.steps(record)
     datas, verdicts = [], []
-    logged = False
+    late: float | None = None  # what a logger made of the forces that the building was computed from, s
     for number, given in enumerate(parts, 1):
-        part = given.logged() if logged and isinstance(given, LaboratoryPart) else given
+        part = given if late is None or not isinstance(given, LaboratoryPart) else given.logged(late)
         tell(part.name, number, len(parts))
         datas.append(fitting.prepare(part, record, readings.resolutions(record, rounded)))
         scales = Scales(record, part.shift() if isinstance(part, Ground) else 0.0)
         verdicts.append(judged(datas[-1], scales))
-        logged |= isinstance(part, Building) and not verdicts[-1].search.data.part.exact
-    white, held = readings.levels([(data, data.white) for data in datas]), readings.held(record, rounded)
+        found = verdicts[-1].search
+        if isinstance(found.data.part, Building) and not found.data.part.exact:
+            late = found.data.part.late(found.chosen.z)
+    white, held = readings.levels(datas), readings.held(record, rounded)
     return Diagnosis(
         record,
         verdicts,
         readings.findings(record, white, rounded),
         exchanged(record),
         held,
-        readings.levels([(item.search.data, heard(item.search)) for item in verdicts]),
+        readings.levels([item.search.data for item in verdicts], [heard(item.search) for item in verdicts]),
         [*of_plan(record), *not_recorded(record), *reversed_signs(datas), *repeating(held)],
     )
 

@@ -81,13 +81,13 @@ def printed(values: Array) -> bool:
     return all(float(f"{value:.7g}") == value for value in some.tolist())
 
 
-def levels(searches: list[tuple[Data, Array]]) -> dict[str, float]:
-    """Noise of every reading, rms, from those of the parts (signals,)."""
+def levels(datas: list[Data], noises: list[Array] | None = None) -> dict[str, float]:
+    """Noise of every reading, rms; `noises` of the parts (signals,), those of their data where none are given."""
     return {
         name: float(noise)
-        for data, noises in searches
+        for data, own in zip(datas, noises or [data.white for data in datas], strict=True)
         if not data.part.exact and not isinstance(data.part, Building)
-        for name, noise, there in zip(data.part.signals, noises, data.part.present.T, strict=True)
+        for name, noise, there in zip(data.part.signals, own, data.part.present.T, strict=True)
         if there.any()
     }
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -29,6 +29,7 @@ EXACT = 1e-4  # share of a computed signal's rms below which a difference is rou
 UNREST = 0.05  # share of its largest value from which on a first value is no rest
 PIECE, REACH = 1.0, 10  # s between beginnings of a free damper, ticks to each side that they are read from
 LATE = 4e-3  # s, by which a logger's filters usually make a force late
+ALIKE = 5e-4  # s, by which a logger's channels may differ: a quarter of an interval
 CALIBRATED = 0.01  # by which a logger's calibration usually differs
 MODEL_ERROR = 1e-3  # share of a measured signal's rms that two good solutions of one model may differ by
 
@@ -286,12 +287,17 @@ class LaboratoryPart:
             result.anew = self.anew[self.anew[:, 0] < ticks]
         return result
 
-    def logged(self) -> LaboratoryPart:
-        """The same laboratory, whose readings came through a logger that may have made all of them late."""
+    def logged(self, delay: float) -> LaboratoryPart:
+        """The same laboratory, whose readings came through a logger that made the forces used late by `delay` s.
+
+        What a logger does to one channel it does to all, but for `ALIKE`; nothing of what is stated of it is changed.
+        """
         if any(channel.filter is not None or channel.delay != 0.0 for channel in self.channels):
-            return self  # what the logger did is stated
-        late = LoggedReadings("delay", LATE, self.lab, self.lab.kind.channels.names)
-        return self.replaced(nuisances=(*self.nuisances, late))
+            return self
+        late = LoggedReadings("delay", ALIKE, self.lab, self.lab.kind.channels.names)
+        base = max(0.0, delay - ALIKE)
+        channels = tuple(replace(channel, delay=base) for channel in self.channels)
+        return self.replaced(nuisances=(*self.nuisances, late), channels=channels)
 
     def replaced(self, **fields: Any) -> LaboratoryPart:
         """The same laboratory in another test: other inputs, or other readings."""
@@ -394,6 +400,15 @@ class Building:
         )
         result: Building = with_fields(self, {"exact": False, "nuisances": (*self.nuisances, *logger)})
         return result
+
+    def late(self, z: Array) -> float:
+        """By how much a logger recorded the force too late, s, at places (nuisances,) of a fit."""
+        rows = zip(self.nuisances, z, strict=True)
+        return sum(
+            float(x) * one.tolerance
+            for one, x in rows
+            if isinstance(one, LoggedForce) and one.parameter == "delay"
+        )
 
     def first(self, ticks: int) -> Building:
         """The whole of it, because it is computed and cheap."""

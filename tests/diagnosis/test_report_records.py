@@ -46,7 +46,7 @@ def test_a_report_goes_to_json_and_back(name: str) -> None:
 
 
 WRONG: dict[str, tuple[tuple[Any, ...], Any, str]] = {
-    "version": (("version",), 2, "version must be one of 1, not 2"),
+    "version": (("version",), 3, "version must be one of 1, 2, not 3"),
     "status": (("status",), "fine", "status must be one of no_gap,"),
     "unknown key": (("extra",), 1, "extra is unknown"),
     "key within": (("where", 0, "roof"), 1, "where[0].roof is unknown"),
