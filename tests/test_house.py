@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import subprocess
 import sys
+from collections.abc import Mapping
+from graphlib import CycleError, TopologicalSorter
 from importlib import metadata
 from pathlib import Path
+
+import pytest
 
 from rths.__main__ import VERBS, check_home
 from tests.helpers import ROOT
@@ -54,7 +59,7 @@ def test_no_public_text_names_a_registry_or_a_path_of_a_machine() -> None:
         "|".join(["pypi" + r"\.org", "files" + r"\.pythonhosted", "npmjs" + r"\.", "/" + "work/main"])
     )
     for path in tracked():
-        if path.suffix not in (".mcap", ".AT2", ".png"):
+        if path.suffix not in (".mcap", ".AT2", ".npz", ".png"):
             found = registries.search(path.read_text(encoding="utf-8"))
             assert found is None, f"{path}: {found}"
 
@@ -89,3 +94,27 @@ def test_another_common_in_the_way_is_said_in_one_sentence(tmp_path: Path) -> No
     )
     assert found.returncode == 2
     assert found.stderr.startswith("rths: another package named 'common'")
+
+
+def test_no_files_import_each_other_in_a_circle() -> None:
+    """Imports for type checkers and within functions count too, since a reader follows them alike."""
+    files = {place.relative_to(ROOT).as_posix() for place in tracked() if place.suffix == ".py"}
+    names = {name[:-3].removesuffix("/__init__").replace("/", "."): ROOT / name for name in files}
+    ties = {name: imported(path, names) - {name} for name, path in names.items()}
+    try:
+        list(TopologicalSorter(ties).static_order())
+    except CycleError as error:
+        pytest.fail(" -> ".join(error.args[1]))
+
+
+def imported(path: Path, known: Mapping[str, Path]) -> set[str]:
+    """The project's modules from which a file imports anything."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            for alias in node.names:
+                whole = f"{node.module}.{alias.name}"
+                found.add(whole if whole in known else str(node.module))
+    return found & known.keys()

@@ -12,11 +12,10 @@ import numpy as np
 
 from common.errors import InputError, InterlockError
 from common.plan import read as plans
-from common.plan import reality as realities
-from common.plan.reality import Reality
-from validation.blind.cases.case import Case, Laid, levels
+from validation.blind.cases.case import Case, levels, reality
 from validation.blind.loggers import LOGGERS
 from validation.blind.relogging import relog
+from validation.blind.size import sizes
 from validation.spread import spread
 
 
@@ -39,7 +38,6 @@ def record_all(cases: Sequence[Case], folder: Path, jobs: int = 1) -> Iterator[R
 def record(case: Case, folder: Path) -> RecordedCase:
     """Play a case in virtual time, and log it; a test that a limit stops is kept up to there."""
     from simulation import virtual
-    from validation.blind.size import sizes
 
     plan = plans.from_tables(case.plan, Path())
     path = folder / f"{secrets.token_hex(8)}.mcap"
@@ -55,12 +53,6 @@ def record(case: Case, folder: Path) -> RecordedCase:
         relog(played, path, plan, LOGGERS[case.logger], levels(case.truths), case.seed)
         played.unlink()
     return RecordedCase(case.index, path.name, sizes(case, path), str(ended or ""))
-
-
-def reality(case: Case, laid: tuple[Laid, ...] | None = None, *, silent: bool = False) -> Reality:
-    """The laboratories of a case, with other effects or without noise where asked for."""
-    plan = plans.from_tables(case.plan, Path())
-    return realities.from_reality(case.reality(laid, silent=silent), plan, Path())
 
 
 def truth(case: Case) -> str:

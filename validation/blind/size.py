@@ -18,7 +18,7 @@ from common.roles import MASTER
 from laboratories.effects.sites import LINK
 from laboratories.kinds import kind_of, kinds_of
 from loop.names import sent_names
-from validation.blind.cases.case import Case, Laid, of_role
+from validation.blind.cases.case import Case, Laid, of_role, reality
 
 Differences = list[tuple[Values, float]]  # each with the rms noise that it is compared with
 
@@ -65,7 +65,6 @@ def of_laboratory(case: Case, item: Laid, run: Run) -> Differences:
 def play(case: Case, laid: tuple[Laid, ...], run: Run, role: str) -> dict[str, Values]:
     """A laboratory's readings on the recorded commands."""
     from loop import rigs
-    from validation.blind.record import reality
 
     kind = kind_of(plans.from_tables(case.plan, Path()), role)
     rig = rigs.build(reality(case, laid, silent=True).of(role), role)
@@ -95,7 +94,6 @@ def of_building(case: Case, item: Laid, run: Run) -> Differences:
 def play_building(case: Case, laid: tuple[Laid, ...], run: Run) -> dict[str, Values]:
     """What the building wants of each role's laboratory, and the ground's acceleration (no role)."""
     from master.assembly import master_step
-    from validation.blind.record import reality
 
     plan = plans.from_tables(case.plan, Path())
     kinds, columns = kinds_of(plan), run.columns[MASTER]

@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from common.plan import read as plans
+from common.plan import reality as realities
+from common.plan.reality import Reality
 from common.roles import MASTER, SLAVE, name_of
 from validation.blind.library import REPLACED, parts_of, rig_of
 
@@ -107,3 +109,9 @@ def levels(truths: Mapping[str, Any]) -> dict[str, float]:
     for own in truths.get(SLAVE, {}).values():
         found |= levels(own)
     return found
+
+
+def reality(case: Case, laid: tuple[Laid, ...] | None = None, *, silent: bool = False) -> Reality:
+    """The laboratories of a case, with other effects or without noise where asked for."""
+    plan = plans.from_tables(case.plan, Path())
+    return realities.from_reality(case.reality(laid, silent=silent), plan, Path())
