@@ -23,7 +23,7 @@ from models import cache, compensators, energy_balance
 from models.compiled import plain
 from models.registry import Array
 from models.system import System
-from recorder.encoding import RowEncoder
+from recorder.encoding import RowEncoder, RowTable
 
 SHORT = 0.01  # s
 TWO_TABLES = "[slave.a]\n[slave.b]\n"
@@ -43,8 +43,7 @@ def compile_all() -> None:
     replay.building(System(plan), ground, still, still, still)
     ticks(plan, ground)
     of_users(drive)
-    topics = default_topics()
-    RowEncoder(topics, dict.fromkeys(topics, 1), plan.storeys)
+    recorded(plan.storeys)
     (cache.folder() / cache.READY).touch()
 
 
@@ -66,6 +65,14 @@ def ticks(plan: Plan, ground: Array) -> None:
     readings.step(readings.build(plan.test.interval, ("any",), {}), 0, 0.0, 0.0, 0.0)
     none = compensators.build("none", {}, plan.test.interval)
     compensators.enter(plain(none), *compensators.STILL, plan.test.interval)
+
+
+def recorded(storeys: int) -> None:
+    """What the recorder does with rows."""
+    topics = default_topics()
+    RowEncoder(topics, dict.fromkeys(topics, 1), storeys)
+    table = RowTable(topics, storeys)
+    table.sound([(table.names[0], bytes(table.sizes[table.names[0]]))], 1)
 
 
 def of_users(drive: Array) -> None:
