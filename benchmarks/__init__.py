@@ -13,11 +13,11 @@ from benchmarks import (
     exchange,
     false_trips,
     live,
-    loops,
     real_time,
     recorder,
     scale,
     start,
+    virtual_time,
 )
 from benchmarks.result import BenchmarkFigure
 
@@ -34,7 +34,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "real_time": real_time.run,
     "live": live.run,
     "closed_loop": closed_loop.run,
-    "loops": loops.run,
+    "virtual": virtual_time.run,
     "scale": scale.run,
     "recorder": recorder.run,
     "codec": codec.run,

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks import loops, opensees_peer
+from benchmarks import opensees_peer, virtual_time
 from benchmarks.opensees_peer import PeerAnswer, PeerCase
 from benchmarks.result import BenchmarkFigure, rate_figure, rates
 from common.plan.plan import Plan, ideal
 from common.plan.read import with_test
-from common.plan.tables import Control, RecordingTable
+from common.plan.tables import Control
 from loop import substructure
 from loop.closed_loop import signals, simulate
 from models.registry import Array
@@ -92,7 +92,7 @@ def run(*, quick: bool = False) -> list[BenchmarkFigure]:
     peer = statistics.median(rates(lambda: len(plain_python(plan, ground)), repeats))
     compiled = rates(lambda: simulate(plan, ground).ticks, repeats)
     noisy = rates(lambda: simulate(plan, ground, seed=1).ticks, repeats)
-    objects = loops.played(replace(plan, recording=RecordingTable(required=False)), lambda: None, repeats)
+    objects = [pace.wall for pace in virtual_time.unrecorded(plan, repeats)]
     x = signals(alone, simulate(alone, ground))["displacement"]
     words = "central difference of the building alone in plain Python"
     return [

@@ -2,123 +2,145 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from operator import itemgetter
-from typing import Any, NamedTuple
+import math
+import struct
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
 
-from common.plan.limits import Change, Frozen, Guard, Lasting, LimitViolation, Standstill
+import numpy as np
+
+from common.plan.limits import UNITS, LimitViolation, Standstill
 from common.plan.plan import Plan
 from common.signals import UNITS_OF_RATES
-from laboratories.kind import Kind, Sensed
+from laboratories import checks
+from laboratories.checks import FINE, NONE, Checks, Numbers
+from laboratories.kind import Kind
+from models.compiled import plain
+from models.registry import Array
 
 
-class SensorPart(NamedTuple):
-    """Sensors of one part of a rig: which readings are theirs, and the command that moves them."""
+class Limit(NamedTuple):
+    """The limit of a value by its name; of one that is none of the plan's own, its unit."""
 
-    readings: Callable[[Any], Any]
-    drive: int
-    frozen: Frozen
+    name: str
+    most: float  # NONE for none
+    unit: str = ""
 
 
 def quantities(kind: Kind) -> dict[str, str]:
     """The units of what a kind of laboratory may limit, by name."""
-    channels, limited = kind.channels, kind.limited
+    channels, moved = kind.channels, kind.limited
     found = {signal.name: signal.unit for signal in (*channels.driving, channels.command, *channels.measured)}
     found |= dict(zip(channels.rates, UNITS_OF_RATES, strict=True))
-    found |= {limited.step: "m", limited.velocity: "m/s", limited.acceleration: "m/s²"}
-    found |= {limited.effort_step: "N", limited.error: "m"}
+    found |= {moved.step: "m", moved.velocity: "m/s", moved.acceleration: "m/s²"}
+    found |= {moved.effort_step: "N", moved.error: "m"}
     return {name: unit for name, unit in found.items() if name}
 
 
-class LaboratoryLimits:
-    """The limits of a kind's laboratory.
+def limited(
+    limits: Mapping[str, float], names: Iterable[str], units: Mapping[str, str] = UNITS
+) -> list[Limit]:
+    """The limits on values of these names, in their `units`; a value without one is not checked."""
+    return [Limit(name, limits.get(name, NONE), units.get(name, "")) for name in names]
 
-    Readings, commands and motion are asked for in every tick; `written` is told of every command that went to the rig.
+
+def first_beyond(limits: Sequence[Limit], values: Sequence[float]) -> LimitViolation | None:
+    """The first of some values that is beyond its limit."""
+    for limit, value in zip(limits, values, strict=True):
+        if limit.most != NONE and not abs(value) <= limit.most:
+            return LimitViolation(limit.name, value, limit.most, limit.unit)
+    return None
+
+
+def of_readings(kind: Kind, plan: Plan) -> list[Limit]:
+    """The limits on what a kind's laboratory reads."""
+    return limited(kind.limits(plan), kind.channels.names, quantities(kind))
+
+
+def of_commands(kind: Kind, plan: Plan) -> list[Limit]:
+    """The limits on what its rig is written."""
+    return limited(kind.limits(plan), kind.channels.drives, quantities(kind))
+
+
+def of_sent(kind: Kind, plan: Plan) -> list[Limit]:
+    """The limits on what it is told at a tick: target, motor's force, the target's rates."""
+    channels = kind.channels
+    effort = channels.effort.name if channels.effort else ""
+    return limited(kind.limits(plan), (channels.target.name, effort, *channels.rates), quantities(kind))
+
+
+def of_changes(kind: Kind, plan: Plan) -> list[Limit]:
+    """The limits on how its commands change, each one's step, velocity and acceleration, and on its lasting error."""
+    moved, limits, units = kind.limited, kind.limits(plan), quantities(kind)
+    names = [moved.step, moved.velocity, moved.acceleration]
+    names += [moved.effort_step, "", ""] if kind.channels.effort else []
+    names.append(moved.error)
+    return [Limit(name, limits.get(name, math.inf) if name else NONE, units.get(name, "")) for name in names]
+
+
+class TickLimits:
+    """All limits of a laboratory's tick; `kind` is None for a master without a laboratory.
+
+    `values` are the limits on what `violation` is given in every tick, the measurements first, `commands` is the place
+    of the commands among them. `written` is told of every command that went to the rig.
     """
 
-    def __init__(self, kind: Kind, plan: Plan) -> None:
-        limits, channels, interval = kind.limits(plan), kind.channels, plan.test.interval
-        limited, self._plan = kind.limited, plan
-        noise = dict(zip(channels.names, kind.noise(plan).tolist(), strict=True))
-        self._units = quantities(kind)
-        self._measurements = Guard(limits, channels.names, units=self._units)
-        self._commands = Guard(limits, channels.drives, units=self._units)
-        self._changes = [
-            Change(
-                limits,
-                interval,
-                step=limited.step,
-                velocity=limited.velocity,
-                acceleration=limited.acceleration,
-            ),
-            *([Change(limits, interval, step=limited.effort_step)] if channels.effort else []),
-        ]
-        self._error = Lasting(limits, limited.error)
-        self._position = channels.names.index(channels.position)
-        self._parts = [self._part(sensed, channels.names, noise) for sensed in kind.sensed]
-        self._wrote: tuple[float, ...] = (0.0,) * len(channels.drives)
+    def __init__(self, kind: Kind | None, plan: Plan, values: Sequence[Limit], commands: int) -> None:
+        self._limits = [*values, *(of_changes(kind, plan) if kind else [Limit("", NONE)])]
+        self._readings = of_readings(kind, plan) if kind else []
+        drives = len(kind.channels.drives) if kind else 0
+        position = kind.channels.names.index(kind.channels.position) if kind else 0
+        places = [commands, len(values), position, plan.safety.frozen_readings]
+        watched, sensors, parts = watching(kind, plan)
+        self._checks = Checks(
+            np.stack([np.zeros(len(self._limits)), [limit.most for limit in self._limits]]),
+            np.array(places),
+            np.array([plan.test.interval, 0.0, *(0.0 for _ in range(parts))]),
+            np.zeros((3, drives + 1)),
+            watched,
+            sensors,
+        )
+        self._arrays = plain(self._checks)
+        self._values, self._written = self._checks.values.data, self._checks.commands.data
+        self._fill = struct.Struct(f"{len(values)}d").pack_into
+        self._wrote = struct.Struct(f"{drives + 1}d").pack_into
 
-    def _part(self, sensed: Sensed, names: tuple[str, ...], noise: dict[str, float]) -> SensorPart:
-        first, *rest = (names.index(name) for name in sensed.channels)
-        frozen = Frozen(noise, sensed.channels, sensed.moved, self._plan.safety.frozen_readings)
-        picked = itemgetter(first, *rest) if rest else lambda measured: (measured[first],)
-        return SensorPart(picked, int(sensed.by_effort), frozen)
+    def violation(self, target: float, *values: float) -> LimitViolation | Standstill | None:
+        """The first value beyond its limit, changes of commands and lasting errors after them, or a frozen sensor.
 
-    def readings(self, measured: tuple[float, ...]) -> LimitViolation | None:
-        """The first reading beyond its limit."""
-        return self._measurements.violation(measured)
+        `target` (m) is what the position measured at the tick should be.
+        """
+        self._fill(self._values, 0, *values)
+        place = checks.enter(self._arrays, target)
+        return None if place == FINE else self._found(place)
 
-    def commands(self, wanted: tuple[float, ...]) -> LimitViolation | None:
-        """The first command beyond its limit."""
-        return self._commands.violation(wanted)
-
-    def motion(
-        self, measured: tuple[float, ...], wanted: tuple[float, ...], target: float
-    ) -> LimitViolation | Standstill | None:
-        """The first change of a command beyond its limit, lasting error beside the `target`, or frozen sensor."""
-        lasting = self._error.violation(target - measured[self._position])
-        found: LimitViolation | Standstill | None = None
-        for change, command in zip(self._changes, wanted, strict=True):
-            found = found or change.violation(command)
-        found = found or lasting
-        for part in self._parts:  # each has to see every reading
-            frozen = part.frozen.violation(part.readings(measured), self._wrote[part.drive])
-            found = found or frozen
-        return found._replace(unit=self._units[found.name]) if isinstance(found, LimitViolation) else found
+    def _found(self, place: int) -> LimitViolation | Standstill:
+        if place < len(self._limits):
+            name, most, unit = self._limits[place]
+            return LimitViolation(name, float(self._checks.values[checks.VALUE, place]), most, unit)
+        sensor = place - len(self._limits)
+        state, read = self._checks.sensors[sensor], self._checks.watched[sensor, checks.READ]
+        return Standstill(self._readings[read].name, float(state[checks.READING]), int(state[checks.SAME]))
 
     def written(self, command: tuple[float, ...]) -> None:
         """The rig was given this command."""
-        self._wrote = command
-        for change, value in zip(self._changes, command, strict=True):
-            change.written(value)
+        self._wrote(self._written, 0, *command, 1.0)
 
     def standing(self, measured: tuple[float, ...]) -> str:
         """Why a rig at rest may not be reset, empty where all it reads is within its limits."""
-        return str(self._measurements.violation(measured) or "")
+        return str(first_beyond(self._readings, measured) or "")
 
 
-class NoLimits:
-    """The limits of a master without a laboratory of its own: nothing is read, and nothing moves."""
-
-    def readings(self, _measured: tuple[float, ...]) -> None:
-        """No reading."""
-
-    def commands(self, _wanted: tuple[float, ...]) -> None:
-        """No command."""
-
-    def motion(self, _measured: tuple[float, ...], _wanted: tuple[float, ...], _target: float) -> None:
-        """No motion."""
-
-    def written(self, command: tuple[float, ...]) -> None:
-        """Nothing to compare the next one with."""
-
-    def standing(self, _measured: tuple[float, ...]) -> str:
-        """Nothing stands against a reset."""
-        return ""
-
-
-def sent_guard(kind: Kind, plan: Plan) -> Guard:
-    """The limits on what a laboratory of a kind is told at a tick: target, motor's force, the target's rates."""
-    channels = kind.channels
-    effort = channels.effort.name if channels.effort else ""
-    return Guard(kind.limits(plan), (channels.target.name, effort, *channels.rates), units=quantities(kind))
+def watching(kind: Kind | None, plan: Plan) -> tuple[Numbers, Array, int]:
+    """The sensors of a kind that must go on to differ, as `Checks` knows them, and how many parts they are of."""
+    if kind is None:
+        return np.zeros((0, 3), dtype=np.int64), checks.sensors(np.zeros(0), np.zeros(0)), 0
+    names, noise = kind.channels.names, kind.noise(plan)
+    watched = [
+        (names.index(name), int(sensed.by_effort), part)
+        for part, sensed in enumerate(kind.sensed)
+        for name in sensed.channels
+    ]
+    moved = [names.index(sensed.moved) for sensed in kind.sensed for _ in sensed.channels]
+    found = checks.sensors(noise[[read for read, *_ in watched]], checks.TRAVEL * noise[moved])
+    return np.array(watched, dtype=np.int64).reshape(-1, 3), found, len(kind.sensed)

@@ -15,6 +15,7 @@ from common.roles import MASTER, name_of, title
 from laboratories import kinds
 from laboratories.emulated import EmulatedLab
 from laboratories.kind import Kind
+from laboratories.limits import TickLimits
 from laboratories.sensors import noise, readings
 from loop.realised import true_system
 from models.compiled import plain
@@ -78,8 +79,9 @@ def at_rest(gate: Gate | None, setting: Setting, role: str) -> AtRest | None:
 
 
 def warm_up(reality: Reality, role: str) -> None:
-    """Compile the kernels of a role's emulated laboratory on arrays that are thrown away."""
+    """Compile the kernels of a role's emulated laboratory and of its limits on arrays that are thrown away."""
     kind = hosted(reality, role)
     if kind is not None:
         kind.enter(plain(kind.build(true_system(reality))), *(0.0 for _ in kind.channels.drives))
     readings.step(readings.build(reality.plan.test.interval, ("any",), {}), 0, 0.0, 0.0, 0.0)
+    TickLimits(None, reality.plan, [], commands=0).violation(0.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import struct
 from collections.abc import Callable
 from operator import itemgetter
 from typing import Any
@@ -21,6 +22,7 @@ from models.energy_balance import DRIFT_SHARE, ERROR_SHARE
 
 # of the largest displacement allowed: with less motion a share of the ground's energy says nothing
 FLOOR_SHARE = 0.01
+LIMITED = ("error_energy", "numerical_drift")  # the limits of both shares, in the order of the kernel's
 
 
 class EnergyMonitor:
@@ -30,12 +32,16 @@ class EnergyMonitor:
         self._limits, self._motions = vars(plan.limits), 3 * plan.storeys
         ratio, scale, self._felt = interface(kinds.own(plan), plan)
         self._balance = energy_balance.build(
-            plan.test.interval, ratio, scale, floor(plan), np.array(plan.structure.mass)
+            plan.test.interval,
+            ratio,
+            scale,
+            floor(plan),
+            np.array(plan.structure.mass),
+            np.array([self._limits[name] for name in LIMITED]),
         )
         self._enter, self._sums = energy_balance.enter, plain(self._balance)
-        self._motion = self._balance.motion.reshape(-1)[
-            : self._motions
-        ]  # displacement, velocity, acceleration
+        # displacements, velocities and accelerations, as they stand first in the table of motion
+        self._fill, self._motion = struct.Struct(f"{self._motions}d").pack_into, self._balance.motion.data
 
     @property
     def error_energy(self) -> float:
@@ -49,13 +55,12 @@ class EnergyMonitor:
 
     def violation(self, measured: tuple[float, ...], outputs: Outputs) -> LimitViolation | None:
         """Take one tick into the sums; the first of them beyond its limit."""
-        self._motion[:] = outputs.storeys[: self._motions]
-        self._enter(self._sums, outputs.ground_acceleration, outputs.target, *self._felt(measured))
-        error, drift = self.error_energy, self.numerical_drift
-        limits = self._limits
-        if abs(error) <= limits["error_energy"] and abs(drift) <= limits["numerical_drift"]:
+        self._fill(self._motion, 0, *outputs.storeys[: self._motions])
+        position, force = self._felt(measured)
+        if self._enter(self._sums, outputs.ground_acceleration, outputs.target, position, force):
             return None
-        return violated(limits, error_energy=error, numerical_drift=drift)
+        shares = dict(zip(LIMITED, (self.error_energy, self.numerical_drift), strict=True))
+        return violated(self._limits, **shares)
 
 
 def interface(own: Kind | None, plan: Plan) -> tuple[float, float, Callable[[Any], tuple[float, float]]]:

@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass
-from typing import NamedTuple
 
 from common.host.clock_offset import ClockOffset
 from common.lab.laboratory import Laboratory
@@ -120,64 +119,53 @@ class LatencyAccount:
     def _record(self, row: LatencyRow, now: int) -> None:
         lab, sent = self._lab, row.sent_ns != 0
         at, offset = lab.tick_ns(row.tick), self._offset.at(row.wake_ns)
-        answered = segments(row, offset) if row.feedback is not None else UNANSWERED
+        answered, stamps = segments(row, offset) if row.feedback is not None else UNANSWERED
+        there, in_slave, computing, back, round_trip, decoding = answered
         values = (
             row.tick,
             (row.wake_ns - at) * 1e-9,
             (row.ready_ns - row.wake_ns) * 1e-9 if sent else NAN,
-            answered.command_one_way,
-            answered.slave_time,
-            answered.feedback_one_way,
-            answered.round_trip,
+            there,
+            in_slave,
+            back,
+            round_trip,
             offset * 1e-9,
             self._offset.bound_at(row.wake_ns) * 1e-9,
             row.missed,
             (row.sent_ns - row.ready_ns) * 1e-9 if sent else NAN,
-            answered.slave_compute_time,
-            answered.decode_time,
+            computing,
+            decoding,
             row.age,
             at,
             row.wake_ns,
             row.sent_ns,
-            *answered.stamps,
+            *stamps,
             row.used_ns,
         )
         log_ns = lab.unix_ns(row.tick)
         lab.outlet.add(self._topic, log_ns, lab.epoch_ns + now - lab.start_ns, values)
 
 
-class TickSegments(NamedTuple):
-    """What an answered tick adds to its row; times in s, stamps in ns as they were read."""
-
-    command_one_way: float = NAN
-    slave_time: float = NAN
-    slave_compute_time: float = NAN
-    feedback_one_way: float = NAN
-    round_trip: float = NAN
-    decode_time: float = NAN
-    stamps: tuple[int, int, int, int] = (
-        0,
-        0,
-        0,
-        0,
-    )  # command received, slave started, feedback sent, received
+# of a tick that no feedback answers: six segments, s, and four stamps, ns, as `segments` gives them
+UNANSWERED = ((NAN,) * 6, (0,) * 4)
 
 
-UNANSWERED = TickSegments()
+def segments(row: LatencyRow, offset: int) -> tuple[tuple[float, ...], tuple[int, ...]]:
+    """The segments of an answered tick, s, and its stamps as they were read, ns.
 
-
-def segments(row: LatencyRow, offset: int) -> TickSegments:
-    """The segments of an answered tick; `offset` (ns) is the slave's clock minus the master's."""
+    They are: command one way, time in the slave, the computing in it, feedback one way, round trip, decoding; command
+    received, slave started, feedback sent, received. `offset` (ns) is the slave's clock minus the master's.
+    """
     feedback = row.feedback
     assert feedback is not None  # noqa: S101 - the caller has looked
-    stamps = (feedback.command_received_ns, feedback.started_ns, feedback.sent_ns, row.received_ns)
-    received, started, sent, back = stamps
-    return TickSegments(  # in the order of the fields: by their names it takes twice the time
+    received, started, sent = feedback.command_received_ns, feedback.started_ns, feedback.sent_ns
+    back = row.received_ns
+    found = (
         (received - offset - row.sent_ns) * 1e-9,
         (sent - received) * 1e-9,
         (sent - started) * 1e-9,
         (back - sent + offset) * 1e-9,
         (back - row.sent_ns) * 1e-9,
         (row.decoded_ns - back) * 1e-9,
-        stamps,
     )
+    return found, (received, started, sent, back)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from common.plan.limits import Guard, LimitViolation, Standstill
+from itertools import chain
+
+from common.plan.limits import LimitViolation, Standstill
 from common.plan.plan import Plan
 from common.signals import OF_STOREYS
 from laboratories import kinds
-from laboratories.limits import LaboratoryLimits, NoLimits, sent_guard
+from laboratories.limits import TickLimits, limited, of_commands, of_readings, of_sent
 from master.energy import EnergyMonitor
-from master.step import Outputs, Sent
+from master.step import Outputs
 
 
 class MasterLimits:
@@ -19,32 +21,20 @@ class MasterLimits:
 
     def __init__(self, plan: Plan) -> None:
         own = kinds.own(plan)
-        storeys = tuple(name for name in OF_STOREYS for _ in range(plan.storeys))
-        self._own = LaboratoryLimits(own, plan) if own else NoLimits()
-        self._sent = [sent_guard(kinds.kind_of(plan, role), plan.of(role)) for role in plan.roles]
-        self._storeys = Guard(vars(plan.limits), storeys)
+        readings, commands = (of_readings(own, plan), of_commands(own, plan)) if own else ([], [])
+        sent = [limit for role in plan.roles for limit in of_sent(kinds.kind_of(plan, role), plan.of(role))]
+        storeys = limited(vars(plan.limits), (name for name in OF_STOREYS for _ in range(plan.storeys)))
+        values = [*readings, *commands, *sent, *storeys]
+        self._tick = TickLimits(own, plan, values, commands=len(readings))
         self._energy = EnergyMonitor(plan)
-        self.written = self._own.written
-        self.standing = self._own.standing
+        self.written = self._tick.written
+        self.standing = self._tick.standing
 
     def violation(
         self, measured: tuple[float, ...], wanted: tuple[float, ...], outputs: Outputs
     ) -> LimitViolation | Standstill | None:
         """The first value beyond its limit, None where there is none; `wanted` is the command for its own rig."""
-        motion = self._own.motion(measured, wanted, outputs.target)
+        sent = chain.from_iterable(outputs.sent)
+        beyond = self._tick.violation(outputs.target, *measured, *wanted, *sent, *outputs.storeys)
         energy = self._energy.violation(measured, outputs)
-        return (
-            self._own.readings(measured)
-            or self._own.commands(wanted)
-            or self._beyond(outputs.sent)
-            or self._storeys.violation(outputs.storeys)
-            or motion
-            or energy
-        )
-
-    def _beyond(self, sent: list[Sent]) -> LimitViolation | None:
-        """The first value beyond its limit of what goes to the slaves."""
-        for guard, values in zip(self._sent, sent, strict=True):
-            if violation := guard.violation(values):
-                return violation
-        return None
+        return beyond or energy

@@ -60,8 +60,7 @@ class OwnLaboratory:
         """What is recorded of it: target, motor's force, command, readings; nothing where it is not there."""
         if self.channels is None:
             return ()
-        transfer, *motor = command
-        return (outputs.target, *motor, transfer, *measured)
+        return (outputs.target, *command[1:], command[0], *measured)
 
     def force(self, measured: tuple[float, ...]) -> dict[str, float]:
         """Its force (N) by the channel's name; empty where it is not there."""

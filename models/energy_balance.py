@@ -49,27 +49,30 @@ class EnergyBalance(NamedTuple):
     fixed: Array
     sums: Array
     motion: Array  # (5, n)
+    most: Array  # (2,) limits of the two shares
 
 
-def build(interval: float, ratio: float, represents: float, floor: float, mass: Array) -> EnergyBalance:
-    """The balance of a building at rest, masses (n,) kg; `interval` s, `floor` J."""
+def build(
+    interval: float, ratio: float, represents: float, floor: float, mass: Array, most: Array
+) -> EnergyBalance:
+    """The balance of a building at rest, masses (n,) kg; `interval` s, `floor` J, limits (2,) of the shares."""
     fixed = np.concatenate([[interval, ratio, represents, floor], mass])
-    return EnergyBalance(fixed, np.zeros(8), np.zeros((5, mass.size)))
+    return EnergyBalance(fixed, np.zeros(8), np.zeros((5, mass.size)), most)
 
 
 @jit
 def enter(
     balance: tuple[Any, ...], ground_acceleration: float, target: float, measured: float, force: float
-) -> None:
+) -> bool:
     """`step` for a caller outside compiled code, which holds the balance as `compiled.plain` gives it."""
-    step(EnergyBalance(*balance), ground_acceleration, target, measured, force)
+    return step(EnergyBalance(*balance), ground_acceleration, target, measured, force)
 
 
 @jit
 def step(
     balance: EnergyBalance, ground_acceleration: float, target: float, measured: float, force: float
-) -> None:
-    """One tick, with the building's motion in `motion`: the shares come into `sums`.
+) -> bool:
+    """One tick, with the building's motion in `motion`: the shares come into `sums`; whether they are in their limits.
 
     `ground_acceleration` m/s², the specimen's `target` and `measured` deformation m and `force` N are of that tick.
     """
@@ -92,3 +95,5 @@ def step(
     given = fixed[FLOOR] + sums[LARGEST_INPUT]
     sums[ERROR_SHARE] = sums[ERROR] / given
     sums[DRIFT_SHARE] = (kinetic - sums[INERTIA]) / given
+    within = abs(sums[ERROR_SHARE]) <= balance.most[0]  # not where it is NaN
+    return within and abs(sums[DRIFT_SHARE]) <= balance.most[1]

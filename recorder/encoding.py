@@ -7,6 +7,7 @@ time has some forty thousand messages per second. In proto3 a field that holds 0
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from operator import ne
 
 import numpy as np
 import numpy.typing as npt
@@ -53,13 +54,14 @@ class RowTable:
 
     def gathered(self, items: Sequence[Item]) -> tuple[ByteArray, ByteArray]:
         """The rows of items one after the other, and the place of each one's topic."""
-        places = bytes([self._places[topic] for topic, _ in items])
-        rows = b"".join([row for _, row in items])
-        return np.frombuffer(rows, dtype=np.uint8), np.frombuffer(places, dtype=np.uint8)
+        topics, rows = zip(*items, strict=True)
+        places = bytes(map(self._places.__getitem__, topics))
+        return np.frombuffer(b"".join(rows), dtype=np.uint8), np.frombuffer(places, dtype=np.uint8)
 
     def sound(self, items: Sequence[Item], ticks: int) -> bool:
         """Whether rows of plain topics have their size, stamps that are times, ticks below `ticks`, and true flags."""
-        if any(len(row) != self.sizes[topic] for topic, row in items):
+        topics, rows = zip(*items, strict=True)
+        if any(map(ne, map(len, rows), map(self.sizes.__getitem__, topics))):
             return False
         return bool(check(*self.gathered(items), self.fields, ticks))
 

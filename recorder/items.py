@@ -44,7 +44,7 @@ class Items:
             items = pairs(packed)
         except (ValueError, msgpack.UnpackException):
             return None
-        if type(items) is not tuple or not 0 < len(items) <= PIECE or not all(map(is_item, items)):
+        if not is_piece(items):
             return None
         sizes = self._table.sizes
         numbers = [item for item in items if item[0] in sizes]
@@ -76,9 +76,14 @@ class Items:
         return all(check(value) for check, value in zip(self._others[topic], values, strict=True))
 
 
-def is_item(item: Any) -> bool:
-    """Whether something is a topic and a row."""
-    return type(item) is tuple and tuple(map(type, item)) == (str, bytes)
+def is_piece(found: Any) -> bool:
+    """Whether something is some items, each a topic and a row."""
+    if type(found) is not tuple or not 0 < len(found) <= PIECE or set(map(type, found)) != {tuple}:
+        return False
+    if set(map(len, found)) != {2}:
+        return False
+    topics, rows = zip(*found, strict=True)
+    return set(map(type, topics)) == {str} and set(map(type, rows)) == {bytes}
 
 
 def checks(rows: tuple[Signal, ...], plan: Plan) -> list[Check]:

@@ -14,7 +14,7 @@ from common import signals
 from common.errors import InputError, InterlockError, RigError, RthsError
 from common.host.clock import Clock, MonotonicClock, VirtualClock, unix_ns
 from common.plan.kinds import COLUMN, TABLE
-from common.plan.limits import Guard, LimitViolation
+from common.plan.limits import LimitViolation
 from common.plan.plan import Plan
 from common.plan.reality import Reality
 from common.recording.reader import CLOCK
@@ -27,6 +27,7 @@ from common.signals import SEQ, TIME, Signal
 from common.terminal.telling import Tell, untold
 from laboratories.kind import Chosen, Kind
 from laboratories.kinds import kind_of
+from laboratories.limits import first_beyond, limited
 from loop import rigs
 from models import excitation
 from models.compensators.follower import Follower
@@ -191,11 +192,10 @@ class Bench:
         self.segments = programme.segments
         self.plan = plan.with_ticks(programme.motion.shape[1] - 1)
         self.rig = rigs.build(reality, role)
-        channels, limits = kind.channels, kind.limits(plan)
+        channels = kind.channels
         self._position = channels.names.index(channels.position)
-        units = {row.name: row.unit for row in self.rows}
-        self._measurements = Guard(limits, channels.names, units=units)
-        self._commands = Guard(limits, (channels.target.name, *channels.drives), units=units)
+        names = (*channels.names, channels.target.name, *channels.drives)
+        self._limits = limited(kind.limits(plan), names, {row.name: row.unit for row in self.rows})
         self.packer = RowPacker({self.topic: self.rows}, plan.storeys)
         self._command = command_of(channels)
         self._ahead = int(role != MASTER)
@@ -219,7 +219,7 @@ class Bench:
             target, command, force = 0.0, 0.0, float(self._force[tick + 1])
         effort = (force,) if self.kind.channels.effort else ()
         wanted = self._command(command, *effort)
-        violation = self._measurements.violation(measured) or self._commands.violation((target, *wanted))
+        violation = first_beyond(self._limits, (*measured, target, *wanted))
         if not violation:
             self.rig.write(wanted)
         return (target, *effort, command, *measured), violation

@@ -14,6 +14,7 @@ from common.plan.read import parse, with_test
 from common.signals import default_topics
 from laboratories import completeness, device, kinds
 from laboratories.column import model as column_lab
+from laboratories.limits import TickLimits
 from laboratories.sensors import readings
 from laboratories.table import model as table_lab
 from loop import replay, site, substructure
@@ -58,13 +59,14 @@ def closed_loops(plan: Plan, ground: Array) -> None:
 def ticks(plan: Plan, ground: Array) -> None:
     """What the real loops call at every tick."""
     substructure.enter(plain(substructure.build(plan, ground)), 0, 0.0, 0.0)
-    balance = energy_balance.build(plan.test.interval, 0.5, 1.0, 1.0, np.ones(1))
+    balance = energy_balance.build(plan.test.interval, 0.5, 1.0, 1.0, np.ones(1), np.ones(2))
     energy_balance.enter(plain(balance), 0.0, 0.0, 0.0, 0.0)
     column_lab.enter(plain(column_lab.build(plan.test.interval, plan.actuator, plan.column)), 0.0)
     table_lab.enter(plain(table_lab.build(plan.test.interval, plan.table, plan.damper)), 0.0, 0.0)
     readings.step(readings.build(plan.test.interval, ("any",), {}), 0, 0.0, 0.0, 0.0)
     none = compensators.build("none", {}, plan.test.interval)
     compensators.enter(plain(none), *compensators.STILL, plan.test.interval)
+    TickLimits(None, plan, [], commands=0).violation(0.0)
 
 
 def recorded(storeys: int) -> None:

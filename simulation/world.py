@@ -48,6 +48,7 @@ class World:
         self.alive = 0  # processes that have begun and not ended
         self._orders = count()
         self._hub: greenlet.greenlet | None = None
+        self._pause: Callable[[], bool] | None = None
 
     def at(self, time: int, action: Callable[..., None], *arguments: Any) -> None:
         """Let something happen at a time, or now where that has passed."""
@@ -63,7 +64,7 @@ class World:
 
         Where `pause` becomes true time stops before the next event, and may be let pass on by another call.
         """
-        self._hub = greenlet.getcurrent()
+        self._hub, self._pause = greenlet.getcurrent(), pause
         heap = self.heap
         with _garbage_kept():
             try:
@@ -82,8 +83,19 @@ class World:
         for process in self.processes.values():
             process.discard()
 
-    def hand_over(self) -> None:
-        """Leave a process's greenlet for the scheduler."""
+    def hand_over(self, process: Process) -> None:
+        """Leave the greenlet of a process that waits, until it is its turn.
+
+        Nearly all events are turns. The next process takes its own from here, without the scheduler's greenlet between
+        them, which does whatever else happens.
+        """
+        heap = self.heap
+        while self._pause is None and heap[0][2] is take_turn and heap[0][0] <= self.limit:
+            self.time, _, _, (other, token) = heappop(heap)
+            if other.may_go_on(token):
+                if other is not process:
+                    other.go_on()
+                return
         assert self._hub is not None  # noqa: S101 - only a running process comes here
         self._hub.switch()
 
@@ -154,7 +166,7 @@ class Process:
         self._thread = greenlet.greenlet(guarded)
         self._token += 1
         self.world.alive += 1
-        self.world.at(at, self._resume, self._token)
+        self.world.at(at, take_turn, self, self._token)
 
     @property
     def started(self) -> bool:
@@ -189,22 +201,27 @@ class Process:
             world.time = until  # nothing happens before: to switch would change nothing
             return
         self._token += 1
-        world.at(until, self._resume, self._token)
-        world.hand_over()
+        world.at(until, take_turn, self, self._token)
+        world.hand_over(self)
 
     def wake(self) -> None:
         """A message has come for it: it goes on at this time, after what is due before."""
         if self._listening:
             self._listening = False
-            self.world.at(self.world.time, self._resume, self._token)
+            self.world.at(self.world.time, take_turn, self, self._token)
 
-    def _resume(self, token: int) -> None:
+    def may_go_on(self, token: int) -> bool:
+        """Whether the wait of this token is over now, and takes note of it; one that stands still goes on later."""
         if token != self._token or self.ended:
-            return
+            return False
         if self.world.time < self.stalled_until:
-            self.world.at(self.stalled_until, self._resume, token)
-            return
+            self.world.at(self.stalled_until, take_turn, self, token)
+            return False
         self._token += 1
+        return True
+
+    def go_on(self) -> None:
+        """Change to its greenlet."""
         assert self._thread is not None  # noqa: S101 - it was started
         self._thread.switch()
 
@@ -246,6 +263,12 @@ class Process:
         """Leave nothing of its greenlet behind; the world is over."""
         if self._thread is not None and not self._thread.dead:
             self._thread.throw(greenlet.GreenletExit)
+
+
+def take_turn(process: Process, token: int) -> None:
+    """Let a process go on where its wait of this token is over."""
+    if process.may_go_on(token):
+        process.go_on()
 
 
 @contextmanager

@@ -6,7 +6,7 @@ from common.plan.limits import LimitViolation, Standstill
 from common.plan.plan import Plan
 from common.protocol.messages import Command
 from laboratories.kind import Kind
-from laboratories.limits import LaboratoryLimits, sent_guard
+from laboratories.limits import TickLimits, of_commands, of_readings, of_sent
 
 TARGET = Command._fields.index("target")
 
@@ -18,27 +18,20 @@ class SlaveLimits:
     """
 
     def __init__(self, kind: Kind, plan: Plan) -> None:
-        self._laboratory = LaboratoryLimits(kind, plan)
-        self._sent = sent_guard(kind, plan)
+        before = [*of_readings(kind, plan), *of_sent(kind, plan)]
+        self._tick = TickLimits(kind, plan, [*before, *of_commands(kind, plan)], commands=len(before))
         self._target = 0.0  # of the command asked about last
         self._present = 0.0  # of the command that was in force over the interval just over
-        self.standing = self._laboratory.standing
+        self.standing = self._tick.standing
 
     def violation(
         self, measured: tuple[float, ...], command: Command, wanted: tuple[float, ...]
     ) -> LimitViolation | Standstill | None:
         """The first value beyond its limit, None where there is none."""
         self._target = command.target
-        laboratory = self._laboratory
-        motion = laboratory.motion(measured, wanted, self._present)
-        return (
-            laboratory.readings(measured)
-            or self._sent.violation(command[TARGET:])
-            or laboratory.commands(wanted)
-            or motion
-        )
+        return self._tick.violation(self._present, *measured, *command[TARGET:], *wanted)
 
     def written(self, command: tuple[float, ...]) -> None:
         """The rig was given this command, for the target asked about last."""
         self._present = self._target
-        self._laboratory.written(command)
+        self._tick.written(command)

@@ -69,6 +69,7 @@ class SlaveLoop(RigLoop):
             setting.plan.window * self.lab.interval_ns
         )  # clocks drift slowly: beyond it is no drift
         self._watchdog = Watchdog(setting.plan.safety, setting.plan.test.interval)
+        self._wait_ns = round(setting.plan.link.wait_share * self.lab.interval_ns)
         self._tally = Tally(setting.plan.ticks, setting.plan.window)
         self._feedbacks = 0  # sent
         self._master_ticks = 0  # those it says it has done
@@ -177,7 +178,7 @@ class SlaveLoop(RigLoop):
             return
         self._answer(tick, now, measured, wanted)
         self.ticks = tick + 1
-        if lab.running and now - lab.heard_ns > lab.plan.link.loss_timeout * 1e9:
+        if lab.running and now - lab.heard_ns > lab.loss_ns:
             lab.lost("The master", lab.plan.link.loss_timeout, tick)
 
     def _begin(self, now: int) -> None:
@@ -222,9 +223,10 @@ class SlaveLoop(RigLoop):
         """
         if seq not in self._received_ns:
             return 0
-        received_ns = min(self._received_ns[seq], now)
-        self._received_ns = {later: stamp for later, stamp in self._received_ns.items() if later > seq}
-        return received_ns
+        received_ns = self._received_ns.pop(seq)
+        if self._received_ns:
+            self._received_ns = {later: stamp for later, stamp in self._received_ns.items() if later > seq}
+        return received_ns if received_ns < now else now
 
     def _sample(
         self, tick: int, measured: tuple[float, ...], wanted: tuple[float, ...], sent_ns: int
@@ -326,7 +328,7 @@ class SlaveLoop(RigLoop):
 
     def latest(self, tick: int) -> int:
         """For the command of a tick it is waited until then, ns."""
-        return self.tick_ns(tick) + round(self.lab.plan.link.wait_share * self.lab.interval_ns)
+        return self.tick_ns(tick) + self._wait_ns
 
     def heard(self, tick: int) -> bool:
         """Whether what the tick waits for has come: its command, or a later one."""

@@ -11,7 +11,6 @@ import re
 import pytest
 
 from common.lab import preflight
-from common.plan.limits import PATIENCE
 from common.plan.patience import strict
 from common.plan.plan import Plan
 from common.plan.tables import Limits
@@ -21,6 +20,7 @@ from common.rig import ColumnCommand, ColumnMeasurement, TableCommand, TableMeas
 from common.safety.modes import TURNS, Mode, Turn
 from common.signals import OF_STOREYS, SENT
 from docs import generate
+from laboratories.checks import PATIENCE
 from laboratories.table.kind import TABLE
 from master.limits import MasterLimits
 from master.step import Outputs

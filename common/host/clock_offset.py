@@ -87,7 +87,8 @@ class ClockOffset:
         now = now_ns - start
         value = self._level + self._slope * (now - self._centre)
         wander = MAX_DRIFT * abs(now - self._seen)
-        return first + round(min(max(value, self._low - wander), self._high + wander))
+        low, high = self._low - wander, self._high + wander
+        return first + round(low if value < low else high if value > high else value)
 
     def bound_at(self, now_ns: int) -> int:
         """Largest possible error of `at`, ns; grows by `MAX_DRIFT` and the slope until the next minimum is seen.
@@ -132,9 +133,10 @@ class ClockOffset:
     def _narrow(self, time: float, offset: float, reach: float) -> None:
         """Intersect the interval, brought to `time`, with that of an exchange."""
         wander = MAX_DRIFT * abs(time - self._seen)
-        low, high = max(offset - reach, self._low - wander), min(offset + reach, self._high + wander)
-        if low > high:
-            low, high = offset - reach, offset + reach
+        low, high = offset - reach, offset + reach
+        oldest, latest = self._low - wander, self._high + wander
+        if oldest <= high and low <= latest:
+            low, high = oldest if oldest > low else low, latest if latest < high else high
         self._seen, self._low, self._high = time, low, high
 
     def _fit(self) -> None:

@@ -147,10 +147,10 @@ def run(loop: DrivenLoop, stopping: Callable[[], str]) -> int:
         if not lab.running:
             return tick
         loop.tick(tick)
-        lab.tell_news(tick)
         lab.send_samples()
         if lab.clock.now() - reported >= PROGRESS_NS:
             reported = lab.clock.now()
+            lab.tell_news(tick)
             lab.report("progress", {"tick": tick, "t": tick * lab.plan.test.interval, **loop.progress})
     wait(loop, lab.plan.ticks)
     return lab.plan.ticks

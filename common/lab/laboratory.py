@@ -57,6 +57,8 @@ class Laboratory:
         self.answers: dict[int, tuple[bool, str]] = {}  # to the operator's presses
         self._exact_ns = setting.plan.test.interval * 1e9
         self.interval_ns = round(self._exact_ns)
+        self.loss_ns = setting.plan.link.loss_timeout * 1e9  # silence after which another role is lost
+        self._overrun_ns = setting.plan.safety.overrun * self.interval_ns
         self._even = self._exact_ns == self.interval_ns
         self.start_ns = 0  # own clock, tick 0
         self.epoch_ns = 0  # Unix time of tick 0 on the master's base
@@ -208,9 +210,9 @@ class Laboratory:
 
     def overrun(self, late_ns: int, tick: int) -> bool:
         """End the test where a tick comes too many intervals late, because the rig's motion meanwhile is unknown."""
-        most = self.plan.safety.overrun
-        if late_ns <= most * self.interval_ns:
+        if late_ns <= self._overrun_ns:
             return False
+        most = self.plan.safety.overrun
         if 2 * self.rig_time.behind >= late_ns:
             self.slow_rig(tick)
             return True
@@ -289,7 +291,7 @@ class Laboratory:
     def recorded(self) -> bool:
         """Whether a recorder takes part in the test."""
         recorder = self.recorder
-        return recorder is not None and self.exchange.belongs(recorder.session)
+        return recorder is not None and 0 != recorder.session == self.exchange.session
 
     def recorder_has_all(self) -> bool:
         """Whether the recorder says that it has this laboratory's whole stream."""
@@ -301,4 +303,4 @@ class Laboratory:
     @property
     def running(self) -> bool:
         """Whether ticks may go on."""
-        return self.exchange.state in (State.SCHEDULED, State.RUNNING)
+        return self.exchange.state.running

@@ -10,7 +10,7 @@ from common.lab.descent import Descent, Resting
 from common.lab.laboratory import REPEAT_NS, Laboratory
 from common.protocol.exchange import Event
 from common.rig import GuardedRig
-from common.safety.modes import Turn
+from common.safety.modes import Mode, Turn
 from common.safety.watchdog import WatchdogFinding
 
 SAY_NS = REPEAT_NS // 2  # between two times that a laboratory says the same of its end
@@ -62,7 +62,10 @@ class RigLoop:
         if finding is WatchdogFinding.RAMP:
             lab.silent(who, tick)
             return True
-        lab.safety.follow(Turn.HOLD if finding is WatchdogFinding.HOLD else Turn.RESUME)
+        if finding is WatchdogFinding.HOLD:
+            lab.safety.follow(Turn.HOLD)
+        elif lab.safety.mode is Mode.HOLDING:
+            lab.safety.take(Turn.RESUME)
         return False
 
     def _rig_failed(self, error: RigError, tick: int) -> None:

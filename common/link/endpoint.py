@@ -44,7 +44,7 @@ from common.roles import MASTER, OPERATOR, RECORDER, SLAVE, kind_of
 
 CHANNELS: dict[type, str] = {Command: TICK, Feedback: TICK, Samples: SAMPLES, Finished: SAMPLES}
 
-# bytes of a frame: a tick's has numbers only; a control message some texts; a piece ten items of many storeys
+# bytes of a frame: a tick's has numbers only; a control message some texts; a piece the items of many storeys
 LARGEST = {TICK: 256, CONTROL: 1 << 16, SAMPLES: codec.MOST_FRAME}
 
 SPOKEN: Mapping[str, frozenset[type]] = {

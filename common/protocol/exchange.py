@@ -12,7 +12,10 @@ from common.errors import LocalProtocolError, RemoteProtocolError
 
 
 class State(Enum):
-    """Where a laboratory stands in a test."""
+    """Where a laboratory stands in a test; `running` says whether ticks may go on."""
+
+    def __init__(self, name: str) -> None:
+        self.running = name in ("scheduled", "running")
 
     IDLE = "idle"
     REGISTERED = "registered"

@@ -25,22 +25,24 @@ class Tally:
 
     def admit(self, seq: int, expected: int) -> bool:
         """Whether a message is fresh; `expected` is the tick in which it came."""
-        reason = self._reason(seq, expected)
-        if not reason:
+        window, fates = self._window, self._fates
+        if self._newest < seq < len(fates) and expected - window <= seq <= expected + window:
             self._newest = seq
-            self._fates[seq] = ADMITTED
+            fates[seq] = ADMITTED
             return True
+        reason = self._reason(seq, expected)
         self.reasons[reason] += 1
         if reason != AHEAD and self._fates[seq] == NOT_SEEN:
             self._fates[seq] = REJECTED
         return False
 
     def _reason(self, seq: int, expected: int) -> str:
+        """Why a message is not fresh."""
         if not 0 <= seq < len(self._fates) or seq > expected + self._window:
             return AHEAD
         if seq <= self._newest:
             return "old" if self._fates[seq] == NOT_SEEN else REPEATED
-        return "stale" if seq < expected - self._window else ""
+        return "stale"
 
     def lose(self, seq: int) -> None:
         """An emulated link has lost a message that was admitted."""

@@ -6,17 +6,17 @@ has to be at rest.
 
 from __future__ import annotations
 
-from enum import Enum
+from enum import IntEnum
 
 from common.plan.tables import SafetyTable
 
 
-class WatchdogFinding(Enum):
-    """What the watchdog wants at a tick."""
+class WatchdogFinding(IntEnum):
+    """What the watchdog wants at a tick; the worse, the higher."""
 
-    FINE = "fine"
-    HOLD = "hold"
-    RAMP = "ramp"
+    FINE = 0
+    HOLD = 1
+    RAMP = 2
 
 
 ROUND_TRIP = 2  # intervals that an echo may be later than a message: it has gone both ways
@@ -49,6 +49,10 @@ class Watchdog:
         silence.
         """
         fresh = seq > self._seq and tick - seq <= self._age
+        if fresh and echo > self._echo >= 0:  # as in nearly every tick
+            self._unheard = self._unechoed = 0
+            self._seq, self._echo = seq, echo
+            return WatchdogFinding.FINE
         self._unheard = 0 if fresh else self._unheard + 1
         self._unechoed = 0 if fresh and echo > self._echo else self._unechoed + 1
         if fresh:

@@ -9,7 +9,6 @@ import pytest
 
 from common.errors import InputError, RigError
 from common.plan import tables
-from common.plan.limits import Guard
 from common.plan.plan import Plan
 from common.plan.plugins import construct, find
 from common.plan.reality import as_planned
@@ -199,16 +198,3 @@ def test_a_class_that_cannot_be_had_is_a_sentence(tmp_path: Path, reference: str
 def test_options_that_do_not_fit_are_a_sentence() -> None:
     with pytest.raises(InputError, match=r"Cannot construct Fake named in \[master.rig\].*colour"):
         construct(Fake, {"colour": 1}, "[master.rig]")
-
-
-def test_limits_apply_by_name_and_take_no_nan() -> None:
-    guard = Guard(vars(tables.Limits(column_force=10.0)), ColumnMeasurement._fields)
-    assert guard.violation((0.0, 10.0)) is None
-    assert str(guard.violation((0.0, -10.1))) == "column_force is -10.1, beyond its limit of 10 N."
-    assert "column_displacement is nan" in str(guard.violation((math.nan, 0.0)))
-
-
-def test_limits_apply_to_every_storey() -> None:
-    guard = Guard(vars(tables.Limits(displacement=1.0)), ("displacement", "displacement", "other"))
-    assert guard.violation((0.5, 1.0, 99.0)) is None
-    assert str(guard.violation((0.5, -1.5, 0.0))) == "displacement is -1.5, beyond its limit of 1 m."

@@ -14,14 +14,13 @@ import pytest
 from common.errors import InterlockError
 from common.plan import read as plans
 from common.plan import reality
-from common.plan.limits import PATIENCE
 from common.plan.plan import Plan, ideal
 from common.plan.read import from_tables, with_test
 from common.plan.reality import Reality, from_reality
 from common.plan.tables import Limits
 from common.recording.reader import Run, read
 from common.terminal import cli
-from laboratories.limits import LaboratoryLimits
+from laboratories.checks import CHANGE, LAST, PATIENCE, take_written
 from loop import substructure
 from loop.closed_loop import signals, simulate
 from models import integrators
@@ -162,9 +161,9 @@ def test_a_held_tick_does_not_move_what_rates_are_measured_from(short_plan: Plan
     bench.world.time = bench.master.lab.tick_ns(101)  # a whole interval late
     bench.master.tick(100)
     assert bench.master._command == before
-    own = bench.master._limits._own
-    assert isinstance(own, LaboratoryLimits)
-    assert [(change._last, change._change) for change in own._changes] == [(*before, 0.0)]
+    checks = bench.master._limits._tick._checks
+    take_written(checks)
+    assert (checks.commands[LAST, :-1].tolist(), checks.commands[CHANGE, :-1].tolist()) == ([*before], [0.0])
 
 
 # -- dangers ------------------------------------------------------------------------------------------

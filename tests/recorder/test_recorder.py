@@ -12,6 +12,7 @@ import pytest
 
 from common.errors import IncompleteError, InputError, InterlockError, LostError
 from common.host.clock import MonotonicClock, VirtualClock
+from common.lab.outlet import PIECE
 from common.link.memory_link import MemoryEndpoint
 from common.plan import reality
 from common.plan.plan import Plan
@@ -250,7 +251,7 @@ def test_samples_that_the_link_loses_are_asked_for_again(
     deliver, lost = MemoryEndpoint.send, []
 
     def leaky(self: MemoryEndpoint, message: Any, to: str = "") -> int:
-        if isinstance(message, Samples) and message.first // 10 % 7 == 3 and message.first not in lost:
+        if isinstance(message, Samples) and message.first // PIECE % 7 == 3 and message.first not in lost:
             lost.append(message.first)
             return 0
         return deliver(self, message, to)
@@ -259,7 +260,7 @@ def test_samples_that_the_link_loses_are_asked_for_again(
     bench = virtual.assemble(short_plan, reality.as_planned(short_plan), tmp_path / "a.mcap")
     assert virtual.run(bench, lambda: "") is None
     run = read(tmp_path / "a.mcap")
-    assert len(lost) > 50
+    assert len(lost) > 500 // PIECE
     for topic in ("master", "slave", "latency"):
         assert run.sequences[topic].tolist() == list(range(short_plan.ticks))
     assert run.metadata["summary"]["items_lost"] == "0"
@@ -271,7 +272,7 @@ def test_what_can_not_be_had_again_is_counted_and_said(
     deliver = MemoryEndpoint.send
 
     def leaky(self: MemoryEndpoint, message: Any, to: str = "") -> int:
-        if isinstance(message, Samples) and message.lab == "slave" and 490 < message.first <= 500:
+        if isinstance(message, Samples) and message.lab == "slave" and 490 <= message.first < 490 + PIECE:
             return 0
         return deliver(self, message, to)
 
@@ -280,14 +281,14 @@ def test_what_can_not_be_had_again_is_counted_and_said(
     error = virtual.run(bench, lambda: "")
     run = read(tmp_path / "a.mcap")
     summary = run.metadata["summary"]
-    assert summary["items_lost"] == "10"
-    assert summary["slave_gaps"] == "10"
-    assert run.ticks("slave") == short_plan.ticks - 10
+    assert summary["items_lost"] == str(PIECE)
+    assert summary["slave_gaps"] == str(PIECE)
+    assert run.ticks("slave") == short_plan.ticks - PIECE
     lost = [event for event in run.events if event["code"] == "rows_lost"]
     assert [(event["lab"], event["level"], event["values"]) for event in lost] == [
-        ("recorder", "error", {"items": 10.0})
+        ("recorder", "error", {"items": float(PIECE)})
     ]
-    assert "10 rows and events of the slave are lost" in lost[0]["text"]
+    assert f"{PIECE} rows and events of the slave are lost" in lost[0]["text"]
     assert isinstance(error, IncompleteError)
     assert error.exit_code == 1
 
