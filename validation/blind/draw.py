@@ -16,16 +16,18 @@ import numpy as np
 
 from common.errors import InputError
 from common.plan.schema import nearest
+from common.roles import MASTER
 from laboratories.effects.effect import Parameter
 from validation.blind import lots
 from validation.blind.cases.basis import TrialBasis, basis, draw_plan, log_uniform
 from validation.blind.cases.case import Case, Laid
 from validation.blind.cases.truths import draw_truths, is_inside
-from validation.blind.library import REPLACED, Library
+from validation.blind.library import MATERIAL, REPLACED, Library
 from validation.blind.lots import Lot
-from validation.blind.sets import SETS, SHARES
+from validation.blind.sets import MILD, SETS, SHARES
 
-KINDS = tuple(SHARES)
+KINDS = (*SHARES, "many", MATERIAL)
+TWO_TOLERANCES = 2.0  # that normal parameters stay within in 95 of 100 cases
 
 PATIENCE = 200_000  # draws without a case that was asked for
 
@@ -93,16 +95,32 @@ def begin(index: int, seed: int, set_: str, library: Library) -> Beginning:
         case "unknown" if library.strangers:
             names = (lots.chosen(library.strangers, *lot, "effect"),)
         case "pair" if len(library.catalogue) > 1:
-            first = of_catalogue(library, *lot, "effect")
-            names = (first, of_catalogue(library, *lot, "second effect", without=first))
+            known = library.independent() if SETS[set_].own else tuple(library.catalogue)
+            first = of_catalogue(library, *lot, "effect", among=known)
+            rest = [name for name in known if name != first]
+            names = (first, of_catalogue(library, *lot, "second effect", among=rest))
+        case "many":
+            names = several(library, lot)
+        case "material":
+            names = (f"opensees.{SETS[set_].material(lot)}",)
         case _:
             names = ()
     return Beginning(index, kind, names, lot)
 
 
-def of_catalogue(library: Library, *lot: str | int, without: str = "") -> str:
+def several(library: Library, lot: Lot) -> tuple[str, ...]:
+    """One to nine effects of the catalogue, each once."""
+    count = int(lots.generator(*lot, "count").integers(1, MILD + 1))
+    names: list[str] = []
+    for place in range(min(count, len(library.catalogue))):
+        rest = [name for name in library.catalogue if name not in names]
+        names.append(of_catalogue(library, *lot, f"effect {place}", among=rest))
+    return tuple(names)
+
+
+def of_catalogue(library: Library, *lot: str | int, among: Collection[str] = ()) -> str:
     """An effect of the catalogue; each family as likely as any other, whatever its number of signals."""
-    effects = [effect for effect in library.catalogue.values() if effect.name != without]
+    effects = [effect for effect in library.catalogue.values() if not among or effect.name in among]
     family = lots.chosen({effect.family for effect in effects}, *lot)
     return lots.chosen((effect.name for effect in effects if effect.family == family), *lot)
 
@@ -111,20 +129,26 @@ def drawn(begun: Beginning, trial: TrialBasis) -> Case:
     """The rest of a case."""
     lot, kind = begun.lot, begun.kind
     plan = draw_plan(lot, trial)
-    truths = draw_truths(lot, plan)
+    chosen = SETS[str(lot[1])]
+    truths = draw_truths(lot, plan, normal=chosen.normal)
     noise = int(lots.generator(*lot, "noise").integers(2**31))
-    laid = tuple(draw_effect(lot, kind, name, trial.library) for name in begun.names)
-    inside = kind in ("catalogue", "pair") and is_inside(laid, truths, plan, trial.library)
-    logger = SETS[str(lot[1])].logger(lot)
-    return Case(begun.index, kind, plan.tables(), truths, noise, laid, inside, logger)
+    laid = tuple(draw_effect(lot, kind, name, trial.library, own=chosen.own) for name in begun.names)
+    most = TWO_TOLERANCES if chosen.normal else 1.0
+    moved = kind in ("catalogue", "pair", "many")
+    inside = moved and is_inside(laid, truths, plan, trial.library, most)
+    more = (chosen.logger(lot), chosen.own, chosen.normal)
+    return Case(begun.index, kind, plan.tables(), truths, noise, laid, inside, *more)
 
 
-def draw_effect(lot: Lot, kind: str, name: str, library: Library) -> Laid:
-    """An effect with its parameters, each a draw of its own; one of a pair is of good size.
+def draw_effect(lot: Lot, kind: str, name: str, library: Library, *, own: bool = False) -> Laid:
+    """An effect with its parameters, each a draw of its own; one of a pair is of good size, one of many is mild.
 
-    Where several laboratories can have it, one of them is chosen by name as well.
+    Where several laboratories can have it, one of them is chosen by name as well. With `own` it lies in an
+    independent laboratory.
     """
-    roles = library.roles(name, replaced=kind in REPLACED)
+    if kind == MATERIAL:
+        return draw_material(lot, name)
+    roles = library.roles(name, replaced=kind in REPLACED or own)
     role, alone = lots.chosen(roles, *lot, name, "laboratory") if roles else "", len(roles) > 1
     if kind == "unknown":
         stranger = library.strangers[name]
@@ -133,9 +157,11 @@ def draw_effect(lot: Lot, kind: str, name: str, library: Library) -> Laid:
         }
         return Laid(name, stranger.site, values, {}, role=role, alone=alone)
     effect = library.catalogue[name]
-    formula = lots.chosen(library.formulas[name], *lot, name, "formula") if kind == "formula" else ""
+    formulas = library.formulas.get(name, ()) if kind == "formula" or own else ()
+    formula = lots.chosen(formulas, *lot, name, "formula") if formulas else ""
+    part = {"pair": "strong", "many": "mild"}.get(kind, "")
     values = {
-        item.name: draw_parameter(lots.generator(*lot, name, item.name), item, strong=kind == "pair")
+        item.name: draw_parameter(lots.generator(*lot, name, item.name), item, part)
         for item in effect.parameters
         if item.sizes and not (formula and item.smoothing)  # other formulas smooth their laws themselves
     }
@@ -143,20 +169,34 @@ def draw_effect(lot: Lot, kind: str, name: str, library: Library) -> Laid:
     return Laid(name, effect.site, values, nulls, formula, role, alone)
 
 
-def draw_parameter(generator: np.random.Generator, item: Parameter, *, strong: bool) -> float:
+def draw_material(lot: Lot, name: str) -> Laid:
+    """A material of OpenSees with its numbers, in the place of the master's column."""
+    from validation.blind.labs.materials import BENDS, MATERIALS
+
+    ranges = {"d": BENDS, **MATERIALS[name.removeprefix("opensees.")].ranges}
+    values = {key: between(lots.generator(*lot, name, key), *ends) for key, ends in ranges.items()}
+    return Laid(name, "column", values, {}, role=MASTER)
+
+
+def draw_parameter(generator: np.random.Generator, item: Parameter, part: str = "") -> float:
     """A value between the weakest and the strongest of a parameter's sizes, log-uniform; a factor on both sides.
 
-    With `strong`, it is in the stronger half of that range.
+    Of that range `part` takes the "strong" half, the "mild" half, or all.
     """
     if item.shape or not np.isfinite(item.null):
         weak, full = item.sizes[0], item.sizes[-1]
-        return between(generator, float(np.sqrt(weak * full)) if strong and not item.shape else weak, full)
+        return between(generator, *((weak, full) if item.shape else halved(weak, full, part)))
     sides = distances(item)
     side = sides[int(generator.integers(len(sides)))]
-    weak, full = min(side, key=abs), max(side, key=abs)
-    if strong:
-        weak = float(np.sign(full) * np.sqrt(weak * full))
-    return item.null + between(generator, weak, full)
+    return item.null + between(generator, *halved(min(side, key=abs), max(side, key=abs), part))
+
+
+def halved(weak: float, full: float, part: str) -> tuple[float, float]:
+    """The ends of a range, or of its strong or mild half on a logarithmic scale."""
+    if not part:
+        return weak, full
+    middle = float(np.sqrt(weak * full)) if full > 0.0 else -float(np.sqrt(weak * full))
+    return (middle, full) if part == "strong" else (weak, middle)
 
 
 def distances(item: Parameter) -> list[list[float]]:

@@ -25,7 +25,13 @@ PARTS = {
     OWN: TABLES_OF_KIND[OWN],
 }
 OWN_KERNEL = "own kernel"  # in place of a formula: nobody has written this laboratory a second time
-REPLACED = ("formula", "unknown")  # kinds of cases in which a rig stands in for the emulated laboratory
+MATERIAL = "material"  # kind of case whose column is a material of OpenSees
+MATERIAL_LAB = "validation.blind.labs.material_lab:MaterialLab"
+REPLACED = (
+    "formula",
+    "unknown",
+    MATERIAL,
+)  # kinds of cases in which a rig stands in for the emulated laboratory
 
 Reached = Mapping[str, Mapping[str, float]]  # largest magnitudes by role and signal
 
@@ -53,6 +59,13 @@ class Library:
     def names(self) -> tuple[str, ...]:
         """Every effect there is."""
         return (*self.catalogue, *self.strangers)
+
+    def independent(self) -> tuple[str, ...]:
+        """The effects of the catalogue that the independent laboratories know in any formula."""
+        from validation.blind.labs import PLAIN
+
+        known = {*self.formulas, *PLAIN}
+        return tuple(name for name in self.catalogue if name in known and self.roles(name, replaced=True))
 
     def roles(self, name: str, *, replaced: bool) -> tuple[str, ...]:
         """The roles that can have an effect, of those with `replaced` that a rig of the trial can stand in for."""

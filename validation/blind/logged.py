@@ -92,19 +92,29 @@ def heavy_tailed(generator: np.random.Generator, count: int, _rate: float) -> Ar
     return generator.standard_t(FREEDOM, count) / math.sqrt(FREEDOM / (FREEDOM - 2.0))
 
 
-def low_passed(generator: np.random.Generator, count: int, rate: float, cutoff: float) -> Array:
-    """White noise behind a Butterworth filter of order 4."""
+def low_pass(rate: float, cutoff: float) -> tuple[Array, Array]:
+    """A Butterworth filter of order 4."""
     above, below = signal.butter(ORDER, cutoff, fs=rate)
-    return _settled(generator, count, above, below)
+    return np.asarray(above), np.asarray(below)
 
 
-def ar1(generator: np.random.Generator, count: int, _rate: float) -> Array:
+def ar1(_rate: float) -> tuple[Array, Array]:
     """Each sample 0.95 of the one before, and something new."""
-    return _settled(generator, count, np.ones(1), np.array([1.0, -CORRELATION]))
+    return np.ones(1), np.array([1.0, -CORRELATION])
 
 
-def _settled(generator: np.random.Generator, count: int, above: Array, below: Array) -> Array:
+FILTERS: dict[str, Callable[[float], tuple[Array, Array]]] = {
+    "ar1": ar1,
+    "low_pass_50": partial(low_pass, cutoff=50.0),
+    "low_pass_100": partial(low_pass, cutoff=100.0),
+    "low_pass_200": partial(low_pass, cutoff=200.0),
+}
+"""Digital filters that colour white noise: coefficients by the rate in Hz."""
+
+
+def coloured(generator: np.random.Generator, count: int, rate: float, colour: str) -> Array:
     """White noise through a digital filter, in its stationary state and of rms 1."""
+    above, below = FILTERS[colour](rate)
     impulse = signal.lfilter(above, below, np.eye(1, SETTLING)[0])
     noise = signal.lfilter(above, below, generator.standard_normal(count + SETTLING))[SETTLING:]
     return np.asarray(noise / np.sqrt(np.sum(impulse**2)))
@@ -124,13 +134,29 @@ def pink_shape(frequency: Array) -> Array:
     return np.asarray(1.0 / np.sqrt(np.maximum(frequency, DEEPEST)))
 
 
+def colour_shape(colour: str, frequency: Array, rate: float) -> Array:
+    """Amplitude of noise of rms 1 at frequencies (Hz) over that of white noise."""
+    if colour in ("white", "heavy_tailed"):
+        return np.ones(frequency.size)
+    every = np.fft.rfftfreq(4 * frequency.size, 1.0 / rate)
+    shape, whole = (
+        _shape(colour, np.asarray(values, dtype=np.float64), rate) for values in (frequency, every)
+    )
+    return np.asarray(shape / np.sqrt(np.mean(whole**2)))
+
+
+def _shape(colour: str, frequency: Array, rate: float) -> Array:
+    """Amplitude at frequencies (Hz), up to a factor."""
+    if colour == "pink":
+        return pink_shape(frequency)
+    above, below = FILTERS[colour](rate)
+    return np.asarray(np.abs(signal.freqz(above, below, worN=frequency, fs=rate)[1]))
+
+
 COLOURS: dict[str, Callable[[np.random.Generator, int, float], Array]] = {
     "white": white,
     "heavy_tailed": heavy_tailed,
-    "ar1": ar1,
     "pink": pink,
-    "low_pass_50": partial(low_passed, cutoff=50.0),
-    "low_pass_100": partial(low_passed, cutoff=100.0),
-    "low_pass_200": partial(low_passed, cutoff=200.0),
+    **{colour: partial(coloured, colour=colour) for colour in FILTERS},
 }
 """Noise of rms 1: generator, number of samples, rate in Hz."""

@@ -134,7 +134,11 @@ def with_goal(outcomes: Sequence[Outcome]) -> list[Measure]:
     """The measures that are passed or missed."""
     seen = [item for item in outcomes if item.single and item.visible]
     right = [one for item in seen if item.kind == "catalogue" for one in item.estimates]
-    explained = [item for item in outcomes if item.visible and item.kind != "unknown"]
+    explained = [
+        item
+        for item in outcomes
+        if item.visible and item.kind != "unknown" and not math.isnan(item.shrinkage)
+    ]
     return [
         rate("right effect first", seen, lambda item: item.named, 0.95),
         rate("right site first", seen, lambda item: item.located, 0.98),
@@ -169,9 +173,12 @@ def further(outcomes: Sequence[Outcome]) -> list[Measure]:
     ]
     strange = [item for item in kind(outcomes, "unknown") if item.visible]
     pairs = [item for item in kind(outcomes, "pair") if item.visible]
+    noticed = [item for item in kind(outcomes, "unknown") if item.seen]
     return [
         rate("unknown effect that is visible: said so, site right", strange, lambda item: item.right),
+        rate("unknown effect that an oracle sees: said so, site right", noticed, lambda item: item.right),
         rate("both of a pair whose strongest is visible", pairs, lambda item: item.named),
+        rate("an oracle sees that something is there", gaps, lambda item: item.seen),
         *by_kind,
         rate("right effect first, all sizes", singles, lambda item: item.named),
         rate("right site first, all sizes", singles, lambda item: item.located),

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import secrets
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
@@ -12,8 +13,11 @@ import numpy as np
 
 from common.errors import InputError, InterlockError
 from common.plan import read as plans
+from common.recording.reader import read
+from validation.blind.best import gaps, silent_run
 from validation.blind.cases.case import Case, levels, reality
 from validation.blind.loggers import LOGGERS
+from validation.blind.oracle import separation
 from validation.blind.relogging import relog
 from validation.blind.size import sizes
 from validation.spread import spread
@@ -27,6 +31,10 @@ class RecordedCase:
     name: str  # of the file; drawn at random, so that it reveals nothing
     sizes: tuple[float, ...]  # residual to noise of every effect by itself
     stopped: str  # why the test ended early, empty where it was completed
+    separation: float = math.inf  # of all effects together, as an oracle sees them
+    left: Mapping[str, float] = field(
+        default_factory=dict
+    )  # gap of the true laboratories without noise, by signal
 
 
 def record_all(cases: Sequence[Case], folder: Path, jobs: int = 1) -> Iterator[RecordedCase]:
@@ -49,10 +57,16 @@ def record(case: Case, folder: Path) -> RecordedCase:
     ended = virtual.run(bench, lambda: "")
     if ended is not None and not isinstance(ended, InterlockError):
         raise InputError(f"Case {case.index} ({truth(case)}) cannot be recorded: {ended}")
+    true = path.with_suffix(".true")
     if case.logger:
         relog(played, path, plan, LOGGERS[case.logger], levels(case.truths), case.seed)
-        played.unlink()
-    return RecordedCase(case.index, path.name, sizes(case, path), str(ended or ""))
+        silent = read(true)
+    else:
+        silent = silent_run(plan, reality(case, silent=True), true)
+    true.unlink()
+    run = read(path)
+    seen, left = separation(case, run), gaps(run, silent, plan)
+    return RecordedCase(case.index, path.name, sizes(case, path), str(ended or ""), seen, left)
 
 
 def truth(case: Case) -> str:

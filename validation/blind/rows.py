@@ -20,7 +20,7 @@ HEAD = (
     "extra names",
     "Brier skill",
     "intervals hold",
-    "could be seen",
+    "oracle sees",
 )
 
 
@@ -45,11 +45,11 @@ class CaseRow:
     cases: int
     clean: Hits  # clean laboratories that are called clean
     first: Hits  # single effects that can be seen: the verdict's first name is a right one
-    listed: Hits  # the same: the verdict names it
+    listed: Hits  # effects that can be seen, of any case of the catalogue: the verdict names them
     extra: float  # names per case of what is not there, what the logger did apart
     skill: float  # of the stated probabilities, over a constant
     inside: Hits  # stated intervals that hold the true parameter
-    seen: Hits  # cases with an effect that can be seen
+    seen: Hits  # cases with an effect of which an oracle sees that something is there
 
     @property
     def cells(self) -> tuple[str, ...]:
@@ -83,17 +83,18 @@ def case_row(name: str, outcomes: Sequence[Outcome]) -> CaseRow:
     """One row."""
     effects = [item for item in outcomes if item.truth]
     singles = [item for item in effects if item.single and item.visible]
+    known = [item for item in effects if item.kind != "unknown"]
     stated = [one for item in outcomes for one in item.estimates if one.inside is not None]
     return CaseRow(
         name,
         len(outcomes),
         hits((item for item in outcomes if item.kind == "clean"), lambda item: item.named),
         hits(singles, lambda item: item.first),
-        hits(singles, lambda item: item.named),
+        Hits(sum(item.listed for item in known), sum(item.asked for item in known)),
         sum(item.surplus for item in outcomes) / len(outcomes) if outcomes else math.nan,
         brier_skill(stated_verdicts(outcomes)),
         Hits(sum(bool(one.inside) for one in stated), len(stated)),
-        hits(effects, lambda item: item.visible),
+        hits(effects, lambda item: item.seen),
     )
 
 

@@ -15,14 +15,19 @@ from pathlib import Path
 
 from common.plan import read as plans
 from diagnosis.report.values import Value
+from validation.blind.best import best_closed
 from validation.blind.cases.case import Case, Laid
 from validation.blind.cases.names import NAMING, CaseNames, Heard
 from validation.blind.judge import NONE, DiagnosisAnswer
+from validation.blind.labs.materials import MATERIALS
+from validation.blind.library import MATERIAL
 from validation.blind.loggers import LOGGERS
+from validation.blind.oracle import SEEN
 from validation.blind.record import RecordedCase
 
 QUIET = ("no_gap", "within_tolerances")
-UNKNOWN = ("unknown_effect", "partly_explained")
+UNKNOWN = ("unknown_effect", "partly_explained")  # the second without a name that is said surely
+SURE = 0.5  # probability from which on a name is said surely: more likely than not
 VISIBLE = 2.0  # residual to noise from which an effect must be found: below it noise may hide an effect
 AS_MUCH = {"butterworth": "delay"}  # a maximally flat low-pass is as much a delay as the catalogue's lag
 STANDARD_LENGTH = 30.0  # s of test that the time of a diagnosis is scaled to
@@ -66,6 +71,10 @@ class Outcome:
     why: str
     logger: str = ""  # through which it was recorded
     first: bool = False  # the first name of the verdict, the logger's doing apart, says a true effect
+    asked: int = 0  # effects that are large enough to be asked for
+    listed: int = 0  # of these, those that the verdict names
+    separation: float = math.inf  # of all effects, as an oracle sees them
+    closed: float = math.nan  # share of the gap that the report says it closes
     estimates: list[JudgedEstimate] = field(default_factory=list)
     shrinkage: float = math.nan  # closed over what the true effects would close
     seconds: float = math.nan  # per 30 s of test
@@ -73,12 +82,17 @@ class Outcome:
     @property
     def single(self) -> bool:
         """Whether one effect of the catalogue is hidden."""
-        return self.kind in ("catalogue", "formula")
+        return self.kind in ("catalogue", "formula", MATERIAL)
 
     @property
     def visible(self) -> bool:
         """Whether the effect is large enough to be asked for."""
         return self.size >= VISIBLE and not self.inside
+
+    @property
+    def seen(self) -> bool:
+        """Whether an oracle sees that something is there."""
+        return self.separation >= SEEN and not self.inside
 
 
 def judge_all(
@@ -106,8 +120,13 @@ def judge(case: Case, recorded: RecordedCase, answer: DiagnosisAnswer) -> Outcom
     ]
     truth = [names.effect(item) for item in case.laid]
     own = [name for name in verdict if not is_distortion(case, name, names) or name in truth]
-    wrong = [name for name in own if not any(same(item, name, sets) for item in truth)]
-    named = is_named(case, status, heard, names)
+    right_names = {name for item in case.laid for name in truths(item, names)}
+    wrong = [name for name in own if not any(same(item, name, sets) for item in right_names)]
+    asked_for = visible(case, recorded)
+    listed = [one for item in asked_for if (one := report_on(item, heard)) and names_it(item, one, names)]
+    named = is_named(case, status, heard, names, asked_for)
+    best = best_closed(list(answer.reports.values()), recorded.left)
+    closed = min((number(one.closed) for one in asked), default=math.nan)
     right = named and (bool(located) or not case.laid or case.inside)
     outcome = Outcome(
         index=case.index,
@@ -132,8 +151,12 @@ def judge(case: Case, recorded: RecordedCase, answer: DiagnosisAnswer) -> Outcom
         why="",
         logger=case.logger,
         first=bool(own) and own[0] not in wrong,
+        asked=len(asked_for),
+        listed=len(listed),
+        separation=recorded.separation,
+        closed=closed,
         estimates=estimates(case, heard, names) if named else [],
-        shrinkage=min((number(one.closed) for one in asked), default=math.nan) / best_closed(case),
+        shrinkage=0.0 if math.isnan(closed) else closed / best,
         seconds=answer.seconds * STANDARD_LENGTH / float(case.plan["test"]["duration"]),
     )
     return outcome if right else replace(outcome, why=why(outcome, answer.error))
@@ -162,15 +185,26 @@ def status_of(case: Case, asked: Sequence[Heard]) -> str:
     return next(iter([*denied, *(one.status for one in asked)]), "error")
 
 
-def is_named(case: Case, status: str, heard: Sequence[Heard], names: CaseNames) -> bool:
-    """Whether the verdict says what there is."""
+def visible(case: Case, recorded: RecordedCase) -> list[Laid]:
+    """The effects that are large enough to be asked for."""
+    if case.inside:
+        return []
+    return [item for item, size in zip(case.laid, recorded.sizes, strict=False) if size >= VISIBLE]
+
+
+def is_named(
+    case: Case, status: str, heard: Sequence[Heard], names: CaseNames, asked_for: Sequence[Laid]
+) -> bool:
+    """Whether the verdict says what there is; of many mild faults those that are large enough."""
     if case.kind == "clean":
         return bool(heard) and all(is_quiet(case, one, names) for one in heard)
     if case.kind == "unknown":
-        return status in UNKNOWN
+        sure = any(one.names and number(one.probability) >= SURE for one in consulted(case, heard))
+        return status in UNKNOWN and not sure
     if case.inside and status in QUIET:
         return True
-    return all((one := report_on(item, heard)) and names_it(item, one, names) for item in case.laid)
+    wanted = asked_for if case.kind == "many" else case.laid
+    return all((one := report_on(item, heard)) and names_it(item, one, names) for item in wanted)
 
 
 def is_quiet(case: Case, one: Heard, names: CaseNames) -> bool:
@@ -191,6 +225,9 @@ def names_it(item: Laid, one: Heard, names: CaseNames) -> bool:
 
 def truths(item: Laid, names: CaseNames) -> set[str]:
     """Names that are right for an effect: its own, and the fault of the same reading that its formula is as much."""
+    if item.name.startswith("opensees."):
+        mechanism = MATERIALS[item.name.removeprefix("opensees.")].effects
+        return {names.effect(replace(item, name=name)) for name in mechanism}
     fault, site = AS_MUCH.get(item.formula), names.site(item)
     alike = {name for name, there in names.sites.items() if there == site and names.faults[name] == fault}
     return {names.effect(item)} | alike
@@ -234,11 +271,6 @@ def estimate(item: Laid, called: str, name: str, said: Value | None) -> JudgedEs
     return JudgedEstimate(
         f"{called}.{name}", true, value, miss / strength, miss / abs(true) if true else miss, inside
     )
-
-
-def best_closed(_case: Case) -> float:
-    """Share of the gap that the true effects close: all of it, down to the noise floor."""
-    return 1.0
 
 
 def number(value: float | None) -> float:

@@ -11,12 +11,14 @@ from dataclasses import dataclass, field
 from itertools import accumulate
 from typing import TYPE_CHECKING
 
+from validation.blind.labs.materials import MATERIALS
 from validation.blind.loggers import LOGGERS
 
 if TYPE_CHECKING:
     from validation.blind.lots import Lot
 
 # what may be wrong in a laboratory, and in how many of all cases it is
+MILD = 9  # faults at most in a laboratory of the kind "many"
 SHARES = {"catalogue": 0.50, "formula": 0.15, "unknown": 0.10, "pair": 0.10, "clean": 0.15}
 
 
@@ -29,7 +31,12 @@ class CaseSet:
     turns: tuple[str, ...] = ()  # kinds that take turns instead, a round of loggers each
     loggers: tuple[
         str, ...
-    ] = ()  # taken in turn by the number of the case; none: the recording is the test's own
+    ] = ()  # taken in turn by the number of the case, none for the test's own recording
+    normal: bool = (
+        False  # true parameters are normal about the nominal ones, by tolerances as standard deviations
+    )
+    own: bool = False  # every laboratory that has one is played by its independent code
+    materials: tuple[str, ...] = ()  # OpenSees' materials in the column's place, taken in turn
 
     def kind(self, lot: Lot) -> str:
         """The kind of a case."""
@@ -40,6 +47,10 @@ class CaseSet:
         share = lots.generator(*lot, "kind").random()
         sums = accumulate(self.shares.values())
         return next(kind for kind, most in zip(self.shares, sums, strict=True) if share < most)
+
+    def material(self, lot: Lot) -> str:
+        """The material of a case."""
+        return self.materials[int(lot[-1]) % len(self.materials)]
 
     def logger(self, lot: Lot) -> str:
         """The logger of a case, empty for none."""
@@ -56,5 +67,15 @@ SETS = {
         "clean laboratories and single effects through data loggers",
         turns=("clean", "catalogue"),
         loggers=tuple(LOGGERS),
+    ),
+    "normal": CaseSet("true parameters normal about the nominal ones", normal=True),
+    "many": CaseSet("up to nine mild faults at once", {"clean": 0.1, "many": 0.9}),
+    "independent": CaseSet(
+        "clean laboratories, single effects and pairs in code of their own",
+        {"clean": 0.35, "formula": 0.3, "pair": 0.35},
+        own=True,
+    ),
+    "materials": CaseSet(
+        "OpenSees' materials as columns (make opensees)", turns=("material",), materials=tuple(MATERIALS)
     ),
 }

@@ -26,7 +26,6 @@ from validation.blind.cases.basis import TrialBasis, basis
 from validation.blind.cases.case import Case
 from validation.blind.cases.truths import NOISE, UNCERTAIN
 from validation.blind.draw import (
-    KINDS,
     begin,
     between,
     distances,
@@ -89,8 +88,8 @@ def test_what_is_not_asked_for_is_passed_over() -> None:
 
 def test_kinds_come_in_their_shares() -> None:
     kinds = [begin(index, 0, "judge", LIBRARY).kind for index in range(4000)]
-    for kind in KINDS:
-        assert kinds.count(kind) / 4000 == pytest.approx(SHARES[kind], abs=0.025)
+    for kind, share in SHARES.items():
+        assert kinds.count(kind) / 4000 == pytest.approx(share, abs=0.025)
 
 
 def test_truths_are_inside_the_tolerances_and_noise_is_common() -> None:
@@ -129,13 +128,13 @@ def test_the_independent_laboratory_has_the_true_parameters() -> None:
 
 def test_a_factor_goes_both_ways_between_its_sizes() -> None:
     generator = np.random.default_rng(0)
-    values = np.array([draw_parameter(generator, FACTOR, strong=False) for _ in range(500)])
+    values = np.array([draw_parameter(generator, FACTOR) for _ in range(500)])
     moves = np.abs(values - 1.0)
     assert 0.3 < np.mean(values > 1.0) < 0.7
     assert moves.min() >= 0.01 - 1e-9
     assert moves.max() <= 0.3 + 1e-9
     assert np.median(moves) == pytest.approx(math.sqrt(0.01 * 0.3), rel=0.25)
-    strong = [abs(draw_parameter(generator, FACTOR, strong=True) - 1.0) for _ in range(100)]
+    strong = [abs(draw_parameter(generator, FACTOR, "strong") - 1.0) for _ in range(100)]
     assert min(strong) >= math.sqrt(0.01 * 0.3) - 1e-9
 
 
@@ -143,10 +142,10 @@ def test_a_force_has_one_side_and_a_limit_no_null() -> None:
     generator = np.random.default_rng(0)
     assert len(distances(FRICTION.parameters[0])) == 1
     limit = Parameter("force", "N", null=math.inf, least=1.0, most=1e6, sizes=(200.0, 50.0))
-    values = [draw_parameter(generator, limit, strong=False) for _ in range(100)]
+    values = [draw_parameter(generator, limit) for _ in range(100)]
     assert min(values) >= 50.0
     assert max(values) <= 200.0
-    assert max(draw_parameter(generator, limit, strong=True) for _ in range(100)) <= 100.0
+    assert max(draw_parameter(generator, limit, "strong") for _ in range(100)) <= 100.0
     assert -3.0 <= between(generator, -1.0, -3.0) <= -1.0
     assert -1.0 <= between(generator, -1.0, 3.0) <= 3.0
 

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from common.plan import read as plans
 from common.plan import reality as realities
+from common.plan.kinds import COLUMN, TABLE
 from common.plan.reality import Reality
 from common.roles import MASTER, SLAVE, name_of
-from validation.blind.library import REPLACED, parts_of, rig_of
+from validation.blind.library import MATERIAL, MATERIAL_LAB, REPLACED, parts_of, rig_of
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,8 @@ class Case:
     laid: tuple[Laid, ...] = ()
     inside: bool = False  # with its effect every parameter is still inside its tolerance: there is no gap
     logger: str = ""  # through which it is recorded, empty where the controllers' own readings are
+    own: bool = False  # every laboratory of a kind that ships is played by its independent code
+    normal: bool = False  # tolerances are standard deviations
 
     def reality(self, laid: tuple[Laid, ...] | None = None, *, silent: bool = False) -> dict[str, Any]:
         """The tables of the reality, with other effects or without noise where asked for.
@@ -47,14 +50,22 @@ class Case:
         """
         laid = self.laid if laid is None else laid
         tables = quiet(self.truths) if silent or self.logger else self.truths
-        if self.kind in REPLACED:
-            return {"seed": self.seed, **with_rig(tables, self.laid[0].role, self._rig(tables, laid))}
-        effects = [written(item) for item in laid]
+        replaced = self.replaced()
+        for role in replaced:
+            own = [item for item in laid if item.role == role]
+            tables = with_rig(tables, role, self._rig(tables, role, own))
+        effects = [written(item) for item in laid if item.role not in replaced]
         return {"seed": self.seed, **tables, **({"effect": effects} if effects else {})}
 
-    def _rig(self, tables: Mapping[str, Any], laid: tuple[Laid, ...]) -> dict[str, Any]:
+    def replaced(self) -> tuple[str, ...]:
+        """The roles in the place of whose laboratories rigs of the trial stand."""
+        if self.own:
+            kinds = plans.from_tables(self.plan, Path()).kinds
+            return tuple(role for role, kind in kinds.items() if kind in (COLUMN, TABLE))
+        return (self.laid[0].role,) if self.kind in REPLACED else ()
+
+    def _rig(self, tables: Mapping[str, Any], role: str, laid: Sequence[Laid]) -> dict[str, Any]:
         """The table of the rig that stands in for a laboratory, with the true parameters among its options."""
-        role = self.laid[0].role
         kind = plans.from_tables(self.plan, Path()).kinds[role]
         planned, true = of_role(self.plan, role), of_role(tables, role)
         options: dict[str, Any] = {
@@ -63,7 +74,8 @@ class Case:
         options["effects"] = [
             {"name": item.name, "formula": item.formula, "parameters": item.parameters} for item in laid
         ]
-        return rig_of(kind, options)
+        rig = rig_of(kind, options)
+        return rig | {"class": MATERIAL_LAB} if self.kind == MATERIAL else rig
 
 
 def written(item: Laid) -> dict[str, Any]:

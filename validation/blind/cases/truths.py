@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -31,17 +31,23 @@ UNCERTAIN = {
 }
 NOISE = (0.5, 3.0)  # factor on the plan's noise, all sensors alike
 ROUNDING = 1e-12
+MOST_MOVED = 4.0  # tolerances: a move that one normal draw in fifteen thousand passes
+Move = Callable[[np.random.Generator], float]
 
 
-def draw_truths(lot: Lot, plan: Plan) -> dict[str, Any]:
-    """True parameters inside the plan's tolerances, and the true noise, in the tables of a reality."""
+def draw_truths(lot: Lot, plan: Plan, *, normal: bool = False) -> dict[str, Any]:
+    """True parameters inside the plan's tolerances, and the true noise, in the tables of a reality.
+
+    With `normal` they are normal about the nominal ones, with the tolerances as standard deviations.
+    """
     generator, tables = lots.generator(*lot, "truths"), plan.tables()
+    move = about if normal else inside
     building = {
-        name: varied(tables["structure"][name], tolerance(plan, "structure", name), generator)
+        name: varied(tables["structure"][name], tolerance(plan, "structure", name), generator, move)
         for name in of_building(plan)
     }
     factors = {
-        f"{table}.{name}": varied(1.0, tolerance(plan, table, name), generator)
+        f"{table}.{name}": varied(1.0, tolerance(plan, table, name), generator, move)
         for table, names in UNCERTAIN.items()
         for name in names
         if table != "structure"
@@ -55,24 +61,35 @@ def draw_truths(lot: Lot, plan: Plan) -> dict[str, Any]:
         place = truths
         if role not in (MASTER, SLAVE):
             place = truths.setdefault(SLAVE, {}).setdefault(name_of(role), {})
-        place |= of_laboratory(lot, plan, role, kind, factors, noise)
+        place |= of_laboratory(lot, plan, (role, kind), factors, noise, move)
     return truths
 
 
+def inside(generator: np.random.Generator) -> float:
+    """A move in tolerances, anywhere inside."""
+    return float(generator.uniform(-1.0, 1.0))
+
+
+def about(generator: np.random.Generator) -> float:
+    """A move in tolerances that are standard deviations."""
+    return float(np.clip(generator.standard_normal(), -MOST_MOVED, MOST_MOVED))
+
+
 def of_laboratory(
-    lot: Lot, plan: Plan, role: str, kind: Kind, factors: Mapping[str, float], noise: float
+    lot: Lot, plan: Plan, whose: tuple[str, Kind], factors: Mapping[str, float], noise: float, move: Move
 ) -> dict[str, Any]:
     """The tables of a laboratory whose parameters differ in truth, each by a factor.
 
     `factors` are those of the plan's own tables that are drawn for all laboratories together.
     """
+    role, kind = whose
     seen = plan.of(role)
     system = System(seen)
     for name in parameters(kind, seen):
         factor = factors.get(name) if role in (MASTER, SLAVE) else None
         if factor is None:
             own = lots.generator(*lot, "truths", name_of(role), name)
-            factor = varied(1.0, kind.tolerance(seen, name), own)
+            factor = varied(1.0, kind.tolerance(seen, name), own, move)
         system = kind.scaled(system, name, factor)
     if kind.name not in KINDS:
         levels = zip(kind.channels.names, kind.noise(seen).tolist(), strict=True)
@@ -107,14 +124,14 @@ def parameters(kind: Kind, plan: Plan) -> list[str]:
     return [name for name in names if kind.planned(plan, name) != 0.0]
 
 
-def varied(value: Any, width: float, generator: np.random.Generator) -> Any:
-    """A value, or each of several, within a relative width of itself; a matrix as a whole, which stays symmetric."""
+def varied(value: Any, width: float, generator: np.random.Generator, move: Move) -> Any:
+    """A value, or each of several, moved by relative widths of itself; a matrix as a whole, which stays symmetric."""
     if isinstance(value, list) and isinstance(value[0], list):
-        factor = varied(1.0, width, generator)
+        factor = varied(1.0, width, generator, move)
         return [[factor * item for item in row] for row in value]
     if isinstance(value, list):
-        return [varied(item, width, generator) for item in value]
-    return value * (1.0 + width * generator.uniform(-1.0, 1.0))
+        return [varied(item, width, generator, move) for item in value]
+    return value * (1.0 + width * move(generator))
 
 
 def tolerance(plan: Plan, table: str, name: str) -> float:
@@ -122,8 +139,10 @@ def tolerance(plan: Plan, table: str, name: str) -> float:
     return plan.tolerances.parameters.get(f"{table}.{name}", plan.tolerances.default)
 
 
-def is_inside(laid: Iterable[Laid], truths: dict[str, Any], plan: Plan, library: Library) -> bool:
-    """Whether effects of the catalogue move nothing but known parameters, none of them out of its tolerance."""
+def is_inside(
+    laid: Iterable[Laid], truths: dict[str, Any], plan: Plan, library: Library, most: float = 1.0
+) -> bool:
+    """Whether effects of the catalogue move nothing but known parameters, none by more than `most` tolerances."""
     true = realities.true_plan(truths, plan)
     moved: dict[str, System] = {}
     for item in laid:
@@ -131,25 +150,31 @@ def is_inside(laid: Iterable[Laid], truths: dict[str, Any], plan: Plan, library:
         system = moved.get(role, System(true.of(role)))
         moved[role] = effect.apply(system, **effect.values(item.parameters))
     return bool(moved) and all(
-        stays_inside(plan, role, true.of(role), system) for role, system in moved.items()
+        stays_inside(plan, role, true.of(role), system, most) for role, system in moved.items()
     )
 
 
-def stays_inside(plan: Plan, role: str, true: Plan, moved: System) -> bool:
-    """Whether what effects make of a role's true plan is inside the tolerances of the whole plan's nominal one."""
+def stays_inside(plan: Plan, role: str, true: Plan, moved: System, most: float) -> bool:
+    """Whether what effects make of a role's true plan is within tolerances, times `most`, of the whole plan's."""
     if moved.effects != Effects():
         return False
     nominal, there = plan.of(role), moved.plan.tables()
     close = [
         near(
-            there["structure"][name], nominal.tables()["structure"][name], tolerance(plan, "structure", name)
+            there["structure"][name],
+            nominal.tables()["structure"][name],
+            most * tolerance(plan, "structure", name),
         )
         for name in of_building(plan)
     ]
     if role in plan.kinds:
         kind = kind_of(plan, role)
         close += [
-            near(kind.planned(moved.plan, name), kind.planned(nominal, name), kind.tolerance(nominal, name))
+            near(
+                kind.planned(moved.plan, name),
+                kind.planned(nominal, name),
+                most * kind.tolerance(nominal, name),
+            )
             for name in parameters(kind, nominal)
         ]
     return all(close) and all(

@@ -1,0 +1,59 @@
+"""How far the true effects close the gap of a case: what a diagnosis that found everything would reach."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from common.plan.plan import Plan
+from common.plan.reality import Reality
+from common.recording.reader import Run, read
+from diagnosis.report.records import Report
+from laboratories import kinds
+from simulation import virtual
+
+LEAST = 0.1  # share of the gap that the truth closes: below it the gap is one of chance, which nobody closes
+
+
+def silent_run(plan: Plan, reality: Reality, path: Path) -> Run:
+    """The test with the true laboratories and silent sensors; its recording is written to `path`."""
+    virtual.run(virtual.assemble(plan, reality, path), lambda: "")
+    return read(path)
+
+
+def gaps(recorded: Run, true: Run, plan: Plan) -> dict[str, float]:
+    """rms(recorded - true)/rms(recorded) of every measured signal; of names at several roles, of the first."""
+    found: dict[str, float] = {}
+    for role, kind in kinds.kinds_of(plan).items():
+        for name in kind.channels.names:
+            if recorded.ticks(role) and true.ticks(role) and name not in found:
+                read_, wanted = (run.columns[role][name] for run in (recorded, true))
+                size = min(read_.size, wanted.size)
+                level = float(np.sqrt(np.mean(read_[:size] ** 2)))
+                left = float(np.sqrt(np.mean((read_[:size] - wanted[:size]) ** 2)))
+                found[name] = left / level if level else math.nan
+    return found
+
+
+def best_closed(reports: Sequence[Report], left: Mapping[str, float]) -> float:
+    """Share of the gap above the noise that the true effects close; NaN where the gap is one of chance.
+
+    `left` are the gaps of the true laboratories by signal. Of several reports the one in which they close most counts;
+    where no report tells its gap, all of it.
+    """
+    shares = [share for report in reports if not math.isnan(share := share_closed(report, left))]
+    best = max(shares, default=1.0)
+    return best if best >= LEAST else math.nan
+
+
+def share_closed(report: Report, left: Mapping[str, float]) -> float:
+    """The same of one report."""
+    far = report.how_far
+    names = [name for name in report.gap.signals if name in left and math.isfinite(left[name])]
+    if far.before is None or far.noise_floor is None or not names or far.before <= far.noise_floor:
+        return math.nan
+    after = math.sqrt(float(np.mean([left[name] ** 2 for name in names])))
+    return (far.before - max(after, far.noise_floor)) / (far.before - far.noise_floor)

@@ -1,0 +1,116 @@
+"""Laboratory A whose column is a material of OpenSees: the servo loop of `column_lab`, the force of another program."""
+
+from __future__ import annotations
+
+import struct
+import subprocess
+import sys
+import weakref
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from common.errors import InputError
+from common.plan import schema
+from common.plan.tables import Column
+from common.plan.tables import SensorsTable as Levels
+from common.rig import ColumnCommand, ColumnMeasurement
+from validation.blind.labs import material_server, materials
+from validation.blind.labs.column_lab import SIGNALS, TrueColumnLab
+from validation.blind.labs.sensors import TrueSensors, true_values
+
+SUBSTEPS = 4  # deformations that a material is led through in an interval
+HOME = Path(__file__).resolve().parents[3]
+
+
+class MaterialLab:
+    """Servo loop, and a material of OpenSees in the column's place; effects name one as `opensees.NAME`.
+
+    Without an effect the column is elastic. The servo does not feel the force.
+    """
+
+    def __init__(
+        self,
+        interval: float,
+        seed: int,
+        actuator: Mapping[str, Any] | None = None,
+        column: Mapping[str, Any] | None = None,
+        sensors: Mapping[str, Any] | None = None,
+        effects: Sequence[Mapping[str, Any]] = (),
+    ) -> None:
+        levels = schema.plain(schema.fill(Levels, sensors or {}, "sensors"))
+        self._servo = TrueColumnLab(interval, seed, actuator, column, dict.fromkeys(levels, 0.0))
+        self._sensors = TrueSensors(SIGNALS, true_values(SIGNALS, levels), interval, seed)
+        self._stiffness = schema.fill(Column, column or {}, "column").stiffness
+        self._material = MaterialProcess(*chosen(effects), self._stiffness) if effects else None
+        self._true = (0.0, 0.0)
+
+    def arm(self) -> None:
+        """An emulated laboratory is always ready."""
+
+    def read(self) -> ColumnMeasurement:
+        """Readings at the present tick."""
+        return ColumnMeasurement(*self._sensors.read(self._true))
+
+    def write(self, command: ColumnCommand) -> None:
+        """Move on by one interval, ramping to the command; the material follows in straight lines."""
+        self._servo.write(command)
+        place, _ = self._servo.read()
+        way = np.linspace(self._true[0], place, SUBSTEPS + 1)[1:]
+        force = self._material.force(way) if self._material else self._stiffness * place
+        self._true = (place, force)
+
+    def disarm(self) -> None:
+        """The actuator stays where it is."""
+        if self._material:
+            self._material.close()
+
+
+def chosen(effects: Sequence[Mapping[str, Any]]) -> tuple[str, Mapping[str, float]]:
+    """Name and values of the one material that the effects name."""
+    if len(effects) != 1:
+        raise InputError("This laboratory takes one effect, 'opensees.NAME'.")
+    name = str(effects[0]["name"]).removeprefix("opensees.")
+    if name not in materials.MATERIALS:
+        raise InputError(f"Unknown material '{name}': {schema.nearest(name, materials.MATERIALS)}")
+    return name, effects[0]["parameters"]
+
+
+class MaterialProcess:
+    """The process that holds a material."""
+
+    def __init__(self, name: str, values: Mapping[str, float], stiffness: float) -> None:
+        words = [sys.executable, "-m", material_server.__name__, materials.calls(name, stiffness, values)]
+        self._process = subprocess.Popen(
+            words, cwd=HOME, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        )
+        self.close = weakref.finalize(self, _end, self._process)
+        if len(self._answer()) < material_server.VALUE.size:
+            _, complaints = self._process.communicate()
+            said = complaints.decode(errors="replace").strip().splitlines() or ["it said nothing"]
+            raise InputError(
+                f"OpenSees cannot be the column '{name}' ({said[-1]}): make opensees installs it."
+            )
+
+    def force(self, way: Any) -> float:
+        """The force (N) at the end of a way (m)."""
+        assert self._process.stdin is not None  # noqa: S101 - it is a pipe
+        self._process.stdin.write(material_server.COUNT.pack(len(way)) + struct.pack(f"<{len(way)}d", *way))
+        self._process.stdin.flush()
+        (found,) = material_server.VALUE.unpack(self._answer())
+        return float(found)
+
+    def _answer(self) -> bytes:
+        assert self._process.stdout is not None  # noqa: S101 - it is a pipe
+        return self._process.stdout.read(material_server.VALUE.size)
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """End the process; what it has to say is of no interest any more."""
+    for stream in (process.stdin, process.stdout, process.stderr):
+        if stream is not None:
+            stream.close()
+    process.kill()
+    process.wait()

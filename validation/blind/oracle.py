@@ -1,0 +1,161 @@
+"""What somebody could see who knows everything but the nominal parameters: how far a case's effects stand out.
+
+The oracle knows which effects a case hides, how large they are, the noise of every sensor with its colour and what the
+logger does; of the laboratories' parameters it knows, as everybody does, the nominal values and their tolerances. With
+d the change of all readings that the effects make on the recorded commands, and J their changes with each parameter by
+one standard deviation of its tolerance, both whitened with the noise, the most powerful test has the separation
+
+    s² = dᵀ (I + J Jᵀ)⁻¹ d
+
+(J. Neyman, E. S. Pearson, Phil. Trans. R. Soc. A 231 (1933) 289-337). A test of the separation `SEEN` that raises one
+false alarm in a thousand misses one effect in a thousand.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from common.plan import read as plans
+from common.recording.reader import Run
+from common.roles import MASTER, SLAVE, name_of
+from laboratories.effects.sites import LINK
+from laboratories.kinds import kind_of, kinds_of
+from models.registry import Array
+from validation.blind.cases.case import Case, Laid, of_role
+from validation.blind.cases.truths import tolerance
+from validation.blind.logged import DECIMALS, MAINS, RANGE, colour_shape
+from validation.blind.loggers import LOGGERS, Logger
+from validation.blind.size import levels, messages, play, play_building
+
+SEEN = 6.18  # twice the 99.9 % point of the normal distribution
+FLOOR = 1e-4  # of white noise, in amplitude: where coloured noise fades, two solutions of one model differ by so much
+WIDTH = 1.0  # Hz, to each side of the mains that hum hides
+RANDOM = (".noise", ".missing")  # effects without a waveform of their own: only their energy is seen
+UNIFORM = math.sqrt(3.0)  # half the width of a uniform distribution over its standard deviation
+Signals = Mapping[str, Array]
+Played = Callable[[Case, tuple[Laid, ...]], Signals]
+
+
+def separation(case: Case, run: Run) -> float:
+    """The separation of all effects of a case together, 0 for a clean laboratory, NaN where it was not recorded."""
+    if not case.laid:
+        return 0.0
+    if not all(map(run.has, (MASTER, *plans.from_tables(case.plan, Path()).roles))):
+        return math.nan
+    squares = 0.0
+    for role in {item.role for item in case.laid}:
+        here = tuple(item for item in case.laid if item.role == role)
+        inside = tuple(item for item in here if item.site != LINK)
+        squares += at_role(case, role, inside, run) ** 2 if inside else 0.0
+        squares += at_link(case, role, run) if len(inside) < len(here) else 0.0
+    return math.sqrt(squares)
+
+
+def at_role(case: Case, role: str, laid: tuple[Laid, ...], run: Run) -> float:
+    """The separation of the effects of one role's laboratory, or of the building (no role)."""
+
+    def played(other: Case, effects: tuple[Laid, ...]) -> Signals:
+        return play(other, effects, run, role) if role else play_building(other, effects, run)
+
+    truly, without = played(case, laid), played(case, ())
+    whitened = whitening(case, truly, noise_at(case, role))
+    change = whitened(less(truly, without))
+    if all(item.name.endswith(RANDOM) for item in laid):
+        return float(change @ change) / math.sqrt(2.0 * change.size)  # of the energy, over its scatter
+    moves = [whitened(less(played(other, laid), truly)) for other in neighbours(case, role)]
+    columns = np.stack(moves, axis=1) if moves else np.zeros((change.size, 0))
+    seen, known = columns.T @ change, np.eye(columns.shape[1]) + columns.T @ columns
+    return math.sqrt(max(float(change @ change - seen @ np.linalg.solve(known, seen)), 0.0))
+
+
+def less(one: Signals, other: Signals) -> dict[str, Array]:
+    """Differences by name."""
+    return {name: values - other[name] for name, values in one.items()}
+
+
+def noise_at(case: Case, role: str) -> dict[str, tuple[float, str]]:
+    """Rms and unit of the noise that each signal of a role is compared with, of the building's those of positions."""
+    plan = plans.from_tables(case.plan, Path())
+    if role:
+        noise = levels(case, role)
+        return {row.name: (noise[row.name], row.unit) for row in kind_of(plan, role).channels.measured}
+    kinds = kinds_of(plan)
+    found = {one: (levels(case, one)[kind.channels.position], "m") for one, kind in kinds.items()}
+    return {"": (case.truths["sensors"]["table_acceleration"], "m/s²"), **found}
+
+
+def neighbours(case: Case, role: str) -> list[Case]:
+    """The case with one true parameter of a role, or of the building, moved by one standard deviation each."""
+    plan = plans.from_tables(case.plan, Path())
+    true = of_role(case.truths, role) if role else {"structure": case.truths["structure"]}
+    tables = [name for name in true if name not in ("sensors", SLAVE) and (name == "structure") == (not role)]
+    found = []
+    for table in tables:
+        for name, value in true[table].items():
+            numbers = isinstance(value, float) or (isinstance(value, list) and isinstance(value[0], float))
+            if not numbers:
+                continue
+            width = tolerance(plan, table, name) / (1.0 if case.normal else UNIFORM)
+            moved = (
+                [item * (1.0 + width) for item in value] if isinstance(value, list) else value * (1.0 + width)
+            )
+            found.append(replace(case, truths=with_value(case.truths, role, table, name, moved)))
+    return found
+
+
+def with_value(truths: Mapping[str, Any], role: str, table: str, name: str, value: Any) -> dict[str, Any]:
+    """True parameters with another value of one of them."""
+    slave = name_of(role)
+    if slave:
+        own = with_value(truths[SLAVE][slave], "", table, name, value)
+        return {**truths, SLAVE: {**truths[SLAVE], slave: own}}
+    return {**truths, table: {**truths[table], name: value}}
+
+
+def whitening(
+    case: Case, truly: Signals, noise: Mapping[str, tuple[float, str]]
+) -> Callable[[Signals], Array]:
+    """A function that stacks changes of readings, divided by the amplitude of their noise at every frequency."""
+    interval = case.plan["test"]["interval"]
+    logger = LOGGERS[case.logger] if case.logger else Logger("")
+    amplitudes = {
+        name: amplitude(logger, *noise[name], np.asarray(values), interval)
+        for name, values in truly.items()
+        if noise[name][0] > 0.0
+    }
+
+    def whitened(changes: Signals) -> Array:
+        stacked = []
+        for name, rms in amplitudes.items():
+            spectrum = np.fft.rfft(changes[name], norm="ortho")[1:] * math.sqrt(2.0) / rms
+            stacked += [spectrum.real, spectrum.imag]
+        return np.concatenate(stacked)
+
+    return whitened
+
+
+def amplitude(logger: Logger, level: float, unit: str, values: Array, interval: float) -> Array:
+    """Rms of the noise at each frequency above zero, of rms `level`, with what the logger adds to it."""
+    frequency: Array = np.asarray(np.fft.rfftfreq(values.size, interval)[1:], dtype=np.float64)
+    shape = colour_shape(logger.colour, frequency, 1.0 / interval)
+    power = level**2 * (shape**2 + FLOOR**2)
+    if logger.printed:
+        power = power + DECIMALS[unit] ** 2 / 12.0
+    if logger.bits:
+        middle = math.sqrt(RANGE[0] * RANGE[1])
+        power = power + (2.0 * middle * float(np.max(np.abs(values))) / 2**logger.bits) ** 2 / 12.0
+    if logger.hum:
+        power = np.where(np.abs(frequency - MAINS) < WIDTH, np.inf, power)
+    return np.asarray(np.sqrt(power))
+
+
+def at_link(case: Case, role: str, run: Run) -> float:
+    """The square of the separation of what messages of a slave's link changed."""
+    changed = messages(case, run, role)
+    return sum(float(np.sum((values / level) ** 2)) for values, level in changed if level > 0.0)
