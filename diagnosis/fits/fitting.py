@@ -33,6 +33,7 @@ from models.system import System
 AVERAGED = 0.008  # s, over which residuals are averaged: the laboratories move much more slowly
 BLOCK = 1.0  # s, of the blocks that are held out in turn: longer than a model's error is correlated
 HELD_OUT = (2, 4)  # of every five blocks, these
+STEPPING = 2.0  # steps over the noise from which on a reading is rounded to more than its noise
 COARSE = 3.0  # steps that count as noise where a reading is rounded to more than its noise
 SHORTEST, LONGEST = 6.0, 0.7  # of a beginning: seconds, and share of the test
 SPARSE = 0.5  # of an averaged sample's ticks that must be there
@@ -169,7 +170,9 @@ def measured_by(data: Data, white: Array) -> Data:
     """The data with residuals in units of a noise (signals,)."""
     level = np.sqrt(np.mean(np.square(data.part.measured), axis=0))
     least = (EXACT if data.part.exact else MODEL_ERROR) * level + 1e-15
-    rounding = np.where(data.rounded > 2.0 * white, COARSE * data.rounded, data.rounded / math.sqrt(12.0))
+    rounding = np.where(
+        data.rounded > STEPPING * white, COARSE * data.rounded, data.rounded / math.sqrt(12.0)
+    )
     return replace(data, sigma=np.sqrt(white**2 + least**2 + rounding**2), white=white)
 
 

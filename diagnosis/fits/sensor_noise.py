@@ -197,7 +197,8 @@ def model(data: Data, rest: Remainder, quiet: Mask, source: Source, place: int) 
     lines = pickup.named(rest.found[place])
     resolution = float(data.rounded[place])
     segments = stretches(rest.noise[:, place], quiet)
-    if not segments or not np.any(rest.noise[:, place]) or is_white(segments, flat, resolution):
+    stepping = resolution > fitting.STEPPING * flat  # counts by itself, and more than noise of its size
+    if stepping or not segments or not np.any(rest.noise[:, place]) or is_white(segments, flat, resolution):
         return NoiseModel(flat, lines=lines, resolution=resolution)
     if alike(rest.noise[:, place], quiet):
         quiet, source = np.ones_like(quiet), "residual"
