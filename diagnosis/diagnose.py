@@ -10,6 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from common.errors import InputError
 from common.plan.kinds import COLUMN
+from common.recording.imported import exchange_known
 from common.terminal.telling import Tell, untold
 from diagnosis.findings import readings, report
 from diagnosis.findings.found import Diagnosis
@@ -119,7 +120,7 @@ def judged(data: Data, scales: Scales) -> PartVerdict:
 
 def exchanged(record: Record) -> list[LinkFinding]:
     """What the messages' numbers and stamps say of the exchange, where both ends were recorded."""
-    if not (record.run.has("master") and record.run.has("slave")):
+    if not (record.run.has("master") and record.run.has("slave") and exchange_known(record.run)):
         return []
     account = link.account(record.run, record.plan.test.interval)
     return link.findings(account, record.plan.test.interval)
@@ -194,6 +195,8 @@ def not_recorded(record: Record) -> list[str]:
         if lab.kind.name == COLUMN and not driven(record, lab) and record.has(*lab.measured):
             (command,) = lab.commands
             result.append(f"{command} was not recorded: nothing can be said of the actuator.")
+    if record.run.has("master") and record.run.has("slave") and not exchange_known(record.run):
+        result.append("The recording holds no numbers or stamps of messages: the link cannot be judged.")
     missing = [name for lab in record.labs for name in lab.measured if not record.has(name)]
     if missing:
         result.append(f"Not recorded: {', '.join(missing)}; what only they show cannot be decided.")

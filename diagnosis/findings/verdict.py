@@ -174,24 +174,33 @@ def scatter(fit: Fit) -> Array:
     What a model leaves comes and goes slowly, so samples are no independent witnesses.
     """
     groups, signals = fit.reduced.shape
+    seen_by_fit = np.where(fit.data.train[:, None], fit.reduced, 0.0)
     block = max(1, round(CORRELATED / (fit.data.system.plan.test.interval * fit.data.group)))
     count = groups // block
+    seen_slopes = on_train(fit)
+    white = seen_slopes.T @ seen_slopes
     if count < 4:
-        return fit.jacobian.T @ fit.jacobian
+        return white
     slopes = fit.jacobian.reshape(groups, signals, -1)[: count * block]
-    steps = np.einsum("gs,gsp->gp", fit.reduced[: count * block], slopes)
+    steps = np.einsum("gs,gsp->gp", seen_by_fit[: count * block], slopes)
     sums = steps.reshape(count, block, -1).sum(axis=1)
-    seen: Array = sums.T @ sums - fit.jacobian.T @ fit.jacobian
+    seen: Array = sums.T @ sums - white
     values, vectors = np.linalg.eigh(0.5 * (seen + seen.T))
     return (vectors * np.maximum(values, 0.0)) @ vectors.T
 
 
+def on_train(fit: Fit) -> Array:
+    """The slopes of the residuals that the fit has seen, (groups·signals of these, parameters)."""
+    return np.asarray(fit.jacobian[np.repeat(fit.data.train, fit.data.sigma.size)])
+
+
 def intervals(fit: Fit) -> dict[str, dict[str, Interval]]:
-    """Parameters of a fit's effects with their 95 % intervals, from the curvature of its cost."""
+    """Parameters of a fit's effects with their 95 % intervals, from the curvature of the cost that it saw."""
     count = fit.z.size
     problem = Problem(fit.data, fit.values)
     size = count + len(problem.frees)
-    information = fit.jacobian.T @ fit.jacobian
+    slopes = on_train(fit)
+    information = slopes.T @ slopes
     information[:count, :count] += np.eye(count)
     inverse = np.linalg.pinv(information + 1e-12 * np.trace(information) * np.eye(size))
     covariance = inverse + inverse @ scatter(fit) @ inverse

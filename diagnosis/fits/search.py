@@ -47,6 +47,7 @@ LOUDEST = (
     10.0  # noise at its loudest frequency over that at the highest ones: pink noise of a whole test has less
 )
 POLISHED = 12  # steps of a fit that leaves something, before that counts
+HALVINGS = 20  # by which a value is found beyond which the system is the same
 SETTLING = 4  # rounds in which a fit and the noise that it leaves are found in turn
 SUSPICIOUS = 8.0  # of Σ z²: nominal parameters that are all off together imitate an effect
 NEAR = 1.0  # tolerances within which fits begin: a parameter that is further away imitates an effect
@@ -153,7 +154,8 @@ class Searcher:
         if not chosen.names:
             return Search(self.data, commissioned, chosen, ())
         chosen = self.pruned(commissioned, chosen)
-        return physical(Search(self.data, commissioned, chosen, self.alternatives(chosen, first)))
+        others = tuple(map(trimmed, self.alternatives(chosen, first)))
+        return physical(Search(self.data, commissioned, trimmed(chosen), others))
 
     def settled(self, fit: Fit) -> Fit:
         """The fit under the noise that it leaves, which the search goes on with.
@@ -351,6 +353,25 @@ def hidden(fit: Fit) -> bool:
         item.ratio > MATERIAL and item.significance > SIGNIFICANT for item in sensor_noise.foreseen(fit)
     )
     return seen or (sensor_noise.loudest(fit) > LOUDEST and leaves(fit))
+
+
+def trimmed(fit: Fit) -> Fit:
+    """A fit whose effects are no larger than what changes the system: no more delay taken away than there is."""
+    values = {name: dict(given) for name, given in fit.values.items()}
+    for name, given in values.items():
+        effect = fit.data.catalogue[name]
+        system = fitting.lay(fit.data, fit.z, {key: item for key, item in fit.values.items() if key != name})
+        for item in effect.parameters:
+            if item.shape or not math.isfinite(item.null) or given[item.name] == item.null:
+                continue
+            whole, least, most = effect.apply(system, **given), 0.0, 1.0
+            for _ in range(HALVINGS):
+                share = 0.5 * (least + most)
+                moved = given | {item.name: item.null + share * (given[item.name] - item.null)}
+                least, most = (least, share) if effect.apply(system, **moved) == whole else (share, most)
+            if most < 1.0:
+                given[item.name] = item.null + most * (given[item.name] - item.null)
+    return replace(fit, values=values) if values != fit.values else fit
 
 
 def refines(bare: Fit, before: Fit, after: Fit) -> bool:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Collection
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -29,7 +29,8 @@ EXACT = 1e-4  # share of a computed signal's rms below which a difference is rou
 UNREST = 0.05  # share of its largest value from which on a first value is no rest
 PIECE, REACH = 1.0, 10  # s between beginnings of a free damper, ticks to each side that they are read from
 LATE = 4e-3  # s, by which a logger's filters usually make a force late
-ALIKE = 5e-4  # s, by which a logger's channels may differ: a quarter of an interval
+ALIKE = 5e-4  # s, by which a logger's channels may differ: a quarter of an interval,
+UNLIKE = 0.5  # and this share of a delay, so that a channel on time is no more than two tolerances off
 CALIBRATED = 0.01  # by which a logger's calibration usually differs
 MODEL_ERROR = 1e-3  # share of a measured signal's rms that two good solutions of one model may differ by
 
@@ -94,15 +95,17 @@ class LoggedForce(Nuisance):
 
 @dataclass(frozen=True)
 class LoggedReadings(Nuisance):
-    """How late a logger recorded all readings of a laboratory, in seconds."""
+    """How late a logger recorded all readings of a laboratory, in seconds, about what it made of another one."""
 
     of_record = True
     signals: tuple[str, ...] = ()  # of the readings in their laboratory
+    about: float = 0.0  # s
 
     def moved(self, system: System, z: float) -> System:
         """The system whose readings all come that late; none comes early."""
-        for name in self.signals if z > 0.0 else ():
-            system = system.sensed(name, delay=z * self.tolerance)
+        delay = max(0.0, self.about + z * self.tolerance)
+        for name in self.signals if delay > 0.0 else ():
+            system = system.sensed(name, delay=delay)
         return system
 
 
@@ -290,14 +293,14 @@ class LaboratoryPart:
     def logged(self, delay: float) -> LaboratoryPart:
         """The same laboratory, whose readings came through a logger that made the forces used late by `delay` s.
 
-        What a logger does to one channel it does to all, but for `ALIKE`; nothing of what is stated of it is changed.
+        What a logger does to one channel it mostly does to all; nothing of what is stated of it is changed.
         """
         if any(channel.filter is not None or channel.delay != 0.0 for channel in self.channels):
             return self
-        late = LoggedReadings("delay", ALIKE, self.lab, self.lab.kind.channels.names)
-        base = max(0.0, delay - ALIKE)
-        channels = tuple(replace(channel, delay=base) for channel in self.channels)
-        return self.replaced(nuisances=(*self.nuisances, late), channels=channels)
+        about = max(0.0, delay)
+        tolerance = max(ALIKE, UNLIKE * about)
+        late = LoggedReadings("delay", tolerance, self.lab, self.lab.kind.channels.names, about)
+        return self.replaced(nuisances=(*self.nuisances, late))
 
     def replaced(self, **fields: Any) -> LaboratoryPart:
         """The same laboratory in another test: other inputs, or other readings."""
