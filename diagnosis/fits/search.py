@@ -46,6 +46,9 @@ PRIOR_GAIN, DATA_GAIN = 6.25, 25.0  # 2.5 tolerances squared; 5 standard deviati
 LOUDEST = (
     10.0  # noise at its loudest frequency over that at the highest ones: pink noise of a whole test has less
 )
+SMALL = (
+    0.05  # of a reading's rms that may be coloured noise where only the residual beside effects tells of it
+)
 POLISHED = 12  # steps of a fit that leaves something, before that counts
 HALVINGS = 20  # by which a value is found beyond which the system is the same
 SETTLING = 4  # rounds in which a fit and the noise that it leaves are found in turn
@@ -347,8 +350,10 @@ def hidden(fit: Fit) -> bool:
     """Whether the noise that a fit is measured by may hold a gap.
 
     Something is left beside that noise, and either the inputs foresee it or the noise is far louder at some frequency
-    than at the highest ones, as the noise of no sensor is.
+    than at the highest ones, as the noise of no sensor is; or what effects leave would be a large share of a reading.
     """
+    if fit.names and sensor_noise.share(fit.data) > SMALL:
+        return True
     seen = any(
         item.ratio > MATERIAL and item.significance > SIGNIFICANT for item in sensor_noise.foreseen(fit)
     )

@@ -115,6 +115,14 @@ def predictable(data: Data, averaged: Array) -> Array:
     return data.related.predict(averaged / data.sigma) * data.sigma
 
 
+def share(data: Data) -> float:
+    """Largest rms of a coloured noise over that of its reading, of noise that only the residual tells of."""
+    level = np.sqrt(np.mean(np.square(data.part.measured), axis=0))
+    own = [item.density is not None and item.source == "residual" for item in data.noise]
+    ratios = data.white[own] / np.maximum(level[own], 1e-300)
+    return float(np.max(ratios, initial=0.0))
+
+
 def loudest(fit: Fit) -> float:
     """Largest rms density of a sensor's noise over that at the highest frequencies."""
     white = fitting.noise(fit.data.residual(fitting.lay(fit.data, fit.z, fit.values)))
