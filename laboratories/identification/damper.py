@@ -26,6 +26,10 @@ from models.registry import Array
 
 LEAST = 100  # samples
 SUBSTEP = 0.25e-3  # s
+PIECE, REACH = (
+    1.0,
+    10,
+)  # s between beginnings of a drive without a spring, ticks to each side that they are read from
 CREEP = 5e-4  # v₀, m/s
 NAMES = ("mass", "damping", "stiffness", "motor_time_constant", "gain", "friction")
 UNITS = ("kg", "N·s/m", "N/m", "s", "", "N")
@@ -103,6 +107,33 @@ def response(
     return stroke, force
 
 
+def anew(stroke: Array, interval: float) -> list[tuple[int, float, float]]:
+    """Ticks, places (m) and rates (m/s) from which a stroke that no spring brings back is followed anew.
+
+    Without a spring every error of a force adds up for ever. Places and rates are read off a cubic over `REACH` ticks
+    to each side.
+    """
+    length = max(4 * REACH, round(PIECE / interval))
+    found = []
+    for tick in range(0, max(1, stroke.size - length // 2), length):
+        window = np.arange(max(0, tick - REACH), min(stroke.size, tick + REACH + 1))
+        cubic = np.polynomial.polynomial.polyfit((window - tick) * interval, stroke[window], 3)
+        found.append((tick, float(cubic[0]), float(cubic[1])))
+    return found
+
+
+def in_pieces(
+    values: Array, command: Array, ground: Array, interval: float, begins: Sequence[tuple[int, float, float]]
+) -> tuple[Array, Array]:
+    """Stroke (m) and force (N), each (n,), followed anew from each beginning."""
+    ends = [*(tick for tick, _, _ in begins[1:]), command.size]
+    pieces = [
+        response(values, command[tick:end], ground[tick:end], interval, place, rate)
+        for (tick, place, rate), end in zip(begins, ends, strict=True)
+    ]
+    return np.concatenate([stroke for stroke, _ in pieces]), np.concatenate([force for _, force in pieces])
+
+
 def least_squares(
     damper_command: Array,
     stroke: Array,
@@ -118,7 +149,8 @@ def least_squares(
     measured) and `table_acceleration` (m/s²; None on a still table) have one value per tick of `interval`
     (s). `free` names what is fitted, of mass (kg), damping (N·s/m), stiffness (N/m), motor_time_constant
     (s), gain and friction (N); the others keep the `nominal` damper's values, gain 1 and friction 0, from
-    which the fit starts too. The state at the beginning is fitted beside. Output error, both signals
+    which the fit starts too. The state at the beginning is fitted beside; a drive whose nominal stiffness is 0
+    is followed anew every second from its measured motion. Output error, both signals
     weighted by their scatter; intervals from Jacobian and residual, corrected for autocorrelation signal by
     signal (`estimate.of_fit`). A friction near zero may come out negative within its interval. What the
     record cannot separate (mass and gain without a force) has infinite intervals.
@@ -171,10 +203,13 @@ def fit(
     travel = float(np.std(outputs[0]))
     speed = max(float(np.std(np.gradient(outputs[0], interval))), 1e-9)
     nuisance = np.array([travel, speed])
+    begins = anew(outputs[0], interval) if nominal.stiffness == 0.0 else []
 
     def model(x: Array) -> tuple[Array, Array]:
         now = values.copy()
         now[places] = x[:-2] * scales[places]
+        if begins:
+            return in_pieces(now, command, ground, interval, begins)
         begin = x[-2:] * nuisance
         return response(now, command, ground, interval, float(begin[0]), float(begin[1]))
 

@@ -150,18 +150,25 @@ def of_damper(run: Run, interval: float) -> dict[str, Any]:
     columns = run.columns[topic_of(run, "damper")]
     plan = plan_of(run)
     still = part_of(run) == "damper"
+    force = columns.get("damper_force")
+    free = [
+        name for name in damper.NAMES if name != "gain" or force is not None
+    ]  # without a force the motor's is taken
+    if plan and plan.damper.stiffness == 0.0:
+        free.remove("stiffness")
     fit = damper.least_squares(
         columns["damper_command"],
         columns["damper_stroke"],
-        columns.get("damper_force"),
+        force,
         None if still else columns.get("table_acceleration"),
         interval,
+        free=free,
         nominal=plan.damper if plan else None,
     )
-    return {
-        "parameters": plain(fit.parameters),
-        "nrmse": {"damper_stroke": fit.stroke_nrmse, "damper_force": fit.force_nrmse},
-    }
+    misfits = {"damper_stroke": fit.stroke_nrmse} | (
+        {"damper_force": fit.force_nrmse} if force is not None else {}
+    )
+    return {"parameters": plain(fit.parameters), "nrmse": misfits}
 
 
 def of_device(run: Run, plan: Plan, role: str, kind: Device) -> dict[str, Any] | None:

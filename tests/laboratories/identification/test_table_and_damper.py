@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from common.errors import InputError
 from common.plan.tables import Damper, ShakingTable
 from laboratories.identification import damper, table
 from laboratories.table import model as table_lab
+from tests.rths.test_free_drive import DASHPOT, FRICTION, INTERVAL, MASS, drive
 
 DT = 0.002
 SEEDS = range(20)
@@ -156,6 +158,18 @@ def test_without_a_force_mass_and_gain_are_not_separable() -> None:
     held = damper.least_squares(motor, stroke, None, None, DT, free=("mass", "damping", "stiffness"))
     assert held["mass"].low < 16.0 < held["mass"].high
     assert set(held.parameters) == {"mass", "damping", "stiffness"}
+
+
+def test_a_drive_without_a_spring_is_followed_piece_by_piece() -> None:
+    force, position = drive()
+    planned = replace(
+        Damper(), mass=1.1 * MASS, stiffness=0.0, damping=0.8 * DASHPOT, motor_time_constant=0.0
+    )
+    free = ("mass", "damping", "friction")
+    found = damper.least_squares(force, position, None, None, INTERVAL, free=free, nominal=planned)
+    for name, true in {"mass": MASS, "damping": DASHPOT, "friction": FRICTION}.items():
+        assert found[name].low < true < found[name].high, name
+        assert found[name].value == pytest.approx(true, rel=0.15), name
 
 
 def test_a_shaken_table_excites_the_damper() -> None:
