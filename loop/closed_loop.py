@@ -102,7 +102,7 @@ class Traffic(NamedTuple):
 
 
 class ClosedLoop(NamedTuple):
-    """Everything that moves in a closed loop, at rest."""
+    """The state of a closed loop."""
 
     building: Substructure
     own: MasterLaboratory
@@ -111,7 +111,7 @@ class ClosedLoop(NamedTuple):
 
 
 def on_time(ticks: int) -> MessagesUsed:
-    """Every message there in time: command k at tick k, feedback k at tick k + 1."""
+    """The exchange in which every message is in time: command k is used at tick k, feedback k at tick k + 1."""
     return MessagesUsed(np.arange(ticks), np.arange(ticks) - 1)
 
 

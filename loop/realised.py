@@ -1,4 +1,4 @@
-"""What a reality says the laboratories are."""
+"""The laboratories as the reality describes them, with effects laid over the plan's parameters."""
 
 from __future__ import annotations
 

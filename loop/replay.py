@@ -1,4 +1,4 @@
-"""One part alone: recorded inputs through its model, to the readings that model would have given.
+"""Replay of one part: its model is driven by recorded inputs and gives the readings that it would have had.
 
 Reading k is taken before the command of tick k acts, as in the test.
 """

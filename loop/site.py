@@ -37,7 +37,7 @@ def build(kind: Kind, system: System, errors: Array) -> Site:
 
 
 def none(ticks: int) -> Site:
-    """In place of a laboratory where there is none: one channel that reads zero."""
+    """The placeholder for a missing laboratory: one channel that reads zero."""
     sensors = readings.build(1.0, ("none",), {})
     return Site(kinds.nothing(), sensors, np.zeros((ticks, 1)), np.zeros(1), np.zeros((ticks, 1)))
 

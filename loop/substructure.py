@@ -1,4 +1,4 @@
-"""The master's computation of one control interval: the building, and what its laboratories are told.
+"""The master's computation of one control interval: the building, and the commands of its laboratories.
 
     M_N·ẍ + C_N·ẋ + f_numerical(x) + Σ λ·f_drift = −M·1·z̈ + Σ λ·f_floor
 

@@ -20,7 +20,7 @@ LEAD_NS = 250_000_000
 
 
 class MasterHandshake:
-    """From the first call for slaves to the start; `wall_ns` is the wall clock minus the laboratory's.
+    """The master's handshake, from the first call to the start; `wall_ns` is the wall clock minus the laboratory's.
 
     With a `gate` the link to every slave must pass its exchanges.
     """
@@ -73,7 +73,7 @@ class MasterHandshake:
             self._lab.fail(Event.TRIP, RigError(reason), code="not_armed", remote=True)
 
     def _await_reset(self, partner: Partner) -> None:
-        """A slave is latched: the operator reaches it through this session, so that it is asked again until it goes."""
+        """Ask a latched slave again until it is reset, because the reset reaches it through this session."""
         if not partner.latched:
             partner.latched = True
             text = f"The {partner.title} refuses the test: {STILL_LATCHED}"
@@ -190,7 +190,7 @@ class MasterHandshake:
         self._lab.fail(Event.LOSE, error, code="nobody")
 
     def _hesitant(self) -> None:
-        """All processes have joined, and one does not go on."""
+        """End the handshake where all processes have joined and one of them does not go on."""
         arming = self._lab.exchange.state is State.REGISTERED
         who = next(one for one in self._partners if not (one.armed if arming else one.scheduled))
         seconds = self._lab.plan.link.connect_timeout

@@ -56,7 +56,7 @@ class LatencyAccount:
         self.round_trip = NAN
 
     def open(self, tick: int, wake_ns: int, ready_ns: int, sent_ns: int, used: Feedback) -> None:
-        """The tick's command is out; stamps in ns, the command's 0 where none went."""
+        """Open the row of a tick whose command was sent; stamps in ns, that of the command 0 where none was sent."""
         age = (wake_ns + self._offset.at(wake_ns) - used.started_ns) * 1e-9 if used.seq >= 0 else NAN
         self._rows[tick] = LatencyRow(tick, wake_ns, ready_ns, sent_ns, age)
         if sent_ns:
@@ -84,7 +84,7 @@ class LatencyAccount:
                 self._offset.add(sent_ns, feedback.heard_ns, feedback.sent_ns, received_ns)
 
     def close(self, tick: int, used_ns: int) -> None:
-        """The next tick begins: judge `tick`, and write what is complete."""
+        """Judge `tick` as the next one begins, and write the rows that are complete."""
         row = self._rows.get(tick)
         if row is not None and not row.used_ns:
             row.used_ns = used_ns
@@ -95,18 +95,18 @@ class LatencyAccount:
         self._write(used_ns, everything=False)
 
     def finish(self, tick: int, used_ns: int) -> None:
-        """`tick` was the last: write all."""
+        """Write all rows, because `tick` was the last."""
         self.close(tick, used_ns)
         self._write(used_ns, everything=True)
 
     def _in_time(self, row: LatencyRow) -> bool:
-        """Whether the feedback of the tick itself answers it and is there for the next."""
+        """Whether the tick's own feedback answered its command and arrived before the next tick."""
         if row.feedback is None or row.feedback.seq != row.tick:
             return False
         return ticks_late(row.extra, self._lab.plan.test.interval) == 0
 
     def _write(self, now: int, *, everything: bool) -> None:
-        """Rows of ticks that are over, from the oldest to the first of which more will be known."""
+        """Write the rows of past ticks in order, up to the first row that a later feedback may still complete."""
         while self._rows:
             row = next(iter(self._rows.values()))
             known = row.feedback is not None or row.sent_ns == 0 or row.tick < self._named

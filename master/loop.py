@@ -135,7 +135,7 @@ class MasterLoop(RigLoop):
     # -- ticks ------------------------------------------------------------------------------------
 
     def tick(self, tick: int) -> None:
-        """One control interval (contract, section 3); a tick that comes a whole interval late moves nothing.
+        """Play one control interval (contract, section 3); a tick that is a whole interval late writes no new command.
 
         Where all laboratories are emulated the tick is made up for, because only the emulation waits for it.
         """
@@ -173,7 +173,7 @@ class MasterLoop(RigLoop):
         self._watch(tick, wake)
 
     def _finding(self, tick: int) -> tuple[WatchdogFinding, str]:
-        """What the slaves' watchdogs say, and of which slave: the first of which it is the worst."""
+        """The worst finding of the slaves' watchdogs, and the first slave that has it."""
         worst, who = WatchdogFinding.FINE, ""
         for partner in self._partners:
             found = partner.look(tick)
@@ -267,7 +267,7 @@ class MasterLoop(RigLoop):
     # -- end --------------------------------------------------------------------------------------
 
     def stop(self, reason: str) -> None:
-        """Bring the test to an end; after its last tick, or earlier because somebody wants it so."""
+        """Bring the test to an end, after its last tick or earlier on request."""
         self.end(reason)
 
     def leave(self, *, last: bool = False) -> None:
@@ -303,7 +303,7 @@ class MasterLoop(RigLoop):
 
     @property
     def left(self) -> bool:
-        """Whether slaves and recorder know and have all."""
+        """Whether the slaves know of the end and the recorder has all samples."""
         settled = self.lab.exchange.ended
         return settled and (self.lab.recorder_has_all() or not self.lab.recorded)
 
@@ -367,7 +367,7 @@ class MasterLoop(RigLoop):
         return self.lab.tick_ns(tick)
 
     def latest(self, tick: int) -> int:
-        """For the feedbacks of the tick before it is waited a little into the interval, until then, ns."""
+        """Until when a tick waits for the feedbacks of the tick before, a little after its nominal time, ns."""
         return self.lab.tick_ns(tick) + self._wait_ns
 
     def heard(self, tick: int) -> bool:

@@ -19,7 +19,7 @@ NOWHERE = (0.0, 0.0)  # position and force of a laboratory that is not there
 
 
 class NoRigAtRest:
-    """The way to rest of a laboratory without a rig: it is there."""
+    """The ramp to rest of a laboratory without a rig, which ends at once."""
 
     done, travel, left = True, 0.0, 0.0
 
@@ -57,13 +57,13 @@ class OwnLaboratory:
         return self._kind.ramp(self._plan, last, before) if self._kind else NoRigAtRest()
 
     def row(self, outputs: Outputs, command: Any, measured: tuple[float, ...]) -> tuple[float, ...]:
-        """What is recorded of it: target, motor's force, command, readings; nothing where it is not there."""
+        """Its recorded values: target, motor's force, command, readings; empty for a master without a laboratory."""
         if self.channels is None:
             return ()
         return (outputs.target, *command[1:], command[0], *measured)
 
     def force(self, measured: tuple[float, ...]) -> dict[str, float]:
-        """Its force (N) by the channel's name; empty where it is not there."""
+        """Its force (N) by the channel's name; empty for a master without a laboratory."""
         return (
             {}
             if self.channels is None

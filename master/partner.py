@@ -82,7 +82,7 @@ class Partner:
         return self._syncs >= self._exchanges
 
     def there(self, now: int) -> bool:
-        """Whether it takes part and has not left: its last word has not come, and it was not silent for too long."""
+        """Whether it takes part: its last message has not come, and it was not silent for too long."""
         return self.registered and not self.stopped and now - self.heard_ns < self._silence_ns
 
     def pass_gate(self, exchanges: int) -> None:
@@ -91,11 +91,11 @@ class Partner:
 
     @property
     def start_option(self) -> str:
-        """What its process is started with, beside plan and address."""
+        """The option that its process is started with, beside plan and address."""
         return f", --name {name_of(self.role)}" if self._address else ""
 
     def ask_anew(self, now: int) -> None:
-        """What comes next is asked at once, not when the last question is due again."""
+        """Ask the next question at once, not when the last one is due again."""
         self._asked_ns = now - REPEAT_NS
 
     def due(self, now: int) -> bool:
@@ -132,7 +132,7 @@ class Partner:
         return True
 
     def settle(self) -> None:
-        """The start is chosen: what is estimated of its clock by now counts."""
+        """Keep the present estimate of its clock, because the start is chosen by it."""
         self._first_offset = self._offset.at(self._lab.start_ns)
 
     def schedule(self) -> None:
@@ -159,7 +159,7 @@ class Partner:
         return self._feedback.newest_seen >= seq
 
     def begin(self, tick: int, now: int) -> float:
-        """The force (N) that a tick uses: of the newest feedback that is there by then."""
+        """The force (N) that a tick uses: that of the newest feedback received before the tick."""
         if (feedback := self._feedback.take(tick)) is not None:
             self.used = feedback
             self.tally.use(feedback.seq)
@@ -172,12 +172,12 @@ class Partner:
         return self.used.measured[self._force]
 
     def look(self, tick: int) -> WatchdogFinding:
-        """What the watchdog says at a tick that came in time."""
+        """The watchdog's finding at a tick that came in time."""
         judged = self._feedback.judged(self.used)
         return self._watchdog.look(tick - 1, judged.seq, judged.heard_seq)
 
     def send(self, tick: int) -> tuple[int, int]:
-        """Send the command that is `sent`; when its turn came, and when its frame was handed to the link, ns."""
+        """Send the command; return when its turn came and when its frame was handed to the link, ns."""
         lab = self._lab
         now = lab.clock.now()
         shift = self._offset.at(now) - self._first_offset
@@ -186,7 +186,7 @@ class Partner:
         return now, lab.endpoint.send(command, self._address)
 
     def exchanged(self) -> tuple[str, dict[str, float]]:
-        """What became of the messages of both directions as far as this end knows: a sentence and its numbers."""
+        """The fate of the messages of both directions as far as this end knows: a sentence and its numbers."""
         if (last := self._feedback.take(self.commands)) is not None:  # came for the tick after the last one
             self.tally.use(last.seq)
         values = {f"{self.role}.commands_sent": float(self.commands)}

@@ -79,7 +79,7 @@ def record(args: argparse.Namespace, plan: Plan, path: Path) -> int:
 
 
 def receive(loop: RecorderLoop, endpoint: Endpoint, stopping: Stopper) -> None:
-    """Take messages until the test is over, or somebody wants to stop."""
+    """Take messages until the test is over or a stop is asked for."""
     while not loop.done:
         if (received := endpoint.receive(WAIT_S)) is not None:
             loop.take(received.message, received.received_ns)

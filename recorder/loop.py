@@ -1,4 +1,4 @@
-"""The recorder's loop: takes both streams in order, asks again for what is missing, says what it could not get."""
+"""The recorder's loop: takes all streams in order, asks again for missing items, reports those that never came."""
 
 from __future__ import annotations
 
@@ -143,7 +143,7 @@ class RecorderLoop:
             self._take_event(values_of(row)[2:])
 
     def _take_event(self, values: Sequence[Any]) -> None:
-        """Take note of the machines, and of why the test ended: the first cause, or what led to it if that is late."""
+        """Keep what an event says of the machines and of the test's end, of which the earliest cause counts."""
         _, lab, level, code, text, numbers = values
         if code in CODES:
             self._machines |= described(lab, code, numbers)
@@ -172,7 +172,7 @@ class RecorderLoop:
         self._end(now)
 
     def _notice_stall(self, now: int) -> None:
-        """Do not count the time in which this process was held up itself as silence of the others."""
+        """Extend the others' deadlines by the time for which this process itself was held up."""
         held = now - self._polled_ns
         self._polled_ns = now
         if held > STALL_NS:
@@ -220,7 +220,7 @@ class RecorderLoop:
         self._write(items)
 
     def _give_up_rest(self) -> None:
-        """Write what came behind holes that are still open, and say what of the streams is missing."""
+        """Write the items behind holes that are still open, and report what is missing of the streams."""
         for lab, inlet in self._inlets.items():
             while inlet.missing() is not None:
                 self._give_up(lab)
@@ -229,7 +229,7 @@ class RecorderLoop:
                 self._say_lost(f"The end of what the {title(lab)} records did not reach the recorder.", {})
 
     def _say_lost(self, text: str, values: Mapping[str, float]) -> None:
-        """Record and report that something is missing, at the time of the newest tick."""
+        """Record and report a loss of items, at the time of the newest tick."""
         log_ns, t = self._newest_ns, self._newest_tick * self._plan.test.interval
         event = (t, RECORDER, "error", ROWS_LOST, text, dict(values))
         self._sink.put([other("event", log_ns, log_ns, event)])
@@ -274,7 +274,7 @@ class RecorderLoop:
         return SILENCE_NS if self._begun else max(SILENCE_NS, round(self._plan.link.connect_timeout * 1e9))
 
     def _fell_silent(self) -> None:
-        """No laboratory is heard; a test that was to end in order is incomplete where one has not reported its end."""
+        """End the recording because no laboratory is heard; every laboratory must have reported an orderly end."""
         code, text = self._outcome
         missing = [title(lab) for lab, inlet in self._inlets.items() if inlet.total is None]
         if code == "stop" and missing:
@@ -289,7 +289,7 @@ class RecorderLoop:
             self.error = LostError(f"{self._outcome[1].removesuffix('.')}; what came until then is recorded.")
 
     def stop(self, reason: str) -> None:
-        """End the recording because somebody wants it so; why the test ended before stays the outcome.
+        """End the recording on request; where the test had ended before, its own cause stays the outcome.
 
         A test that needs its recording is asked to end, and its ramp to rest is recorded.
         """
@@ -324,7 +324,7 @@ class RecorderLoop:
         return summary
 
     def _judge(self) -> None:
-        """An error where the plan requires the recording, something is missing, and nothing worse has happened."""
+        """The error of a required recording that misses something, unless something worse has happened."""
         lost = sum(inlet.lost for inlet in self._inlets.values())
         worse = self.error is not None and not self._settled
         if not self._plan.recording.required or worse or not (lost or self._unended):
@@ -337,7 +337,7 @@ class RecorderLoop:
         )
 
     def summary(self) -> dict[str, str]:
-        """What was expected, what is recorded, what is missing, how it ended."""
+        """The summary: expected, recorded and missing items, and how the test ended."""
         result: dict[str, Any] = {"ticks_expected": self._plan.ticks}
         for topic, seen in self._seen.items():
             result[f"{topic}_recorded"] = seen.count(1)

@@ -43,7 +43,7 @@ class Sink(Protocol):
         """Take items; never waits for the disk in real time."""
 
     def close(self, summary: dict[str, str], machines: dict[str, str]) -> None:
-        """Write what is left, the summary and what is known of the machines."""
+        """Write the remaining items, the summary and the properties of the machines."""
 
 
 class FileSink:
@@ -170,7 +170,7 @@ class ThreadedSink:
                 self._waiting -= len(items)
 
     def close(self, summary: dict[str, str], machines: dict[str, str]) -> None:
-        """Write what is queued, then the summary and what is known of the machines; not for ever on a hanging disk."""
+        """Write the queue, the summary and what is known of the machines; give up where the disk hangs."""
         self._ending.set()
         self._thread.join(CLOSE_S)
         if self._thread.is_alive():

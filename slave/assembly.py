@@ -16,7 +16,7 @@ from slave.step import SlaveStep
 
 
 def preflight(_plan: Plan) -> list[PreflightCheck]:
-    """The master judges the test as a whole; a slave its own rig, as it arms."""
+    """No check: the master judges the test as a whole, and a slave's gate judges its own rig as it arms."""
     return []
 
 

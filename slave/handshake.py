@@ -26,7 +26,7 @@ from common.safety.modes import STILL_LATCHED
 
 
 class SlaveHandshake:
-    """From waiting for a master to the start; `instance` tells this process from others of its role."""
+    """A slave's handshake, up to the start; `instance` tells this process from others of its role."""
 
     def __init__(self, lab: Laboratory, rig: GuardedRig, instance: int) -> None:
         self._lab = lab
@@ -71,7 +71,7 @@ class SlaveHandshake:
             lab.endpoint.send(Refused(request.session, "it takes part in another test already."))
 
     def make_way(self, session: int) -> None:
-        """Leave without a word that could disturb the test: another process takes part in it under this role."""
+        """Leave without sending anything, because another process takes part in the test under this role."""
         lab = self._lab
         if not lab.exchange.allows(Event.REFUSE) or lab.exchange.session not in (0, session):
             return

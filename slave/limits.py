@@ -32,6 +32,6 @@ class SlaveLimits:
         return self._tick.violation(self._present, *measured, *command[TARGET:], *wanted)
 
     def written(self, command: tuple[float, ...]) -> None:
-        """The rig was given this command, for the target asked about last."""
+        """Take note of a command that went to the rig for the target asked about last."""
         self._present = self._target
         self._tick.written(command)

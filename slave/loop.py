@@ -143,7 +143,7 @@ class SlaveLoop(RigLoop):
         return self.lab.tick_ns(tick) + self._shift_ns
 
     def tick(self, tick: int) -> None:
-        """One control interval (contract, section 3); a tick that comes a whole interval late keeps its command.
+        """Play one control interval (contract, section 3); a tick that is a whole interval late keeps the last command.
 
         Where all laboratories are emulated the tick is made up for with its own command.
         """
@@ -189,7 +189,7 @@ class SlaveLoop(RigLoop):
         self.lab.heard_ns = now
 
     def _finding(self, tick: int) -> tuple[WatchdogFinding, str]:
-        """What the watchdog says of the master."""
+        """The watchdog's finding on the master."""
         judged = self._commands.judged(self._command)
         return self._watchdog.look(tick, judged.seq, judged.heard_seq), MASTER
 
@@ -251,7 +251,7 @@ class SlaveLoop(RigLoop):
     # -- end --------------------------------------------------------------------------------------
 
     def stop(self, reason: str) -> None:
-        """Stop because somebody at this laboratory wants it so."""
+        """Stop on request of an operator of this laboratory."""
         self.lab.fail(Event.TRIP, InterlockError(reason), code="stop", tick=self.ticks)
 
     def disarm(self) -> None:
@@ -286,7 +286,7 @@ class SlaveLoop(RigLoop):
 
     @property
     def left(self) -> bool:
-        """Whether the recorder has all."""
+        """Whether the recorder has all samples."""
         lab = self.lab
         nothing = not lab.exchange.session or not lab.recorded
         return lab.exchange.ended and (nothing or lab.recorder_has_all())
@@ -303,7 +303,7 @@ class SlaveLoop(RigLoop):
 
     @property
     def others_rest(self) -> float:
-        """Nobody comes to rest behind a slave."""
+        """Whether the other laboratories are at rest: a slave waits for none."""
         return 0.0
 
     @property
@@ -327,7 +327,7 @@ class SlaveLoop(RigLoop):
         return self.tick_ns(tick - 1)
 
     def latest(self, tick: int) -> int:
-        """For the command of a tick it is waited until then, ns."""
+        """Until when a tick waits for its command, ns."""
         return self.tick_ns(tick) + self._wait_ns
 
     def heard(self, tick: int) -> bool:
@@ -335,5 +335,5 @@ class SlaveLoop(RigLoop):
         return self._commands.newest_seen >= tick
 
     def finish(self) -> None:
-        """All ticks are done: the rig comes to rest, whether the master says so in time or not."""
+        """Bring the rig to rest after the last tick, whether or not the master's message of the end comes in time."""
         self.lab.safety.follow(Turn.END)

@@ -1,4 +1,4 @@
-"""Whether the whole simulated loop is stable: what it does after one pulse of the ground.
+"""Whether the whole simulated loop is stable, judged by its free motion after one pulse of the ground.
 
 Everything takes part that is in the test: integration, both laboratories, compensators, the damper's control. Sensors
 are free of noise and the pulse is small, so that a specimen keeps its first stiffness.

@@ -1,4 +1,4 @@
-"""The quantities that a plan limits, as a simulation or a recording has them."""
+"""The quantities that a plan limits, computed from the signals of a simulation or a recording."""
 
 from __future__ import annotations
 

@@ -3,8 +3,8 @@
     M = M_N + Σ m_e·1_s·1_sᵀ,    C = C_N + Σ c_e·e·eᵀ,    K = K_N + Σ k_e·e·eᵀ
 
 with the whole building's matrices on the left and one term for every laboratory that follows a drift: e the drift of
-its storey as a row over the floors and 1_s the floor above it. What a specimen really is, as the building feels it,
-says its kind; of a column stiffness, dashpot and mass count `represents` times the deformation ratio.
+its storey as a row over the floors and 1_s the floor above it. The kind says what the building feels of its
+specimen: stiffness, dashpot and mass of a column count `represents` times the deformation ratio.
 """
 
 from __future__ import annotations

@@ -74,7 +74,7 @@ def path_at(plan: Plan, frequency: float, role: str = MASTER) -> TransferPath:
 
 
 def watched(plan: Plan, frequency: float) -> float:
-    """Time (s) after a pulse in which a stable path comes to rest and an unstable one is seen to grow."""
+    """Time (s) of watching after a pulse: a stable path comes to rest within it, and an unstable one grows visibly."""
     actuator = plan.actuator
     own = actuator.delay + actuator.time_constant
     if actuator.model == "servo_hydraulic":

@@ -1,4 +1,4 @@
-"""The whole building under the ground, nothing of it in a laboratory: what a hybrid test should find."""
+"""The response of the whole building, with no part in a laboratory: what an ideal hybrid test would measure."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from models.registry import Array
 
 
 class WholeBuilding(NamedTuple):
-    """The whole building with its memories, which `march` moves on."""
+    """The state of the whole building, which `march` advances."""
 
     code: int  # of the integrator
     coefficients: Array  # of the integrator
