@@ -96,6 +96,11 @@ def key(
     return dataclasses.field(default=default, metadata=metadata)
 
 
+def inner(table: type[Any]) -> Any:
+    """Field of a plan's table that is a table of its own, at its defaults where the plan does not give it."""
+    return dataclasses.field(default_factory=table, metadata={"table": table, "more": False})
+
+
 def nearest(word: str, known: Iterable[str]) -> str:
     """A hint that names the known word nearest to `word`, or lists all of them."""
     names = sorted(known)

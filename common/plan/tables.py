@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from common.plan.schema import NAME, Storeys, StoreysOrMatrix, key
+from common.plan.schema import NAME, Storeys, StoreysOrMatrix, inner, key
 
 
 @dataclass(frozen=True)
@@ -81,9 +81,7 @@ class Structure:
     )
     integrator: str = key("integration method", default="newmark_explicit")
     rho_infinity: float = key("KR-α: spectral radius at infinity", default=0.5, least=0.0, most=1.0)
-    columns: NumericalColumnsTable = field(
-        default_factory=NumericalColumnsTable, metadata={"table": NumericalColumnsTable, "more": False}
-    )
+    columns: NumericalColumnsTable = inner(NumericalColumnsTable)
     experimental: Experimental | None = field(default=None, metadata={"table": Experimental, "more": False})
 
 
@@ -142,9 +140,7 @@ class Actuator:
         default="ramp",
         choices=("ramp", "held"),
     )
-    servo: ServoHydraulics = field(
-        default_factory=ServoHydraulics, metadata={"table": ServoHydraulics, "more": False}
-    )
+    servo: ServoHydraulics = inner(ServoHydraulics)
 
 
 PAPER_COMPENSATOR = {"lead": 0.044, "proportional": 1.93, "integral": 0.047, "derivative": 0.0}
@@ -169,9 +165,7 @@ class CompensatorTable:
 
     kind: str = key("name of a compensator", default="pid_taylor")
     parameters: dict[str, float] = key("its parameters", default=PAPER_COMPENSATOR, more=True)
-    force: ForceCorrection = field(
-        default_factory=ForceCorrection, metadata={"table": ForceCorrection, "more": False}
-    )
+    force: ForceCorrection = inner(ForceCorrection)
 
 
 @dataclass(frozen=True)
@@ -191,9 +185,7 @@ class ShakingTable:
     )
     damping_ratio: float = key("damping ratio", default=0.7, unit="", above=0.0)
     delay: float = key("dead time", default=0.004, unit="s", least=0.0, most=1.0)
-    compensator: TableCompensator = field(
-        default_factory=TableCompensator, metadata={"table": TableCompensator, "more": False}
-    )
+    compensator: TableCompensator = inner(TableCompensator)
 
 
 @dataclass(frozen=True)
@@ -252,7 +244,7 @@ class Link:
     wait_share: float = key(
         "share of the interval a message is waited for", default=0.75, above=0.0, most=0.95
     )
-    security: Security = field(default_factory=Security, metadata={"table": Security, "more": False})
+    security: Security = inner(Security)
 
 
 @dataclass(frozen=True)
@@ -319,80 +311,51 @@ class Preflight:
     readings: int = key("readings by which the sensors are judged", default=50, least=2, most=100_000)
 
 
+def limit(text: str, default: float, unit: str = "", *, infinite: bool = False) -> Any:
+    """Field of a limit, which is above 0, and inf for none where it may be `infinite`."""
+    return key(text, default=default, unit=unit, above=0.0, infinite=infinite)
+
+
 @dataclass(frozen=True)
 class Limits:
     """Largest magnitudes; beyond one of them the test is stopped."""
 
-    displacement: float = key("storey displacement", default=0.15, unit="m", above=0.0)
-    velocity: float = key("storey velocity", default=1.0, unit="m/s", above=0.0, infinite=True)
-    acceleration: float = key("storey acceleration", default=30.0, unit="m/s²", above=0.0, infinite=True)
-    actuator_command: float = key("actuator command", default=0.05, unit="m", above=0.0)
-    actuator_velocity: float = key(
-        "speed of the actuator command", default=0.5, unit="m/s", above=0.0, infinite=True
+    displacement: float = limit("storey displacement", 0.15, "m")
+    velocity: float = limit("storey velocity", 1.0, "m/s", infinite=True)
+    acceleration: float = limit("storey acceleration", 30.0, "m/s²", infinite=True)
+    actuator_command: float = limit("actuator command", 0.05, "m")
+    actuator_velocity: float = limit("speed of the actuator command", 0.5, "m/s", infinite=True)
+    actuator_acceleration: float = limit(
+        "acceleration of the actuator command, its noise included", 500.0, "m/s²", infinite=True
     )
-    actuator_acceleration: float = key(
-        "acceleration of the actuator command, its noise included",
-        default=500.0,
-        unit="m/s²",
-        above=0.0,
-        infinite=True,
+    actuator_step: float = limit(
+        "change of the actuator command within one interval", 0.005, "m", infinite=True
     )
-    actuator_step: float = key(
-        "change of the actuator command within one interval",
-        default=0.005,
-        unit="m",
-        above=0.0,
-        infinite=True,
+    column_displacement: float = limit("specimen deformation", 0.03, "m")
+    column_error: float = limit(
+        "specimen deformation beside its target, for three intervals", 0.01, "m", infinite=True
     )
-    column_displacement: float = key("specimen deformation", default=0.03, unit="m", above=0.0)
-    column_error: float = key(
-        "specimen deformation beside its target, for three intervals",
-        default=0.01,
-        unit="m",
-        above=0.0,
-        infinite=True,
+    column_force: float = limit("specimen force", 400e3, "N")
+    table_target: float = limit("table target", 0.40, "m")
+    table_target_velocity: float = limit("velocity of the table target", 1.5, "m/s", infinite=True)
+    table_target_acceleration: float = limit("acceleration of the table target", 30.0, "m/s²", infinite=True)
+    table_command: float = limit("table command", 0.40, "m")
+    table_velocity: float = limit("speed of the table command", 1.5, "m/s", infinite=True)
+    table_step: float = limit("change of the table command within one interval", 0.01, "m", infinite=True)
+    table_error: float = limit(
+        "table displacement beside its target, for three intervals", 0.02, "m", infinite=True
     )
-    column_force: float = key("specimen force", default=400e3, unit="N", above=0.0)
-    table_target: float = key("table target", default=0.40, unit="m", above=0.0)
-    table_target_velocity: float = key(
-        "velocity of the table target", default=1.5, unit="m/s", above=0.0, infinite=True
+    damper_step: float = limit("change of the motor force within one interval", 200.0, "N", infinite=True)
+    damper_command: float = limit("motor force", 1000.0, "N")
+    table_displacement: float = limit("table displacement", 0.40, "m")
+    table_acceleration: float = limit("table acceleration", 30.0, "m/s²")
+    damper_stroke: float = limit("damper stroke", 0.40, "m")
+    damper_force: float = limit("damper force", 1000.0, "N")
+    numerical_drift: float = limit(
+        "energy that the integration makes or loses, over the energy put in", 0.1, infinite=True
     )
-    table_target_acceleration: float = key(
-        "acceleration of the table target", default=30.0, unit="m/s²", above=0.0, infinite=True
-    )
-    table_command: float = key("table command", default=0.40, unit="m", above=0.0)
-    table_velocity: float = key(
-        "speed of the table command", default=1.5, unit="m/s", above=0.0, infinite=True
-    )
-    table_step: float = key(
-        "change of the table command within one interval", default=0.01, unit="m", above=0.0, infinite=True
-    )
-    table_error: float = key(
-        "table displacement beside its target, for three intervals",
-        default=0.02,
-        unit="m",
-        above=0.0,
-        infinite=True,
-    )
-    damper_step: float = key(
-        "change of the motor force within one interval", default=200.0, unit="N", above=0.0, infinite=True
-    )
-    damper_command: float = key("motor force", default=1000.0, unit="N", above=0.0)
-    table_displacement: float = key("table displacement", default=0.40, unit="m", above=0.0)
-    table_acceleration: float = key("table acceleration", default=30.0, unit="m/s²", above=0.0)
-    damper_stroke: float = key("damper stroke", default=0.40, unit="m", above=0.0)
-    damper_force: float = key("damper force", default=1000.0, unit="N", above=0.0)
-    numerical_drift: float = key(
-        "energy that the integration makes or loses, over the energy put in",
-        default=0.1,
-        above=0.0,
-        infinite=True,
-    )
-    error_energy: float = key(
-        "energy of the interface's displacement error, over the energy put in",
-        default=1.0,
-        above=0.0,
-        infinite=True,
+    error_energy: float = limit(
+        "energy of the interface's displacement error, over the energy put in", 1.0, infinite=True
     )
 
 
@@ -425,9 +388,7 @@ class DeviceTable:
     place: int = key("storey whose drift, or floor whose motion, the device follows", default=1, least=1)
     ratio: float = key("target of the device over that motion", default=1.0, above=0.0)
     scale: float = key("force on the building over force in the laboratory", default=1.0)
-    compensator: TableCompensator = field(
-        default_factory=TableCompensator, metadata={"table": TableCompensator, "more": False}
-    )
+    compensator: TableCompensator = inner(TableCompensator)
     parameters: dict[str, Any] = key("nominal parameters in place of those of the class", default={})
     limits: dict[str, Any] = key("limits in place of those of the class", default={})
     noise: dict[str, Any] = key("rms noise of readings in place of that of the class", default={})
@@ -440,7 +401,7 @@ class LaboratoryTable:
     The slave without a name has the plan's own tables: of the master's kind it is a twin of the master's laboratory.
     """
 
-    rig: RigTable = field(default_factory=RigTable, metadata={"table": RigTable, "more": False})
+    rig: RigTable = inner(RigTable)
     kind: str = key(
         "kind of laboratory: column, table, none, or 'file.py:Class' of one's own; empty: a master's is column, a "
         "slave's table",
