@@ -50,7 +50,7 @@ def test_a_late_force_is_seen_by_its_own_indicator_only(played: Played) -> None:
         assert without is not None
         assert with_it is not None
         assert with_it.j2 < 1.1 * without.j2
-        assert with_it.j4 == pytest.approx(published, abs=0.003)
+        assert with_it.j4 == pytest.approx(published, abs=0.006)  # there of 8 ticks, 1.95 ms
 
 
 def test_no_compensation_is_unstable_and_amb_is_not(played: Played) -> None:
@@ -75,8 +75,8 @@ def test_the_goals_are_all_judged_and_met(played: Played) -> None:
 
 def test_of_all_settings_one_at_least_must_reach_the_goals(played: Played) -> None:
     assert compensator_check(played.evidence.summaries).passed
-    assert compensator_check(played.evidence.summaries).value == "amb"
-    others = [item for item in played.evidence.summaries if item.setting != "amb"]
+    assert compensator_check(played.evidence.summaries).value == "amb, ats"
+    others = [item for item in played.evidence.summaries if not item.meets]
     assert not compensator_check(others).passed
     for worse in (
         {"unstable": 1},
