@@ -15,6 +15,7 @@ from common.errors import InputError, InterlockError, RigError, RthsError
 from common.host.clock import Clock, MonotonicClock, VirtualClock, unix_ns
 from common.plan.kinds import COLUMN, TABLE
 from common.plan.limits import LimitViolation
+from common.plan.patience import strict
 from common.plan.plan import Plan
 from common.plan.reality import Reality
 from common.recording.reader import CLOCK
@@ -148,8 +149,8 @@ def chosen(plan: Plan, kind: Kind, order: Order) -> Programme:
 
 
 def reach(plan: Plan, kind: Kind) -> Reach:
-    """How far and how fast the target of a kind may go in a bench test, by its limits."""
-    limits, channels, limited = kind.limits(plan), kind.channels, kind.limited
+    """How far and how fast the target of a kind may go in a bench test, by the limits that hold beside a rig."""
+    limits, channels, limited = kind.limits(strict(plan)), kind.channels, kind.limited
     ways = (channels.target.name, channels.command.name, channels.position)
     way = min(limits.get(name, math.inf) for name in ways)
     shares = (

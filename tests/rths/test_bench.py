@@ -9,9 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from common.plan.patience import strict
+from common.plan.read import load
 from common.recording.reader import read
+from laboratories.kinds import kind_of
+from simulation.benches import reach
 from tests.helpers import ROOT
-from tests.rths.test_commands import call  # noqa: F401  the fixture
 
 NOMINAL: dict[str, dict[str, tuple[float, float]]] = {
     "column": {"elastic_stiffness": (12.5e6, 0.01)},
@@ -31,7 +34,7 @@ NOMINAL: dict[str, dict[str, tuple[float, float]]] = {
 @pytest.mark.parametrize("part", NOMINAL)
 def test_what_the_plan_says_is_identified_from_the_bench_recording(
     part: str,
-    call: Any,  # noqa: F811
+    call: Any,
     capsys: Any,
     tmp_path: Path,
 ) -> None:
@@ -58,7 +61,7 @@ def test_what_the_plan_says_is_identified_from_the_bench_recording(
 
 
 def test_a_reality_shows_in_the_bench_recording_but_not_its_name(
-    call: Any,  # noqa: F811
+    call: Any,
     capsys: Any,
     tmp_path: Path,
 ) -> None:
@@ -74,7 +77,7 @@ def test_a_reality_shows_in_the_bench_recording_but_not_its_name(
 
 
 def test_a_limit_stops_a_bench_test_and_the_recording_stays(
-    call: Any,  # noqa: F811
+    call: Any,
     capsys: Any,
     tmp_path: Path,
 ) -> None:
@@ -90,7 +93,7 @@ def test_a_limit_stops_a_bench_test_and_the_recording_stays(
 
 
 @pytest.mark.slow
-def test_in_real_time_it_gives_the_same_numbers(call: Any, tmp_path: Path) -> None:  # noqa: F811
+def test_in_real_time_it_gives_the_same_numbers(call: Any, tmp_path: Path) -> None:
     runs = []
     for clock in ("--virtual", "--real-time"):
         path = tmp_path / f"{clock}.mcap"
@@ -103,7 +106,7 @@ def test_in_real_time_it_gives_the_same_numbers(call: Any, tmp_path: Path) -> No
 
 
 def test_wrong_wishes_get_a_sentence(
-    call: Any,  # noqa: F811
+    call: Any,
     capsys: Any,
     tmp_path: Path,
     virtual_recording: Path,
@@ -122,7 +125,7 @@ def test_wrong_wishes_get_a_sentence(
 
 @pytest.mark.slow
 def test_a_plug_in_laboratory_goes_through_the_same_bench_test(
-    call: Any,  # noqa: F811
+    call: Any,
     capsys: Any,
     tmp_path: Path,
 ) -> None:
@@ -132,7 +135,7 @@ def test_a_plug_in_laboratory_goes_through_the_same_bench_test(
 
 @pytest.mark.slow
 def test_a_hysteretic_model_is_fitted_to_the_realistic_column(
-    call: Any,  # noqa: F811
+    call: Any,
     capsys: Any,
     tmp_path: Path,
 ) -> None:
@@ -147,3 +150,14 @@ def test_a_hysteretic_model_is_fitted_to_the_realistic_column(
     assert cycles["cycles"][-1]["stiffness"] < 0.5 * cycles["cycles"][0]["stiffness"]
     assert call("identify", path, "--fit", "clugh") == 2
     assert "did you mean clough?" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("file", "role"), [("two_columns", "slave.east"), ("viscous_damper.toml", "slave")])
+def test_a_bench_test_goes_as_far_as_beside_a_rig(file: str, role: str) -> None:
+    plan = load(
+        ROOT / ("examples" if file.endswith(".toml") else "rths/plans") / Path(file).with_suffix(".toml")
+    )
+    assert plan.eased
+    kind = kind_of(plan, role)
+    assert reach(plan.of(role), kind) == reach(strict(plan).of(role), kind)
+    assert reach(plan, kind).velocity == 0.5 * kind.limits(strict(plan))[kind.limited.velocity]
