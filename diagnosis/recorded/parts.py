@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
@@ -42,11 +42,14 @@ class Nuisance:
     parameter: str  # table.name of the plan
     tolerance: float
     lab: RecordedLaboratory | None = None
+    storey: int = field(default=0, kw_only=True)  # whose value alone moves, from 1; 0: all
     of_record = False  # whether it says something of the recording alone, and nothing of the test
 
     @property
     def name(self) -> str:
-        """The name in reports: part.parameter."""
+        """The name in reports: part.parameter, and of one storey alone which."""
+        if self.storey:
+            return f"{self.parameter} of storey {self.storey}"
         return self.lab.site(self.parameter) if self.lab else self.parameter
 
     def moved(self, system: System, z: float) -> System:
@@ -57,7 +60,11 @@ class Nuisance:
         if self.lab:
             return self.lab.kind.scaled(system, self.parameter, factor)
         table, _, key = self.parameter.partition(".")
-        return system.scaled(table, key, factor)
+        if not self.storey:
+            return system.scaled(table, key, factor)
+        values = getattr(getattr(system.plan, table), key)
+        place = self.storey - 1
+        return system.moved(table, **{key: (*values[:place], factor * values[place], *values[self.storey :])})
 
 
 @dataclass(frozen=True)
@@ -137,13 +144,24 @@ def nuisances(lab: RecordedLaboratory, names: tuple[str, ...]) -> tuple[Nuisance
 
 
 def of_building(plan: Plan) -> tuple[Nuisance, ...]:
-    """Those of the building's parameters that can move."""
+    """Those of the building's parameters that can move; each storey's by itself, as far as it has one of its own."""
     known, result = plan.tolerances, []
     for key in ("mass", "stiffness", "damping", "damping_ratio"):
-        tolerance = known.parameters.get(f"structure.{key}", known.default)
-        if movable(getattr(plan.structure, key), tolerance):
-            result.append(Nuisance(f"structure.{key}", tolerance))
+        name, values = f"structure.{key}", getattr(plan.structure, key)
+        tolerance = known.parameters.get(name, known.default)
+        if movable(values, tolerance):
+            storeys = range(1, len(values) + 1) if apart(plan, values) else (0,)
+            result += [Nuisance(name, tolerance, storey=storey) for storey in storeys]
     return tuple(result)
+
+
+def apart(plan: Plan, values: Any) -> bool:
+    """Whether a parameter of the building has values of several storeys that may be wrong one by one.
+
+    Those of a matrix are not: it stays symmetric. What `[structure.experimental]` takes over belongs to all of them.
+    """
+    several = isinstance(values, tuple) and len(values) > 1 and not isinstance(values[0], tuple)
+    return several and plan.structure.experimental is None
 
 
 def movable(value: Any, tolerance: float) -> bool:

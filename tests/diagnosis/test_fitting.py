@@ -12,12 +12,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from common.plan import read as plans
 from common.plan.plan import Plan
 from common.recording.reader import read
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data, Fit
 from diagnosis.recorded import record
-from diagnosis.recorded.parts import MODEL_ERROR, Building, LaboratoryPart, Part
+from diagnosis.recorded.parts import MODEL_ERROR, Building, LaboratoryPart, Part, of_building
 from diagnosis.recorded.record import Record
 from laboratories.effects import CATALOGUE
 from models.registry import Array
@@ -209,3 +210,21 @@ def test_withheld_time_is_in_blocks_of_a_second(cases: Cases) -> None:
     seconds = data.train[: 10 * 125].reshape(10, 125)
     assert all(block.all() or not block.any() for block in seconds)
     assert [bool(block[0]) for block in seconds] == [True, True, False, True, False] * 2
+
+
+def test_each_storey_of_the_building_may_be_off_by_itself() -> None:
+    text = "[structure]\nmass = [1e5, 2e5]\nstiffness = [3e7, 2e7]\ndamping_ratio = 0.05\n"
+    plan = plans.parse(text, Path())
+    found = {item.name: item for item in of_building(plan)}
+    assert list(found) == [
+        *(f"structure.{key} of storey {storey}" for key in ("mass", "stiffness") for storey in (1, 2)),
+        "structure.damping_ratio",
+    ]
+    moved = found["structure.stiffness of storey 2"].moved(System(plan), 0.5).plan.structure
+    assert moved.stiffness == pytest.approx((3e7, 2e7 * 1.01))
+    assert moved.mass == plan.structure.mass
+    assert [item.name for item in of_building(Plan())] == [
+        "structure.mass",
+        "structure.stiffness",
+        "structure.damping",
+    ]
