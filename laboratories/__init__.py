@@ -1,1 +1,1 @@
-"""Kinds of laboratory: what is known of each stands in its own folder."""
+"""Kinds of laboratory, each described in a folder of its own, with their effects, limits and identification."""

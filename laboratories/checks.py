@@ -1,7 +1,7 @@
 """The checks of a tick in one compiled call: limits of values and changes, errors that last, frozen sensors.
 
 NaN is beyond any limit, and nothing else is beyond an infinite one. What changes and repeats is compared with what the
-ticks before have left in the arrays, so that every tick has to be looked at once.
+ticks before have left in the arrays, so that every tick must be checked exactly once.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Checks(NamedTuple):
 
 
 def sensors(noise: Array, reach: Array) -> Array:
-    """Sensors that have shown nothing yet; their nominal rms `noise`, and how far a command must move each to tell."""
+    """Sensors without a reading yet, with their nominal rms `noise` and how far a command must move to judge each."""
     found = np.zeros((noise.size, 8))
     found[:, NOISE], found[:, REACH] = noise, reach
     found[:, FINEST] = np.where(noise > 0.0, np.inf, -np.inf)
@@ -66,7 +66,7 @@ def enter(checks: tuple[Any, ...], target: float) -> int:
 
 @jit
 def look(checks: Checks, target: float) -> int:
-    """The place of the first value of a tick beyond its limit, a frozen sensor's behind all of them, FINE for none.
+    """Where the first value of a tick is that exceeds its limit, or behind all values a frozen sensor; FINE for none.
 
     `target` (m) is what the measured position should be.
     """
@@ -142,7 +142,7 @@ def still(checks: Checks) -> int:
 
 @jit
 def compare_readings(checks: Checks, part: int) -> None:
-    """Take note of the finest step that each sensor of a part has shown, and of its present run of equal readings."""
+    """Keep the finest step that each sensor of a part has shown, and count its present run of equal readings."""
     alone = True
     for sensor in range(checks.sensors.shape[0]):
         state, read = checks.sensors[sensor], checks.watched[sensor]

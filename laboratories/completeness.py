@@ -1,4 +1,4 @@
-"""Whether a class of a user's is a complete kind of laboratory: what is wrong with it, in one sentence, and its kernel.
+"""Checks whether a class of a user's is a complete kind of laboratory, and compiles its kernel.
 
 The kernel is tried on its nominal parameters before a plan may use it: between numbers that it must not touch, since
 compiled code that writes beside its arrays would otherwise end the process or falsify others without a word.
@@ -59,7 +59,7 @@ def complaint(kind: Device) -> str:
 
 
 def of_names(kind: Device) -> str:
-    """The names of signals, parameters and faults."""
+    """Complaint about the names of signals, parameters and faults."""
     channels = kind.channels
     signals = [channels.target.name, *channels.drives, *channels.names]
     for name in (kind.name, *signals, *kind.nominal, *kind.faults):
@@ -73,7 +73,7 @@ def of_names(kind: Device) -> str:
 
 
 def of_channels(kind: Device) -> str:
-    """How many are measured, and which are the position and the force."""
+    """Complaint about the count of measured channels, or about which are the position and the force."""
     names = kind.channels.names
     if not 1 <= len(names) <= MOST_CHANNELS:
         return f"measures {len(names)} channels, but must measure 1 to {MOST_CHANNELS}"
@@ -85,7 +85,7 @@ def of_channels(kind: Device) -> str:
 
 
 def of_tables(kind: Device) -> str:
-    """Nominal parameters, noise, limits and faults, and the names in which one refers to another."""
+    """Complaint about nominal parameters, noise, limits and faults, or about names with which one refers to another."""
     channels = kind.channels
     limits = (*(name for name in (*kind.limited,) if name), channels.target.name, *channels.drives)
     for table, known in (("rms", channels.names), ("most", (*channels.names, *limits))):
@@ -170,7 +170,7 @@ def driven(step: Any, parameters: Array, state: Array, truth: Array, reach: floa
 
 
 def of_truth(kind: Device, truth: Array) -> str:
-    """Which channel a trial has left without a finite number."""
+    """Complaint about a channel that a trial has left without a finite number."""
     for place_, name in enumerate(kind.channels.names):
         if not math.isfinite(truth[place_]):
             return f"gives {name} (truth[{place_}]) no finite number under a sine of 1 mm with the nominal parameters"
@@ -178,6 +178,6 @@ def of_truth(kind: Device, truth: Array) -> str:
 
 
 def padded(values: Iterable[float]) -> Array:
-    """The values between numbers that are none, so that a kernel which reads them shows it."""
+    """The values between NaN, so that a kernel which reads beside its arrays gives NaN."""
     beside = [math.nan] * BESIDE
     return np.array([*beside, *values, *beside])

@@ -1,4 +1,4 @@
-"""The way to rest of a laboratory that deforms something: to a hold, then the specimen is unloaded."""
+"""The ramp to rest of a laboratory that deforms a specimen: to a hold, then the specimen is unloaded."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ class HoldRamp:
     Args:
         plan: of the role that hosts the laboratory; it says whether the specimen is unloaded behind the hold.
         last: the last commands written, the displacement first.
-        before: those before.
+        before: the commands one interval earlier.
         force: place of the specimen's force among the measured channels.
         moved: what moves, in a word.
         tested: what carries the force, in a word.
@@ -45,11 +45,11 @@ class HoldRamp:
 
     @property
     def left(self) -> float:
-        """How long it takes at most from here on, s."""
+        """The longest remaining time, s."""
         return self._motion.left
 
     def doing(self, measured: tuple[float, ...] | None) -> str:
-        """What it does, in words, with the force that the specimen still carries."""
+        """The present phase in words, with the force that the specimen still carries."""
         force = "unknown force" if measured is None else f"{abs(measured[self._force]) * 1e-3:.1f} kN"
         if self._motion.unloading:
             return f"unloading the {self._tested}: {force} left"
@@ -57,5 +57,5 @@ class HoldRamp:
 
     @property
     def travel(self) -> float:
-        """How far apart the commands have been, m."""
+        """The distance between the largest and the smallest command, m."""
         return self._motion.travel

@@ -1,6 +1,6 @@
 """A kind of laboratory of the user's own: a class in a file, from which all else follows.
 
-The class names its channels, its nominal parameters, what may go wrong with it, and what moves it on. A plan chooses it
+The class gives its channels, its nominal parameters, its possible faults and its kernel. A plan chooses it
 by `kind = "file.py:Class"`, and its table `[device]` says where the device stands in the building.
 """
 
@@ -59,7 +59,7 @@ class Nominal(NamedTuple):
 
 
 class Fault(NamedTuple):
-    """What may go wrong with a device and that no plan describes: an effect of the catalogue with one parameter.
+    """A fault that a device may have and no plan describes: an effect of the catalogue with one parameter.
 
     The fault `leak` is the effect `device.leak`, which a reality can hide and a diagnosis can name.
     """
@@ -74,7 +74,7 @@ class Fault(NamedTuple):
     reference: str = "the user's own kind"
 
     def effect(self, name: str) -> Effect:
-        """The effect of the catalogue that sets it."""
+        """The effect of the catalogue that gives a device this fault."""
         # the catalogue loads the files of the shipped kinds, which need this module's room
         from laboratories.effects.effect import Effect, Parameter
 
@@ -132,7 +132,7 @@ class Device(Kind):
     step: Callable[[Array, Array, Array, float, float], None]
 
     def __init_subclass__(cls) -> None:
-        """A reading that has noise never stays the same: where it does while the device moves, its sensor is frozen.
+        """Complete the class: channels with noise are watched for sensors that repeat a value while it moves.
 
         Pictures show its force over its position.
         """
@@ -163,7 +163,7 @@ class Device(Kind):
         return self.values(plan)[name.partition(".")[2]]
 
     def tolerance(self, plan: Plan, name: str) -> float:
-        """As the class says it."""
+        """The tolerance that the class gives to a nominal parameter."""
         return self.nominal[name.partition(".")[2]].tolerance
 
     def scaled(self, system: System, name: str, factor: float) -> System:
@@ -223,7 +223,7 @@ class Device(Kind):
         )
 
     def compensator(self, plan: Plan) -> Chosen:
-        """That of `[device.compensator]`."""
+        """The compensator of `[device.compensator]`."""
         chosen = plan.device.compensator
         return Chosen(chosen.kind, chosen.parameters, "device.compensator")
 
@@ -250,7 +250,7 @@ class Device(Kind):
         return dict(self.most) | free | self._given(plan.device.limits, units, "device.limits")
 
     def ramp(self, plan: Plan, last: tuple[float, ...], before: tuple[float, ...]) -> Ramp:
-        """The command comes to a hold, then the device is unloaded."""
+        """The ramp on which the command comes to a hold and then the device is unloaded."""
         force = self.channels.names.index(self.channels.force)
         rest = (0.0,) if self.channels.effort else ()
         return HoldRamp(plan, last, before, force, "device", "device", rest)

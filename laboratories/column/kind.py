@@ -89,7 +89,7 @@ class ColumnKind(Kind):
         return model.enter(lab, command)
 
     def coupling(self, plan: Plan) -> Coupling:
-        """The specimen's storey; its force resists the drift, `represents` times."""
+        """The storey of the specimen, whose force resists the drift `represents` times."""
         column = plan.column
         felt = column.deformation_ratio * column.represents
         return Coupling(
@@ -106,11 +106,11 @@ class ColumnKind(Kind):
         )
 
     def compensator(self, plan: Plan) -> Chosen:
-        """That of `[compensator]`."""
+        """The compensator of `[compensator]`."""
         return Chosen(plan.compensator.kind, plan.compensator.parameters, "compensator")
 
     def ramp(self, plan: Plan, last: tuple[float, ...], before: tuple[float, ...]) -> HoldRamp:
-        """The actuator comes to a hold, then unloads the specimen."""
+        """The ramp on which the actuator comes to a hold and then unloads the specimen."""
         force = self.channels.names.index(self.channels.force)
         return HoldRamp(plan, last, before, force, "actuator", "column")
 

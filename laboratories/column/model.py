@@ -35,7 +35,7 @@ PRESENT, VELOCITY_LIMIT, BACKLASH, COMPLIANCE, DEADBAND, GAIN, STIFFNESS, HELD, 
 
 
 class ColumnLab(NamedTuple):
-    """The laboratory with its memories, which `advance` moves on."""
+    """The state and constants of the laboratory, which `advance` moves on by one interval."""
 
     taps: Array  # of the delayed command
     rows: Array  # of the actuator's propagation
@@ -53,7 +53,7 @@ def build(
     actuator_effects: ActuatorEffects | None = None,
     column_effects: ColumnEffects | None = None,
 ) -> ColumnLab:
-    """Laboratory at rest with the nominal or true parameters given, and what is laid over them.
+    """The laboratory at rest, with the system's parameters and the effects laid over them.
 
     Raises:
         InputError: the specimen cannot be, or servo-hydraulics have an effect that they cannot have.

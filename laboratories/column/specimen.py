@@ -30,7 +30,7 @@ DEGRADED_AT = 2e-3  # m, deformation at which most of the loss of a degrading co
 
 
 class Specimen(NamedTuple):
-    """The specimen with its memories, which `force` moves on."""
+    """The state and constants of the specimen, which `force` moves on."""
 
     code: int  # of the plan's model
     params: Array

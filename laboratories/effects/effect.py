@@ -1,4 +1,4 @@
-"""What an entry of the catalogue says of itself."""
+"""An entry of the catalogue of effects: its parameters, and the properties that others ask it for."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Parameter:
 
     @property
     def default(self) -> float | None:
-        """Its value where it is not given, None where it must be."""
+        """The value of a parameter that is not given; None where it must be given."""
         return self.null if self.shape else None
 
 
@@ -49,7 +49,7 @@ class Contact:
 
 
 def no_starts(_plan: Plan) -> tuple[float, ...]:
-    """No sizes of its own for any plan."""
+    """The default of `starts`: no plan needs other sizes."""
     return ()
 
 
@@ -82,7 +82,7 @@ class Effect:
         return f"sensor: {self.fault}" if self.signal else self.name
 
     def fits(self, plan: Plan) -> bool:
-        """Whether what the plan describes can have it."""
+        """Whether the laboratory that the plan describes can have the effect."""
         return not self.actuators or plan.actuator.model in self.actuators
 
     def values(self, given: Mapping[str, float]) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""What all friction of the catalogue shares: the velocity below which it falls off."""
+"""Constants of all friction in the catalogue: the velocity below which it falls off."""
 
 from __future__ import annotations
 

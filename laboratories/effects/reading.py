@@ -82,7 +82,7 @@ def sized(size: float, *shares: float) -> tuple[float, ...]:
 
 
 def falsified(system: System, *, signal: str, fault: str, **parameter: float) -> System:
-    """The system with the one parameter of an effect on a reading; a true reading leaves no trace."""
+    """The system with the one parameter of an effect on a reading; a true reading leaves it unchanged."""
     (value,) = parameter.values()
     changed = system.sensed(signal, **{fault: value})
     before = system.effects.sensors.get(signal, SensorEffects())

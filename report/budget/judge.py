@@ -50,7 +50,7 @@ def excused(check: BudgetCheck, *, unfit: bool) -> BudgetCheck:
 
 
 def silence(item: ExchangeTicks) -> BudgetCheck:
-    """The check that a slave without a row of latency fails: no tick may be without where all are."""
+    """The check that a slave without any row of latency fails: it allows no tick without one."""
     ticks = float(item.ticks)
     return BudgetCheck(item.label("ticks without latency"), "ticks", ticks, None, 0.0, 0.0, OVER)
 
@@ -61,7 +61,7 @@ def limited(budget: Budget) -> list[str]:
 
 
 def unfitness(found: Figures, machine: MachineLimits) -> list[str]:
-    """Why nothing over its limit is judged, a sentence each; none where the machine is fit."""
+    """A sentence for each reason not to judge values over their limits; none where the machine is fit."""
     said = [
         f"The host took {percent(share, 1)} of the processors' time of the {lab}: "
         f"beyond {percent(machine.stolen_share, 1)} nothing over its limit is judged."
@@ -92,7 +92,7 @@ def late_share(found: Figures) -> float:
 
 
 def remarks(found: Figures, budget: Budget, checks: list[BudgetCheck]) -> list[str]:
-    """What was not judged, or judged with less data than the budget assumes, a sentence each."""
+    """A sentence for each limit that was not judged, or judged with less data than the budget assumes."""
     said = []
     if gone := [name for item in found.exchanges if not item.silent for name in absent(item, budget)]:
         said.append(f"The recording has no value of {', '.join(gone)}: not judged.")
@@ -104,7 +104,7 @@ def remarks(found: Figures, budget: Budget, checks: list[BudgetCheck]) -> list[s
 
 
 def absent(item: ExchangeTicks, budget: Budget) -> list[str]:
-    """What the budget limits and no tick has a value of."""
+    """Names of what the budget limits but no tick has a value for."""
     late = budget.late
     names = [name for name in budget.segments if name not in item.segments]
     if item.late is None and np.isfinite(min(late.share, late.longest_gap)):

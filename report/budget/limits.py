@@ -48,7 +48,7 @@ class LateLimits:
 
 @dataclass(frozen=True)
 class MachineLimits:
-    """What is attributed to the machine, not to the test."""
+    """Limits beyond which lateness is attributed to the machine and not to the test."""
 
     lateness: float = key("most that the bare loop adds to a limit", default=0.3e-3, unit="s", least=0.0)
     share: float = key("most that its own share adds to a share", default=0.005, least=0.0, most=1.0)

@@ -1,4 +1,4 @@
-"""What became of every message between the laboratories: sent = used + rejected + lost, by direction.
+"""The fate of every message between the laboratories, by direction: sent = used + rejected + lost.
 
 A message that the other laboratory did not send is counted apart, as foreign. A frame does not say who made it, so a
 foreign one is recognised by its number: the sender never reached it, it came before, or it is far ahead.

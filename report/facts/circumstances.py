@@ -1,4 +1,4 @@
-"""Under what circumstances a recording was made: whose clock, and which rigs as far as the plan says.
+"""The circumstances of a recording: its clock, and its rigs as far as the plan describes them.
 
 What a laboratory really was stands in no recording, because a hidden reality may have put another rig in place of the
 plan's. So only the plan is asked, and the sentence says so.
@@ -45,7 +45,7 @@ def clock_of(run: Run) -> str:
 
 
 def sentence(run: Run, plan: Plan | None) -> str:
-    """Whose clock and which rigs, as a sentence; empty where the recording does not say."""
+    """A sentence on the clock and the rigs; empty where the recording does not say."""
     clock = clock_of(run)
     part = run.metadata.get("bench", {}).get("part", "")
     if clock == REAL and part:

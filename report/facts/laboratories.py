@@ -1,4 +1,4 @@
-"""The laboratories of a recording: whose they are, and what their signals are called.
+"""The laboratories of a recording: the roles that host them, and the names of their signals.
 
 The plan inside a recording says the kinds. Of a kind of the user's the recording itself says the signals. A recording
 is data: nothing here runs a class that its plan names, and it opens where that class is not at hand.
@@ -44,12 +44,12 @@ class LaboratoryFacts(NamedTuple):
 
     @property
     def name(self) -> str:
-        """What it moves, in a word."""
+        """The part that it moves, in a word."""
         return self.pictured.name + self.letter
 
     @property
     def label(self) -> str:
-        """What its motion is called."""
+        """The name of its motion."""
         return f"{self.pictured.name} {self.pictured.position}{self.letter}"
 
 

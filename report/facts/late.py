@@ -1,4 +1,4 @@
-"""Late ticks of a recording: how many, the most in any window, and what that means for the result."""
+"""Late ticks of a recording: their number, the most in any window, and their meaning for the result."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def late_ticks(run: Run) -> dict[str, Any] | None:
 
 
 def warning(found: dict[str, Any] | None) -> str:
-    """That a test did not keep real time, in a sentence; empty where it did or where it is not known."""
+    """The sentence that a test did not keep real time; empty where it did or where that is unknown."""
     if found is None or found["worst"] <= MOST:
         return ""
     return (

@@ -44,7 +44,7 @@ def numbers(report: Report) -> Rows:
 
 
 def remaining(report: Report) -> str:
-    """What is left and where."""
+    """The gap that is left, and its sites."""
     found = report.details.remaining
     if found is None:
         return ""

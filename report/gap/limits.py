@@ -1,4 +1,4 @@
-"""What the diagnosis cannot say, what to run next, and how to read the page."""
+"""The limits of the diagnosis: effects not told apart or not exercised, the next test, how to read the page."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def not_exercised(report: Report) -> list[tuple[str, str, str]]:
 
 
 def tests(report: Report) -> Rows:
-    """What could be run next, and what it would tell apart."""
+    """Tests that could be run next, and the candidates that they would tell apart."""
     rows = [
         [
             strong(item.test),

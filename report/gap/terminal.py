@@ -1,4 +1,4 @@
-"""A diagnosis in one look on the terminal."""
+"""The summary of a diagnosis on the terminal."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ UNBROKEN = "\u00a0%"
 
 
 def summary(report: Report) -> str:
-    """What a person understands in one look, at most 25 lines."""
+    """The summary as text of at most 25 lines."""
     lines = [
         *verdict(report),
         *gap(report),

@@ -138,7 +138,7 @@ class Strange(NamedTuple):
 
 
 def unknown(found: Unknown) -> Strange:
-    """What an effect that the catalogue lacks looks like."""
+    """The residual of a part that no effect of the catalogue explains, as the page shows it."""
     facts = []
     if found.amplitude is not None:
         facts.append(f"size {quantity(found.amplitude, found.unit)}")

@@ -1,4 +1,4 @@
-"""What a report says in words: names of effects and signals, status, equivalents."""
+"""Words for the contents of a report: names of effects and signals, status, equivalents."""
 
 from __future__ import annotations
 
@@ -172,7 +172,7 @@ def within(report: Report) -> str:
 
 
 def by_part(report: Report) -> str:
-    """What is said of each part with a gap; nothing of a report without parts."""
+    """A sentence on each part with a gap; none for a report without parts."""
     left = [entry for entry in report.parts if entry.outcome in ("explained", "partly", "unknown")]
     named = {name for entry in left for name in entry.effects}
     texts = [f"in {entry.part} {of_part(entry)}" for entry in left]
@@ -182,7 +182,7 @@ def by_part(report: Report) -> str:
 
 
 def of_part(entry: PartOfGap) -> str:
-    """What is said of one part."""
+    """The sentence on one part."""
     if entry.outcome == "unknown":
         return "it is made by something that the catalogue lacks"
     if entry.outcome == "explained":

@@ -10,6 +10,7 @@ from bokeh.plotting import figure
 
 from report.live.stream import Stream
 
+PLAIN_POWER = 7  # forces of a user's device stand in N: up to 10 MN they are written without an exponent
 HEIGHT = 230  # px
 TOOLS = "pan,box_zoom,reset,save"
 Scale = Literal["linear", "log"]
@@ -40,6 +41,8 @@ def plot(title: str, across: str, up: str, scales: tuple[Scale, Scale], **option
         active_drag=None,
         **options,
     )
+    if scales[1] == "linear":
+        found.yaxis[0].formatter.power_limit_high = PLAIN_POWER
     found.toolbar.autohide = True
     found.toolbar.logo = None
     return found

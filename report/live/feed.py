@@ -108,7 +108,7 @@ class Feed:
     # -- reading ----------------------------------------------------------------------------------
 
     def look(self) -> None:
-        """Read on; what cannot be read is told in `state`."""
+        """Read what the file has got since the last look; a failure to read stands in `state`."""
         if self.failure or self._old():
             return
         try:
@@ -171,7 +171,7 @@ class Feed:
             self.standing.event(event)
 
     def _move(self, role: str, columns: Mapping[str, Values]) -> None:
-        """What a laboratory did at some ticks, or on its ramp to rest."""
+        """Add the motion of a laboratory at some ticks, or on its ramp to rest."""
         if not columns or not columns["seq"].size:
             return
         if not self.interval and columns["seq"][-1] > 0:
@@ -238,7 +238,7 @@ class Feed:
 
     @property
     def ended(self) -> bool:
-        """Whether there will be nothing new any more."""
+        """Whether the recording is complete, so that nothing more will come."""
         return bool(self._tail.finished or self._tail.damage or self.failure)
 
     @property

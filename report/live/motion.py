@@ -1,4 +1,4 @@
-"""What the rigs do: each laboratory's motion beside its target, forces over motions or over time."""
+"""Plots of the rigs: each laboratory's motion beside its target, forces over motions or over time."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def motions(streams: Streams, labs: Iterable[LaboratoryFacts], window: float | N
 
 
 def looks(labs: Iterable[LaboratoryFacts]) -> list[Any]:
-    """What makes the plots of laboratories differ from those of others."""
+    """The properties of laboratories by which their plots differ."""
     return [(lab.topic == MASTER, lab.channels, lab.letter) for lab, *_ in alike(labs)]
 
 
@@ -64,7 +64,7 @@ def add(found: dict[str, Plot], name: str, lab: LaboratoryFacts, figure: Any) ->
 
 
 def stream_of(streams: Streams, lab: LaboratoryFacts) -> Stream:
-    """Where a laboratory's signals come from."""
+    """The stream that holds a laboratory's signals."""
     return streams.master if lab.topic == MASTER else streams.slave
 
 
