@@ -133,11 +133,11 @@ def diagnose_file(path: Path, *, validate: Sequence[Path] = ()) -> Report:
     return next(iter(diagnose_slaves(read(path), validate=validate).values()))
 
 
-def diagnose_recording(path: Path) -> dict[str, Report]:
+def diagnose_recording(path: Path, validate: Sequence[Path] = ()) -> dict[str, Report]:
     """The reports on a recording by the name of the slave, as `diagnose_slaves`; raises InputError likewise."""
     from common.recording.reader import read
 
-    return diagnose_slaves(read(path))
+    return diagnose_slaves(read(path), validate=validate)
 
 
 def diagnose_slaves(

@@ -19,7 +19,7 @@ from common.plan.schema import nearest
 from common.roles import MASTER
 from laboratories.effects.effect import Parameter
 from validation.blind import lots
-from validation.blind.cases.basis import TrialBasis, basis, draw_plan, log_uniform
+from validation.blind.cases.basis import TrialBasis, another_motion, basis, draw_plan, log_uniform
 from validation.blind.cases.case import Case, Laid
 from validation.blind.cases.truths import draw_truths, is_inside
 from validation.blind.library import MATERIAL, REPLACED, Library
@@ -136,7 +136,8 @@ def drawn(begun: Beginning, trial: TrialBasis) -> Case:
     most = TWO_TOLERANCES if chosen.normal else 1.0
     moved = kind in ("catalogue", "pair", "many")
     inside = moved and is_inside(laid, truths, plan, trial.library, most)
-    more = (chosen.logger(lot), chosen.own, chosen.normal)
+    other = another_motion(lot, plan, trial).tables() if chosen.twice else {}
+    more = (chosen.logger(lot), chosen.own, chosen.normal, other)
     return Case(begun.index, kind, plan.tables(), truths, noise, laid, inside, *more)
 
 

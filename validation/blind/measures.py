@@ -178,6 +178,7 @@ def further(outcomes: Sequence[Outcome]) -> list[Measure]:
         rate("unknown effect that is visible: said so, site right", strange, lambda item: item.right),
         rate("unknown effect that an oracle sees: said so, site right", noticed, lambda item: item.right),
         rate("both of a pair whose strongest is visible", pairs, lambda item: item.named),
+        *closed_on_another_motion(outcomes),
         rate("an oracle sees that something is there", gaps, lambda item: item.seen),
         *by_kind,
         rate("right effect first, all sizes", singles, lambda item: item.named),
@@ -192,6 +193,15 @@ def further(outcomes: Sequence[Outcome]) -> list[Measure]:
         _coverage(stated),
         Measure("Brier score", *_thrice(brier_score(verdicts)), len(verdicts), rate=False),
     ]
+
+
+def closed_on_another_motion(outcomes: Sequence[Outcome]) -> list[Measure]:
+    """Median and worst share of the gap that is closed on a second motion; nothing where a report does not say it."""
+    shares = sorted(0.0 if math.isnan(item.closed) else item.closed for item in outcomes if item.twice)
+    if not shares:
+        return []
+    median = quantile("closed on another motion, median", shares)
+    return [median, Measure("closed on another motion, worst", *_thrice(shares[0]), len(shares), rate=False)]
 
 
 def kind(outcomes: Iterable[Outcome], name: str) -> list[Outcome]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import secrets
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
@@ -20,6 +20,7 @@ from validation.blind.loggers import LOGGERS
 from validation.blind.oracle import separation
 from validation.blind.relogging import relog
 from validation.blind.size import sizes
+from validation.blind.worker import OTHER
 from validation.spread import spread
 
 
@@ -57,6 +58,8 @@ def record(case: Case, folder: Path) -> RecordedCase:
     ended = virtual.run(bench, lambda: "")
     if ended is not None and not isinstance(ended, InterlockError):
         raise InputError(f"Case {case.index} ({truth(case)}) cannot be recorded: {ended}")
+    if case.other:
+        play_other(case, path.with_suffix(OTHER))
     true = path.with_suffix(".true")
     if case.logger:
         relog(played, path, plan, LOGGERS[case.logger], levels(case.truths), case.seed)
@@ -67,6 +70,15 @@ def record(case: Case, folder: Path) -> RecordedCase:
     run = read(path)
     seen, left = separation(case, run), gaps(run, silent, plan)
     return RecordedCase(case.index, path.name, sizes(case, path), str(ended or ""), seen, left)
+
+
+def play_other(case: Case, path: Path) -> None:
+    """Record the same laboratories under the case's second motion."""
+    from simulation import virtual
+
+    second = replace(case, plan=case.other)
+    plan = plans.from_tables(second.plan, Path())
+    virtual.run(virtual.assemble(plan, reality(second), path), lambda: "")
 
 
 def truth(case: Case) -> str:

@@ -75,6 +75,7 @@ class Outcome:
     listed: int = 0  # of these, those that the verdict names
     separation: float = math.inf  # of all effects, as an oracle sees them
     closed: float = math.nan  # share of the gap that the report says it closes
+    twice: bool = False  # that share is of another motion
     estimates: list[JudgedEstimate] = field(default_factory=list)
     shrinkage: float = math.nan  # closed over what the true effects would close
     seconds: float = math.nan  # per 30 s of test
@@ -155,6 +156,7 @@ def judge(case: Case, recorded: RecordedCase, answer: DiagnosisAnswer) -> Outcom
         listed=len(listed),
         separation=recorded.separation,
         closed=closed,
+        twice=bool(case.other),
         estimates=estimates(case, heard, names) if named else [],
         shrinkage=0.0 if math.isnan(closed) else closed / best,
         seconds=answer.seconds * STANDARD_LENGTH / float(case.plan["test"]["duration"]),

@@ -37,6 +37,9 @@ class CaseSet:
     )
     own: bool = False  # every laboratory that has one is played by its independent code
     materials: tuple[str, ...] = ()  # OpenSees' materials in the column's place, taken in turn
+    twice: bool = (
+        False  # a second motion is recorded, on which the diagnosis judges what it found on the first
+    )
 
     def kind(self, lot: Lot) -> str:
         """The kind of a case."""
@@ -76,6 +79,9 @@ SETS = {
         own=True,
     ),
     "materials": CaseSet(
-        "OpenSees' materials as columns (make opensees)", turns=("material",), materials=tuple(MATERIALS)
+        "OpenSees' materials as columns (make opensees)",
+        turns=("material",),
+        materials=tuple(MATERIALS),
+        twice=True,
     ),
 }

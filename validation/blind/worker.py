@@ -22,6 +22,7 @@ from common.terminal import cli
 from diagnosis.report.records import Report
 from validation.spread import spread
 
+OTHER = ".other"  # suffix of a recording of the same laboratories, on which what was found is judged
 DIAGNOSIS = "rths.examine.diagnose:diagnose_recording"
 
 
@@ -39,7 +40,9 @@ def diagnose(path: Path, reference: str, out: Path) -> str:
     function = find(reference)
     started = time.perf_counter()
     try:
-        found: Report | Mapping[str, Report] = function(path)
+        other = path.with_suffix(OTHER)
+        more = {"validate": [other]} if other.exists() else {}
+        found: Report | Mapping[str, Report] = function(path, **more)
         reports = {"": found} if isinstance(found, Report) else found
         answer: dict[str, Any] = {"reports": {name: report.plain() for name, report in reports.items()}}
     except RthsError as error:

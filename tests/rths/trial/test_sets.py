@@ -83,7 +83,10 @@ def test_materials_take_turns_and_stand_in_the_columns_place() -> None:
     assert count >= 12
     begun = [begin(index, 4, "materials", trial().library) for index in range(count)]
     assert [item.names for item in begun] == [(f"opensees.{name}",) for name in materials.MATERIALS]
-    reality = drawn("materials", 1)[0].reality()
+    (first,) = drawn("materials", 1)
+    assert first.other["ground_motion"] != first.plan["ground_motion"]
+    assert {**first.other, "ground_motion": None} == {**first.plan, "ground_motion": None}
+    reality = first.reality()
     assert reality["master"]["rig"]["class"].endswith(":MaterialLab")
     assert reality["master"]["rig"]["options"]["effects"][0]["name"] == "opensees.Steel01"
     for name, item in materials.MATERIALS.items():

@@ -115,6 +115,19 @@ def draw_plan(lot: Lot, trial: TrialBasis) -> Plan:
     return plans.from_tables(tables, trial.plan.base)
 
 
+def another_motion(lot: Lot, plan: Plan, trial: TrialBasis) -> Plan:
+    """A case's plan with a second motion, scaled to a drift of its own."""
+    first, damper = plan.ground_motion.record, plan.control.amd
+    record = lots.chosen((name for name in MOTIONS if name != first), *lot, "other motion")
+    peak = trial.usual * log_uniform(lots.generator(*lot, "other peak"), *PEAK_DRIFT)
+    tables = plan.tables()
+    tables["ground_motion"] = {
+        "record": record,
+        "scale": round(peak / trial.drift(record, damper=damper), 4),
+    }
+    return plans.from_tables(tables, plan.base)
+
+
 def controls(tables: Mapping[str, Any]) -> list[dict[str, Any]]:
     """The tables [control] of a plan's tables, its own and every slave's."""
     own = [

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +42,9 @@ class Case:
     logger: str = ""  # through which it is recorded, empty where the controllers' own readings are
     own: bool = False  # every laboratory of a kind that ships is played by its independent code
     normal: bool = False  # tolerances are standard deviations
+    other: dict[str, Any] = field(
+        default_factory=dict
+    )  # tables of the plan with another motion, empty for none
 
     def reality(self, laid: tuple[Laid, ...] | None = None, *, silent: bool = False) -> dict[str, Any]:
         """The tables of the reality, with other effects or without noise where asked for.
