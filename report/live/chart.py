@@ -6,6 +6,7 @@ from typing import Any, Literal, NamedTuple
 
 from bokeh.models import DataRange1d
 from bokeh.models.annotations import Legend, LegendItem
+from bokeh.models.formatters import BasicTickFormatter
 from bokeh.plotting import figure
 
 from report.live.stream import Stream
@@ -42,7 +43,7 @@ def plot(title: str, across: str, up: str, scales: tuple[Scale, Scale], **option
         **options,
     )
     if scales[1] == "linear":
-        found.yaxis[0].formatter.power_limit_high = PLAIN_POWER
+        found.yaxis[0].formatter = BasicTickFormatter(power_limit_high=PLAIN_POWER)
     found.toolbar.autohide = True
     found.toolbar.logo = None
     return found
