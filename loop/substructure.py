@@ -56,7 +56,7 @@ SENT_VALUES = 5
 STOREY_DISPLACEMENT, STOREY_VELOCITY, STOREY_ACCELERATION, STOREY_ABSOLUTE, STOREY_FORCE = range(
     5
 )  # `OF_STOREYS`
-STOREY_VALUES = 5
+STOREY_VALUES = len(OF_STOREYS)
 
 
 def layout(plan: Plan, slaves: Sequence[str]) -> dict[str, list[int]]:
