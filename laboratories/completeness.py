@@ -35,8 +35,8 @@ TAKEN = frozenset(signal.name for signal in (*BUILDING, NUMERICAL, MODE)) | {"co
 BESIDE = 64  # numbers kept on each side of an array that the kernel is tried on
 # of the trial, in which the command goes once around a sine of 1 mm
 INTERVAL = 2e-3  # s
-TICKS = 250
-REACH = 1e-3  # m
+TICKS = 250  # of the trial: one period of 0.5 s at the usual interval, as slow as a building moves
+REACH = 1e-3  # m: so little that a device which is sound keeps clear of its stops
 
 
 def complete(kind: Device, where: str) -> None:

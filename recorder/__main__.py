@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from common.plan.plan import Plan
     from recorder.loop import RecorderLoop
 
-WAIT_S = 0.02
+WAIT_S = 0.02  # a request to stop waits no longer than this for the next message
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

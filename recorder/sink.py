@@ -20,7 +20,7 @@ BLOCK_BYTES = (
     8 << 10
 )  # of rows encoded at once: a kernel's call costs as much as ten rows; an eighth of a chunk
 SYNC_NS = 1_000_000_000  # a power cut costs a second at most; a sync takes tens of ms on a slow disk
-QUEUE_ITEMS = 60_000  # forty seconds of a default test
+QUEUE_ITEMS = 60_000  # a disk may hang for forty seconds of a default test before items are dropped
 CLOSE_S = 25.0  # less than `rths run` allows the recorder to write what it holds
 
 

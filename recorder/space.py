@@ -27,8 +27,8 @@ MESSAGE_HEAD = 31  # bytes before a message in a chunk
 INDEX_ENTRY = 16  # bytes of the chunk's index for a message
 COMPRESSED = 0.7  # of a chunk of measurements with noise, zstd; constant ones take less
 GROUND_ROWS = 2 * 8  # bytes of the ground motion per tick
-FIXED = 50_000  # bytes of plan, schemas and host
-SPARE = 1.1  # for events and the index
+FIXED = 50_000  # bytes of plan, schemas and host, rounded up
+SPARE = 1.1  # a tenth more for events and the index, whose size depends on the test
 
 
 def need(plan: Plan) -> float:

@@ -11,7 +11,7 @@ from models.compiled import jit
 from models.registry import Array
 from models.transfer_systems import delay, first_order
 
-LEAST = 20  # samples
+LEAST = 20  # samples: several for each parameter of the fit
 NAMES = ("delay", "time_constant", "gain")
 UNITS = ("s", "s", "")
 LONGEST = 0.5  # s, for either time: an actuator that is slower cannot take part in a test in real time

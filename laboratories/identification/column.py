@@ -13,7 +13,7 @@ from laboratories.identification import checks, estimate
 from laboratories.identification.estimate import Estimate
 from models.registry import Array
 
-LEAST = 20  # samples
+LEAST = 20  # samples: a line through fewer says little of its interval
 RETURN = 0.3  # share of the smallest amplitude by which the motion must come back to count as a reversal
 # share by which a cycle's amplitude may miss the protocol's: the paper's amplitudes differ by 20 % and more
 MATCH = 0.2

@@ -24,13 +24,13 @@ from laboratories.identification.estimate import Estimate
 from models.compiled import jit
 from models.registry import Array
 
-LEAST = 100  # samples
-SUBSTEP = 0.25e-3  # s
+LEAST = 100  # samples: more than ten for each parameter of the fit
+SUBSTEP = 0.25e-3  # s: an eighth of the usual interval, short beside the motor's lag
 PIECE, REACH = (
     1.0,
     10,
 )  # s between beginnings of a drive without a spring, ticks to each side that they are read from
-CREEP = 5e-4  # v₀, m/s
+CREEP = 5e-4  # v₀, m/s: friction turns within it, so that its force has no jump
 NAMES = ("mass", "damping", "stiffness", "motor_time_constant", "gain", "friction")
 UNITS = ("kg", "N·s/m", "N/m", "s", "", "N")
 

@@ -15,7 +15,7 @@ from models.compiled import jit_apart
 from models.registry import Array
 from models.system import System
 
-LEAST = 20  # samples
+LEAST = 20  # samples: several for each parameter of the fit
 HOPELESS = 0.9  # nrmse above which nothing was identified: a constant leaves 1
 STEP = 1e-4  # of a parameter, relative, for the derivatives of the response
 MOST = 40  # steps: a device that follows its command is found in ten

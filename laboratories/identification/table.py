@@ -14,7 +14,7 @@ from laboratories.table import model as table_lab
 from models.compiled import jit
 from models.registry import Array
 
-LEAST = 50  # samples
+LEAST = 50  # samples: more than ten for each parameter of the fit
 NAMES = ("frequency", "damping_ratio", "delay")
 UNITS = ("Hz", "", "s")
 LOW = (0.2, 0.02, 0.0)

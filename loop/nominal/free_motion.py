@@ -23,7 +23,7 @@ from models.structures import shear_building
 PERIODS = (
     40  # of the first mode that are watched: a loop of −0.05 % of damping or less then grows by what counts
 )
-PULSE = 0.1  # of the first period
+PULSE = 0.1  # of the first period: its spectrum reaches to about ten times the first frequency
 PUSH = 1e-3  # m/s², of the pulse: so small that a specimen keeps its first stiffness
 MOST_TICKS = 200_000  # of the watched motion: 400 s at 2 ms, computed in some hundredths of a second
 METRES = "m"

@@ -29,7 +29,7 @@ CYCLES = 12  # of the sine at which amplitude and delay are found
 LEAST_CYCLES = 2.0  # s, as many cycles of it as that where they are more
 AMPLITUDE = 1e-3  # m, of sine and pulse: so small that no limit of the actuator is met
 PULSE = 0.5  # of a period: the pulse's spectrum then has its first zero at four times the frequency
-LEAST_PULSE = 8  # ticks
+LEAST_PULSE = 8  # ticks: with fewer the smooth pulse has no shape on the grid
 WATCHED = (
     50  # of the actuator's own delay after the pulse: ten turns of the slowest loop that it can make unstable
 )

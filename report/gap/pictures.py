@@ -27,7 +27,7 @@ GREY = "#808080"
 RECORDED, BEFORE, AFTER = INK, ORANGE, BLUE
 MOST_PARTS = len(COLOURS)
 LEVEL = "noise"  # a step of the waterfall that is a level of its own
-ZOOM = 4.0  # s around the worst seconds
+ZOOM = 4.0  # s around the worst seconds: some periods of a building
 
 
 def svg(canvas: Any) -> str:

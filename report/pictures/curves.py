@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 Values = NDArray[np.float64]
 
-STRONGEST = 1.5  # s before and behind the largest target
+STRONGEST = 1.5  # s before and behind the largest target: some periods of a building
 LATE = 1  # ticks by which a command stands before the measurement at which it is to be reached
 
 

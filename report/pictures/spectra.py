@@ -21,11 +21,11 @@ if TYPE_CHECKING:
     from report.facts.laboratories import LaboratoryFacts
 
 SEGMENT = 10.0  # s: lines 0.1 Hz apart, half the width of a peak at 2 Hz with 5 % of damping
-LEAST = 64  # ticks
+LEAST = 64  # ticks: a spectrum of fewer has too few frequencies to be drawn
 HOLES = 4  # ticks that may be missing for one that is there
 RANGE = 1e6  # of the ordinate: below lies rounding
 BANDS = 24  # a decade: 10 % wide, as wide as a peak with 5 % of damping
-MODES = 3
+MODES = 3  # whose frequencies are marked: more lines would hide the curves
 DASHED = (0, (4, 2))
 DOTTED = (0, (1, 1))
 
