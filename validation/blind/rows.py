@@ -1,4 +1,4 @@
-"""The table by logger, or by kind of case where there is none: each row's cases, and how the diagnosis did on them."""
+"""The table by logger, by material or by kind of case: each row's cases, and how the diagnosis did on them."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from report.text.formats import MISSING
+from validation.blind.library import MATERIAL
 from validation.blind.loggers import LOGGERS
 from validation.blind.scoring import Outcome
 from validation.blind.stated import brier_skill, stated_verdicts
@@ -68,11 +69,12 @@ class CaseRow:
 
 
 def case_rows(outcomes: Sequence[Outcome]) -> list[CaseRow]:
-    """The rows in the order of the loggers or kinds, and one of all cases."""
+    """The rows in the order of the loggers, or of materials and kinds by name, and one of all cases."""
     by_logger = any(item.logger for item in outcomes)
     groups: dict[str, list[Outcome]] = {}
     for item in outcomes:
-        groups.setdefault(item.logger if by_logger else item.kind, []).append(item)
+        kind = item.truth[0] if item.kind == MATERIAL else item.kind
+        groups.setdefault(item.logger if by_logger else kind, []).append(item)
     order = list(LOGGERS) if by_logger else sorted(groups)
     texts = {name: LOGGERS[name].text if by_logger else name for name in groups}
     rows = [case_row(texts[name], groups[name]) for name in order if name in groups]

@@ -27,6 +27,7 @@ from validation.blind.cases.case import Case, Laid
 from validation.blind.draw import begin, draw
 from validation.blind.labs import materials
 from validation.blind.loggers import LOGGERS, Logger
+from validation.blind.rows import case_rows
 from validation.blind.sets import MILD, SETS
 
 SECONDS = 2.0
@@ -124,6 +125,7 @@ def test_a_material_is_named_by_its_mechanism() -> None:
     hidden = case("material", steel)
     assert judged(hidden, said("explained", "column.yielding", site="column")).right
     wrong = judged(hidden, said("explained", "column.stiffness", site="column"))
+    assert [row.name for row in case_rows([wrong])] == ["opensees.Steel02", "all cases"]
     assert not wrong.named
     assert wrong.surplus == 1
 
