@@ -140,9 +140,12 @@ def unproven(search: Search) -> bool:
         np.sqrt(np.mean(np.square(fit.data.residual(fitting.lay(fit.data, fit.z, fit.values))), axis=0))
         for fit in (before, after)
     ]
-    seen = [item.ratio > MATERIAL for item in gaps(before, search.data.group)]
-    own = [item.density is not None and item.source == "residual" for item in search.data.noise]
-    return bool(own) and bool(np.any(np.array(seen) & np.array(own) & (left[1] > OWN * left[0])))
+    seen = np.array([item.ratio > MATERIAL for item in gaps(before, search.data.group)])
+    own = np.array([item.density is not None and item.source == "residual" for item in search.data.noise])
+    if not own.size or not np.any(seen & own):
+        return False
+    was, is_ = (np.square(rms / search.data.sigma)[seen & own].sum() for rms in left)
+    return bool(is_ > OWN**2 * was)
 
 
 def pinned(fit: Fit) -> tuple[str, ...]:

@@ -9,6 +9,13 @@ from report.gap.blocks import Drawing, Rows, bar, code, drawings, strong
 from report.text.formats import MISSING, percent, quantity, signed, times
 
 MOST_HISTORIES = 4
+OUTCOMES = {
+    "none": "noise",
+    "tolerances": "within tolerances",
+    "explained": "explained",
+    "partly": "stands in",
+    "unknown": "unknown",
+}
 
 
 def steps(report: Report) -> list[Drawing]:
@@ -51,6 +58,46 @@ def remaining(report: Report) -> str:
     sites = [f"{wording.site(item.site)} {times(item.residual_to_noise)} its noise" for item in found.where]
     place = f", at: {', '.join(sites)}" if sites else ""
     return f"What remains: {percent(found.overall)} overall{place}."
+
+
+def made_of(report: Report) -> Rows:
+    """Every part's gap as tolerances, named effects, what was learnt and what is left; the noise beside it."""
+    head = ("part", "gap", "tolerances", "named", "learnt", "left", "noise", "says", "good enough")
+    rows = [
+        [
+            wording.plain(part.part),
+            *map(percent, (part.gap, part.tolerances, part.named, part.learned, part.left, part.noise)),
+            OUTCOMES[part.outcome] + (f": {wording.effects(part.effects)}" if part.effects else ""),
+            MISSING if part.adequate is None else "yes" if part.adequate else "no",
+        ]
+        for part in report.parts
+    ]
+    return Rows(head, rows)
+
+
+def noises(report: Report) -> Rows:
+    """The noise of every sensor: how large, of which colour, what it picks up, and where that was found."""
+    head = ("signal", "rms", "colour", "lines", "resolution", "found in")
+    rows = [
+        [
+            wording.plain(name),
+            quantity(noise.rms, unit(report, name)),
+            "white" if noise.kind == "white" else f"coloured, order {noise.order}",
+            ", ".join(f"{line:g} Hz" for line in noise.lines) or MISSING,
+            quantity(noise.resolution, unit(report, name)),
+            {"at rest": "readings at rest", "quiet part": "its quiet part"}.get(
+                noise.from_, "the whole residual"
+            ),
+        ]
+        for part in report.parts
+        for name, noise in part.noise_model.items()
+    ]
+    return Rows(head, rows)
+
+
+def unit(report: Report, name: str) -> str:
+    """A signal's unit as far as the report says it."""
+    return report.gap.signals[name].unit if name in report.gap.signals else ""
 
 
 def paths(report: Report) -> Rows:

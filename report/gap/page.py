@@ -67,6 +67,8 @@ def shrunk(report: Report) -> dict[str, Any]:
         "judged_on": wording.judged_on(report) if report.how_far.judged_on else "",
         "steps": how_far.steps(report),
         "remaining": how_far.remaining(report),
+        "made_of": how_far.made_of(report),
+        "noises": how_far.noises(report),
         "paths": how_far.paths(report),
         "force_path": wording.force_path(report),
         "tolerances": how_far.tolerances(report),
