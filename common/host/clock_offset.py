@@ -49,7 +49,7 @@ class ClockOffset:
     def __init__(self, *, length: int = 50, blocks: int = 20) -> None:
         self._length = length
         self._minima: deque[Minimum] = deque(maxlen=blocks)
-        self._best = Minimum(0.0, 0.0, 0.0)  # of the present block
+        self._best = (0.0, 0.0, 0.0)  # the minimum of the present block so far
         self._shortest = math.inf
         self._in_block = 0
         self._newest = 0
@@ -114,7 +114,7 @@ class ClockOffset:
             self._keep(t1, t2, t3, t4)
         self._in_block += 1
         if self._in_block >= self._length:
-            self._minima.append(self._best)
+            self._minima.append(Minimum(*self._best))
             self._shortest, self._in_block = math.inf, 0
             self._fit()
 
@@ -125,10 +125,11 @@ class ClockOffset:
         start, first = self._origin
         trip = (t4 - t1) - (t3 - t2)
         reach = max(trip + MAX_DRIFT * (t4 - t1), 0.0) / 2 + RESOLUTION
-        self._best = Minimum((t1 + t4 - 2 * start) / 2, (t2 - t1 + t3 - t4 - 2 * first) / 2, reach)
-        self._narrow(*self._best)
+        time, offset = (t1 + t4 - 2 * start) / 2, (t2 - t1 + t3 - t4 - 2 * first) / 2
+        self._best = time, offset, reach
+        self._narrow(time, offset, reach)
         if not self._minima:
-            self._centre, self._level = self._best.time, self._best.offset
+            self._centre, self._level = time, offset
 
     def _narrow(self, time: float, offset: float, reach: float) -> None:
         """Intersect the interval, brought to `time`, with that of an exchange."""
