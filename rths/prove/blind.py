@@ -48,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=cli.words,
         default=[],
         metavar="KIND,…",
-        help="catalogue, formula, unknown, pair or clean",
+        help="catalogue, formula, unknown, pair, clean, many or material",
     )
     which.add_argument(
         "--effects", type=cli.words, default=[], metavar="NAME,…", help="cases with these effects"
