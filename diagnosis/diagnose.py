@@ -19,6 +19,7 @@ from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import Searcher
+from diagnosis.learned.learn import learn
 from diagnosis.recorded import link
 from diagnosis.recorded.ground import Ground
 from diagnosis.recorded.laboratory import RecordedLaboratory
@@ -103,6 +104,7 @@ def examine(record: Record, tell: Tell = untold) -> Diagnosis:
         held,
         readings.levels([item.search.data for item in verdicts], [heard(item.search) for item in verdicts]),
         [*of_plan(record), *not_recorded(record), *reversed_signs(datas), *repeating(held)],
+        [law for verdict in verdicts if verdict.outcome != "none" for law in learn(verdict.search.chosen)],
     )
 
 

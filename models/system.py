@@ -20,6 +20,7 @@ class ActuatorEffects:
     backlash: float = 0.0  # m, whole play
     compliance: float = 0.0  # m/N
     deadband: float = 0.0  # m, whole band of the loop's error without flow
+    learned: tuple[float, ...] = ()  # a law of `models.preisach` that adds to the motion, m
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,9 @@ class ColumnEffects:
 
     yield_displacement: float = math.inf  # m
     hardening: float = 0.0
-    exponent: float = 2.0  # sharpness of the transition, Bouc-Wen's n
+    exponent: float = 2.0  # sharpness of the transition: Bouc-Wen's n, Menegotto and Pinto's R₀
+    law: float = 0.0  # of yielding, its place in `laboratories.column.specimen.LAWS`
+    unloading: float = 0.0  # exponent of the unloading stiffness, of a peak-oriented specimen
     degradation: float = (
         0.0  # share of stiffness lost, once the largest deformation is well past the reference
     )
@@ -41,6 +44,7 @@ class ColumnEffects:
     viscous: float = 0.0  # N·s/m
     inertia: float = 0.0  # kg
     slip: float = 0.0  # m, whole gap
+    learned: tuple[float, ...] = ()  # a law of `models.preisach` that adds to the force, N
 
 
 @dataclass(frozen=True)
@@ -67,6 +71,9 @@ class DamperEffects:
     offset: float = 0.0  # N, a constant force on the moving mass
     stop_stroke: float = math.inf  # m
     stop_stiffness: float = 0.0  # N/m
+    learned: tuple[
+        float, ...
+    ] = ()  # a law of `models.preisach` of the stroke that resists beside the spring, N
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from diagnosis.findings.ceilings import ceilings, unknowns
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.how_far import Response
 from diagnosis.findings.next_test import ChosenTest
+from diagnosis.findings.rest import shown
 from diagnosis.findings.series import numbers, strongest
 from diagnosis.findings.verdict import PartVerdict
 from diagnosis.findings.where import SiteTrace
@@ -69,6 +70,7 @@ def details(
         histories=far.histories,
         unknown=strange[0] if strange else None,
         unknowns=strange,
+        learned=tuple(shown(found, law) for law in found.learned),
         remaining=remains(found, far),
         next=tuple(
             NextTest(test=item.test, separation=item.separation, pair=item.pair) for item in tests[:LISTED]

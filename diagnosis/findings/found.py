@@ -9,6 +9,7 @@ from common.plan.plan import Plan
 from diagnosis.findings.readings import SensorFinding
 from diagnosis.findings.verdict import PartVerdict
 from diagnosis.fits.fitting import Values
+from diagnosis.learned.learn import LearnedLaw, Of
 from diagnosis.recorded.link import LinkFinding
 from diagnosis.recorded.record import Record
 from models.system import System
@@ -25,6 +26,7 @@ class Diagnosis:
     held: Mapping[str, float] = field(default_factory=dict)  # sensors that repeat samples, and how many
     white: Mapping[str, float] = field(default_factory=dict)  # rms of each reading's noise
     warnings: Sequence[str] = ()
+    learned: Sequence[LearnedLaw] = ()  # what no effect explains
 
     def named(self, site: str) -> list[str]:
         """The effects found at a site."""
@@ -58,6 +60,13 @@ class Diagnosis:
             role = next(lab.role for lab in self.record.labs if effect.signal in lab.measured)
             if (sites is None or effect.site in sites) and (noisy or not effect.random):
                 systems[role] = effect.apply(systems[role], **{reading.parameter: reading.value})
+        return systems
+
+    def corrected(self, plans: Mapping[str, Plan] | None = None, of: Of = "law") -> dict[str, System]:
+        """What master and slave are by role, with the effects of all sites and with what was learned."""
+        systems = self.systems(plans=plans)
+        for law in self.learned:
+            systems[law.role] = law.laid(systems[law.role], of)
         return systems
 
 

@@ -20,6 +20,7 @@ from diagnosis.report.evidence import History, LoopShare, Step
 from diagnosis.report.records import Gap, HowFar, SignalGap
 from diagnosis.signals.mask import Mask
 from models.registry import Array
+from models.system import System
 
 QUIET = 0.2  # noise over a signal's rms from which on a part alone is not judged by it
 PLAYERS = 6  # sites among which shares are computed exactly
@@ -61,15 +62,17 @@ class Judge:
 
     def signals(self, sites: frozenset[str] | None) -> Mapping[str, Array] | None:
         """Simulated response with the effects of some sites, of all where None."""
-        systems = self.found.systems(sites, self.record.plans)
-        if self.loop is not None:
-            linked = bool(self.found.link) and (sites is None or "link" in sites)
-            return self.loop.simulate(systems, linked=linked)
-        return self.open(sites)
+        linked = sites is None or "link" in sites
+        return self.simulated(self.found.systems(sites, self.record.plans), linked=linked)
 
-    def open(self, sites: frozenset[str] | None) -> Mapping[str, Array]:
+    def simulated(self, systems: Mapping[str, System], *, linked: bool = True) -> Mapping[str, Array] | None:
+        """Simulated response of systems, with the exchange that was found where `linked`."""
+        if self.loop is not None:
+            return self.loop.simulate(systems, linked=linked and bool(self.found.link))
+        return self.open(systems)
+
+    def open(self, systems: Mapping[str, System]) -> Mapping[str, Array]:
         """Each part's own prediction, where no loop was recorded."""
-        systems = self.found.systems(sites)
         result: dict[str, Array] = {}
         for verdict in self.found.verdicts:
             part = verdict.search.data.part

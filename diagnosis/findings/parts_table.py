@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -10,7 +11,8 @@ from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.verdict import PartVerdict, heard
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data
-from diagnosis.recorded.parts import LaboratoryPart
+from diagnosis.learned.learn import LearnedLaw
+from diagnosis.recorded.parts import ColumnAlone, LaboratoryPart
 from diagnosis.report.records import NoiseEntry, PartOfGap
 from models.registry import Array
 from models.system import System
@@ -20,31 +22,42 @@ QUIET = 0.2  # noise over a signal's rms from which on a part is not judged by i
 
 def parts(found: Diagnosis, require: float | None = None) -> tuple[PartOfGap, ...]:
     """The parts in the order of the test; `require` is the gap that may be left in each."""
-    return tuple(part(verdict, require) for verdict in found.verdicts)
+    return tuple(part(verdict, found.learned, require) for verdict in found.verdicts)
 
 
-def part(verdict: PartVerdict, require: float | None) -> PartOfGap:
+def part(verdict: PartVerdict, learned: Sequence[LearnedLaw], require: float | None) -> PartOfGap:
     """One part: each step's gap above noise less the next one's."""
     search = verdict.search
     data, bare, fit = search.data, search.commissioned, search.chosen
     noise = rms(heard(search) / levels(data), data)
-    steps = [
-        above(data, system, noise)
-        for system in (data.system, fitting.lay(data, bare.z, {}), fitting.lay(data, fit.z, fit.values))
-    ]
-    nominal, moved, left = steps[0], min(steps[:2]), min(steps)
+    systems = [data.system, fitting.lay(data, bare.z, {}), fitting.lay(data, fit.z, fit.values)]
+    systems.append(systems[-1])
+    for law in learned:
+        if law.site in sites_of(data):
+            systems[-1] = law.laid(systems[-1])
+    steps = [above(data, system, noise) for system in systems]
+    nominal, moved, named, left = (min(steps[: place + 1]) for place in range(4))
     return PartOfGap(
         part=name_of(data),
         outcome=verdict.outcome,
         effects=verdict.effects,
         gap=nominal,
         tolerances=nominal - moved,
-        named=moved - left,
+        named=moved - named,
+        learned=named - left,
         left=left,
         noise=noise,
         adequate=None if require is None else left <= require,
         noise_model=noises(data),
     )
+
+
+def sites_of(data: Data) -> set[str]:
+    """The sites of machines in a part."""
+    part = data.part
+    if isinstance(part, LaboratoryPart | ColumnAlone):
+        return {part.lab.site(name) for name in part.lab.kind.sites}
+    return set()
 
 
 def name_of(data: Data) -> str:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from common.terminal.telling import Tell, untold
-from diagnosis.findings import details, exercise, how_far, next_test, parts_table, where
+from diagnosis.findings import details, exercise, how_far, next_test, parts_table, rest, where
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.which import which
 from diagnosis.recorded.parts import LoggedForce, LoggedReadings
@@ -23,6 +24,7 @@ def build(
     """The whole report, but for its verdict in words; `require` is the gap that may be left in each part."""
     tell("how far the gap closes", 0, 0)
     far = how_far.judge(found, validation)
+    found, learned, doubts = rest.judged(found, validation)
     named = which(found)
     tell("the next test", 0, 0)
     tests = next_test.choices(found)
@@ -34,10 +36,10 @@ def build(
         where=sites_of(found, far),
         which=named.candidates,
         equivalent=tuple(names for verdict in found.verdicts for names in verdict.equivalent),
-        how_far=far.how_far,
+        how_far=replace(far.how_far, learned=learned),
         not_exercised=exercise.not_exercised(found),
         next_test=next_test.sentence(tests),
-        warnings=(*found.warnings, *far.warnings, *named.warnings),
+        warnings=(*found.warnings, *far.warnings, *named.warnings, *doubts),
         parts=parts_table.parts(found, require),
         details=details.details(found, far, named.candidates, tests),
     )

@@ -191,6 +191,8 @@ class NaturalCurve(Entry):
     measured: Series = noted("As recorded", default=())
     before: Series = noted("Predicted without the site's effects", default=())
     after: Series = noted("Predicted with them", default=())
+    low: Series = noted("Lower end of the band of 95 % of what is predicted with them", default=())
+    high: Series = noted("Upper end of that band", default=())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -231,6 +233,19 @@ class Unknown(Entry):
     amplitude: Number = noted("Its size, rms times √2", default=None)
     unit: str = noted("Unit of the size", default="")
     curve: NaturalCurve | None = noted("The relation that is left over", default=None, absent=Absent.LEFT_OUT)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LearnedRest(Entry):
+    """What no effect explains at a site, learned as a force or a displacement over state and history."""
+
+    site: Site = noted("Where it acts")
+    quantity: str = noted("What it adds to: force or displacement")
+    unit: str = noted("Unit of that")
+    before: Number = noted("Rms of what the effects leave of it")
+    after: Number = noted("Rms of what is left on time that the law has not seen")
+    curve: NaturalCurve = noted("It over the motion of the site, in the seconds in which it is largest")
+    law: Series = noted("The law as `models.preisach` takes it", default=())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -286,5 +301,6 @@ class Details(Entry):
     unknowns: tuple[Unknown, ...] = noted(
         "The same of every part with something left, the largest over its noise first", default=()
     )
+    learned: tuple[LearnedRest, ...] = noted("What no effect explains, learned", default=())
     remaining: Remaining | None = noted("What the verdict leaves", default=None, absent=Absent.EMPTY)
     next: tuple[NextTest, ...] = noted("Tests that would tell candidates apart, the best first", default=())

@@ -104,12 +104,16 @@ class PartOfGap(Entry):
 
 @dataclass(frozen=True, kw_only=True)
 class LearnedGap(Entry):
-    """How far what was learnt without a name closes the gap that named effects leave."""
+    """How far the gap closes with what was learned beside the effects of the verdict."""
 
-    before: Number = noted("Overall gap with the named effects alone")
-    after: Number = noted("Overall gap with what was learnt as well")
-    closed: Number = noted("Share of the gap above the noise that it closes")
-    sites: tuple[Site, ...] = noted("Where something was learnt", default=())
+    before: Number = noted("Overall gap with parameters moved inside their tolerances, without effects")
+    named: Number = noted("Overall gap with the effects of the verdict alone")
+    after: Number = noted("Overall gap with the effects of the verdict and what was learned")
+    closed: Number = noted("Share of the gap above the noise that closes with both")
+    sites: tuple[Site, ...] = noted("Where something was learned")
+    judged_on: str = noted(
+        "Data not used: other recordings, the strongest part of this one, or pieces between those used (interpolation)"
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,7 +131,9 @@ class HowFar(Entry):
     closed_interval: Ends | None = noted("Its interval of 90 %, or its range over the recordings given")
     noise_floor: Number = noted("Overall gap that the sensors' noise alone makes")
     judged_on: str | None = noted("The data, not used for the fit, on which this was judged")
-    learned: LearnedGap | None = noted("What was learnt without a name", default=None, absent=Absent.LEFT_OUT)
+    learned: LearnedGap | None = noted(
+        "With what was learned of what no effect explains", default=None, absent=Absent.LEFT_OUT
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

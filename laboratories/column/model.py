@@ -3,7 +3,8 @@
 The actuator is a first-order lag with dead time, whose motion does not depend on the specimen, or servo-hydraulics that
 move the specimen's mass by their force. Effects are laid over either: a band of the loop's error may be lost (valve
 overlap), the piston is no faster than its valve lets oil through, under load it yields by the oil's and the frame's
-compliance, and play in the clevis of the lag lies between it and the specimen.
+compliance, and play in the clevis of the lag lies between it and the specimen. A law learned from a recording moves the
+specimen beside what the lag does.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from common.errors import InputError
 from common.plan.tables import Actuator, Column
 from laboratories.column import specimen
 from laboratories.column.specimen import REACTION, Specimen
+from models import preisach
 from models.compiled import jit
 from models.registry import Array
 from models.system import ActuatorEffects, ColumnEffects
@@ -44,6 +46,8 @@ class ColumnLab(NamedTuple):
     history: Array  # commands written, newest first
     state: Array
     specimen: Specimen
+    learned: Array  # a law of `models.preisach` of the piston's place, empty for none
+    learned_memory: Array
 
 
 def build(
@@ -70,6 +74,7 @@ def build(
     rows = first_order.propagators(actuator.gain, actuator.time_constant, segments.lengths)
     limits = [float(present), on_actuator.velocity_limit, on_actuator.backlash, on_actuator.compliance]
     limits += [on_actuator.deadband, actuator.gain, column.stiffness, float(actuator.command == "held")]
+    law = np.array(on_actuator.learned)
     return ColumnLab(
         segments.taps,
         rows,
@@ -78,6 +83,8 @@ def build(
         np.zeros(segments.memory),
         np.zeros(STATES),
         specimen.build(column, on_column),
+        law,
+        preisach.memory(law),
     )
 
 
@@ -114,6 +121,8 @@ def hydraulic(
         np.zeros(segments.memory),
         np.zeros(STATES + servo_hydraulic.STATES),
         specimen.build(bare, on_column),
+        preisach.NONE,
+        preisach.NONE,
     )
 
 
@@ -139,8 +148,9 @@ def begin(lab: ColumnLab, command: float, interval: float) -> None:
 @jit
 def enter(lab: tuple[Any, ...], command: float) -> tuple[float, float]:
     """`advance` for a caller outside compiled code, which holds the laboratory as `compiled.plain` gives it."""
-    taps, rows, lengths, limits, history, state, tested = lab
-    return advance(ColumnLab(taps, rows, lengths, limits, history, state, Specimen(*tested)), command)
+    taps, rows, lengths, limits, history, state, tested, learned, memory = lab
+    whole = ColumnLab(taps, rows, lengths, limits, history, state, Specimen(*tested), learned, memory)
+    return advance(whole, command)
 
 
 @jit
@@ -158,6 +168,7 @@ def advance(lab: ColumnLab, command: float) -> tuple[float, float]:
     cell = tested.cell
     delay.remember(history, command)
     servo, displacement, force = state[SERVO], state[DISPLACEMENT], state[FORCE]
+    reached = displacement
     before = delay.delayed(history, taps, 0)
     for i in range(rows.shape[0]):
         after = delay.delayed(history, taps, i + 1)
@@ -169,6 +180,7 @@ def advance(lab: ColumnLab, command: float) -> tuple[float, float]:
             servo_hydraulic.step(rows[i], state, STATES, before - lost, after - lost, excess)
             choked(limits, state)
             displacement = state[STATES + servo_hydraulic.POSITION]
+            reached = displacement
             force = state[STATES + servo_hydraulic.FORCE]
             if limits[BEYOND] != 0.0:
                 specimen.force(tested, displacement, lengths[i])
@@ -180,12 +192,17 @@ def advance(lab: ColumnLab, command: float) -> tuple[float, float]:
             else:
                 servo = ahead
                 displacement = ahead
-            force = specimen.force(tested, displacement, lengths[i])
+            reached = displacement
+            if lab.learned.size > 0:
+                rate = (displacement - state[DISPLACEMENT]) / lengths[i]
+                state[DISPLACEMENT] = displacement
+                reached += preisach.step(lab.learned, lab.learned_memory, displacement, rate)
+            force = specimen.force(tested, reached, lengths[i])
         before = after
     state[SERVO] = servo
     state[DISPLACEMENT] = displacement
     state[FORCE] = force
-    return displacement, force
+    return reached, force
 
 
 @jit

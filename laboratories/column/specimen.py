@@ -2,8 +2,9 @@
 
     f = g(δ_max)·p(δ')·f_column(δ') + friction + c·δ̇ + m·δ̈,    δ' = δ outside the grip's gap
 
-with `f_column` the plan's model or, once it yields, that of Bouc and Wen in its place, and with the plan's mass and
-dashpot in m and c. Without them and without effects the force is that of the plan's model to the last bit.
+with `f_column` the plan's model or, once it yields, one of `LAWS` in its place, and with the plan's mass and dashpot in
+m and c; a law learned from a recording adds to it. Without all these the force is that of the plan's model to the last
+bit.
 """
 
 from __future__ import annotations
@@ -14,10 +15,10 @@ from typing import NamedTuple
 import numpy as np
 
 from common.plan.tables import Column
-from models import specimens
+from models import preisach, specimens
 from models.compiled import jit, jit_apart
 from models.registry import Array
-from models.specimens import bouc_wen
+from models.specimens import SPECIMENS
 from models.system import ColumnEffects
 
 # places in `effects`
@@ -26,6 +27,12 @@ FRICTION, PRESLIDING, VISCOUS, INERTIA, SLIP, FRICTION_VELOCITY = range(7, 13)
 
 # places in `cell`
 DEFORMATION, RATE, LARGEST, SLIDER, LAST_STEP, REACTION = range(6)
+LAWS = (
+    "bouc_wen",
+    "bilinear",
+    "menegotto_pinto",
+    "clough",
+)  # of yielding, as `ColumnEffects.law` counts them
 DEGRADED_AT = 2e-3  # m, deformation at which most of the loss of a degrading column has happened
 
 
@@ -36,9 +43,11 @@ class Specimen(NamedTuple):
     params: Array
     memory: Array
     effects: Array
-    yielding: Array  # of Bouc and Wen's model
+    yielding: Array  # of the law of yielding, behind the stiffness that it replaces
     yielded: Array  # its memory
     cell: Array  # what the effects remember
+    learned: Array  # a law of `models.preisach`, empty for none
+    learned_memory: Array
 
 
 def build(column: Column, effects: ColumnEffects | None = None) -> Specimen:
@@ -50,7 +59,7 @@ def build(column: Column, effects: ColumnEffects | None = None) -> Specimen:
     values = [
         float(more != ColumnEffects()),
         column.stiffness,
-        float(yields),
+        float(SPECIMENS[LAWS[int(more.law)]].code if yields else 0),
         more.degradation,
         more.pinching,
         more.pinching_width,
@@ -62,11 +71,31 @@ def build(column: Column, effects: ColumnEffects | None = None) -> Specimen:
         more.slip,
         more.friction_velocity,
     ]
-    limit = more.yield_displacement if yields else 1.0
-    yielding = np.array([column.stiffness, limit, more.hardening, more.exponent, 0.5, 0.5])
+    law = np.array(more.learned)
     return Specimen(
-        code, params, memory, np.array(values), yielding, np.zeros(bouc_wen.STATE_SIZE), np.zeros(6)
+        code,
+        params,
+        memory,
+        np.array(values),
+        yielding(column.stiffness, more),
+        np.zeros(specimens.STATE_SIZE),
+        np.zeros(6),
+        law,
+        preisach.memory(law),
     )
+
+
+def yielding(stiffness: float, effects: ColumnEffects) -> Array:
+    """Parameters of the law by which a column of that stiffness (N/m) yields, in the order of its kernel."""
+    limit = effects.yield_displacement if np.isfinite(effects.yield_displacement) else 1.0
+    name = LAWS[int(effects.law)]
+    if name == "bouc_wen":
+        return np.array([stiffness, limit, effects.hardening, effects.exponent, 0.5, 0.5])
+    if name == "menegotto_pinto":
+        return np.array([stiffness, limit, effects.hardening, effects.exponent, 0.925, 0.15])
+    if name == "clough":  # which cannot soften
+        return np.array([stiffness, limit, max(effects.hardening, 0.0), effects.unloading, 0.0, 0.0])
+    return np.array([stiffness, limit, effects.hardening])
 
 
 def with_rates(column: Column, force: Array, displacement: Array, interval: float) -> Array:
@@ -109,7 +138,10 @@ def felt(specimen: Specimen, deformation: float, step: float) -> float:
     within = deformation - inside
     result = specimens.step(specimen.code, specimen.params, specimen.memory, within)
     if effects[YIELDS] != 0.0:
-        result += bouc_wen.step(specimen.yielding, specimen.yielded, within) - effects[STIFFNESS] * within
+        law = int(effects[YIELDS])
+        result += (
+            specimens.step(law, specimen.yielding, specimen.yielded, within) - effects[STIFFNESS] * within
+        )
     cell[LARGEST] = max(cell[LARGEST], abs(within))
     if effects[DEGRADATION] != 0.0:
         result *= 1.0 - effects[DEGRADATION] * (1.0 - np.exp(-cell[LARGEST] / DEGRADED_AT))
@@ -123,6 +155,8 @@ def felt(specimen: Specimen, deformation: float, step: float) -> float:
         cell[SLIDER] = min(max(cell[SLIDER] + moved, -contact), contact)
         left = 1.0 if effects[FRICTION_VELOCITY] <= 1e-6 else np.tanh(abs(rate) / effects[FRICTION_VELOCITY])
         result += effects[FRICTION] * cell[SLIDER] / contact * left
+    if specimen.learned.size > 0:
+        result += preisach.step(specimen.learned, specimen.learned_memory, deformation, rate)
     cell[REACTION] = result
     result += effects[VISCOUS] * rate
     if effects[INERTIA] != 0.0 and cell[LAST_STEP] > 0.0:

@@ -18,6 +18,7 @@ import numpy as np
 from common.errors import InputError
 from common.plan.tables import Damper, ShakingTable
 from laboratories.column.model import substeps
+from models import preisach
 from models.compiled import jit
 from models.registry import Array
 from models.system import DamperEffects, TableEffects
@@ -47,6 +48,8 @@ class TableLab(NamedTuple):
     history: Array  # table commands written, newest first
     state: Array  # (n,), n = 6, or 8 with an oil column
     scratch: Array  # (n + 7,), the last two the command behind the play and an ideal table's last velocity
+    learned: Array  # a law of `models.preisach` of the stroke, empty for none
+    learned_memory: Array
 
 
 def build(
@@ -64,6 +67,8 @@ def build(
     on_table, on_damper = table_effects or TableEffects(), damper_effects or DamperEffects()
     present = on_table != TableEffects() or on_damper != DamperEffects()
     short = on_table.backlash or on_table.friction or on_damper.friction or on_damper.stop_stiffness
+    law = np.array(on_damper.learned)
+    short = short or law.size > 0
     segments = delay.split(interval, table.delay, substeps(interval) if short else 1)
     alike: dict[float, Array] = {}  # equal steps differ by rounding only
     for length in segments.lengths:
@@ -83,6 +88,8 @@ def build(
         np.zeros(segments.memory),
         np.zeros(size),
         np.zeros(size + INPUTS + 2),
+        law,
+        preisach.memory(law),
     )
 
 
@@ -136,7 +143,7 @@ def advance(lab: TableLab, command: float, motor_command: float) -> tuple[float,
                 wanted = scratch[after]
                 scratch[played] = min(max(scratch[played], wanted - half), wanted + half)
                 scratch[after] = scratch[played]
-            resist(matrices[i], limits, scratch, size)
+            resist(matrices[i], lab, scratch, size)
         for row in range(size):
             value = 0.0
             for column in range(size + INPUTS):
@@ -151,8 +158,9 @@ def advance(lab: TableLab, command: float, motor_command: float) -> tuple[float,
 
 
 @jit
-def resist(matrix: Array, limits: Array, scratch: Array, size: int) -> None:
-    """Forces of a segment that oppose motion: table friction, then end stop and friction of the damper."""
+def resist(matrix: Array, lab: TableLab, scratch: Array, size: int) -> None:
+    """Forces of a segment that oppose motion: the table's friction; the damper's stop, what was learned, friction."""
+    limits = lab.limits
     rail, drag = size + 3, size + 4
     scratch[rail] = -limits[OFFSET]
     scratch[drag] = 0.0
@@ -160,6 +168,8 @@ def resist(matrix: Array, limits: Array, scratch: Array, size: int) -> None:
     over = abs(middle) - limits[STOP]
     if over > 0.0:  # at the segment's middle, which keeps the energy of a bounce
         scratch[rail] += limits[STOP_STIFFNESS] * (over if middle > 0.0 else -over)
+    if lab.learned.size > 0:
+        scratch[rail] += preisach.step(lab.learned, lab.learned_memory, middle, scratch[STROKE_RATE])
     if limits[TABLE_FRICTION] > 0.0:
         base = BASE_RATE if size > BASE else TABLE_RATE
         most = limits[TABLE_FRICTION] * falling(scratch[base], limits[TABLE_VELOCITY])

@@ -17,7 +17,7 @@ from common.plan.schema import Rule, nearest
 from models import registry
 from models.compiled import jit
 from models.registry import Array
-from models.specimens import bilinear, bouc_wen, bwbn, clough, linear
+from models.specimens import bilinear, bouc_wen, bwbn, clough, linear, menegotto_pinto
 
 
 def no_fault(_params: Any) -> str:
@@ -47,6 +47,13 @@ SPECIMENS = {
         ),
         SpecimenModel("clough", 3, clough.CloughParams, clough.RULES, clough.STATE_SIZE, clough.fault),
         SpecimenModel("bwbn", 4, bwbn.BwbnParams, bwbn.RULES, bwbn.STATE_SIZE, bwbn.fault),
+        SpecimenModel(
+            "menegotto_pinto",
+            5,
+            menegotto_pinto.MenegottoPintoParams,
+            menegotto_pinto.RULES,
+            menegotto_pinto.STATE_SIZE,
+        ),
     )
 }
 STATE_SIZE = max(model.state_size for model in SPECIMENS.values())
@@ -85,4 +92,6 @@ def step(kind: int, p: Array, s: Array, deformation: float) -> float:
         return clough.step(p, s, deformation)
     if kind == 4:
         return bwbn.step(p, s, deformation)
+    if kind == 5:
+        return menegotto_pinto.step(p, s, deformation)
     return linear.step(p, s, deformation)

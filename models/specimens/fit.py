@@ -94,6 +94,13 @@ FREE: dict[str, dict[str, SearchRange]] = {
         "delta_psi": SearchRange(1e-6, 5.0, (0.005,)),
         "lambda_": SearchRange(0.01, 5.0, (0.5,)),
     },
+    "menegotto_pinto": {
+        "stiffness": STIFFNESS,
+        "yield_displacement": YIELDING,
+        "hardening": HARDENING,
+        "sharpness": SearchRange(1.0, 50.0, (5.0, 18.0)),
+        "loss": SearchRange(0.0, 0.98, (0.9,), log=False),
+    },
 }
 
 

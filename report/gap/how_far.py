@@ -43,11 +43,18 @@ def numbers(report: Report) -> Rows:
     rows += [
         ["parameters moved inside their tolerances (before)", percent(far.before)],
         ["with the effects named (after)", strong(percent(far.after))],
+        *learned(report),
         ["noise floor", percent(far.noise_floor)],
     ]
     closed = wording.closed(report)
     rows += [["closed, of the gap above the noise", bar(far.closed, closed)]] if closed else []
     return Rows(head, rows)
+
+
+def learned(report: Report) -> list[list[str]]:
+    """The gap with what was learned beside the effects; no row where nothing was."""
+    far = report.how_far.learned
+    return [] if far is None else [["with what was learned as well", strong(percent(far.after))]]
 
 
 def remaining(report: Report) -> str:

@@ -55,6 +55,8 @@ def named(report: Report) -> dict[str, Any]:
         "kinds": which.kinds(report),
         "nothing": which.nothing(report),
         "unknown": which.unknown(unknown) if unknown else None,
+        "learned": which.learned(report),
+        "learned_text": wording.learned(report),
         "predictions": which.predictions(report),
         "curves": which.curves(report),
     }

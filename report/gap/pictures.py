@@ -269,6 +269,10 @@ def curve(item: NaturalCurve, names: tuple[str, str] = ("without the effect", "w
     x, drawn = x_factor * x, [(y_factor * y, colour, label) for y, colour, label in drawn]
     canvas = figure(WIDTH, 3.0)
     axis = canvas.subplots()
+    low, high = (y_factor * values(series) for series in (item.low, item.high))
+    if low.size == high.size == x.size:
+        axis.vlines(x, low, high, color=AFTER, alpha=0.05, linewidth=1.2, rasterized=True)
+        axis.plot([], [], color=AFTER, alpha=0.3, linewidth=5, label="band of 95 %")
     steady = bool(np.all(np.diff(x) >= 0.0))
     for y, colour, label in drawn:
         if steady and colour != GREY:

@@ -143,7 +143,7 @@ def how_far(report: Report) -> list[str]:
     nominal = wording.nominal_gap(report)
     if nominal is not None and percent(nominal) != before:
         text += f"; {percent(nominal)} before parameters were moved"
-    return row("how far", f"{text}.", 3)
+    return [*row("how far", f"{text}.", 3), *row("learned", wording.learned(report), 3)]
 
 
 def tolerances(report: Report) -> list[str]:

@@ -155,6 +155,23 @@ def unknown(found: Unknown) -> Strange:
     )
 
 
+def learned(report: Report) -> list[Drawing]:
+    """What no effect explains, learned, each site in its natural coordinates with its band."""
+    names = ("", "learned")
+    return drawings(
+        *(
+            (
+                pictures.curve(item.curve, names),
+                f"{wording.site(item.site).capitalize()}: the {item.quantity} that no effect explains, over the "
+                "motion there.",
+                f"{quantity(item.before, item.unit)} rms, of which {quantity(item.after, item.unit)} are left on time "
+                "that the law has not seen.",
+            )
+            for item in report.details.learned
+        )
+    )
+
+
 def predictions(report: Report) -> list[Drawing]:
     """Measured against predicted, of the parts with the largest residuals first."""
     signals = [(part.site, signal) for part in report.details.parts for signal in part.signals]

@@ -32,6 +32,11 @@ JUDGED = {
     "held-out time windows": "On data not used for fitting",
     "recordings given": "On the recordings given for validation",
 }
+LEARNED_ON = {
+    "other recordings": "the recordings given, which it has not seen",
+    "strongest part": "the strongest part of this recording, which it has not seen",
+    "interleaved (interpolation)": "time that it has not seen, but of the same strength: that is interpolation",
+}
 DOMINANT = 0.5  # share of the gap from which one site is named as the place
 NOTABLE = 1.0  # standard deviations of its tolerance that make a parameter's move worth a word
 
@@ -230,6 +235,20 @@ def closed(report: Report) -> str:
 def judged_on(report: Report) -> str:
     """The data on which the gap before and after is compared, as the beginning of a sentence."""
     return JUDGED.get(str(report.how_far.judged_on), "In this recording")
+
+
+def learned(report: Report) -> str:
+    """What was learned of what no effect explains and how far it closes the gap, as a sentence; empty without any."""
+    far = report.how_far.learned
+    if far is None:
+        return ""
+    places = joined([site(name) for name in far.sites])
+    on = LEARNED_ON.get(far.judged_on, far.judged_on)
+    fall = f"from {percent(far.before)} to {percent(far.after)}"
+    return (
+        f"What no effect explains at the {places} was learned as a law of the motion there: the gap falls {fall} "
+        f"({percent(far.named)} with the named effects alone), judged on {on}."
+    )
 
 
 def force_path(report: Report) -> str:

@@ -59,6 +59,14 @@ def test_bilinear_is_steel01(ops: Any, hardening: float) -> None:
     )
 
 
+@pytest.mark.parametrize("sharpness", [5.0, 20.0])
+def test_menegotto_and_pinto_is_steel02(ops: Any, sharpness: float) -> None:
+    points = path(200)
+    expected = theirs(ops, points, "Steel02", K * DY, K, 0.05, sharpness, 0.925, 0.15)
+    found = ours("menegotto_pinto", points, hardening=0.05, sharpness=sharpness)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * K * DY)
+
+
 @pytest.mark.parametrize("n", [1.0, 2.0, 4.0])
 @pytest.mark.parametrize(("beta", "gamma"), [(0.5, 0.5), (0.8, 0.2), (0.3, 0.7)])
 def test_bouc_wen_is_theirs(ops: Any, n: float, beta: float, gamma: float) -> None:

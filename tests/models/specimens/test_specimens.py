@@ -29,6 +29,7 @@ EXAMPLES: dict[str, dict[str, float]] = {
         "closing": 0.3,
     },
     "bwbn": {"stiffness": K, "yield_displacement": DY, "hardening": 0.05},
+    "menegotto_pinto": {"stiffness": K, "yield_displacement": DY, "hardening": 0.05, "sharpness": 18.0},
 }
 
 

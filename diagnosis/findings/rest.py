@@ -1,0 +1,133 @@
+"""How far what was learned closes the gap beside the named effects, and how the report shows it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy import ndimage
+
+from diagnosis.findings.found import Diagnosis
+from diagnosis.findings.how_far import Judge, held_out
+from diagnosis.findings.series import numbers, strongest
+from diagnosis.learned.learn import LearnedLaw, Of
+from diagnosis.learned.regression import AVERAGED
+from diagnosis.recorded.loop import closed_share, overall
+from diagnosis.recorded.record import Record
+from diagnosis.report.evidence import Abscissa, LearnedRest, NaturalCurve, Ordinate
+from diagnosis.report.records import LearnedGap
+from diagnosis.signals.mask import Mask
+from models import preisach
+
+FARTHER = 1.1  # times what the rest of the record reaches, from which on its strongest part is more than that
+WORSE = 1.02  # times the gap with named effects alone: what was learned and leaves more does not hold
+ENOUGH = 0.2  # of the strongest part: less than this, seen by no fit of effects, tells too little
+OTHERS, STRONGEST, INTERLEAVED = "other recordings", "strongest part", "interleaved (interpolation)"
+
+
+class Gaps(NamedTuple):
+    """Overall gaps on data that was not used."""
+
+    before: float  # parameters moved inside their tolerances, no effect
+    named: float  # with the effects of the verdict
+    learned: float  # with what was learned as well
+    floor: float  # of noise alone
+    on: str  # the data
+
+
+def judged(
+    found: Diagnosis, validation: Sequence[Record]
+) -> tuple[Diagnosis, LearnedGap | None, tuple[str, ...]]:
+    """What was found with the laws that hold, how far they close the gap, and what is to be said of those that do not.
+
+    On the recordings given for validation; without them on the strongest part of the recording, by laws of the rest.
+    """
+    if not found.learned:
+        return found, None, ()
+    gap = on_others(found, validation) or on_itself(found)
+    if gap.learned > WORSE * gap.named:
+        sites = ", ".join(law.site for law in found.learned)
+        text = f"What was learned at {sites} does not hold on data that it has not seen: it is left out."
+        return replace(found, learned=()), None, (text,)
+    sites = tuple(law.site for law in found.learned)
+    closed = closed_share(gap.before, gap.learned, gap.floor)
+    far = LearnedGap(
+        before=gap.before, named=gap.named, after=gap.learned, closed=closed, sites=sites, judged_on=gap.on
+    )
+    return found, far, ()
+
+
+def on_others(found: Diagnosis, validation: Sequence[Record]) -> Gaps | None:
+    """Means over the recordings given, None where none of them holds a closed loop."""
+    judges = [Judge(found, record, np.ones(record.ticks, dtype=bool)) for record in validation]
+    gaps = [gaps_of(judge, "law", OTHERS) for judge in judges if judge.loop is not None]
+    if not gaps:
+        return None
+    return Gaps(
+        *(float(np.mean(values)) for values in zip(*(item[:4] for item in gaps), strict=True)), OTHERS
+    )
+
+
+def on_itself(found: Diagnosis) -> Gaps:
+    """The strongest part of the recording by laws of the rest where they hold, else what lies between what was used."""
+    record = found.record
+    held = held_out(record)
+    held = held_out(record)
+    part = strongest_part(found)
+    if part is not None:
+        unseen = part & held
+        mask = unseen if unseen.sum() > ENOUGH * part.sum() else part
+        found_there = gaps_of(Judge(found, record, mask), "weaker", STRONGEST)
+        if found_there.learned <= WORSE * found_there.named:
+            return found_there
+    return gaps_of(Judge(found, record, held), "interleaved", INTERLEAVED)
+
+
+def strongest_part(found: Diagnosis) -> Mask | None:
+    """Ticks in which the motion at the foremost law goes farther than ever else, None where there are none such."""
+    first = max(found.learned, key=lambda law: law.regression.share)
+    part = np.zeros(found.record.ticks, dtype=bool)
+    part[slice(*first.regression.strongest)] = True
+    motion = np.abs(first.equation.motion)
+    farther = float(motion[part].max()) > FARTHER * float(motion[~part].max(initial=0.0))
+    return part if farther else None
+
+
+def gaps_of(judge: Judge, of: Of, on: str) -> Gaps:
+    """The overall gaps of a recording under nothing found, under the effects, and under what was learned as well."""
+    plans = judge.record.plans
+    simulated = (
+        judge.signals(frozenset()),
+        judge.signals(None),
+        judge.simulated(judge.found.corrected(plans, of)),
+    )
+    return Gaps(*(overall(judge.gap(item)) for item in simulated), overall(judge.floor()), on)
+
+
+def shown(found: Diagnosis, law: LearnedLaw) -> LearnedRest:
+    """One law as the report holds it, with its curve in natural coordinates."""
+    equation, regression = law.equation, law.regression
+    interval = found.record.plan.test.interval
+    part = strongest(equation.left, interval)
+    said = preisach.play(regression.law, equation.motion, equation.rate)
+    band = regression.band(equation.motion, equation.rate)
+    left = ndimage.uniform_filter1d(equation.left, max(1, round(AVERAGED / interval)))
+    return LearnedRest(
+        site=law.site,
+        quantity=equation.quantity,
+        unit=equation.unit,
+        before=regression.before,
+        after=regression.error,
+        curve=NaturalCurve(
+            title=f"{law.site}: {equation.quantity} beyond the effects named, over {equation.over}",
+            x=Abscissa(label=f"{equation.over} (m)", values=numbers(equation.motion[part])),
+            y=Ordinate(label=f"{equation.quantity} left ({equation.unit})"),
+            measured=numbers(left[part]),
+            after=numbers(said[part]),
+            low=numbers((said - band)[part]),
+            high=numbers((said + band)[part]),
+        ),
+        law=tuple(regression.law.tolist()),
+    )

@@ -1,0 +1,79 @@
+"""What a machine does beyond its model, as a series over its own motion: the force or the way that a model leaves out.
+
+Each is read off the recorded signals at the machine, so that what another machine does wrong does not enter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from common.plan.kinds import COLUMN
+from diagnosis.fits import fitting
+from diagnosis.fits.fitting import Fit
+from diagnosis.recorded.parts import ColumnAlone, LaboratoryPart
+from diagnosis.signals.mask import Mask
+from diagnosis.signals.systematic import systematic
+from loop import replay
+from models.registry import Array
+from models.system import System
+
+
+@dataclass(frozen=True)
+class Equation:
+    """What a model leaves of a reading at a machine, over the machine's motion."""
+
+    machine: str  # site within its laboratory, whose effects have the field `learned`
+    motion: Array  # (ticks,) m, as far as possible without noise
+    rate: Array  # (ticks,) m/s
+    left: Array  # (ticks,) in `unit`
+    there: Mask
+    over: str  # the motion, in words
+    quantity: str  # what is left, in words
+    unit: str
+
+
+def equations(fit: Fit) -> list[Equation]:
+    """Those of the part of a fit, each with the effects of the fit in its model."""
+    part, system = fit.data.part, fitting.lay(fit.data, fit.z, fit.values)
+    if isinstance(part, ColumnAlone):
+        return [of_specimen(system, part.inputs, part.measured[:, 0], part.present[:, 0])]
+    if isinstance(part, LaboratoryPart) and part.lab.kind.name in LABORATORIES:
+        return LABORATORIES[part.lab.kind.name](fit, system)
+    return []
+
+
+def of_column(fit: Fit, system: System) -> list[Equation]:
+    """The piston's way over the way that its model predicts, and the specimen's force over its deformation."""
+    part = fit.data.part
+    predicted = part.predict(system)
+    place, force = part.measured.T
+    placed, felt = part.present.T
+    result = []
+    motion = predicted[:, 0]
+    if placed.any():
+        left = np.where(placed, place - motion, 0.0)
+        rate = rate_of(motion, system)
+        result.append(
+            Equation("actuator", motion, rate, left, placed, "way of the piston", "displacement", "m")
+        )
+        motion = motion + systematic(left, float(fit.data.white[0]), system.plan.test.interval)
+    if felt.any():
+        result.append(of_specimen(system, motion, force, felt))
+    return result
+
+
+def of_specimen(system: System, motion: Array, force: Array, there: Mask) -> Equation:
+    """The force that a specimen's model leaves at a deformation (ticks,) m."""
+    left = np.where(there, force - replay.column(system, motion), 0.0)
+    return Equation("column", motion, rate_of(motion, system), left, there, "deformation", "force", "N")
+
+
+def rate_of(motion: Array, system: System) -> Array:
+    """Rate (ticks,) of a motion (ticks,), m/s, over the interval that ends at each tick, as a simulation has it."""
+    return np.diff(motion, prepend=motion[:1]) / system.plan.test.interval
+
+
+LABORATORIES: dict[str, Callable[[Fit, System], list[Equation]]] = {COLUMN: of_column}

@@ -1,0 +1,129 @@
+"""Laws that are learned of what no effect explains: what they can be, and how their errors are judged."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from diagnosis.learned import regression
+from diagnosis.learned.regression import AGEING, STEADY, Regression, regress
+from models import preisach
+from models.registry import Array
+
+INTERVAL, TICKS = 0.002, 8000
+K, LIMIT = 12.5e6, 0.83e-3  # N/m, m
+
+
+def motion(seed: int, size: float) -> Array:
+    """A narrow-banded motion that swells and fades, at most `size` m."""
+    draws = np.random.default_rng(seed)
+    t = np.arange(TICKS) * INTERVAL
+    phases = draws.uniform(0.0, 2.0 * np.pi, 12)
+    waves = np.cos(2.0 * np.pi * np.linspace(1.5, 2.6, 12)[:, None] * t + phases[:, None]).sum(axis=0)
+    swelling = waves * np.minimum(t / 1.0, 1.0)
+    return np.asarray(size * swelling / np.max(np.abs(swelling)))
+
+
+def rate(x: Array) -> Array:
+    return np.diff(x, prepend=x[:1]) / INTERVAL
+
+
+def bilinear(x: Array) -> Array:
+    """A slider's force: what an elastic, perfectly plastic column lacks beside an elastic one."""
+    held, result = 0.0, np.empty(x.size)
+    for i, step in enumerate(np.diff(x, prepend=0.0)):
+        held = min(max(held + step, -LIMIT), LIMIT)
+        result[i] = K * held
+    return np.asarray(result - K * x)
+
+
+def flag(x: Array) -> Array:
+    """A flag: a slider that works only while a joint is open, so that unloading ends on the elastic line."""
+    opened = x - np.clip(x, -LIMIT, LIMIT)
+    slid, result = 0.0, np.empty(x.size)
+    for i, gap in enumerate(opened):
+        slid = min(max(slid, gap - 0.2e-3), gap + 0.2e-3) if gap * slid >= 0.0 else 0.0
+        result[i] = -0.9 * K * slid
+    return result
+
+
+def clearance(x: Array) -> Array:
+    return np.asarray(-K * np.clip(x, -0.3e-3, 0.3e-3))
+
+
+def damping(x: Array) -> Array:
+    return np.asarray(100e3 * rate(x) * np.abs(x) / 2e-3)
+
+
+LAWS = {"bilinear": bilinear, "flag": flag, "clearance": clearance, "damping": damping}
+
+
+def learned(law: str, seed: int = 1, noise: float = 100.0) -> tuple[Regression | None, Array]:
+    x = motion(seed, 2e-3)
+    y = LAWS[law](x) + noise * np.random.default_rng(9).standard_normal(TICKS)
+    return regress(x, rate(x), y, np.ones(TICKS, dtype=bool), INTERVAL), x
+
+
+def left(found: Regression, law: str, seed: int, size: float) -> float:
+    """Share of the law's rms that is missed on a motion."""
+    x = motion(seed, size)
+    true = LAWS[law](x)
+    missed = true - preisach.play(found.law, x, rate(x))
+    return float(np.sqrt(np.mean(missed**2) / np.mean(true**2)))
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_foreign_law_is_learned_for_another_motion_and_a_larger_one(law: str) -> None:
+    found, _ = learned(law)
+    assert found is not None
+    assert found.share > 0.95
+    assert left(found, law, seed=2, size=1.8e-3) < 0.15
+    assert left(found, law, seed=3, size=2.6e-3) < 0.25
+
+
+def test_nothing_is_learned_of_noise_of_any_colour() -> None:
+    x = motion(1, 2e-3)
+    there = np.ones(TICKS, dtype=bool)
+    white = np.random.default_rng(4).standard_normal(TICKS)
+    slow = np.convolve(white, np.ones(50), "same")
+    for series in (white, slow, np.cumsum(white)):
+        assert regress(x, rate(x), series, there, INTERVAL) is None
+
+
+def test_nothing_is_learned_where_nothing_moves_or_most_is_missing() -> None:
+    x = motion(1, 2e-3)
+    y = bilinear(x)
+    assert regress(0.0 * x, 0.0 * x, y, np.ones(TICKS, dtype=bool), INTERVAL) is None
+    assert regress(x, rate(x), y, np.zeros(TICKS, dtype=bool), INTERVAL) is None
+
+
+def test_the_band_holds_on_another_motion_and_grows_beyond_what_was_seen() -> None:
+    found, x = learned("flag")
+    assert found is not None
+    other = motion(5, 2e-3)
+    missed = np.abs(flag(other) - preisach.play(found.law, other, rate(other)))
+    assert np.mean(missed <= found.band(other, rate(other))) > 0.9
+    far = 2.0 * x
+    assert np.max(found.band(far, rate(far))) > 1.5 * np.max(found.band(x, rate(x)))
+
+
+def test_the_strongest_part_is_predicted_by_a_law_of_the_rest() -> None:
+    found, x = learned("bilinear", noise=0.0)
+    assert found is not None
+    first, last = found.strongest
+    assert first <= int(np.argmax(np.abs(x))) < last
+    assert last - first == round(regression.STRONGEST * TICKS)
+    missed = bilinear(x) - preisach.play(found.weaker, x, rate(x))
+    assert np.std(missed[first:last]) < 0.1 * np.std(bilinear(x)[first:last])
+
+
+def test_marching_gives_what_the_regression_saw() -> None:
+    x = motion(1, 2e-3)
+    for grid in (STEADY, AGEING):
+        bare = preisach.pack(grid, 2e-3, 0.03)
+        weights = np.random.default_rng(3).standard_normal(preisach.count(bare))
+        law = np.concatenate([bare, weights])
+        state = preisach.memory(law)
+        marched = [preisach.step(law, state, *pair) for pair in zip(x[:500], rate(x)[:500], strict=True)]
+        np.testing.assert_allclose(marched, preisach.play(law, x[:500], rate(x)[:500]), rtol=1e-12)
+        assert preisach.features(bare, x, rate(x)).shape == (TICKS, weights.size)
