@@ -151,7 +151,7 @@ class System:
         part = replace(getattr(self.plan, table), **values)
         return replace(self, plan=replace(self.plan, **{table: part}))
 
-    def laid(self, part: str, **values: float) -> System:
+    def laid(self, part: str, **values: float | tuple[float, ...]) -> System:
         """The system with effects on one part replaced: a field of `Effects` that is a part itself."""
         changed = replace(getattr(self.effects, part), **values)
         return replace(self, effects=replace(self.effects, **{part: changed}))

@@ -47,11 +47,10 @@ def judged(
     if not found.learned:
         return found, None, ()
     gap = on_others(found, validation) or on_itself(found)
-    if gap.learned > WORSE * gap.named:
-        sites = ", ".join(law.site for law in found.learned)
-        text = f"What was learned at {sites} does not hold on data that it has not seen: it is left out."
-        return replace(found, learned=()), None, (text,)
     sites = tuple(law.site for law in found.learned)
+    if gap.learned > WORSE * gap.named:
+        text = f"What was learned at {', '.join(sites)} does not hold on data that it has not seen: it is left out."
+        return replace(found, learned=()), None, (text,)
     closed = closed_share(gap.before, gap.learned, gap.floor)
     far = LearnedGap(
         before=gap.before, named=gap.named, after=gap.learned, closed=closed, sites=sites, judged_on=gap.on
@@ -65,9 +64,10 @@ def on_others(found: Diagnosis, validation: Sequence[Record]) -> Gaps | None:
     gaps = [gaps_of(judge, "law", OTHERS) for judge in judges if judge.loop is not None]
     if not gaps:
         return None
-    return Gaps(
-        *(float(np.mean(values)) for values in zip(*(item[:4] for item in gaps), strict=True)), OTHERS
+    before, named, learned, floor = (
+        float(np.mean(values)) for values in zip(*(item[:4] for item in gaps), strict=True)
     )
+    return Gaps(before, named, learned, floor, OTHERS)
 
 
 def on_itself(found: Diagnosis) -> Gaps:
@@ -98,12 +98,10 @@ def strongest_part(found: Diagnosis) -> Mask | None:
 def gaps_of(judge: Judge, of: Of, on: str) -> Gaps:
     """The overall gaps of a recording under nothing found, under the effects, and under what was learned as well."""
     plans = judge.record.plans
-    simulated = (
-        judge.signals(frozenset()),
-        judge.signals(None),
-        judge.simulated(judge.found.corrected(plans, of)),
-    )
-    return Gaps(*(overall(judge.gap(item)) for item in simulated), overall(judge.floor()), on)
+    corrected = judge.simulated(judge.found.corrected(plans, of))
+    simulated = (judge.signals(frozenset()), judge.signals(None), corrected)
+    before, named, learned = (overall(judge.gap(item)) for item in simulated)
+    return Gaps(before, named, learned, overall(judge.floor()), on)
 
 
 def shown(found: Diagnosis, law: LearnedLaw) -> LearnedRest:

@@ -25,7 +25,8 @@ from models.system import System
 class Equation:
     """What a model leaves of a reading at a machine, over the machine's motion."""
 
-    machine: str  # site within its laboratory, whose effects have the field `learned`
+    site: str
+    machine: str  # the site within its laboratory, whose effects have the field `learned`
     motion: Array  # (ticks,) m, as far as possible without noise
     rate: Array  # (ticks,) m/s
     left: Array  # (ticks,) in `unit`
@@ -39,15 +40,15 @@ def equations(fit: Fit) -> list[Equation]:
     """Those of the part of a fit, each with the effects of the fit in its model."""
     part, system = fit.data.part, fitting.lay(fit.data, fit.z, fit.values)
     if isinstance(part, ColumnAlone):
-        return [of_specimen(system, part.inputs, part.measured[:, 0], part.present[:, 0])]
+        site = part.lab.site("column")
+        return [of_specimen(site, system, part.inputs, part.measured[:, 0], part.present[:, 0])]
     if isinstance(part, LaboratoryPart) and part.lab.kind.name in LABORATORIES:
-        return LABORATORIES[part.lab.kind.name](fit, system)
+        return LABORATORIES[part.lab.kind.name](fit, part, system)
     return []
 
 
-def of_column(fit: Fit, system: System) -> list[Equation]:
+def of_column(fit: Fit, part: LaboratoryPart, system: System) -> list[Equation]:
     """The piston's way over the way that its model predicts, and the specimen's force over its deformation."""
-    part = fit.data.part
     predicted = part.predict(system)
     place, force = part.measured.T
     placed, felt = part.present.T
@@ -57,18 +58,28 @@ def of_column(fit: Fit, system: System) -> list[Equation]:
         left = np.where(placed, place - motion, 0.0)
         rate = rate_of(motion, system)
         result.append(
-            Equation("actuator", motion, rate, left, placed, "way of the piston", "displacement", "m")
+            Equation(
+                part.lab.site("actuator"),
+                "actuator",
+                motion,
+                rate,
+                left,
+                placed,
+                "way of the piston",
+                "displacement",
+                "m",
+            )
         )
         motion = motion + systematic(left, float(fit.data.white[0]), system.plan.test.interval)
     if felt.any():
-        result.append(of_specimen(system, motion, force, felt))
+        result.append(of_specimen(part.lab.site("column"), system, motion, force, felt))
     return result
 
 
-def of_specimen(system: System, motion: Array, force: Array, there: Mask) -> Equation:
+def of_specimen(site: str, system: System, motion: Array, force: Array, there: Mask) -> Equation:
     """The force that a specimen's model leaves at a deformation (ticks,) m."""
     left = np.where(there, force - replay.column(system, motion), 0.0)
-    return Equation("column", motion, rate_of(motion, system), left, there, "deformation", "force", "N")
+    return Equation(site, "column", motion, rate_of(motion, system), left, there, "deformation", "force", "N")
 
 
 def rate_of(motion: Array, system: System) -> Array:
@@ -76,4 +87,4 @@ def rate_of(motion: Array, system: System) -> Array:
     return np.diff(motion, prepend=motion[:1]) / system.plan.test.interval
 
 
-LABORATORIES: dict[str, Callable[[Fit, System], list[Equation]]] = {COLUMN: of_column}
+LABORATORIES: dict[str, Callable[[Fit, LaboratoryPart, System], list[Equation]]] = {COLUMN: of_column}

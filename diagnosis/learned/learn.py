@@ -29,7 +29,6 @@ class LearnedLaw:
 
 def learn(fit: Fit) -> list[LearnedLaw]:
     """The laws of what a fit leaves in its part: one for each machine where one predicts time that it has not seen."""
-    part = fit.data.part
     result = []
     for equation in equations(fit):
         found = regress(
@@ -40,5 +39,5 @@ def learn(fit: Fit) -> list[LearnedLaw]:
             fit.data.system.plan.test.interval,
         )
         if found is not None:
-            result.append(LearnedLaw(part.lab.site(equation.machine), part.role, equation, found))
+            result.append(LearnedLaw(equation.site, fit.data.part.role, equation, found))
     return result
