@@ -152,9 +152,7 @@ def effects() -> str:
 def of_any_signal(effect: Effect, signal: str, unit: str) -> Effect:
     """An effect on one reading as the reference lists it for all: with `<signal>` and "its unit"."""
     units = {unit: "its unit", f"{unit}/s": "its unit/s"}
-    parameters = (
-        dataclasses.replace(item, unit=units.get(item.unit, item.unit)) for item in effect.parameters
-    )
+    parameters = (dataclasses.replace(item, unit=units.get(item.unit, item.unit)) for item in effect.every)
     name = effect.name.replace(signal, "<signal>")
     return dataclasses.replace(effect, name=name, parameters=tuple(parameters))
 
@@ -163,7 +161,7 @@ def effect_table(found: Iterable[Effect], *, sized: bool = True) -> str:
     """Effects with their parameters; `sized` with the values from barely visible to strong."""
     rows = []
     for effect in found:
-        for place, parameter in enumerate(effect.parameters):
+        for place, parameter in enumerate(effect.every):
             of = f", of the actuator `{'` or `'.join(effect.actuators)}`" if effect.actuators else ""
             first = (f"`{effect.name}`", effect.says + of) if place == 0 else ("", parameter.says)
             rows.append((*first, f"`{parameter.name}`", parameter.unit, *numbers(parameter, sized)))

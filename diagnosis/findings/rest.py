@@ -12,6 +12,7 @@ from scipy import ndimage
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.how_far import Judge, held_out
 from diagnosis.findings.series import numbers, strongest
+from diagnosis.learned.equations import Equation
 from diagnosis.learned.learn import LearnedLaw, Of
 from diagnosis.learned.regression import AVERAGED
 from diagnosis.recorded.loop import closed_share, overall
@@ -104,6 +105,13 @@ def gaps_of(judge: Judge, of: Of, on: str) -> Gaps:
     return Gaps(before, named, learned, overall(judge.floor()), on)
 
 
+def abscissa(equation: Equation, part: slice) -> Abscissa:
+    """What a law is drawn over: the rate of the motion, or the motion."""
+    if equation.over == "velocity":
+        return Abscissa(label="velocity (m/s)", values=numbers(equation.rate[part]))
+    return Abscissa(label=f"{equation.over} (m)", values=numbers(equation.motion[part]))
+
+
 def shown(found: Diagnosis, law: LearnedLaw) -> LearnedRest:
     """One law as the report holds it, with its curve in natural coordinates."""
     equation, regression = law.equation, law.regression
@@ -120,7 +128,7 @@ def shown(found: Diagnosis, law: LearnedLaw) -> LearnedRest:
         after=regression.error,
         curve=NaturalCurve(
             title=f"{law.site}: {equation.quantity} beyond the effects named, over {equation.over}",
-            x=Abscissa(label=f"{equation.over} (m)", values=numbers(equation.motion[part])),
+            x=abscissa(equation, part),
             y=Ordinate(label=f"{equation.quantity} left ({equation.unit})"),
             measured=numbers(left[part]),
             after=numbers(said[part]),

@@ -35,8 +35,11 @@ def which(found: Diagnosis) -> Named:
     if not effects:
         probability = min(probability, nothing(found))
     fits = {name: values for verdict in named for name, values in intervals(verdict.search.chosen).items()}
-    parameters = {name: fitted(values) for name, values in fits.items()} | seen(found)
     catalogue = found.record.catalogue
+    laws = {
+        name: chosen_law(values) for verdict in named for name, values in verdict.search.chosen.values.items()
+    }
+    parameters = {name: fitted(values) | laws[name] for name, values in fits.items()} | seen(found)
     others = [
         item for verdict in found.verdicts for item in alternatives(verdict, effects, parameters, probability)
     ]
@@ -49,6 +52,11 @@ def which(found: Diagnosis) -> Named:
 def fitted(values: Mapping[str, Interval]) -> dict[str, Value]:
     """Parameters of an effect found by a fit, with intervals."""
     return {key: value(item.value, item.low, item.high, item.unit) for key, item in values.items()}
+
+
+def chosen_law(values: Mapping[str, float]) -> dict[str, Value]:
+    """Which formula of an effect that has several a fit chose, where it is not the first."""
+    return {"law": value(values["law"], None, None, "")} if values.get("law") else {}
 
 
 def at_the_end(effect: Effect, values: Mapping[str, Interval]) -> list[str]:
@@ -109,7 +117,7 @@ def value(size: float, low: float | None, high: float | None, unit: str) -> Valu
 
 def unit_of(effect: Effect, parameter: str) -> str:
     """Unit of an effect's parameter."""
-    return next(item.unit for item in effect.parameters if item.name == parameter)
+    return next(item.unit for item in effect.every if item.name == parameter)
 
 
 def nothing(found: Diagnosis) -> float:

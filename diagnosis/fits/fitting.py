@@ -222,7 +222,7 @@ class Free:
     @property
     def bounds(self) -> tuple[float, float]:
         """Range of the fit's value."""
-        least, most = self.parameter.least, self.parameter.most
+        least, most = self.parameter.least, min(self.parameter.most, self.parameter.believed)
         if self.logarithmic:
             return math.log(max(least, 1e-12)), math.log(most)
         return self.inward(least), self.inward(most)
@@ -231,7 +231,10 @@ class Free:
 def free(effect: Effect, values: Mapping[str, float]) -> list[Free]:
     """The parameters of an effect as a fit moves them, from where it starts."""
     result = []
-    for parameter in effect.parameters:
+    law = effect.law(values)
+    for parameter in effect.every:
+        if law and parameter.shape and parameter.name not in law.shapes:
+            continue
         logarithmic = math.isinf(parameter.null) or (parameter.shape and parameter.least > 0.0)
         if parameter.shape and parameter.default == parameter.least == values[parameter.name]:
             continue  # a shape that is left out

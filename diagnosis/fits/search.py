@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from diagnosis.fits import contact, fitting, sensor_noise
+from diagnosis.fits import contact, fitting, laws, sensor_noise
 from diagnosis.fits.fitting import Data, Fit, Values, excess
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.screening import WORKERS, ScreenedEffect, screen
@@ -141,7 +141,7 @@ class Searcher:
         commissioned = self.settled(fitting.fit(self.data, {}))
         if not self.is_gap(commissioned):
             return Search(self.data, commissioned, commissioned, ())
-        first = self.extended(commissioned)
+        first = self.in_best_laws(self.extended(commissioned))
         chosen, better = commissioned, first
         while better and self.worth(commissioned, chosen, better[0]):
             before = self.data
@@ -153,7 +153,7 @@ class Searcher:
                     break
             if len(chosen.names) >= MOST or self.enough(commissioned, chosen):
                 break
-            better = self.extended(chosen)
+            better = self.in_best_laws(self.extended(chosen))
         if not chosen.names:
             return Search(self.data, commissioned, chosen, ())
         chosen = self.pruned(commissioned, chosen)
@@ -286,6 +286,12 @@ class Searcher:
         if fits and remaining(fits[0]) > MATERIAL:
             fits[0] = fitting.fit(self.data, fits[0].values, fits[0].z, STEPS, rounds=3)
         return self.with_stop(fit, fits)
+
+    def in_best_laws(self, fits: list[Fit]) -> list[Fit]:
+        """The fits, best first, with effects under other formulas where the best leaves a gap and these leave less."""
+        if not fits or remaining(fits[0]) < MATERIAL:
+            return fits
+        return sorted(map(laws.in_best_law, fits), key=lambda item: item.cost)
 
     def with_stop(self, fit: Fit, fits: list[Fit]) -> list[Fit]:
         """The fits, and one with an end stop where all the others leave a large residual."""

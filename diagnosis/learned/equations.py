@@ -7,10 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
+from scipy.signal import lfilter
 
-from common.plan.kinds import COLUMN
+from common.plan.kinds import COLUMN, TABLE
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Fit
 from diagnosis.recorded.parts import ColumnAlone, LaboratoryPart
@@ -19,6 +21,8 @@ from diagnosis.signals.systematic import systematic
 from loop import replay
 from models.registry import Array
 from models.system import System
+
+STILL = 1e-3  # m/s, below which the sign of a measured rate is noise
 
 
 @dataclass(frozen=True)
@@ -31,7 +35,7 @@ class Equation:
     rate: Array  # (ticks,) m/s
     left: Array  # (ticks,) in `unit`
     there: Mask
-    over: str  # the motion, in words
+    over: Literal["way of the piston", "deformation", "velocity"]  # what it is drawn over
     quantity: str  # what is left, in words
     unit: str
 
@@ -76,6 +80,36 @@ def of_column(fit: Fit, part: LaboratoryPart, system: System) -> list[Equation]:
     return result
 
 
+def of_table(fit: Fit, part: LaboratoryPart, system: System) -> list[Equation]:
+    """The damper's force over its stroke."""
+    places = [part.lab.kind.channels.names.index(name) for name in ("damper_stroke", "damper_force")]
+    (stroke, force), (seen, felt) = part.measured.T[places], part.present.T[places]
+    predicted = part.predict(system)[:, places[0]]
+    if not (seen.any() and felt.any()):
+        return []
+    interval = system.plan.test.interval
+    white = float(fit.data.white[places[0]])
+    motion = predicted + systematic(np.where(seen, stroke - predicted, 0.0), white, interval)
+    rate = np.gradient(motion, interval)
+    command = list(part.inputs.values())[1] if len(part.inputs) > 1 else np.zeros(motion.size)
+    left = np.where(felt, force - damper_force(system, motion, rate, command), 0.0)
+    site = part.lab.site("damper")
+    return [Equation(site, "damper", motion, rate, left, felt, "velocity", "force", "N")]
+
+
+def damper_force(system: System, stroke: Array, rate: Array, command: Array) -> Array:
+    """Force (ticks,) N of a damper on its table at a stroke (m) with its rate (m/s), its motor under a command (N)."""
+    damper, effects = system.plan.damper, system.effects.damper
+    wanted = np.clip(effects.gain * command, -effects.force_limit, effects.force_limit)
+    lag = damper.motor_time_constant
+    kept = float(np.exp(-system.plan.test.interval / lag)) if lag > 0.0 else 0.0
+    motor = lfilter([0.0, 1.0 - kept], [1.0, -kept], wanted)
+    over = stroke - np.clip(stroke, -effects.stop_stroke, effects.stop_stroke)
+    rubbing = effects.friction * np.tanh(rate / max(effects.friction_velocity, STILL))
+    beside: Array = effects.stop_stiffness * over + rubbing - effects.offset
+    return damper.stiffness * stroke + damper.damping * rate + beside - motor
+
+
 def of_specimen(site: str, system: System, motion: Array, force: Array, there: Mask) -> Equation:
     """The force that a specimen's model leaves at a deformation (ticks,) m."""
     left = np.where(there, force - replay.column(system, motion), 0.0)
@@ -87,4 +121,7 @@ def rate_of(motion: Array, system: System) -> Array:
     return np.diff(motion, prepend=motion[:1]) / system.plan.test.interval
 
 
-LABORATORIES: dict[str, Callable[[Fit, LaboratoryPart, System], list[Equation]]] = {COLUMN: of_column}
+LABORATORIES: dict[str, Callable[[Fit, LaboratoryPart, System], list[Equation]]] = {
+    COLUMN: of_column,
+    TABLE: of_table,
+}

@@ -93,6 +93,7 @@ class RecordedLaboratory:
             site=self.site(effect.site),
             signal=self.signal(effect.signal),
             parameters=tuple(map(self._followed, effect.parameters)),
+            further=tuple(map(self._followed, effect.further)),
             contact=contact,
         )
 

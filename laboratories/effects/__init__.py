@@ -136,7 +136,7 @@ def checked(effect: Effect, given: Mapping[str, float]) -> dict[str, float]:
     Raises:
         InputError: a parameter is unknown, missing, no number or out of its bounds.
     """
-    known = {item.name: item for item in effect.parameters}
+    known = {item.name: item for item in effect.every}
     for name, value in given.items():
         if name not in known:
             raise InputError(f"Unknown parameter '{name}' of effect '{effect.name}': {nearest(name, known)}")
@@ -146,7 +146,7 @@ def checked(effect: Effect, given: Mapping[str, float]) -> dict[str, float]:
             )
     values = effect.values(given)
     for name, parameter in known.items():
-        if name not in values:
+        if name not in values and parameter not in effect.further:
             raise InputError(
                 f"{name} of effect '{effect.name}' is missing: give a number that is {allowed(parameter)}."
             )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal
@@ -27,6 +28,9 @@ class Parameter:
     follows: str = (
         ""  # recorded signal whose peak scales the sizes; empty: the site's signal of the same unit
     )
+    believed: float = (
+        math.inf
+    )  # largest value that a search believes, where more is possible but is something else
     smoothing: float = (
         0.0  # of a velocity that smooths a law at rest: its share of the peak velocity in a search
     )
@@ -35,6 +39,14 @@ class Parameter:
     def default(self) -> float | None:
         """The value of a parameter that is not given; None where it must be given."""
         return self.null if self.shape else None
+
+
+@dataclass(frozen=True)
+class Law:
+    """One formula of a mechanism that has several."""
+
+    name: str  # as it stands in texts
+    shapes: Mapping[str, float]  # the parameters of shape that it has, and where a fit of them starts
 
 
 @dataclass(frozen=True)
@@ -75,6 +87,24 @@ class Effect:
     contact: Contact | None = None  # an end stop: each impact depends on the ones before it
     shifts_time: bool = False  # moves a motion in time: a search starts at the shift that correlation shows
     starts: Callable[[Plan], tuple[float, ...]] = no_starts  # sizes for plans where the parameter's own fail
+    laws: tuple[
+        Law, ...
+    ] = ()  # formulas among which the parameter `law` chooses by place, the first by default
+    further: tuple[Parameter, ...] = ()  # parameters that need not be given: `law`, and shapes of some laws
+
+    @property
+    def every(self) -> tuple[Parameter, ...]:
+        """All parameters."""
+        return (*self.parameters, *self.further)
+
+    def law(self, values: Mapping[str, float]) -> Law | None:
+        """The formula that these parameters choose, None where the mechanism has but one."""
+        return self.laws[int(values.get("law", 0.0))] if self.laws else None
+
+    def under(self, place: int, values: Mapping[str, float]) -> dict[str, float]:
+        """Parameters for the formula at a place of `laws`, with the shapes from which a fit of it starts."""
+        kept = {item.name: values[item.name] for item in self.parameters}
+        return kept | dict(self.laws[place].shapes) | ({"law": float(place)} if place else {})
 
     @property
     def family(self) -> str:

@@ -40,7 +40,14 @@ def factor_on(
 
 
 def sets(
-    site: str, thing: str, fields: Mapping[str, Parameter], *, says: str, reference: str, **more: Any
+    site: str,
+    thing: str,
+    fields: Mapping[str, Parameter],
+    *,
+    says: str,
+    reference: str,
+    further: Mapping[str, Parameter] | None = None,
+    **more: Any,
 ) -> Effect:
     """The effect `site.thing` whose parameters set fields of the site's record in `models.system.Effects`.
 
@@ -51,19 +58,22 @@ def sets(
             value, the others, which shape the effect, leave no trace.
         says: what the effect is, in a few words.
         reference: a source or an equation.
+        further: parameters that need not be given, by the field that each sets.
         more: further fields of `Effect`.
     """
-    names = {field: parameter.name for field, parameter in fields.items()}
+    rest = further or {}
+    names = {field: parameter.name for field, parameter in (*fields.items(), *rest.items())}
     parameters = tuple(fields.values())
     law = partial(laid, site=site, fields=names, null=parameters[0].null)
+    more |= {"further": tuple(rest.values())}
     return Effect(f"{site}.{thing}", site, "physics", says, parameters, reference, law, **more)
 
 
 def laid(system: System, *, site: str, fields: Mapping[str, str], null: float, **given: float) -> System:
     """The system with fields of a site's record set, by the names of the parameters in `given`."""
-    values = {field: given[name] for field, name in fields.items()}
+    untouched = type(getattr(system.effects, site))()
+    values = {field: given.get(name, getattr(untouched, field)) for field, name in fields.items()}
     if next(iter(values.values())) == null:
-        untouched = type(getattr(system.effects, site))()
         values = {field: getattr(untouched, field) for field in fields}
     return system.laid(site, **values)
 

@@ -8,6 +8,7 @@ from typing import TypeVar
 from common.roles import MASTER, SLAVE, title
 from diagnosis.report.evidence import Evidence
 from diagnosis.report.records import Candidate, PartOfGap, Report, SignalGap, Tolerance
+from diagnosis.report.values import Value
 from laboratories import effects as catalogue
 from laboratories.effects import CATALOGUE
 from report.text.force_path import sentence as force_sentence
@@ -118,10 +119,18 @@ def kind(candidate: Candidate | Evidence) -> str:
 def parameters(candidate: Candidate | Evidence) -> list[tuple[str, str, str]]:
     """A candidate's parameters: effect, parameter, value with interval and unit."""
     return [
-        (name, parameter, quantity(given.value, given.unit, given.interval))
+        (name, parameter, told(name, parameter, given))
         for name, entries in candidate.parameters.items()
         for parameter, given in entries.items()
     ]
+
+
+def told(name: str, parameter: str, given: Value) -> str:
+    """A parameter's value with its interval and unit; of an effect with several formulas the name of the one chosen."""
+    entry = CATALOGUE.get(placed(name, 2)[0])
+    if parameter == "law" and entry and entry.laws and given.value is not None:
+        return entry.laws[int(given.value)].name
+    return quantity(given.value, given.unit, given.interval)
 
 
 def called(effect: str, parameter: str) -> str:

@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
+from common.plan.plan import Plan
 from diagnosis.learned import regression
+from diagnosis.learned.equations import damper_force
 from diagnosis.learned.regression import AGEING, STEADY, Regression, regress
+from laboratories.effects import lay
+from laboratories.kinds import KINDS
+from loop import replay
 from models import preisach
 from models.registry import Array
+from models.system import System
 
 INTERVAL, TICKS = 0.002, 8000
 K, LIMIT = 12.5e6, 0.83e-3  # N/m, m
@@ -127,3 +135,37 @@ def test_marching_gives_what_the_regression_saw() -> None:
         marched = [preisach.step(law, state, *pair) for pair in zip(x[:500], rate(x)[:500], strict=True)]
         np.testing.assert_allclose(marched, preisach.play(law, x[:500], rate(x)[:500]), rtol=1e-12)
         assert preisach.features(bare, x, rate(x)).shape == (TICKS, weights.size)
+
+
+def test_the_dampers_force_is_that_of_its_laboratory() -> None:
+    system = lay(System(Plan()), [("damper.friction", {"force": 3.0}), ("damper.offset", {"force": 1.0})])
+    t = np.arange(3000) * INTERVAL
+    command = np.stack([0.01 * np.sin(9.0 * t), 20.0 * np.sin(13.0 * t)], axis=1)
+    read = replay.laboratory(KINDS["table"], system, command)
+    stroke, force = read[:, 2], read[:, 3]
+    found = damper_force(system, stroke, np.gradient(stroke, INTERVAL), command[:, 1])
+    assert np.std(found - force) < 0.03 * np.std(force)
+    without = damper_force(System(Plan()), stroke, np.gradient(stroke, INTERVAL), command[:, 1])
+    assert np.std(without - force) > 2.5
+
+
+@pytest.mark.parametrize(
+    ("kind", "machine", "law", "channel"),
+    [("column", "column", clearance, 1), ("column", "actuator", flag, 0), ("table", "damper", damping, 3)],
+)
+def test_a_laboratory_marches_with_a_law(
+    kind: str, machine: str, law: Callable[[Array], Array], channel: int
+) -> None:
+    drive = np.stack([motion(1, 2e-3), np.zeros(TICKS)], axis=1)
+    base = System(Plan())
+    bare = replay.laboratory(KINDS[kind], base, drive)
+    x = bare[:, 2 if machine == "damper" else 0]
+    y = law(x) * (1.0 if channel else 1e-9)
+    found = regress(x, rate(x), y, np.ones(TICKS, dtype=bool), INTERVAL)
+    assert found is not None
+    more = replay.laboratory(KINDS[kind], base.laid(machine, learned=tuple(found.law.tolist())), drive)
+    change = more[:, channel] - bare[:, channel]
+    if machine == "damper":  # whose own motion changes with the force
+        assert np.std(change) > 0.0
+        return
+    assert np.std(change - y) < 0.1 * np.std(y)

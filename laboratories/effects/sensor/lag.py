@@ -11,6 +11,8 @@ from __future__ import annotations
 from laboratories.effects.effect import Parameter
 from laboratories.effects.reading import ReadingFault
 
+LONGEST = 0.04  # s, of an amplifier or a filter against aliasing, whose corner is above 4 Hz; a longer one is a travel
+
 FAULT = ReadingFault(
     "lag",
     lambda _: Parameter(
@@ -21,6 +23,7 @@ FAULT = ReadingFault(
         most=1.0,
         sizes=(0.001, 0.003, 0.008, 0.02),
         says="of a first-order low-pass",
+        believed=LONGEST,
     ),
     says="the reading lags behind",
     reference="time_constant·ẏ + y = value",

@@ -2,15 +2,18 @@
 
     f = α·k·δ + (1 − α)·k·δ_y·z,    dz/dδ = (1 − |z|ⁿ·(1 + sgn(z·dδ))/2) / δ_y
 
-with yield displacement δ_y, hardening α and exponent n. Not to be confused with `column.degradation`,
-which softens without a loop, or `column.friction`, whose loop has the same height at every amplitude.
+with yield displacement δ_y, hardening α and exponent n. The parameter `law` takes another formula in its place: 1 the
+bilinear one, 2 that of Menegotto and Pinto with R₀ for the exponent, 3 the peak-oriented one of Clough and Johnston
+with the exponent `unloading` of its unloading stiffness (models/specimens). Not to be confused with
+`column.degradation`, which softens without a loop, or `column.friction`, whose loop has the same height at every
+amplitude.
 """
 
 from __future__ import annotations
 
 import math
 
-from laboratories.effects.effect import Parameter
+from laboratories.effects.effect import Law, Parameter
 from laboratories.effects.laws import sets
 
 EFFECT = sets(
@@ -46,6 +49,34 @@ EFFECT = sets(
             shape=True,
         ),
     },
+    further={
+        "law": Parameter(
+            "law",
+            "",
+            null=0.0,
+            least=0.0,
+            most=3.0,
+            sizes=(),
+            says="0 Bouc and Wen, 1 bilinear, 2 Menegotto and Pinto, 3 peak-oriented",
+            shape=True,
+        ),
+        "unloading": Parameter(
+            "unloading",
+            "",
+            null=0.0,
+            least=0.0,
+            most=1.0,
+            sizes=(),
+            says="exponent of the unloading stiffness of law 3",
+            shape=True,
+        ),
+    },
+    laws=(
+        Law("Bouc and Wen", {"hardening": 0.05, "exponent": 2.0}),
+        Law("bilinear", {"hardening": 0.05}),
+        Law("Menegotto and Pinto", {"hardening": 0.05, "exponent": 15.0}),
+        Law("peak-oriented", {"hardening": 0.05, "unloading": 0.3}),
+    ),
     says="the specimen yields",
     reference="Wen, Method for random vibration of hysteretic systems, J. Eng. Mech. Div. ASCE 102 (1976) 249-263",
 )
