@@ -28,9 +28,7 @@ class Parameter:
     follows: str = (
         ""  # recorded signal whose peak scales the sizes; empty: the site's signal of the same unit
     )
-    believed: float = (
-        math.inf
-    )  # largest value that a search believes, where more is possible but is something else
+    believed: float = math.inf  # largest value that a search believes
     smoothing: float = (
         0.0  # of a velocity that smooths a law at rest: its share of the peak velocity in a search
     )
@@ -87,9 +85,7 @@ class Effect:
     contact: Contact | None = None  # an end stop: each impact depends on the ones before it
     shifts_time: bool = False  # moves a motion in time: a search starts at the shift that correlation shows
     starts: Callable[[Plan], tuple[float, ...]] = no_starts  # sizes for plans where the parameter's own fail
-    laws: tuple[
-        Law, ...
-    ] = ()  # formulas among which the parameter `law` chooses by place, the first by default
+    laws: tuple[Law, ...] = ()  # its formulas; the parameter `law` is a place among them
     further: tuple[Parameter, ...] = ()  # parameters that need not be given: `law`, and shapes of some laws
 
     @property
