@@ -16,14 +16,11 @@ BETTER = 0.9  # of what is left beyond noise: less of it is worth another formul
 
 
 def in_best_law(fit: Fit) -> Fit:
-    """The fit with each of its effects under the formula that leaves least; the first one where none is much better."""
-    for name in fit.names:
-        effect = fit.data.catalogue[name]
-        others = [under(fit, effect, place) for place in range(1, len(effect.laws))]
-        best = min(others, key=lambda item: item.cost, default=fit)
-        if excess(best) < BETTER * excess(fit):
-            fit = best
-    return fit
+    """The fit with its last effect under the formula that leaves least; the first one where none is much better."""
+    effect = fit.data.catalogue[fit.names[-1]]
+    others = [under(fit, effect, place) for place in range(1, len(effect.laws))]
+    best = min(others, key=lambda item: item.cost, default=fit)
+    return best if excess(best) < BETTER * excess(fit) else fit
 
 
 def under(fit: Fit, effect: Effect, place: int) -> Fit:
@@ -34,7 +31,6 @@ def under(fit: Fit, effect: Effect, place: int) -> Fit:
     begun = []
     for share, size in itertools.product(NEARER, shape.sizes):
         values = base | {strength.name: share * base[strength.name], shape.name: size}
-        for z in (np.zeros(fit.z.size), np.clip(fit.z, -1.0, 1.0)):
-            begun.append(fitting.at(fit.data, fit.values | {effect.name: values}, z))
+        begun.append(fitting.at(fit.data, fit.values | {effect.name: values}, np.clip(fit.z, -1.0, 1.0)))
     start = min(begun, key=lambda item: item.cost)
     return fitting.fit(fit.data, start.values, start.z, STEPS, rounds=ROUNDS)
