@@ -31,6 +31,7 @@ from models.system import System
 
 SHORTEST = 0.5  # s of a test that anything can be said of
 BUILDING = ("ground_acceleration", "displacement")
+UNNAMED = ("partly", "unknown")  # outcomes that leave something without a name
 AGAINST = -0.7  # correlation from which on a sign is doubted
 
 
@@ -104,7 +105,7 @@ def examine(record: Record, tell: Tell = untold) -> Diagnosis:
         held,
         readings.levels([item.search.data for item in verdicts], [heard(item.search) for item in verdicts]),
         [*of_plan(record), *not_recorded(record), *reversed_signs(datas), *repeating(held)],
-        [law for verdict in verdicts if verdict.outcome != "none" for law in learn(verdict.search.chosen)],
+        [law for verdict in verdicts if verdict.outcome in UNNAMED for law in learn(verdict.search.chosen)],
     )
 
 
