@@ -288,7 +288,7 @@ class Searcher:
         return self.with_stop(fit, fits)
 
     def in_best_laws(self, fits: list[Fit]) -> list[Fit]:
-        """The fits, best first, with effects under other formulas where the best leaves a gap and these leave less."""
+        """The fits, best first, with effects under other laws where the best leaves a gap and these leave less."""
         if not fits or remaining(fits[0]) < MATERIAL:
             return fits
         return sorted(map(laws.in_best_law, fits), key=lambda item: item.cost)
