@@ -1,0 +1,89 @@
+"""A column that yields by another law than the first is named alike, and the fit says which law it is."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from common.plan.plan import Plan
+from common.roles import MASTER
+from diagnosis.fits import fitting, laws
+from diagnosis.fits.fitting import Data, Fit
+from diagnosis.recorded.parts import Nuisance
+from laboratories.effects import CATALOGUE
+from laboratories.effects.effect import Effect
+from loop import replay
+from models.registry import Array
+from models.system import System
+
+INTERVAL, TICKS, NOISE = 0.002, 4000, 100.0
+K, LIMIT, HARDENING = Plan().column.stiffness, 1.2e-3, 0.05
+
+
+def swelling() -> Array:
+    """A motion that goes farther with every cycle, and then less far."""
+    t = np.arange(TICKS) * INTERVAL
+    return np.asarray(2.6e-3 * np.sin(2.0 * np.pi * 1.3 * t) * np.sin(np.pi * t / t[-1]))
+
+
+def slider(x: Array) -> Array:
+    """A spring beside another one that a slider limits, step by step."""
+    held, result = 0.0, np.empty(x.size)
+    for i, step in enumerate(np.diff(x, prepend=0.0)):
+        held = min(max(held + step, -LIMIT), LIMIT)
+        result[i] = K * (HARDENING * x[i] + (1.0 - HARDENING) * held)
+    return result
+
+
+class Specimen:
+    """A column alone, with forces of a law that the catalogue's first one is not."""
+
+    name, role, signals, exact = "column", MASTER, ("column_force",), False
+    nuisances: tuple[Nuisance, ...] = ()
+    candidates: tuple[Effect, ...] = (CATALOGUE["column.yielding"],)
+
+    def __init__(self) -> None:
+        self.motion = swelling()
+        noise = NOISE * np.random.default_rng(1).standard_normal(TICKS)
+        self.measured = (slider(self.motion) + noise)[:, None]
+        self.present = np.ones((TICKS, 1), dtype=bool)
+
+    def predict(self, system: System) -> Array:
+        return replay.column(system, self.motion)[:, None]
+
+    def first(self, ticks: int) -> Specimen:
+        raise NotImplementedError
+
+
+def first_law() -> Fit:
+    group, train = fitting.withheld(TICKS, INTERVAL)
+    level = np.array([NOISE])
+    data = Data(Specimen(), System(Plan()), level, level, group, train, np.zeros(1))
+    values = {"yield_displacement": 1e-3, "hardening": 0.1, "exponent": 2.0}
+    return fitting.fit(data, {"column.yielding": values})
+
+
+def test_the_law_is_picked_and_its_parameters_are_those_of_the_column() -> None:
+    before = first_law()
+    found = laws.in_best_law(before)
+    values = found.values["column.yielding"]
+    effect = CATALOGUE["column.yielding"]
+    assert found.names == before.names
+    assert effect.laws[int(values["law"])].name == "bilinear"
+    np.testing.assert_allclose(values["yield_displacement"], LIMIT, rtol=0.01)
+    np.testing.assert_allclose(values["hardening"], HARDENING, atol=0.01)
+    assert fitting.excess(found) < 0.5 * fitting.excess(before)
+
+
+def test_a_parameter_that_a_law_lacks_is_not_fitted() -> None:
+    effect = CATALOGUE["column.yielding"]
+    base = {"yield_displacement": 1e-3, "hardening": 0.1, "exponent": 2.0}
+    names = {
+        place: {item.parameter.name for item in fitting.free(effect, effect.under(place, base))}
+        for place in range(len(effect.laws))
+    }
+    assert names == {
+        0: {"yield_displacement", "hardening", "exponent"},
+        1: {"yield_displacement", "hardening"},
+        2: {"yield_displacement", "hardening", "exponent"},
+        3: {"yield_displacement", "hardening", "unloading"},
+    }
