@@ -37,7 +37,8 @@ def slider(x: Array) -> Array:
 class Specimen:
     """A column alone, with forces of a law that the catalogue's first one is not."""
 
-    name, role, signals, exact = "column", MASTER, ("column_force",), False
+    name, role, exact = "column", MASTER, False
+    signals: tuple[str, ...] = ("column_force",)
     nuisances: tuple[Nuisance, ...] = ()
     candidates: tuple[Effect, ...] = (CATALOGUE["column.yielding"],)
 
