@@ -60,7 +60,7 @@ class Regression:
 
 
 @dataclass(frozen=True)
-class Rows:
+class AveragedRows:
     """Averaged features (m, q), already scaled by what is expected of their weights, and the series (m,)."""
 
     grid: Array
@@ -80,7 +80,7 @@ class Rows:
 class Crossed:
     """A penalty with what it leaves of each row (m,) while that is withheld."""
 
-    rows: Rows
+    rows: AveragedRows
     penalty: float
     left: Array
 
@@ -119,7 +119,7 @@ def around(x: Array) -> tuple[int, int]:
 
 def laid_out(
     grid: Array, x: Array, v: Array, y: Array, there: Mask, strongest: tuple[int, int], interval: float
-) -> Rows:
+) -> AveragedRows:
     """Averaged rows, those with missing samples left out."""
     step = max(1, round(AVERAGED / interval))
     count = x.size // step
@@ -131,7 +131,7 @@ def laid_out(
     scale = expected(grid)
     rows = preisach.features(grid, x, v)[: count * step].reshape(count, step, -1).mean(axis=1) * scale
     series = y[: count * step].reshape(count, step).mean(axis=1)
-    return Rows(grid, rows[kept], scale, series[kept], piece[kept], strong[kept])
+    return AveragedRows(grid, rows[kept], scale, series[kept], piece[kept], strong[kept])
 
 
 def expected(grid: Array) -> Array:
@@ -141,7 +141,7 @@ def expected(grid: Array) -> Array:
     return np.concatenate([np.tile(one, radii), np.ones(preisach.RATES)])
 
 
-def crossed(rows: Rows) -> Crossed:
+def crossed(rows: AveragedRows) -> Crossed:
     """The penalty that predicts withheld folds best."""
     folds = range(FOLDS)
     a, y = rows.features, rows.series
@@ -194,7 +194,7 @@ def concluded(found: Crossed, strongest: tuple[int, int], interval: float) -> Re
     )
 
 
-def law_of(rows: Rows, load: Array, chosen: Mask) -> Array:
+def law_of(rows: AveragedRows, load: Array, chosen: Mask) -> Array:
     """The law of some of the rows under a penalty (q, q)."""
     a = rows.features[chosen]
     return np.concatenate([rows.grid, rows.scale * solved(a.T @ a + load, a.T @ rows.series[chosen])])
