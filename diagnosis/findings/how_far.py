@@ -31,6 +31,10 @@ LIKE_MISSED = (
     "device",
 )  # machines that a search blames for samples that are missed
 INTERLEAVED, OTHERS = "interleaved (interpolation)", "other recordings"  # what was judged on
+ROOM = 0.1  # of the floor, by which the response must exceed it to show an effect at all
+NOT_SHOWN = (
+    "The response of the loop hardly shows the gap: how far it closes is that of the readings of its part."
+)
 LEAVING = ("unknown", "partly")  # outcomes of parts with something left
 DRAWS = 200  # of the bootstrap
 
@@ -138,17 +142,58 @@ def judge(found: Diagnosis, validation: Sequence[Record]) -> Response:
         noise_floor=floor,
         judged_on=INTERLEAVED,
     )
-    others = validated(found, validation, summary) if validation else summary
+    hidden = own.loop is not None and hardly_shown(found, summary)
+    told = by_readings(own, summary) if hidden else summary
+    others = validated(found, validation, summary) if validation else told
     share, rows = shares(own, traces)
     return Response(
         gap_entry(record, own, nominal, floors),
-        others or summary,
+        others or told,
         traces,
         share,
         rows,
         waterfall(own, traces, summary),
         histories(own, before, after),
-        () if others else ("The recordings given for validation hold no closed loop to judge by.",),
+        (
+            *([] if others else ["The recordings given for validation hold no closed loop to judge by."]),
+            *([NOT_SHOWN] if hidden else []),
+        ),
+    )
+
+
+def hardly_shown(found: Diagnosis, summary: HowFar) -> bool:
+    """Whether effects were named of which the response of the closed loop shows next to nothing."""
+    before, floor = summary.before or 0.0, summary.noise_floor or 0.0
+    return any(verdict.effects for verdict in found.verdicts) and before - floor < ROOM * floor
+
+
+def by_readings(own: Judge, summary: HowFar) -> HowFar:
+    """How far the gap of the readings closes in the parts with effects, each replayed by itself."""
+    known = [own.open(frozenset()), own.open(None)]
+    names = [
+        name
+        for verdict in own.found.verdicts
+        if verdict.effects and not verdict.search.data.part.exact
+        for name in verdict.search.data.part.signals
+        if name in known[0] and own.record.has(name) and own.moves(name)
+    ]
+    if not names:
+        return summary
+    rows = []
+    for name in names:
+        there = own.record.present[name] & own.mask
+        recorded = own.record.signals[name][there]
+        level = float(np.sqrt(np.mean(recorded**2)))
+        errors = [float(np.sqrt(np.mean((recorded - one[name][there]) ** 2))) / level for one in known]
+        rows.append((*errors, own.found.white.get(name, 0.0) / level))
+    before, after, floor = (float(np.sqrt(np.mean(np.square(column)))) for column in zip(*rows, strict=True))
+    return replace(
+        summary,
+        before=before,
+        after=after,
+        closed=closed_share(before, after, floor),
+        closed_interval=None,
+        noise_floor=floor,
     )
 
 
