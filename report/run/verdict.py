@@ -115,9 +115,11 @@ def completeness(summary: Summary) -> str:
 def exchange(summary: Summary) -> list[str]:
     """What became of the messages, by direction."""
     return [
-        f"{name.replace('/', ', ').capitalize()}: {counts['sent']} sent, of which {counts['used']} used, "
+        f"Exchange with the {title(role)}, {direction}: {counts['sent']} sent, of which {counts['used']} used, "
         f"{counts['rejected']} rejected as late or out of order, {counts['lost']} lost{apart(counts)}."
-        for name, counts in summary["exchange"].items()
+        for (role, _, direction), counts in (
+            (name.partition("/"), counts) for name, counts in summary["exchange"].items()
+        )
     ]
 
 
@@ -156,8 +158,9 @@ def followed(name: str, facts: Mapping[str, Any]) -> str:
     error = f"rms error {100.0 * facts['nrmse']:.2f} % of the target's rms"
     if facts["delay"] is None:
         return f"The delay of the {name} is not determined: {facts['undetermined']}; {error}."
+    way = "lead" if facts["delay"] < 0.0 else "delay"
     return (
-        f"The {name} followed its target with a delay of {milliseconds(facts['delay'])} and "
+        f"The {name} followed its target with a {way} of {milliseconds(abs(facts['delay']))} and "
         f"{facts['amplitude']:.4f} of its amplitude at {facts['frequency']:.2f} Hz; {error}."
     )
 

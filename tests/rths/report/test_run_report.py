@@ -189,7 +189,7 @@ def test_slaves_have_pictures_and_tables_of_their_own(tmp_path: Path, monkeypatc
     assert made.count("<h3>Slave roof</h3>") == made.count("<h3>Slave cellar</h3>") == 1
     assert 'alt="Tracking of the slave &#39;roof&#39;"' in made
     assert "The table of slave cellar followed its target" in text
-    assert "Slave.roof, commands: 1000 sent" in text
+    assert "Exchange with the slave 'roof', commands: 1000 sent" in text
 
 
 def test_margins_are_peaks_over_the_limits_of_the_plan(virtual_recording: Path) -> None:
