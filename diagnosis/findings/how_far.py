@@ -169,7 +169,8 @@ def hardly_shown(found: Diagnosis, summary: HowFar) -> bool:
 
 def by_readings(own: Judge, summary: HowFar) -> HowFar:
     """How far the gap of the readings closes in the parts with effects, each replayed by itself."""
-    known = [own.open(frozenset()), own.open(None)]
+    plans = own.record.plans
+    known = [own.open(own.found.systems(sites, plans)) for sites in (frozenset(), None)]
     names = [
         name
         for verdict in own.found.verdicts
