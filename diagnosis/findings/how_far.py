@@ -170,7 +170,7 @@ def hardly_shown(found: Diagnosis, summary: HowFar) -> bool:
 def by_readings(own: Judge, summary: HowFar) -> HowFar:
     """How far the gap of the readings closes in the parts with effects, each replayed by itself."""
     plans = own.record.plans
-    known = [own.open(own.found.systems(sites, plans)) for sites in (frozenset(), None)]
+    known = [own.open(own.found.systems(frozenset(), plans)), own.open(own.found.systems(plans=plans))]
     names = [
         name
         for verdict in own.found.verdicts
