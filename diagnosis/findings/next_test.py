@@ -81,12 +81,12 @@ def separation(data: Data, one: Fit, other: Fit) -> float:
 
 
 def played(data: Data, truth: Array) -> Data:
-    """The data of a test that has given `truth`."""
+    """The data of a test that has given `truth`, without the spikes and lines of the one that was recorded."""
     part = data.part
     if isinstance(part, LaboratoryPart):
         read = np.broadcast_to(part.present.any(axis=0), truth.shape).copy()
         part = part.replaced(measured=np.where(read, truth, 0.0), present=read)
-    return replace(data, part=part)
+    return replace(data, part=part, lines=None, spikes=None)
 
 
 def menu(data: Data) -> list[tuple[str, Data]]:

@@ -95,3 +95,10 @@ def test_the_advice_in_words() -> None:
         "Run a sine: it separates column.slip from column.pinching by 12 standard deviations of the noise."
     )
     assert next_test.sentence([other], str.upper).startswith("No motion at hand separates COLUMN.SLIP")
+
+
+def test_spikes_of_the_recording_are_not_in_the_next_test(cases: Cases) -> None:
+    data = laboratory(cases)
+    spiky = dataclasses.replace(data, spikes=np.zeros_like(data.part.present))
+    longer = np.zeros((2 * len(data.part.measured), data.part.measured.shape[1]))
+    assert next_test.played(spiky, longer).there.shape == longer.shape
