@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from common.plan import read as plans
+from common.plan.kinds import TABLES_OF_KIND, known_kind
 from common.recording.reader import Run
 from common.roles import MASTER, SLAVE, name_of
 from laboratories.effects.sites import LINK
@@ -93,8 +94,9 @@ def noise_at(case: Case, role: str) -> dict[str, tuple[float, str]]:
 def neighbours(case: Case, role: str) -> list[Case]:
     """The case with one true parameter of a role, or of the building, moved by one standard deviation each."""
     plan = plans.from_tables(case.plan, Path())
-    true = of_role(case.truths, role) if role else {"structure": case.truths["structure"]}
-    tables = [name for name in true if name not in ("sensors", SLAVE) and (name == "structure") == (not role)]
+    true = of_role(case.truths, role)
+    known = TABLES_OF_KIND[known_kind(plan.kinds[role])] if role else ("structure",)
+    tables = [name for name in known if name in true]
     found = []
     for table in tables:
         for name, value in true[table].items():

@@ -28,6 +28,7 @@ from validation.blind.draw import begin, draw
 from validation.blind.judge import DiagnosisAnswer
 from validation.blind.labs.device_lab import OwnKernelLab
 from validation.blind.library import OWN_KERNEL
+from validation.blind.oracle import neighbours
 from validation.blind.record import RecordedCase, record
 from validation.blind.scoring import Outcome, judge
 
@@ -71,6 +72,13 @@ def test_true_parameters_of_two_columns_are_drawn_apart() -> None:
     assert own["stiffness"] != east["stiffness"]
     assert all(abs(one["stiffness"] / 12.5e6 - 1.0) <= 0.02 for one in (own, east))
     assert abs(case.truths["slave"]["east"]["actuator"]["delay"] / 0.012 - 1.0) <= 0.02
+
+
+@pytest.mark.parametrize("name", ["two_dampers", "two_slaves"])
+def test_the_oracle_moves_the_parameters_of_the_laboratory_that_it_looks_at(name: str) -> None:
+    (case,) = draw(1, 1, "judge", trial=trial_of(name), only=["clean"])
+    for role, kind in trial_of(name).plan.kinds.items():
+        assert len(neighbours(case, role)) == {"column": 4, "table": 7}[kind]
 
 
 def test_a_users_kind_is_hidden_in_by_its_own_effects_and_tolerances() -> None:
