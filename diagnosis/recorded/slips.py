@@ -30,7 +30,7 @@ NEAR = 2.0  # factor within which a power of ten is named
 
 
 @dataclass(frozen=True)
-class Slip:
+class ReadingSlip:
     """A reading that does not fit its command."""
 
     signal: str
@@ -76,13 +76,13 @@ def refuse_slips(record: Record, data: Path) -> None:
         raise InputError(f"{data}: {found[0].sentence}; if it is right, import it with --as-is.")
 
 
-def slips(record: Record) -> list[Slip]:
+def slips(record: Record) -> list[ReadingSlip]:
     """The slips of a recording, those of the largest factor first."""
     found = [slip for lab in record.labs for slip in of_laboratory(record, lab)]
     return sorted(found, key=lambda slip: -abs(np.log(abs(slip.factor))))
 
 
-def of_laboratory(record: Record, lab: RecordedLaboratory) -> Iterator[Slip]:
+def of_laboratory(record: Record, lab: RecordedLaboratory) -> Iterator[ReadingSlip]:
     """The slips of one laboratory whose commands were recorded, or of a column whose deformation was."""
     inputs = tuple(name for name in lab.commands if record.has(name) and np.ptp(record.signals[name]) > 0.0)
     position = lab.signal(lab.kind.channels.position)
@@ -99,7 +99,7 @@ def of_laboratory(record: Record, lab: RecordedLaboratory) -> Iterator[Slip]:
             continue
         factor = compared(part.measured[:, place], predicted[:, place], lab.noise.get(name, 0.0), most)
         if factor is not None and (factor < 0.0 or not 1.0 / FAR < factor < FAR):
-            yield Slip(name, commands, factor)
+            yield ReadingSlip(name, commands, factor)
 
 
 def compared(measured: Array, predicted: Array, noise: float, most: int) -> float | None:

@@ -38,14 +38,14 @@ FACTORS = (  # of the period where a value is by that much too small, and what w
 )
 
 
-class Slip(NamedTuple):
+class PlanSlip(NamedTuple):
     """One value that is probably in another unit."""
 
     where: str  # key and table
     text: str  # a sentence
 
 
-def slips(plan: Plan, motion: GroundMotion, found: Findings) -> list[Slip]:
+def slips(plan: Plan, motion: GroundMotion, found: Findings) -> list[PlanSlip]:
     """Everything that looks like a slip of units, in the order of the plan."""
     modes = shear_building.modes(*matrices(plan))
     period = float(modes.periods[0])
@@ -61,7 +61,7 @@ def slips(plan: Plan, motion: GroundMotion, found: Findings) -> list[Slip]:
     ]
 
 
-def interval_slip(plan: Plan, period: float) -> list[Slip]:
+def interval_slip(plan: Plan, period: float) -> list[PlanSlip]:
     """An interval that does not resolve the building's motion."""
     interval = plan.test.interval
     if period / interval >= TICKS_PER_PERIOD or period < SHORTEST:
@@ -70,10 +70,10 @@ def interval_slip(plan: Plan, period: float) -> list[Slip]:
         f"The interval of {interval:g} s is {period / interval:.1f} to the first period of {period:.3g} s, where at "
         f"least {TICKS_PER_PERIOD:g} are needed: it must be in seconds, 0.002 for 2 ms."
     )
-    return [Slip("interval in [test]", text)]
+    return [PlanSlip("interval in [test]", text)]
 
 
-def motion_slips(plan: Plan, motion: GroundMotion) -> list[Slip]:
+def motion_slips(plan: Plan, motion: GroundMotion) -> list[PlanSlip]:
     """A record whose numbers are not m/s², and a scale that makes too little or too much of it."""
     chosen, where, peak = plan.ground_motion, "record in [ground_motion]", motion.peak
     share = f"{peak:.3g} m/s² ({peak / STANDARD_GRAVITY:.3g} g)"
@@ -82,24 +82,24 @@ def motion_slips(plan: Plan, motion: GroundMotion) -> list[Slip]:
             f"The record peaks at {share}, which is weak: where its numbers are in g, say so in its header or by "
             'unit = "g".'
         )
-        return [Slip(where, text)]
+        return [PlanSlip(where, text)]
     if peak > STRONGEST:
         text = (
             f"The record peaks at {share}, more than was ever recorded: where its numbers are in gal, give "
             'unit = "gal".'
         )
-        return [Slip(where, text)]
+        return [PlanSlip(where, text)]
     scaled = abs(chosen.scale) * peak
     if scaled > STRONGEST or 0.0 < scaled < LEAST_PEAK:
         text = (
             f"scale {chosen.scale:g} makes a peak of {scaled:.3g} m/s² of the record's {share}: it is a factor, "
             "0.1 for 10 %."
         )
-        return [Slip("scale in [ground_motion]", text)]
+        return [PlanSlip("scale in [ground_motion]", text)]
     return []
 
 
-def period_slips(period: float) -> list[Slip]:
+def period_slips(period: float) -> list[PlanSlip]:
     """A first period that no building has, and which unit would explain it."""
     if SHORTEST <= period <= LONGEST:
         return []
@@ -113,10 +113,10 @@ def period_slips(period: float) -> list[Slip]:
         f"The first period is {period:.3g} s, where buildings and frames have {SHORTEST:g} to {LONGEST:g} s: look at "
         f"{where}."
     )
-    return [Slip("[structure]", text)]
+    return [PlanSlip("[structure]", text)]
 
 
-def damping_slips(ratio: float) -> list[Slip]:
+def damping_slips(ratio: float) -> list[PlanSlip]:
     """A damping ratio that no building has."""
     if LEAST_DAMPING <= ratio <= LARGEST_DAMPING or ratio == 0.0 or math.isnan(ratio):
         return []
@@ -124,10 +124,10 @@ def damping_slips(ratio: float) -> list[Slip]:
         f"The first mode's damping ratio is {ratio * 100.0:.3g} %, where buildings have 0.5 to 20 %: damping must be "
         "in N·s/m (200e3 for 200 kN·s/m), damping_ratio a share (0.05 for 5 %)."
     )
-    return [Slip("damping in [structure]", text)]
+    return [PlanSlip("damping in [structure]", text)]
 
 
-def specimen_slip(plan: Plan) -> list[Slip]:
+def specimen_slip(plan: Plan) -> list[PlanSlip]:
     """A specimen that is not of the size of what it stands for."""
     if plan.kinds.get(MASTER) != COLUMN:
         return []
@@ -139,10 +139,10 @@ def specimen_slip(plan: Plan) -> list[Slip]:
         f"{wanted / given:.3g} times as much: stiffness must be in N/m (12.5e6 for 12.5 kN/mm) in [column] "
         "and in [structure]."
     )
-    return [Slip("stiffness in [column]", text)]
+    return [PlanSlip("stiffness in [column]", text)]
 
 
-def transfer_slips(plan: Plan) -> list[Slip]:
+def transfer_slips(plan: Plan) -> list[PlanSlip]:
     """Delays of transfer systems that are not in seconds."""
     times = [
         ("time_constant in [actuator]", plan.actuator.time_constant),
@@ -154,7 +154,7 @@ def transfer_slips(plan: Plan) -> list[Slip]:
             (f"delay in [{role}.table]" if plan.slaves else "delay in [table]", plan.of(role).table.delay)
         )
     return [
-        Slip(
+        PlanSlip(
             where,
             f"{where} is {value:g} s, slower than any transfer system: it must be in s, 0.014 for 14 ms.",
         )
@@ -163,18 +163,18 @@ def transfer_slips(plan: Plan) -> list[Slip]:
     ]
 
 
-def sensor_slips(plan: Plan) -> list[Slip]:
+def sensor_slips(plan: Plan) -> list[PlanSlip]:
     """Noise that would drown what is measured."""
     result = []
     for name, rms in vars(plan.sensors).items():
         limit, unit = getattr(plan.limits, name), LIMITS[name].unit
         if rms > NOISE_SHARE * limit:
             text = f"The noise of {name} is {rms:g} {unit} rms, and its limit {limit:g} {unit}: it must be in {unit}."
-            result.append(Slip(f"{name} in [sensors]", text))
+            result.append(PlanSlip(f"{name} in [sensors]", text))
     return result
 
 
-def limit_slips(plan: Plan, found: Findings) -> list[Slip]:
+def limit_slips(plan: Plan, found: Findings) -> list[PlanSlip]:
     """Limits in mm, limits in kN, and a drift that no storey has."""
     result = []
     peaks = {} if found.unstable or found.peaks is None else found.peaks.every
@@ -185,14 +185,14 @@ def limit_slips(plan: Plan, found: Findings) -> list[Slip]:
                 f"The limit of {name} is {limit:g} m, more than any laboratory moves: it must be in m, 0.15 for "
                 "150 mm."
             )
-            result.append(Slip(f"{name} in [limits]", text))
+            result.append(PlanSlip(f"{name} in [limits]", text))
         if unit == "N" and peaks.get(name, 0.0) > FORCE_OFF * limit:
             text = (
                 f"The limit of {name} is {limit:g} N, and {peaks[name]:.3g} N are expected: it must be in N, "
                 "400e3 for 400 kN."
             )
-            result.append(Slip(f"{name} in [limits]", text))
+            result.append(PlanSlip(f"{name} in [limits]", text))
     if peaks.get("displacement", 0.0) > LARGEST_DRIFT:
         text = f"A storey moves by {peaks['displacement']:.3g} m: look at the units of mass, stiffness and record."
-        result.append(Slip("[structure]", text))
+        result.append(PlanSlip("[structure]", text))
     return result

@@ -100,7 +100,7 @@ def replay_master(recording: Run, plan: Plan, tell: Tell = untold) -> dict[str, 
     step, host = MasterStep(plan, ground_of(recording)), kinds.own(plan)
     own = host.channels if host else None
     felt = [columns[name] for name in (own.position, own.force)] if own else []
-    used, names = forces_used(plan, columns), Told(plan)
+    used, names = forces_used(plan, columns), ComputedSignals(plan)
     held = held_ticks(recording, columns[own.command.name] if own else [])
     matches: dict[str, Match] = {}
     command = dict.fromkeys(names.held, 0.0)
@@ -118,7 +118,7 @@ def replay_master(recording: Run, plan: Plan, tell: Tell = untold) -> dict[str, 
     return {f"{MASTER}/{name}": match for name, match in matches.items()}
 
 
-class Told:
+class ComputedSignals:
     """What the master computes, by the signals of its topic; those of `held` stay where a tick moves nothing."""
 
     def __init__(self, plan: Plan) -> None:

@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 
     from validation.blind.cases.basis import TrialBasis
     from validation.blind.cases.case import Case
-    from validation.blind.measures import Measure
     from validation.blind.record import RecordedCase
-    from validation.blind.scoring import Outcome
+    from validation.blind.results.measures import Measure
+    from validation.blind.results.scoring import Outcome
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -82,8 +82,8 @@ def run(args: argparse.Namespace) -> int:
     """Draw, record, diagnose, score; 1 where a goal is missed, which a few cases cannot show."""
     from validation.blind.cases.basis import basis
     from validation.blind.draw import draw
-    from validation.blind.measures import measures
-    from validation.blind.scoring import judge_all
+    from validation.blind.results.measures import measures
+    from validation.blind.results.scoring import judge_all
 
     check(args)
     trial = basis(plans.load(cli.plan_path(args.plan)), args.duration)
@@ -190,8 +190,8 @@ def keep(cases: Iterable[Case], recorded: dict[int, RecordedCase], place: Path, 
 
 def write(folder: Path, outcomes: Sequence[Outcome], about: str) -> dict[str, Any]:
     """The page and the results in a folder; the results."""
-    from validation.blind.measures import results
-    from validation.blind.page import page
+    from validation.blind.results.measures import results
+    from validation.blind.results.page import page
 
     found = {"version": 1, "about": about, **results(outcomes)}
     (folder / "index.html").write_text(page(outcomes, about), encoding="utf-8")
@@ -202,8 +202,8 @@ def write(folder: Path, outcomes: Sequence[Outcome], about: str) -> dict[str, An
 def show(table: Sequence[Measure], outcomes: Sequence[Outcome]) -> None:
     """The measures, then the cases that are not right."""
     from report.text import terminal
-    from validation.blind.page import hidden, number
-    from validation.blind.rows import HEAD, case_rows
+    from validation.blind.results.page import hidden, number
+    from validation.blind.results.rows import HEAD, case_rows
 
     rows = [["measure", "value", "cases", "goal", ""]]
     rows += [[item.name, item.text, str(item.count), item.goal, item.verdict] for item in table]

@@ -38,7 +38,7 @@ INSTALL_S = 240.0
 KINDS = ("one slave", "two slaves", "extremes", "killed and recovered")
 
 
-class Told(NamedTuple):
+class HeardMessage(NamedTuple):
     """A message as an independent reader has it; doubles as hex digits of their bits."""
 
     sequence: int
@@ -50,7 +50,7 @@ class Told(NamedTuple):
 class Read(NamedTuple):
     """A recording as an independent reader has it."""
 
-    messages: dict[str, list[Told]]
+    messages: dict[str, list[HeardMessage]]
     metadata: dict[str, dict[str, str]]
     attachments: dict[str, bytes]
 
@@ -78,11 +78,11 @@ def bits(number: float) -> str:
 @functools.cache
 def by_python(path: Path) -> Read:
     """A recording as the MCAP project's Python libraries read it."""
-    messages: dict[str, list[Told]] = {}
+    messages: dict[str, list[HeardMessage]] = {}
     with path.open("rb") as stream:
         reader = make_reader(stream, validate_crcs=True, decoder_factories=[DecoderFactory()])
         for _, channel, message, decoded in reader.iter_decoded_messages(log_time_order=False):
-            told = Told(message.sequence, message.log_time, message.publish_time, fields(decoded))
+            told = HeardMessage(message.sequence, message.log_time, message.publish_time, fields(decoded))
             messages.setdefault(channel.topic, []).append(told)
         metadata = {item.name: item.metadata for item in reader.iter_metadata()}
         attachments = {item.name: item.data for item in reader.iter_attachments()}
@@ -156,7 +156,9 @@ def by_javascript(run: Callable[..., list[Any]], path: Path) -> Read:
     for line in lines:
         match line["kind"]:
             case "message":
-                told = Told(line["sequence"], int(line["logTime"]), int(line["publishTime"]), line["fields"])
+                told = HeardMessage(
+                    line["sequence"], int(line["logTime"]), int(line["publishTime"]), line["fields"]
+                )
                 found.messages.setdefault(line["topic"], []).append(joined(told))
             case "metadata":
                 found.metadata[line["name"]] = line["values"]
@@ -166,7 +168,7 @@ def by_javascript(run: Callable[..., list[Any]], path: Path) -> Read:
     return found
 
 
-def joined(told: Told) -> Told:
+def joined(told: HeardMessage) -> HeardMessage:
     """A message with the types of Python: a map is a list of pairs, a 64-bit number a text."""
     rows = {row.name: row.kind for rows in signals.TOPICS.values() for row in rows}
     for name, value in told.fields.items():

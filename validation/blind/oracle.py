@@ -30,8 +30,8 @@ from laboratories.kinds import kind_of, kinds_of
 from models.registry import Array
 from validation.blind.cases.case import Case, Laid, of_role
 from validation.blind.cases.truths import tolerance
-from validation.blind.logged import DECIMALS, MAINS, RANGE, colour_shape
-from validation.blind.loggers import LOGGERS, Logger
+from validation.blind.logger.logged import DECIMALS, MAINS, RANGE, colour_shape
+from validation.blind.logger.loggers import LOGGERS, Logger
 from validation.blind.size import levels, messages, play, play_building
 
 SEEN = 6.18  # twice the 99.9 % point of the normal distribution

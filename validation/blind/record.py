@@ -16,9 +16,9 @@ from common.plan import read as plans
 from common.recording.reader import read
 from validation.blind.best import gaps, silent_run
 from validation.blind.cases.case import Case, levels, reality
-from validation.blind.loggers import LOGGERS
+from validation.blind.logger.loggers import LOGGERS
+from validation.blind.logger.relogging import relog
 from validation.blind.oracle import separation
-from validation.blind.relogging import relog
 from validation.blind.size import sizes
 from validation.blind.worker import OTHER
 from validation.spread import spread

@@ -12,7 +12,7 @@ from itertools import accumulate
 from typing import TYPE_CHECKING
 
 from validation.blind.labs.materials import MATERIALS
-from validation.blind.loggers import LOGGERS
+from validation.blind.logger.loggers import LOGGERS
 
 if TYPE_CHECKING:
     from validation.blind.lots import Lot

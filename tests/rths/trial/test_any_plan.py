@@ -30,7 +30,7 @@ from validation.blind.labs.device_lab import OwnKernelLab
 from validation.blind.library import OWN_KERNEL
 from validation.blind.oracle import neighbours
 from validation.blind.record import RecordedCase, record
-from validation.blind.scoring import Outcome, judge
+from validation.blind.results.scoring import Outcome, judge
 
 DAMPER = str(ROOT / "examples" / "viscous_damper.toml")
 CLASS = f"{ROOT / 'examples' / 'viscous_damper.py'}:ViscousDamper"

@@ -13,14 +13,14 @@ from common.recording.reader import read
 from common.signals import COLUMN_CHANNELS, Signal
 from models.registry import Array
 from tests.rths.trial.test_scoring import RUB, case, judged, said
-from validation.blind import logged
 from validation.blind.cases.basis import basis
 from validation.blind.draw import begin, draw
-from validation.blind.loggers import LOGGERS, Logger
+from validation.blind.logger import logged
+from validation.blind.logger.loggers import LOGGERS, Logger
 from validation.blind.record import record
-from validation.blind.rows import case_rows
+from validation.blind.results.rows import case_rows
+from validation.blind.results.stated import brier_skill
 from validation.blind.sets import SETS
-from validation.blind.stated import brier_skill
 
 INTERVAL = 0.002
 DISPLACEMENT, FORCE = COLUMN_CHANNELS.measured

@@ -16,7 +16,8 @@ from tests.rths.diagnosis_report.reports import bare
 from tests.rths.report.pages import check_alone, check_in_browser
 from validation.blind.cases.case import Case, Laid
 from validation.blind.judge import DiagnosisAnswer
-from validation.blind.measures import (
+from validation.blind.record import RecordedCase
+from validation.blind.results.measures import (
     binned,
     by_size,
     calibration_bounds,
@@ -29,9 +30,8 @@ from validation.blind.measures import (
     reliability,
     results,
 )
-from validation.blind.page import page
-from validation.blind.record import RecordedCase
-from validation.blind.scoring import Outcome, judge, judge_all, same
+from validation.blind.results.page import page
+from validation.blind.results.scoring import Outcome, judge, judge_all, same
 
 SLIP = Laid("column.slip", "column", {"gap": 2e-4}, {"gap": 0.0}, role=MASTER)
 SOFT = Laid("column.stiffness", "column", {"factor": 0.9}, {"factor": 1.0}, role=MASTER)

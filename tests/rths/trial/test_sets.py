@@ -26,8 +26,8 @@ from validation.blind.cases.basis import TrialBasis, basis
 from validation.blind.cases.case import Case, Laid
 from validation.blind.draw import begin, draw
 from validation.blind.labs import materials
-from validation.blind.loggers import LOGGERS, Logger
-from validation.blind.rows import case_rows
+from validation.blind.logger.loggers import LOGGERS, Logger
+from validation.blind.results.rows import case_rows
 from validation.blind.sets import MILD, SETS
 
 SECONDS = 2.0

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 from report.text.formats import MISSING
 from validation.blind.library import MATERIAL
-from validation.blind.loggers import LOGGERS
-from validation.blind.scoring import Outcome
-from validation.blind.stated import brier_skill, stated_verdicts
+from validation.blind.logger.loggers import LOGGERS
+from validation.blind.results.scoring import Outcome
+from validation.blind.results.stated import brier_skill, stated_verdicts
 
 HEAD = (
     "",

@@ -21,7 +21,7 @@ from validation.blind.cases.names import NAMING, CaseNames, Heard
 from validation.blind.judge import NONE, DiagnosisAnswer
 from validation.blind.labs.materials import MATERIALS
 from validation.blind.library import MATERIAL
-from validation.blind.loggers import LOGGERS
+from validation.blind.logger.loggers import LOGGERS
 from validation.blind.oracle import SEEN
 from validation.blind.record import RecordedCase
 

@@ -18,8 +18,8 @@ from common.recording.writer import SIGNALS, Recording
 from common.roles import MASTER
 from laboratories import kinds
 from validation.blind import lots
-from validation.blind.logged import logged
-from validation.blind.loggers import Logger
+from validation.blind.logger.logged import logged
+from validation.blind.logger.loggers import Logger
 
 IMPORTED = {"data": "measurements"}  # metadata `import`, the same for every logger
 WRITTEN_ANEW = ("summary", SIGNALS, "import")

@@ -10,7 +10,7 @@ from report.gap.wording import STATUS
 from report.page import data_uri, frame, render
 from report.pictures.figure import COLOURS, figure
 from report.text.formats import MISSING, quantity
-from validation.blind.measures import (
+from validation.blind.results.measures import (
     Bin,
     Matrix,
     by_size,
@@ -19,8 +19,8 @@ from validation.blind.measures import (
     measures,
     reliability,
 )
-from validation.blind.rows import HEAD, case_rows
-from validation.blind.scoring import VISIBLE, Outcome
+from validation.blind.results.rows import HEAD, case_rows
+from validation.blind.results.scoring import VISIBLE, Outcome
 
 TITLE = "Blind trial of the diagnosis"
 CASE = ("case", "kind", "truth", "size", "verdict", "probability", "why")

@@ -16,7 +16,7 @@ from scipy import signal
 
 from common.signals import Signal
 from models.registry import Array
-from validation.blind.loggers import Logger
+from validation.blind.logger.loggers import Logger
 
 MAINS = 50.0  # Hz
 ORDER = 4  # of the anti-alias filter and of the filters that colour noise

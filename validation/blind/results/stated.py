@@ -9,7 +9,7 @@ import numpy as np
 
 from diagnosis.findings.calibration import brier
 from models.registry import Array
-from validation.blind.scoring import Outcome
+from validation.blind.results.scoring import Outcome
 
 Stated = tuple[float, bool]  # probability, and whether it was true
 

@@ -15,9 +15,9 @@ from diagnosis.findings.calibration import reliability as stated_and_observed
 from report.text.formats import percent, quantity
 from validation.blind.cases.names import NAMING
 from validation.blind.library import OWN_KERNEL
-from validation.blind.rows import case_rows
-from validation.blind.scoring import JudgedEstimate, Outcome
-from validation.blind.stated import brier_score, in_columns, stated_verdicts
+from validation.blind.results.rows import case_rows
+from validation.blind.results.scoring import JudgedEstimate, Outcome
+from validation.blind.results.stated import brier_score, in_columns, stated_verdicts
 
 ABSTAINING = ("unknown_effect", "not_enough_data", "ambiguous")
 GOALS = 9  # judged at once
