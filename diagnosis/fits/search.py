@@ -49,6 +49,7 @@ LOUDEST = (
 SMALL = (
     0.05  # of a reading's rms that may be coloured noise where only the residual beside effects tells of it
 )
+UNEVEN = 3.0  # times what the energy of normal noise varies by: such noise comes and goes, as a motion does
 POLISHED = 12  # steps of a fit that leaves something, before that counts
 HALVINGS = 20  # by which a value is found beyond which the system is the same
 SETTLING = 4  # rounds in which a fit and the noise that it leaves are found in turn
@@ -356,14 +357,16 @@ def hidden(fit: Fit) -> bool:
     """Whether the noise that a fit is measured by may hold a gap.
 
     Something is left beside that noise, and either the inputs foresee it or the noise is far louder at some frequency
-    than at the highest ones, as the noise of no sensor is; or what effects leave would be a large share of a reading.
+    than at the highest ones, as the noise of no sensor is; or it comes and goes, or what effects leave would be a
+    large share of a reading.
     """
     if fit.names and sensor_noise.share(fit.data) > SMALL:
         return True
     seen = any(
         item.ratio > MATERIAL and item.significance > SIGNIFICANT for item in sensor_noise.foreseen(fit)
     )
-    return seen or (sensor_noise.loudest(fit) > LOUDEST and leaves(fit))
+    uneven = any(item.tails > UNEVEN for item in fit.data.noise)
+    return seen or (sensor_noise.loudest(fit) > LOUDEST and (uneven or leaves(fit)))
 
 
 def trimmed(fit: Fit) -> Fit:
