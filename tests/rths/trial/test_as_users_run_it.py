@@ -12,6 +12,7 @@ from tests.helpers import ROOT
 from tests.processes import environment, finished
 
 CASES = 12
+CALM = ("no_gap", "within_tolerances")  # verdicts that name no effect
 
 
 @pytest.mark.slow
@@ -27,7 +28,7 @@ def test_the_diagnosis_meets_withheld_effects(tmp_path: Path) -> None:
     plain = [case for case in cases if case["kind"] in ("catalogue", "formula") and case["size"] >= 2.0]
     assert plain
     # a small compliance hides inside the tolerance of the actuator's gain: then nothing is named, never another effect
-    assert all(case["named"] or case["status"] == "no_gap" for case in plain)
+    assert all(case["named"] or case["status"] in CALM for case in plain)
     assert sum(case["named"] for case in plain) >= len(plain) - 1
-    assert all(case["status"] == "no_gap" for case in cases if case["kind"] == "clean")
+    assert all(case["status"] in CALM for case in cases if case["kind"] == "clean")
     assert (tmp_path / "trial" / "index.html").exists()
