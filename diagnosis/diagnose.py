@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -14,7 +15,7 @@ from common.recording.imported import exchange_known
 from common.terminal.telling import Tell, untold
 from diagnosis.findings import readings, report
 from diagnosis.findings.found import Diagnosis
-from diagnosis.findings.verdict import PartVerdict, heard, judge
+from diagnosis.findings.verdict import PartVerdict, heard, judge, seen_in
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data
 from diagnosis.fits.scales import Scales
@@ -22,6 +23,7 @@ from diagnosis.fits.search import Searcher
 from diagnosis.learned.learn import learn
 from diagnosis.recorded import link
 from diagnosis.recorded.ground import Ground
+from diagnosis.recorded.joined import joined, refuse_others
 from diagnosis.recorded.laboratory import RecordedLaboratory
 from diagnosis.recorded.link import LinkFinding
 from diagnosis.recorded.parts import Building, ColumnAlone, LaboratoryPart, Part
@@ -40,19 +42,22 @@ def diagnose(
     validation: Mapping[str, Sequence[Record]],
     tell: Tell = untold,
     require: float | None = None,
+    more: Mapping[str, Sequence[Record]] = MappingProxyType({}),
 ) -> dict[str, Report]:
     """The reports on a test by role of the slave (contract, section 8), but for their verdicts in words.
 
     Each is of the master and of one slave; in its closed loop the other slaves are what they were found to be. The one
-    on a test without slaves is the master's. `require` is the gap that may be left in each part.
+    on a test without slaves is the master's. `require` is the gap that may be left in each part. The laboratories are
+    searched in the recordings `more` of them as well: one cause must explain all; the report shows the first.
 
     Raises:
-        InputError: the recording holds nothing that a model of the plan could predict.
+        InputError: the recording holds nothing that a model of the plan could predict, or one of `more` is not of the
+            same laboratories.
     """
     with threadpool_limits(
         limits=1, user_api="blas"
     ):  # small matrices: more threads only wait for each other
-        found = {role: examine(record, tell) for role, record in records.items()}
+        found = {role: examine(record, tell, more.get(role, ())) for role, record in records.items()}
         systems = {role: item.systems(noisy=False)[role] for role, item in found.items()}
         return {
             role: report.build(
@@ -73,8 +78,9 @@ def among(record: Record, systems: Mapping[str, System]) -> Record:
     return replace(record, whole=replace(record.whole, others=others))
 
 
-def examine(record: Record, tell: Tell = untold) -> Diagnosis:
-    """Judge every part of a recording."""
+def examine(record: Record, tell: Tell = untold, more: Sequence[Record] = ()) -> Diagnosis:
+    """Judge every part of a recording, its laboratories in `more` recordings of them as well."""
+    refuse_others(record, more)
     if record.ticks < LEAST_TICKS or record.ticks * record.plan.test.interval < SHORTEST:
         return Diagnosis(record)
     parts = parts_of(record)
@@ -84,15 +90,19 @@ def examine(record: Record, tell: Tell = untold) -> Diagnosis:
             f"{' or '.join(name for lab in record.labs for name in lab.commands)} with a reading of that laboratory, "
             "or column_displacement with column_force."
         )
+    further = [part for other in more for part in parts_of(other)]
     rounded = readings.steps(record)
     datas, verdicts = [], []
     late: float | None = None  # what a logger made of the forces that the building was computed from, s
     for number, given in enumerate(parts, 1):
         part = given if late is None or not isinstance(given, LaboratoryPart) else given.logged(late)
         tell(part.name, number, len(parts))
-        datas.append(fitting.prepare(part, record, readings.resolutions(record, rounded)))
+        resolutions = readings.resolutions(record, rounded)
+        datas.append(fitting.prepare(part, record, resolutions))
         scales = Scales(record, part.shift() if isinstance(part, Ground) else 0.0)
-        verdicts.append(judged(datas[-1], scales))
+        whole = joined(part, further, datas[-1].group)
+        data = datas[-1] if whole is part else fitting.prepare(whole, record, resolutions)
+        verdicts.append(seen_in(datas[-1], judged(data, scales)))
         found = verdicts[-1].search
         if isinstance(found.data.part, Building) and not found.data.part.exact:
             late = found.data.part.late(found.chosen.z)
@@ -104,7 +114,7 @@ def examine(record: Record, tell: Tell = untold) -> Diagnosis:
         exchanged(record),
         held,
         readings.levels([item.search.data for item in verdicts], [heard(item.search) for item in verdicts]),
-        [*of_plan(record), *not_recorded(record), *reversed_signs(datas), *repeating(held)],
+        [*together(more), *of_plan(record), *not_recorded(record), *reversed_signs(datas), *repeating(held)],
         [law for verdict in verdicts if verdict.outcome in UNNAMED for law in learn(verdict.search.chosen)],
     )
 
@@ -127,6 +137,12 @@ def exchanged(record: Record) -> list[LinkFinding]:
         return []
     account = link.account(record.run, record.plan.test.interval)
     return link.findings(account, record.plan.test.interval)
+
+
+def together(more: Sequence[Record]) -> list[str]:
+    """A sentence where several recordings were searched at once."""
+    names = ", ".join(str(other.run.path) for other in more)
+    return [f"The laboratories' causes explain this recording and {names}."] if more else []
 
 
 def of_plan(record: Record) -> list[str]:

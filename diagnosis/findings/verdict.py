@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.fits import fitting
-from diagnosis.fits.fitting import TOLERANCES, Fit, Problem
+from diagnosis.fits import fitting, sensor_noise
+from diagnosis.fits.fitting import TOLERANCES, Data, Fit, Problem
 from diagnosis.fits.search import DATA_GAIN, MATERIAL, PRIOR_GAIN, Search, exchanged_pair, gaps, leaves, tied
 from diagnosis.recorded.parts import MODEL_ERROR
 from diagnosis.report.records import Outcome
@@ -42,11 +42,17 @@ class Interval:
 class PartVerdict:
     """What one part says."""
 
-    search: Search
+    search: Search  # in the recording that is reported on
     outcome: Outcome
     probability: float  # of the chosen effects, or those tied with them
     others: tuple[tuple[Fit, float], ...]  # alternatives with their probability
     equivalent: tuple[tuple[str, ...], ...]
+    joined: Search | None = None  # in all recordings, where several were searched at once
+
+    @property
+    def fitted(self) -> Fit:
+        """The chosen effects where their parameters were found: in all recordings."""
+        return (self.joined or self.search).chosen
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -77,6 +83,29 @@ def judge(search: Search) -> PartVerdict:
         if not yes
     )
     return PartVerdict(search, outcome, sure * named, others, equivalents(search))
+
+
+def seen_in(data: Data, verdict: PartVerdict) -> PartVerdict:
+    """The verdict on several recordings as it shows in the data of one of them."""
+    joined = verdict.search
+    if len(joined.data.part.measured) == len(data.part.measured):
+        return verdict
+    ticks = len(data.part.measured)
+    lines = None if joined.data.lines is None else joined.data.lines[:ticks]
+    spikes = None if joined.data.spikes is None else joined.data.spikes[:ticks]
+    here = replace(
+        fitting.measured_by(data, joined.data.white), noise=joined.data.noise, lines=lines, spikes=spikes
+    )
+    if here.noise:
+        here = replace(here, related=sensor_noise.related(here, here.system))
+
+    def there(fit: Fit) -> Fit:
+        return fitting.at(here, fit.values, fit.z)
+
+    alternatives = tuple(map(there, joined.alternatives))
+    search = Search(here, there(joined.commissioned), there(joined.chosen), alternatives)
+    others = tuple((there(fit), chance) for fit, chance in verdict.others)
+    return replace(verdict, search=search, others=others, joined=joined)
 
 
 def unnamed(search: Search) -> PartVerdict:

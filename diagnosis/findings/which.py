@@ -34,7 +34,7 @@ def which(found: Diagnosis) -> Named:
     probability = float(np.prod([verdict.probability for verdict in found.verdicts]))
     if not effects:
         probability = min(probability, nothing(found))
-    fits = {name: values for verdict in named for name, values in intervals(verdict.search.chosen).items()}
+    fits = {name: values for verdict in named for name, values in intervals(verdict.fitted).items()}
     catalogue = found.record.catalogue
     laws = {
         name: chosen_law(values) for verdict in named for name, values in verdict.search.chosen.values.items()

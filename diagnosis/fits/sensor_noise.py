@@ -6,6 +6,7 @@ look at it; what is left at rest, or else where the part moves least, is the noi
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 from typing import NamedTuple
@@ -14,6 +15,7 @@ import numpy as np
 
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data, Fit
+from diagnosis.recorded.joined import JoinedPart
 from diagnosis.recorded.parts import Building, ColumnAlone, LaboratoryPart, Part
 from diagnosis.signals import colour, pickup
 from diagnosis.signals.ceiling import Crosswise
@@ -88,14 +90,24 @@ def remainder(data: Data, system: System) -> Remainder:
         whole = fitting.filled(raw[:, place], seen)
         spiky[:, place] = spikes(whole) & seen
         whole = fitting.filled(whole, ~spiky[:, place])
-        found.append(tuple(pickup.pickups(whole, interval)))
-        if found[-1]:
-            lines[:, place] = pickup.waves(whole, found[-1], interval)
+        picked = [tuple(pickup.pickups(whole[span], interval)) for span in spans(part)]
+        for span, waves in zip(spans(part), picked, strict=True):
+            if waves:
+                lines[span, place] = pickup.waves(whole[span], waves, interval)
+        found.append(picked[0])
         raw[:, place] = whole - lines[:, place]
     averaged = data.averaged(raw)
     said = predictable(data, averaged)
     single = raw[: data.groups * data.group] - np.repeat(said, data.group, axis=0) / math.sqrt(data.group)
     return Remainder(averaged - said, single, lines, tuple(found), spiky)
+
+
+def spans(part: Part) -> list[slice]:
+    """The ticks of each recording of a part: a line's phase is that of one recording."""
+    if not isinstance(part, JoinedPart):
+        return [slice(None)]
+    ends = np.cumsum([0, *(len(piece.measured) for piece in part.pieces)])
+    return [slice(int(a), int(b)) for a, b in itertools.pairwise(ends)]
 
 
 def related(data: Data, system: System) -> Crosswise | None:
@@ -167,6 +179,14 @@ def inputs(part: Part, system: System) -> Array:
     building that was not computed from the very forces recorded is predicted from these forces' noise as well: its own
     motion stands in for the prediction.
     """
+    columns = dependencies(part, system)
+    return columns[:, np.ptp(columns, axis=0) > 0.0]
+
+
+def dependencies(part: Part, system: System) -> Array:
+    """The inputs with those that stand still."""
+    if isinstance(part, JoinedPart):
+        return np.concatenate([dependencies(piece, system) for piece in part.pieces])
     if isinstance(part, Building):
         return np.column_stack([part.ground, part.measured])
     if isinstance(part, LaboratoryPart):
@@ -174,9 +194,7 @@ def inputs(part: Part, system: System) -> Array:
         columns = list(part.wanted.values())
     else:
         columns = [part.inputs] if isinstance(part, ColumnAlone) else []
-    columns += list(np.nan_to_num(part.predict(system)).T)
-    moving = [column for column in columns if np.ptp(column) > 0.0]
-    return np.column_stack(moving) if moving else np.zeros((len(part.measured), 0))
+    return np.column_stack([*columns, *np.nan_to_num(part.predict(system)).T])
 
 
 def quiet_part(data: Data, system: System) -> tuple[Mask, Source]:

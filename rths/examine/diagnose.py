@@ -28,6 +28,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `diagnose`."""
     cli.recording_argument(parser, ", whole or of one part")
     parser.add_argument(
+        "more",
+        type=Path,
+        nargs="*",
+        metavar="MORE",
+        help="further recordings of the same laboratories: one cause must explain all of them",
+    )
+    parser.add_argument(
         "--plan", metavar="PLAN", help="what the laboratories should be (default: the plan in FILE)"
     )
     parser.add_argument(
@@ -69,6 +76,7 @@ def run(args: argparse.Namespace) -> int:
         names = chosen(recording, args)
         found = diagnose_slaves(
             recording,
+            more=args.more,
             plan=args.plan,
             validate=args.validate,
             against_ideal=args.ideal,
@@ -98,11 +106,15 @@ def run(args: argparse.Namespace) -> int:
 def check(args: argparse.Namespace) -> None:
     """Raise InputError where the report cannot be written, before any work is done."""
     files = [path for path in (args.html, args.json) if path and str(path) != "-"]
-    inputs = [args.file, *args.validate, *([cli.plan_path(args.plan)] if args.plan else [])]
+    inputs = [args.file, *args.more, *args.validate, *([cli.plan_path(args.plan)] if args.plan else [])]
     for path in files:
         outputs.checked(path, args.force, inputs)
-    if any(path.resolve() == args.file.resolve() for path in args.validate):
-        raise InputError(f"{args.file} cannot validate its own diagnosis: give --validate another recording.")
+    used = [path.resolve() for path in (args.file, *args.more)]
+    for path in args.validate:
+        if path.resolve() in used:
+            raise InputError(f"{path} cannot validate its own diagnosis: give --validate another recording.")
+    if len(set(used)) < len(used):
+        raise InputError(f"A recording is given twice beside {args.file}: name each file once.")
     if args.require is not None and not 0.0 < args.require < math.inf:
         raise InputError(f"--require {args.require:g} is no gap: give a share above 0, such as 0.02.")
     if len({outputs.target(path) for path in files}) < len(files):
@@ -143,6 +155,7 @@ def diagnose_recording(path: Path, validate: Sequence[Path] = ()) -> dict[str, R
 def diagnose_slaves(
     recording: Run,
     *,
+    more: Sequence[Path] = (),
     plan: str | None = None,
     validate: Sequence[Path] = (),
     against_ideal: bool = False,
@@ -151,7 +164,8 @@ def diagnose_slaves(
 ) -> dict[str, Report]:
     """The reports on a recording by the name of the slave, empty where there is one without or none.
 
-    Each is of the master and that slave, and its verdict begins with the laboratory's name where there are several.
+    Each is of the master and that slave, and its verdict begins with the laboratory's name where there are several. The
+    laboratories are searched in the recordings `more` of them as well.
 
     Raises:
         InputError: a file cannot be read, or holds nothing to diagnose.
@@ -169,13 +183,16 @@ def diagnose_slaves(
             role: record.build(run, believed, against_ideal=against_ideal, role=role)
             for role in run.roles or (MASTER,)
         }
-        for run in (recording, *map(read, validate))
+        for run in (recording, *map(read, (*more, *validate)))
     )
-    for one in own.values():
-        refuse_slips(one, recording.path)
-    further = {role: [other[role] for other in others if role in other] for role in own}
+    for one in (one for records in (own, *others[: len(more)]) for one in records.values()):
+        refuse_slips(one, one.run.path)
+    searched, held = (
+        {role: [other[role] for other in some if role in other] for role in own}
+        for some in (others[: len(more)], others[len(more) :])
+    )
     result = {}
-    for role, report in diagnose(own, further, tell, require).items():
+    for role, report in diagnose(own, held, tell, require, searched).items():
         name, words = name_of(role), wording.verdict(report)
         verdict = f"Laboratory {name}: {words}" if name else words
         result[name] = dataclasses.replace(report, verdict=verdict)

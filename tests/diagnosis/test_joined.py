@@ -1,0 +1,89 @@
+"""Several recordings of the same laboratories as one: what is found must explain all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from common.errors import InputError
+from common.recording.reader import read
+from diagnosis.findings.verdict import intervals
+from diagnosis.fits import fitting
+from diagnosis.recorded.joined import JoinedPart, joined, refuse_others
+from diagnosis.recorded.parts import Building
+from diagnosis.recorded.record import Record
+from models.system import System
+from rths.examine.diagnose import diagnose_slaves
+from tests.diagnosis.cases import Cases, lab_a, lab_b
+
+FRICTION = {"damper.friction": {"force": 3.0, "velocity": 1e-6}}
+
+
+@pytest.fixture(scope="module")
+def cases(tmp_path_factory: pytest.TempPathFactory) -> Cases:
+    """Recordings with known secrets, made on demand."""
+    return Cases(tmp_path_factory.mktemp("cases"))
+
+
+@pytest.fixture(scope="module")
+def records(cases: Cases) -> tuple[Record, Record]:
+    """Two tests of one clean laboratory, of other lengths and scales."""
+    return cases.record(duration=4.0), cases.record(duration=3.0, scale=0.2)
+
+
+@pytest.mark.parametrize("part_of", [lab_a, lab_b])
+def test_predicts_each_recording_from_its_own_inputs(
+    part_of: Callable[[Record], object], records: tuple[Record, Record]
+) -> None:
+    pieces = [part_of(record) for record in records]
+    part = JoinedPart(pieces)  # type: ignore[arg-type]
+    system = System(records[0].plan)
+    own = [piece.predict(system) for piece in pieces]  # type: ignore[attr-defined]
+    assert np.array_equal(part.predict(system), np.concatenate(own))
+    assert part.measured.shape == part.present.shape == (2000 + 1500, part.predict(system).shape[1])
+
+
+def test_first_ticks_reach_over_the_end_of_a_recording(records: tuple[Record, Record]) -> None:
+    part, system = JoinedPart([lab_b(record) for record in records]), System(records[0].plan)
+    for ticks in (300, 2000, 2600):
+        begun = part.first(ticks)
+        assert len(begun.measured) == ticks
+        assert np.array_equal(begun.measured, part.measured[:ticks])
+        assert np.array_equal(begun.predict(system), part.predict(system)[:ticks])
+
+
+def test_only_measured_parts_with_the_same_readings_are_joined(records: tuple[Record, Record]) -> None:
+    building, mine, other = Building(records[0]), lab_a(records[0]), lab_a(records[1])
+    assert joined(building, [Building(records[1])], 4) is building
+    assert joined(mine, [lab_b(records[1])], 4) is mine
+    odd = joined(mine, [other.first(1003)], 4)
+    assert len(odd.measured) == 2000 + 1000  # whole averaged samples
+
+
+def test_recordings_of_other_laboratories_are_refused(records: tuple[Record, Record]) -> None:
+    first, second = records
+    refuse_others(first, [second])
+    stiffer = replace(second.plan, table=replace(second.plan.table, frequency=9.0))
+    with pytest.raises(InputError, match=r"their plans differ in \[table\]"):
+        refuse_others(first, [replace(second, plan=stiffer)])
+
+
+def test_a_second_recording_narrows_the_interval(cases: Cases) -> None:
+    first, second = (cases.record(FRICTION, duration=4.0, scale=scale) for scale in (0.1, 0.2))
+    widths = []
+    for others in ([], [lab_b(second)]):
+        data = fitting.prepare(joined(lab_b(first), others, 4), first)
+        found = intervals(fitting.fit(data, FRICTION))["damper.friction"]["force"]
+        assert found.low < 3.0 < found.high
+        widths.append(found.high - found.low)
+    assert widths[1] < 0.9 * widths[0]
+
+
+def test_a_cause_in_one_recording_only_explains_not_both(cases: Cases) -> None:
+    clean, stuck = cases.file(duration=4.0), cases.file(FRICTION, duration=4.0)
+    report = diagnose_slaves(read(stuck), more=[clean])[""].plain()
+    assert report["status"] != "explained"
+    assert any(clean.name in text for text in report["warnings"])
