@@ -10,9 +10,9 @@ import numpy as np
 from benchmarks import opensees_peer, virtual_time
 from benchmarks.opensees_peer import PeerAnswer, PeerCase
 from benchmarks.result import BenchmarkFigure, rate_figure, rates
+from common.plan.laboratory_tables import Control
 from common.plan.plan import Plan, ideal
 from common.plan.read import with_test
-from common.plan.tables import Control
 from loop import substructure
 from loop.closed_loop import signals, simulate
 from models.registry import Array

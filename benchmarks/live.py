@@ -23,7 +23,7 @@ from playwright.sync_api import Error as PageError
 
 from benchmarks.result import BenchmarkFigure, cost_figure
 from benchmarks.whole_test import ROOT, Ending, command, ended_early, ending
-from common.recording.reader import MACHINES, Run
+from common.recording.run import MACHINES, Run
 from tests.browser import chromium, open_page
 from tests.helpers import patient
 

@@ -12,7 +12,7 @@ import numpy as np
 from benchmarks.load import BUSY, busy
 from benchmarks.result import BenchmarkFigure, cost_figure
 from benchmarks.whole_test import ended_early, played
-from common.recording.reader import MACHINES, Run
+from common.recording.run import MACHINES, Run
 
 SECONDS, QUICK_S = 20.0, 0.5
 REPEATS = 3

@@ -22,7 +22,8 @@ from common.link.endpoint import FrameEndpoint
 from common.link.zenoh_link import ZenohLink, listenable
 from common.plan.plan import PROTOCOL_VERSION, Plan
 from common.protocol.messages import Register, Resend
-from common.recording.reader import Run, read
+from common.recording.reader import read
+from common.recording.run import Run
 from common.recording.writer import CHUNK_SIZE, Recording
 from common.signals import TICK_TOPICS, TOPICS, FieldType
 

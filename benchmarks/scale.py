@@ -18,8 +18,9 @@ import numpy as np
 
 from benchmarks.result import BenchmarkFigure
 from common.plan import reality
+from common.plan.laboratory_tables import SlaveLaboratory
 from common.plan.plan import Plan, ideal
-from common.plan.tables import RecordingTable, SlaveLaboratory
+from common.plan.tables import RecordingTable
 from loop import substructure
 from loop.closed_loop import simulate
 from loop.nominal import partition

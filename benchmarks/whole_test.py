@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 from benchmarks.result import BenchmarkFigure
 from common.errors import RthsError
-from common.recording.reader import Run, read
+from common.recording.reader import read
+from common.recording.run import Run
 
 ROOT = Path(__file__).resolve().parent.parent
 

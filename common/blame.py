@@ -1,4 +1,4 @@
-"""Where in a user's own code an exception came from."""
+"""Finds where in a user's own code an exception came from, for sentences about it."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ HOUSE = Path(__file__).resolve().parents[1]
 
 
 def source_of(kind: type[object]) -> str:
-    """The file in which a class stands, empty where there is none."""
+    """The path of the file that defines a class, empty where it was not loaded from a file."""
     return getattr(sys.modules.get(kind.__module__), "__file__", None) or ""
 
 
 def place(error: BaseException, source: str) -> str:
-    """File and line of an exception: the innermost line of the file `source`, else the innermost outside this folder.
+    """File name and line of an exception: the innermost frame in the file `source`, else the innermost user frame.
 
-    Empty where the exception comes from no other code than this folder's.
+    A user frame is one outside this project's folder. The text is empty where the exception passed through none.
     """
     frames = traceback.extract_tb(error.__traceback__)
     own = [frame for frame in frames if frame.filename == source]
@@ -27,12 +27,12 @@ def place(error: BaseException, source: str) -> str:
 
 
 def described(error: BaseException, source: str) -> str:
-    """An exception in words, with file and line where they are known."""
+    """The type and the text of an exception, with file and line where they are known."""
     text, where = str(error), place(error, source)
     what = f"{type(error).__name__}: {text}" if text else type(error).__name__
     return f"{what} ({where})" if where else what
 
 
 def whole(error: BaseException) -> str:
-    """The traceback as Python writes it."""
+    """The whole traceback as Python prints it."""
     return "".join(traceback.format_exception(error))

@@ -44,7 +44,7 @@ class EmergencyStopError(RigError):
 
 
 class InterlockError(RthsError):
-    """The test was stopped by a limit (exit 3)."""
+    """The test was stopped by a limit, by another laboratory or by the user (exit 3)."""
 
     exit_code = 3
 
@@ -69,8 +69,8 @@ class ProtocolError(RthsError):
 
 
 class LocalProtocolError(ProtocolError):
-    """A fault of this side: it tried what the protocol does not allow."""
+    """An event of this process itself is not allowed by the protocol in the present state."""
 
 
 class RemoteProtocolError(ProtocolError):
-    """A fault of the other side: it sent what the protocol does not allow."""
+    """Another process sent an event that the protocol does not allow in the present state."""

@@ -1,4 +1,4 @@
-"""What a process reports of a test while it runs: a kind of news, and its data by name."""
+"""The function by which a process reports a running test: it takes the kind of a report and its data by name."""
 
 from __future__ import annotations
 
@@ -9,4 +9,4 @@ Report = Callable[[str, Mapping[str, Any]], None]
 
 
 def silent(_kind: str, _data: Mapping[str, Any]) -> None:
-    """A report that is discarded."""
+    """Discard a report."""

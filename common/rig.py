@@ -1,8 +1,8 @@
-"""The interface behind which a laboratory stands: emulated, real, or a user's own model.
+"""The interface of a rig: emulated, real, or a user's own model.
 
-A rig is constructed as `Class(interval=…, seed=…, **options)`. Every value is at the laboratory's own
-scale, in SI units. Between two commands it is read once, unless its class says `idle_readings = True`: then it may be
-read any number of times while nothing moves, and is, before the first command, to judge its sensors.
+A rig is constructed as `Class(interval=…, seed=…, **options)`. Every value is at the laboratory's own scale, in SI
+units. Between two commands it is read once. If its class sets `idle_readings = True`, it may be read any number of
+times while nothing moves; its sensors are then judged before the first command.
 """
 
 from __future__ import annotations
@@ -18,35 +18,38 @@ from common.errors import EmergencyStopError, RigError
 from common.rig_time import RigTime
 from common.signals import Channels
 
-ANYTHING = (Exception, SystemExit)  # a plug-in may raise anything, and ends nothing by `sys.exit`
+ANYTHING = (
+    Exception,
+    SystemExit,
+)  # caught from a plug-in: it may raise anything, and `sys.exit` must not end a test
 
 METHODS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {"arm": (), "read": (), "write": ("command",), "disarm": ()}
-)  # of a rig, with the parameters of each
+)  # the methods of a rig, with the parameters of each
 
 
 class ColumnCommand(NamedTuple):
-    """What laboratory A is told."""
+    """The command of a laboratory of the kind column."""
 
     actuator_command: float  # m
 
 
 class ColumnMeasurement(NamedTuple):
-    """What laboratory A reads."""
+    """The measurements of a laboratory of the kind column."""
 
     column_displacement: float  # m
     column_force: float  # N
 
 
 class TableCommand(NamedTuple):
-    """What laboratory B is told."""
+    """The command of a laboratory of the kind table."""
 
     table_command: float  # m
     damper_command: float  # N
 
 
 class TableMeasurement(NamedTuple):
-    """What laboratory B reads."""
+    """The measurements of a laboratory of the kind table."""
 
     table_displacement: float  # m
     table_acceleration: float  # m/s²
@@ -55,11 +58,11 @@ class TableMeasurement(NamedTuple):
 
 
 class NothingCommand(NamedTuple):
-    """What a laboratory without a rig is told."""
+    """The command of a laboratory without a rig, which is empty."""
 
 
 class NothingMeasurement(NamedTuple):
-    """What a laboratory without a rig reads."""
+    """The measurements of a laboratory without a rig, of which there are none."""
 
 
 COMMANDS: Mapping[tuple[str, ...], Any] = {one._fields: one for one in (ColumnCommand, TableCommand)}
@@ -69,23 +72,23 @@ MEASUREMENTS: Mapping[tuple[str, ...], Any] = {
 
 
 def command_of(channels: Channels) -> Any:
-    """The NamedTuple of what a laboratory of these channels is told, in the order of `channels.drives`."""
+    """The NamedTuple class of a laboratory's command, in the order of `channels.drives`."""
     return COMMANDS.get(channels.drives) or namedtuple("Command", channels.drives)
 
 
 def measurement_of(channels: Channels) -> Any:
-    """The NamedTuple of what a laboratory of these channels reads, in the order of `channels.names`."""
+    """The NamedTuple class of a laboratory's measurements, in the order of `channels.names`."""
     return MEASUREMENTS.get(channels.names) or namedtuple("Measurement", channels.names)
 
 
 class Rig(Protocol):
-    """A laboratory."""
+    """Everything physical of one laboratory: transfer system, specimen or device, sensors."""
 
     def arm(self) -> None:
-        """Be ready to move; raise RigError with a reason if not."""
+        """Make the rig ready to move; raise RigError with the reason if that is not possible."""
 
     def read(self) -> Iterable[float]:
-        """The measurements at the present tick."""
+        """The measurements at the present tick, in the order of the kind's channels."""
 
     def write(self, command: Any) -> None:
         """Apply a command over the coming interval."""
@@ -95,24 +98,24 @@ class Rig(Protocol):
 
 
 class NoRig:
-    """The rig of a master without a laboratory: it has nothing to read and nothing that could move."""
+    """The rig of a master without a laboratory: it has no channels and nothing that could move."""
 
     def arm(self) -> None:
-        """Nothing has to be ready."""
+        """Do nothing."""
 
     def read(self) -> NothingMeasurement:
-        """No channel."""
+        """The measurements of no channel."""
         return NothingMeasurement()
 
     def write(self, command: NothingCommand) -> None:
-        """No command."""
+        """Do nothing."""
 
     def disarm(self) -> None:
-        """At rest in any case."""
+        """Do nothing."""
 
 
 class AtRest(Protocol):
-    """Judges what a rig reads while nothing moves."""
+    """Judges a rig's measurements while nothing moves."""
 
     def judge(
         self, read: Callable[[], Any], names: tuple[str, ...], lab: str, *, hidden: bool, paced: bool
@@ -124,11 +127,11 @@ class AtRest(Protocol):
 
 
 class GuardedRig:
-    """A rig whose every failure becomes one sentence that names it.
+    """Calls a rig and turns each of its failures into a RigError of one sentence that names the rig.
 
-    `measurement` is the NamedTuple that `read` must fill. What a `hidden` rig says of its failure is kept back.
-    Once armed, its sensors are judged by `at_rest` where one is given: by a `twin` that is read in the rig's place
-    and thrown away, since reading an emulated rig moves its noise on, or by the rig itself if it allows that.
+    `measurement` is the NamedTuple class of what `read` returns. The sentence about a `hidden` rig does not contain the
+    rig's own message. Where `at_rest` is given, it judges the sensors once the rig is armed: it reads a `twin` of an
+    emulated rig, since reading the rig itself would draw from its noise, or the rig itself if it sets `idle_readings`.
     """
 
     def __init__(
@@ -151,17 +154,17 @@ class GuardedRig:
         self._time: RigTime | None = None
 
     def measure(self, now: Callable[[], int], time: RigTime) -> None:
-        """Measure how long `read` and `write` of a rig that is not emulated take, by a clock in ns, into an account."""
+        """Measure how long `read` and `write` take by the clock `now` (ns), unless the rig is emulated."""
         if self._twin is None:
             self._now, self._time = now, time
 
     @property
     def name(self) -> str:
-        """What errors call it."""
+        """The rig's name in errors."""
         return self._name
 
     def arm(self) -> None:
-        """Arm; raises RigError with the rig's own reason, or with what its sensors read at rest."""
+        """Arm the rig; raises RigError with the rig's own reason, or where a sensor at rest is unsound."""
         try:
             self._rig.arm()
         except ANYTHING as error:  # the user gets a sentence
@@ -211,10 +214,10 @@ class GuardedRig:
             self._time.took("write", self._now() - begun)
 
     def disarm(self) -> RigError | None:
-        """Disarm; a rig that raises all the same gives the error returned, None where all is well."""
+        """Disarm the rig; returns the error where the rig raises one, otherwise None."""
         try:
             self._rig.disarm()
-        except ANYTHING as error:  # the stop must go on
+        except ANYTHING as error:  # the end of the test must go on
             return self._failure("disarm", error)
         return None
 

@@ -1,8 +1,8 @@
 """The roles in a test: a master, one slave or several with names, a recorder; an operator and an observer.
 
-A role is what a process is called in messages, keys and topics: `master`, `recorder`, `slave` where there is one,
-`slave.NAME` where the plan names its slaves. An operator may say something on the control channel and nothing else, an
-observer hears everything and says nothing; a test needs neither.
+A role is the name of a process in messages, keys and topics: `master`, `recorder`, `slave` where there is one,
+`slave.NAME` where the plan names its slaves. An operator sends on the control channel only; an observer receives all
+messages and sends none. A test needs neither.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ def slave_role(name: str) -> str:
 
 
 def kind_of(text: str) -> str:
-    """A role or a topic without a slave's name: `slave` of `slave.roof`."""
+    """A role or a topic without a slave's name: `slave` for `slave.roof`."""
     return text.partition(".")[0]
 
 
 def name_of(text: str) -> str:
-    """The slave's name in a role or a topic, empty where there is none: `roof` of `slave.roof`."""
+    """The slave's name in a role or a topic, empty where there is none: `roof` for `slave.roof`."""
     return text.partition(".")[2]
 
 

@@ -1,7 +1,7 @@
-"""The one table of signals: what a recording holds, in which unit, and what each signal means.
+"""The table of signals: the signals of a recording with their units and meanings.
 
-The MCAP schemas, the listings, the plots, the exports and the limits all derive from this table. A laboratory's part
-of it follows from the channels of its kind.
+The MCAP schemas, listings, plots, exports and limits derive from this table. The signals of a laboratory follow from
+the channels of its kind.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import NamedTuple
 from common.errors import InputError
 from common.roles import MASTER as MASTER_ROLE
 from common.roles import SLAVE as SLAVE_ROLE
-from common.roles import kind_of, latency_topic, ramp_topic
+from common.roles import latency_topic, ramp_topic
 
 
 class FieldType(Enum):
@@ -38,10 +38,10 @@ class Signal(NamedTuple):
     unit: str
     text: str
     kind: FieldType = FieldType.NUMBER
-    slaves: tuple[str, ...] = ()  # roles of those of which it has a value each; a scalar where it is one
+    slaves: tuple[str, ...] = ()  # roles of the slaves for which it has a value each; a scalar for one slave
 
     def count(self, storeys: int) -> int:
-        """How many numbers it holds in a building of so many storeys."""
+        """How many numbers it holds in a building with this number of storeys."""
         return storeys if self.kind is FieldType.STOREYS else max(len(self.slaves), 1)
 
 
@@ -56,23 +56,23 @@ class Channels:
     target: Signal
     command: Signal
     measured: tuple[Signal, ...]
-    position: str  # of those measured: what a compensator compares with the target
-    force: str  # of those measured: what goes back to the building
-    effort: Signal | None = None  # force of a motor, where the kind has one
+    position: str  # the measured channel that a compensator compares with the target
+    force: str  # the measured channel that goes back to the building
+    effort: Signal | None = None  # commanded force of a motor, where the kind has one
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The names of the measured channels, in the order of the kernel's."""
+        """The names of the measured channels, in the order of the kind's kernel."""
         return tuple(signal.name for signal in self.measured)
 
     @property
     def driving(self) -> tuple[Signal, ...]:
-        """The target, and the motor's force where the kind has one."""
+        """The target, and the motor's commanded force where the kind has one."""
         return (self.target, *([self.effort] if self.effort else []))
 
     @property
     def drives(self) -> tuple[str, ...]:
-        """The names of the commands that a rig is written: the transfer system's, and the motor's."""
+        """The names of the commands written to a rig: the transfer system's, and the motor's where there is one."""
         return (self.command.name, *([self.effort.name] if self.effort else []))
 
     @property
@@ -82,7 +82,10 @@ class Channels:
 
     @property
     def sent(self) -> tuple[str, ...]:
-        """The names of what a laboratory is told at a tick: target, motor's force where it has one, target's rates."""
+        """The names of the values sent to a laboratory at a tick.
+
+        Target, motor's force where it has one, target's rates.
+        """
         return (*(signal.name for signal in self.driving), *self.rates)
 
 
@@ -139,7 +142,7 @@ NUMERICAL = Signal(
 )
 
 OF_STOREYS = tuple(row.name for row in (*BUILDING, NUMERICAL) if row.kind is FieldType.STOREYS)
-"""What the master computes of each storey, in the order of the topic."""
+"""The signals that the master computes for each storey, in the order of the topic."""
 
 LATENCY = (
     SEQ,
@@ -188,13 +191,13 @@ EVENT = (
 )
 
 TICK_TOPICS = ("master", "slave", "latency")
-SENT_ = "sent_"  # before the name of a signal that is sent, where the master's own laboratory has one of that name
+SENT_ = "sent_"  # prefix of a sent signal where the master's own laboratory has a signal of the same name
 
 
 def topics(laboratories: Mapping[str, Channels]) -> dict[str, tuple[Signal, ...]]:
-    """What a recording of a test holds; `laboratories` are the channels of each role that hosts one.
+    """The topics of a recording with their signals; `laboratories` holds the channels of each role with a laboratory.
 
-    The slaves stand in the plan's order; a master without a laboratory of its own is not among the roles.
+    The slaves stand in the plan's order. A master without a laboratory of its own is not among the roles.
 
     Raises:
         InputError: two signals of one topic have one name.
@@ -212,12 +215,15 @@ def topics(laboratories: Mapping[str, Channels]) -> dict[str, tuple[Signal, ...]
 
 
 def shared(rows: tuple[Signal, ...]) -> dict[str, tuple[str, ...]]:
-    """The roles of the slaves of which a signal has a value each, by the name of the signal."""
+    """The roles of the slaves for which a signal has a value each, by the name of the signal."""
     return {row.name: row.slaves for row in rows if row.slaves}
 
 
 def alike(slaves: Mapping[str, Channels]) -> dict[Channels, tuple[str, ...]]:
-    """The slaves that have the same channels, and so share fields of the master's topic, in the plan's order."""
+    """The slaves by their channels: those with the same channels share fields of the master's topic.
+
+    In the plan's order.
+    """
     found: dict[Channels, tuple[str, ...]] = {}
     for role, channels in slaves.items():
         found[channels] = (*found.get(channels, ()), role)
@@ -225,7 +231,7 @@ def alike(slaves: Mapping[str, Channels]) -> dict[Channels, tuple[str, ...]]:
 
 
 def _master(own: Channels | None, slaves: Mapping[Channels, tuple[str, ...]]) -> tuple[Signal, ...]:
-    """The building, its own laboratory, and of each kind of slave what was used and what was sent."""
+    """The signals of the building and of the master's laboratory, and those used from and sent to the slaves."""
     rows = [*BUILDING, *(_own(own) if own else ()), NUMERICAL]
     taken = {row.name for row in rows}
     for channels, roles in slaves.items():
@@ -247,7 +253,7 @@ def _at_end(channels: Channels) -> tuple[Signal, ...]:
 
 
 def _used(force: str) -> tuple[Signal, ...]:
-    """The force of a slave that a tick uses."""
+    """The signals of a slave's force as a tick uses it."""
     words = force.replace("_", " ")
     device = words.removesuffix(" force") if words.endswith(" force") else "laboratory"
     return (
@@ -264,7 +270,7 @@ def _rates(channels: Channels) -> tuple[Signal, ...]:
 
 
 def _slave(channels: Channels) -> tuple[Signal, ...]:
-    """What was received, what was written, what was measured."""
+    """The signals that a slave received, wrote and measured."""
     target, *effort = (row._replace(text=f"{row.text}, as received") for row in channels.driving)
     rates = (row._replace(text=f"{row.text}, as received") for row in _rates(channels))
     seq = Signal("command_seq", "", "tick of the command in force, -1 for none yet", FieldType.INDEX)
@@ -272,7 +278,7 @@ def _slave(channels: Channels) -> tuple[Signal, ...]:
 
 
 def _ramp(channels: Channels) -> tuple[Signal, ...]:
-    """The way to rest."""
+    """The signals of the ramp to rest."""
     command, effort = channels.command, channels.effort
     written = [command._replace(text=f"{command.text.partition(',')[0]} on the ramp to rest")]
     if effort:
@@ -284,27 +290,19 @@ def _check(topic: str, rows: tuple[Signal, ...]) -> None:
     name, times = Counter(row.name for row in rows).most_common(1)[0]
     if times > 1:
         raise InputError(
-            f"The topic {topic} would have {times} signals called '{name}': rename that channel in the kind of "
-            "laboratory of your own."
+            f"The topic {topic} would have {times} signals called '{name}': rename that channel in your own kind of "
+            "laboratory."
         )
 
 
-# -- of the default plan: a column at the master, a table at the slave -------------------------------
+# -- topics of the default plan: a column at the master, a table at the slave -------------------------
 
 
 def default_topics(slaves: Sequence[str] = (SLAVE_ROLE,)) -> dict[str, tuple[Signal, ...]]:
-    """What a recording holds of a test with a column at the master and a table at each slave."""
+    """The topics of a test with a column at the master and a table at each slave."""
     return topics({MASTER_ROLE: COLUMN_CHANNELS} | dict.fromkeys(slaves, TABLE_CHANNELS))
 
 
 TOPICS = default_topics()
 
 SENT = TABLE_CHANNELS.sent
-
-
-def signal(topic: str, name: str) -> Signal:
-    """The row of `name` in `topic`, that of a named slave included; raises KeyError where there is none."""
-    for row in TOPICS[kind_of(topic)]:
-        if row.name == name:
-            return row
-    raise KeyError(f"{topic}/{name}")

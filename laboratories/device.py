@@ -17,9 +17,9 @@ import numba
 import numpy as np
 
 from common.errors import InputError
+from common.plan.laboratory_tables import ForceCorrection
 from common.plan.plan import Plan
 from common.plan.schema import Rule, as_type, in_range, nearest
-from common.plan.tables import ForceCorrection
 from common.safety.ramp import Ramp
 from common.signals import Channels, Signal
 from laboratories.descent import HoldRamp

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from common.plan.laboratory_tables import ForceCorrection
 from common.plan.plan import Plan
-from common.plan.tables import ForceCorrection
 from common.safety.ramp import Ramp
 from common.signals import Channels
 from models.registry import Array

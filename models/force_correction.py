@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 
-from common.plan.tables import ForceCorrection
+from common.plan.laboratory_tables import ForceCorrection
 from models.compiled import jit
 from models.registry import Array
 

@@ -15,7 +15,7 @@ from common.host.clock import unix_ns
 from common.host.machine import facts
 from common.lab.preflight import ACCEPTED
 from common.plan.plan import Plan
-from common.recording.reader import CLOCK, GROUND
+from common.recording.run import CLOCK, GROUND
 from common.recording.writer import Recording
 from common.safety.risks import Risk
 from common.terminal import outputs

@@ -8,8 +8,8 @@ from typing import Protocol
 
 from common.host.clock import Clock
 from common.lab.outlet import AT_ONCE
-from common.recording.reader import MACHINES
 from common.recording.rows import Item, values_of
+from common.recording.run import MACHINES
 from common.recording.writer import Recording
 from recorder.encoding import RowEncoder
 

@@ -18,8 +18,8 @@ from common.plan.limits import LimitViolation
 from common.plan.patience import strict
 from common.plan.plan import Plan
 from common.plan.reality import Reality
-from common.recording.reader import CLOCK
 from common.recording.rows import RowPacker, other
+from common.recording.run import CLOCK
 from common.recording.writer import Recording
 from common.rig import GuardedRig, command_of
 from common.roles import MASTER, name_of

@@ -10,7 +10,8 @@ import numpy as np
 
 from common.errors import InputError
 from common.plan import read as plans
-from common.recording.reader import Run, Values, read
+from common.recording.reader import read
+from common.recording.run import Run, Values
 from common.roles import MASTER, name_of
 from common.terminal import cli
 from common.terminal.telling import Tell, untold

@@ -25,8 +25,9 @@ from common.link.endpoint import FrameEndpoint
 from common.link.security import Identity
 from common.link.zenoh_link import ZenohLink
 from common.plan import reality
+from common.plan.laboratory_tables import LaboratoryTable, RigTable
 from common.plan.plan import PROTOCOL_VERSION, Plan
-from common.plan.tables import LaboratoryTable, Link, RecordingTable, RigTable, SafetyTable, Security
+from common.plan.tables import Link, RecordingTable, SafetyTable, Security
 from common.protocol.messages import (
     Arm,
     Armed,

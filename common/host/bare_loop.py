@@ -28,7 +28,9 @@ if TYPE_CHECKING:
 BIN_NS = 1000  # 1 µs: the lateness that matters is tens of µs
 BINS = 20_000  # 20 ms: what is later is told apart by the maximum only
 PERCENTILES = (("p50", 500), ("p90", 900), ("p99", 990), ("p99.9", 999))  # per mille
-PATIENCE = 2.0  # s for its last line, which it prints within milliseconds unless the machine is held up
+# s that `stop` waits for the last line. The process prints it within milliseconds; 2 s allow for pauses of the machine
+# of 0.5 s, the longest that were seen (common/plan/patience.py), four times over.
+PATIENCE = 2.0
 
 
 class Lateness:
@@ -42,7 +44,10 @@ class Lateness:
         self._late = 0
 
     def woke(self, late_ns: int) -> int:
-        """Count a tick; how many ticks ahead the next one is whose time has not passed by a whole interval."""
+        """Count a tick that woke `late_ns` after its time, and return by how many ticks to move on.
+
+        The next tick is the first whose time has not passed by a whole interval; those before it count as late.
+        """
         self._most_ns = max(self._most_ns, late_ns)
         behind = late_ns // self._interval_ns
         self._late += behind
@@ -54,7 +59,7 @@ class Lateness:
         return behind + 1
 
     def percentile(self, per_mille: int) -> float:
-        """The lateness that this share of all ticks did not exceed, s."""
+        """The lateness (s) that `per_mille` thousandths of all ticks did not exceed."""
         wanted = -(-(self._ticks + self._late) * per_mille // 1000)
         passed = 0
         for place in range(BINS):
@@ -64,7 +69,7 @@ class Lateness:
         return self._most_ns / 1e9
 
     def values(self) -> dict[str, float]:
-        """What the loop says at its end."""
+        """The results that the loop prints at its end; times in s."""
         return {
             "ticks": self._ticks,
             "late": self._late,
@@ -76,7 +81,7 @@ class Lateness:
 
 
 def loop(interval_ns: int) -> Lateness:
-    """Tick until standard input ends, once at least."""
+    """Tick until standard input ends, at least once; return the histogram of the lateness."""
     lateness = Lateness(interval_ns)
     asked = select.poll()
     asked.register(0, select.POLLIN)
@@ -90,7 +95,7 @@ def loop(interval_ns: int) -> Lateness:
 
 
 def shape(priority: int, processor: int) -> dict[str, float]:
-    """Set priority and processor, or keep those of the parent; what holds afterwards."""
+    """Set priority and processor, or keep the parent's where that is refused; return those that hold afterwards."""
     try:
         with open("/proc/self/timerslack_ns", "w") as slack:  # noqa: PTH123 - pathlib is not worth its time here
             slack.write("1")
@@ -141,16 +146,19 @@ def main() -> None:
 
 
 class BareLoop:
-    """The loop as a child of a test: `start` it, `stop` it for its values. Neither raises, nor starts a thread."""
+    """The loop as a child process of a test: `start` starts it, `stop` ends it and returns its values.
+
+    Neither method raises an exception or starts a thread.
+    """
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None
 
     def start(self, interval_ns: int, granted: Granted) -> None:
-        """Start it on the processor of a process that was granted its place, one priority above.
+        """Start it on the processor that a process was granted, at one priority above that process.
 
-        Above, because what a slow program holds up would look like a slow machine; it takes some 10 µs per
-        interval. Where the higher priority is refused, it stays at that of the process which starts it.
+        At the same priority, a slow program would delay the bare loop and so look like a slow machine. The loop takes
+        some 10 µs per interval. Where the higher priority is refused, it keeps that of the process which starts it.
         """
         self.stop()
         self.spawn(interval_ns, granted.priority + 1 if granted.priority else 0, granted.processor)
@@ -158,8 +166,9 @@ class BareLoop:
     def spawn(self, interval_ns: int, priority: int, processor: int) -> None:
         """Start it at a priority (0: ordinary) on a processor (-1: any that this process may use).
 
-        The file itself is run, without the packages that Python looks up at its start, out of reach of the
-        terminal's Ctrl-C; the end of its standard input is the end of this process, however it came.
+        The file is run by itself, without the packages that Python imports at its start, and in a session of its own,
+        so that Ctrl-C does not reach it. It ends when its standard input closes, which also happens if this process
+        is killed.
         """
         import subprocess
 
@@ -176,7 +185,7 @@ class BareLoop:
             self._process = None
 
     def stop(self) -> dict[str, float]:
-        """End it, within 2 s; what it found, nothing where it failed or was not started."""
+        """End it within `PATIENCE` s and return its values; an empty dict where it failed or was not started."""
         import json
         import subprocess
 
@@ -198,7 +207,7 @@ class BareLoop:
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
-    """End a process for certain, by force if it does not end by itself."""
+    """Kill a process that still runs, and close its pipes."""
     if process.poll() is None:
         process.kill()
         process.wait()

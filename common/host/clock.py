@@ -1,4 +1,4 @@
-"""Clocks as objects: the machine's monotonic one, and a virtual twin for tests and virtual time."""
+"""Clocks as objects: the machine's monotonic clock, and a virtual one for tests and virtual time."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Waiter(Clock, Protocol):
         """Return once a message has come, at the latest after `timeout` ns."""
 
     def wake(self) -> None:
-        """A message has come for the process that waits on this clock."""
+        """Tell the clock that a message has come for the process that waits on it."""
 
 
 class MonotonicClock:
@@ -41,7 +41,7 @@ class MonotonicClock:
 
 
 class VirtualClock:
-    """A clock that stands still until it is told to move; of a process that is alone, so that no message comes."""
+    """A clock for one process without partners: it moves only when told to, and no message ever comes."""
 
     def __init__(self) -> None:
         self.time = 0
@@ -59,7 +59,7 @@ class VirtualClock:
         self.time += timeout
 
     def wake(self) -> None:
-        """Nobody waits."""
+        """Do nothing: no process waits on this clock."""
 
 
 def unix_ns() -> int:

@@ -27,9 +27,13 @@ from collections import deque
 from typing import NamedTuple
 
 MAX_DRIFT = 200e-6  # ns per ns: two crystals of 100 ppm each
-IMPOSSIBLE = 0.5  # of the time between t1 and t4: no drift makes a round trip so negative, a wrong stamp does
-RESOLUTION = 1.0  # ns: of the four stamps together
-QUEUED = 4.0  # a minimum that waited h₀/4 more than the best one counts a quarter
+# A round trip below minus this share of t4 − t1 is rejected: a drift of `MAX_DRIFT` could make it negative by 2e-4 of
+# that time only, so its stamps must be wrong.
+IMPOSSIBLE = 0.5
+RESOLUTION = 1.0  # ns: the rounding of four integer stamps, halved as the offset is half their sum
+# How fast the weight of a minimum falls: one that waited h₀/4 longer in queues than the best has a quarter of its
+# weight.
+QUEUED = 4.0
 
 
 class Minimum(NamedTuple):
@@ -43,7 +47,9 @@ class Minimum(NamedTuple):
 class ClockOffset:
     """Estimate of (other clock − own clock), ns, from the minima of the newest `blocks` of `length` exchanges each.
 
-    Before the first exchange offset and bound are 0; in the first block the shortest exchange so far is believed.
+    Before the first exchange, offset and bound are 0; in the first block the shortest exchange so far gives them.
+    With an exchange per tick of 2 ms the defaults make a block of 0.1 s, in which one exchange without a queue is to be
+    expected, and a window of 2 s, in which the drift of a crystal is constant.
     """
 
     def __init__(self, *, length: int = 50, blocks: int = 20) -> None:
@@ -57,8 +63,8 @@ class ClockOffset:
         self._origin: tuple[int, int] | None = None  # own time, offset
         self._centre, self._level, self._slope = 0.0, 0.0, 0.0  # the line: level at centre
         self._seen, self._low, self._high = 0.0, -math.inf, math.inf  # the interval at the time `seen`
-        self._asked: int | None = None  # what `at` was asked for last, since the newest exchange
-        self._value = 0  # and its answer
+        self._asked: int | None = None  # time of the last call of `at` since the newest exchange
+        self._value = 0  # what that call returned
 
     @property
     def offset(self) -> int:
@@ -94,7 +100,7 @@ class ClockOffset:
         """Largest possible error of `at`, ns; grows by `MAX_DRIFT` and the slope until the next minimum is seen.
 
         It holds for any drift within ± `MAX_DRIFT`, a changing one too. Where the intervals contradict each other,
-        because a clock ran faster or was set, the newest one alone is believed.
+        because a clock ran faster or was set, the newest one alone counts.
         """
         if self._origin is None:
             return 0
@@ -119,7 +125,7 @@ class ClockOffset:
             self._fit()
 
     def _keep(self, t1: int, t2: int, t3: int, t4: int) -> None:
-        """The best exchange of its block so far."""
+        """Take an exchange as the best one of its block so far."""
         if self._origin is None:
             self._origin = ((t1 + t4) // 2, (t2 - t1 + t3 - t4) // 2)
         start, first = self._origin
@@ -132,7 +138,7 @@ class ClockOffset:
             self._centre, self._level = time, offset
 
     def _narrow(self, time: float, offset: float, reach: float) -> None:
-        """Intersect the interval, brought to `time`, with that of an exchange."""
+        """Intersect the interval, widened to hold at `time`, with that of an exchange."""
         wander = MAX_DRIFT * abs(time - self._seen)
         low, high = offset - reach, offset + reach
         oldest, latest = self._low - wander, self._high + wander

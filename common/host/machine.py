@@ -1,6 +1,6 @@
-"""What the host did to a process while it ran, and what kind of host it is; none of it needs a privilege.
+"""Measures what the host did to a process while it ran, and describes the host; none of it needs a privilege.
 
-`Watch` counts between its start and `values()`. A count that the kernel does not offer, in a container or
+`Watch` counts between its construction and `values()`. A count that the kernel does not offer, in a container or
 on another system than Linux, is left out rather than given as zero.
 """
 
@@ -16,22 +16,22 @@ from pathlib import Path
 PROC, SYS = Path("/proc"), Path("/sys")
 CGROUPS = SYS / "fs/cgroup"
 POLICIES = {0: "other", 1: "fifo", 2: "rr", 3: "batch", 5: "idle", 6: "deadline"}
-STARTED = 19  # place in /proc/PID/stat behind the name, whose first is the state
-ENDED = ("Z", "X")  # states of a process that is gone, with or without its parent knowing
-RESET_ON_FORK = 0x40000000
+STARTED = 19  # index of the start time in /proc/PID/stat, counted from the state, which follows the name
+ENDED = ("Z", "X")  # states of a process that has ended: not yet collected by its parent, or dead
+RESET_ON_FORK = 0x40000000  # Linux's SCHED_RESET_ON_FORK, a flag in the number of the policy
 USER, NICE, SYSTEM, _IDLE, _IOWAIT, IRQ, SOFTIRQ, STEAL = range(8)  # columns of /proc/stat
 BUSY = (USER, NICE, SYSTEM, IRQ, SOFTIRQ)  # guests are counted in `user` already
 
 
 class Watch:
-    """Counts what the host did from here on."""
+    """Counts what the host does from its construction on."""
 
     def __init__(self) -> None:
         self._began = time.monotonic()
         self._before = counters()
 
     def values(self) -> dict[str, float]:
-        """Differences since the start: seconds, shares of all processors' time, counts of this process."""
+        """Differences since the construction: seconds, shares of all processors' time, counts of this process."""
         seconds = max(time.monotonic() - self._began, 1e-9)
         after = counters()
         passed = {name: after[name] - self._before[name] for name in after if name in self._before}
@@ -46,7 +46,7 @@ class Watch:
 
 
 def counters() -> dict[str, float]:
-    """Everything that only grows, in seconds or as a number."""
+    """All counters that only grow, by name; times in s."""
     found: dict[str, float] = {}
     for read in (processor_times, switches_and_faults, pressure, throttling):
         try:
@@ -74,7 +74,7 @@ def processor_times() -> dict[str, float]:
 
 
 def switches_and_faults() -> dict[str, float]:
-    """How often this process, with all its threads, gave or lost its processor, and waited for memory."""
+    """How often this process, with all its threads, gave up or lost its processor, and waited for memory."""
     import resource
 
     usage = resource.getrusage(resource.RUSAGE_SELF)
@@ -149,7 +149,7 @@ def spare_memory() -> int | None:
 
 
 def began(pid: int) -> float | None:
-    """When a process was started, Unix time in s, 0 where the system does not say; None where none runs."""
+    """When a process was started (Unix time, s), 0 where the system does not say; None where it does not run."""
     try:
         os.kill(pid, 0)
     except ProcessLookupError:
@@ -203,13 +203,13 @@ def preemption() -> str:
 
 
 def governors() -> str:
-    """What sets the processors' frequency; 'performance' keeps it up."""
+    """The governors that set the processors' frequency; 'performance' keeps it at its maximum."""
     found = {first_line(path) for path in (SYS / "devices/system/cpu").glob("cpu*/cpufreq/scaling_governor")}
     return ", ".join(sorted(found - {""}))
 
 
 def hypervisor() -> str:
-    """What the machine runs on where it is a virtual one."""
+    """The hypervisor of a virtual machine, empty on a physical one."""
     if "hypervisor" not in cpuinfo("flags").split():
         return first_line(SYS / "hypervisor/type")
     return first_line(SYS / "hypervisor/type") or first_line(SYS / "class/dmi/id/sys_vendor") or "unnamed"

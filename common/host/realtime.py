@@ -1,8 +1,8 @@
-"""The calling process in real-time shape: priority, processor, memory, timers, garbage.
+"""Prepares the calling process for real time: priority, processor, memory, timers, garbage collection.
 
-`prepare` comes before the link opens and before any other thread starts: threads inherit priority and
-processor from the one that starts them, and a thread that runs already keeps what it has. So do child
-processes; one that is not to run at this priority has to say so itself.
+`prepare` must be called before the link opens and before any other thread starts: threads inherit priority and
+processor from the one that starts them, and a thread that runs already keeps what it has. Child processes inherit
+them too; one that is not to run at this priority has to lower it itself.
 """
 
 from __future__ import annotations
@@ -29,7 +29,9 @@ SWITCH_INTERVAL = (
 )
 PR_SET_TIMERSLACK = 29
 MCL_CURRENT, MCL_FUTURE, MCL_ONFAULT = 1, 2, 4
-MOST_OF_MEMORY = 0.5  # of what is spare; locking more invites the kernel to end the process instead
+# Share of the spare memory that is locked at most. Locked memory cannot be paged out, so with more of it locked the
+# kernel might run out of memory and kill the process; half leaves as much again for growth and other processes.
+MOST_OF_MEMORY = 0.5
 
 WHERE_LIMITS = "in /etc/security/limits.d/"
 
@@ -56,9 +58,9 @@ NOTHING = Granted(0, -1, False, ())
 
 
 def prepare(mode: str, processor: int | None) -> Granted:
-    """Put this process into real-time shape; what it was given.
+    """Prepare this process for real time and return what it was given.
 
-    'off' takes only what costs no privilege and changes no scheduling. `processor` None leaves the process free.
+    'off' takes only what needs no privilege and changes no scheduling. `processor` None leaves the process free.
 
     Raises:
         InputError: there is no such mode, this process may not use the processor or it is given with 'off',
@@ -86,12 +88,14 @@ def prepare(mode: str, processor: int | None) -> Granted:
 
 
 def take(processor: int | None) -> Granted:
-    """Everything that can be had."""
+    """Request each real-time setting, and return those that were granted."""
     if sys.platform != "linux":
         return NOTHING._replace(
-            missing=(f"No real-time shape: it is made for Linux, this is {sys.platform}; run on Linux.",)
+            missing=(
+                f"No real-time priority: rths sets it on Linux only, this is {sys.platform}; use Linux.",
+            )
         )
-    # at ordinary priority what takes tens of ms, for which others at the same priority would have to wait
+    # this takes tens of ms, so it runs at ordinary priority: at real-time priority other laboratories would wait for it
     gc.collect()
     gc.freeze()
     not_locked = lock_memory()
@@ -102,7 +106,7 @@ def take(processor: int | None) -> Granted:
 
 
 def raise_priority() -> tuple[int, str]:
-    """SCHED_FIFO for this thread and those it starts; the priority, or 0 and a sentence why not.
+    """Request SCHED_FIFO for this thread and those it starts; return the priority, or 0 and a sentence why not.
 
     Set without SCHED_RESET_ON_FORK, which would send every new thread back to the ordinary scheduler.
     """
@@ -127,7 +131,7 @@ def raise_priority() -> tuple[int, str]:
 
 
 def bind(processor: int, priority: int) -> tuple[int, str]:
-    """Bind this thread and those it starts to one processor; the processor, or -1 and a sentence why not."""
+    """Bind this thread and those it starts to one processor; return it, or -1 and a sentence why not."""
     if priority == 0:
         # An ordinary process that is bound waits for whoever holds its processor while another stands idle.
         return -1, (
@@ -148,11 +152,11 @@ def bind(processor: int, priority: int) -> tuple[int, str]:
 
 
 def lock_memory() -> str:
-    """Keep what the process has in memory from being fetched late again; a sentence why not, else empty.
+    """Lock the memory of the process against page faults; return a sentence why not, or an empty text.
 
-    A page is locked as it is first used: to bring all that is mapped into memory, stacks and buffers that nobody
-    needs among it, would take 400 MB a process and half a second.
-    Not under a limit: what is locked counts against it, and the first allocation beyond it would fail.
+    A page is locked when it is first used: to lock all that is mapped at once, unused stacks and buffers too, would
+    take 400 MB per process and half a second. Under a limit nothing is locked, because locked pages count against it
+    and the first allocation beyond it would fail.
     """
     limit = raised("RLIMIT_MEMLOCK", -1)
     libc = ctypes.CDLL(None, use_errno=True)
@@ -174,7 +178,7 @@ def lock_memory() -> str:
 
 
 def raised(name: str, wanted: int) -> int:
-    """A limit of this process, lifted as far as it may be towards `wanted` (-1: none), and what it is then."""
+    """Raise a limit of this process as far as permitted towards `wanted` (-1: none), and return its new value."""
     import resource
 
     which = getattr(resource, name)
@@ -191,14 +195,14 @@ def raised(name: str, wanted: int) -> int:
 
 
 def reaches(limit: int, wanted: int) -> bool:
-    """Whether a limit allows what is wanted; -1 is no limit, and wanting none."""
+    """Whether a limit allows the wanted value; -1 means no limit in both."""
     return limit == -1 or -1 < wanted <= limit
 
 
 def exempt(libc: ctypes.CDLL) -> bool:
-    """Whether the limit on locked memory does not count for this process.
+    """Whether this process may lock memory whatever its limit.
 
-    This is tried out by locking a page under a limit of 0, because /proc also shows capabilities that hold inside a
+    This is tested by locking a page under a limit of 0, because /proc also shows capabilities that hold inside a
     namespace only.
     """
     import resource
@@ -222,18 +226,18 @@ def resident() -> int:
 
 
 def tighten_timers() -> None:
-    """Wake-ups that are not put off to be bundled with others (50 µs by default), on Linux."""
+    """On Linux, let the kernel delay timer wake-ups by 1 ns at most, in place of 50 µs, to combine them with others."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(PR_SET_TIMERSLACK, 1, 0, 0, 0)
 
 
 def hand_over_quickly() -> None:
-    """A thread that waits for the interpreter gets it soon."""
+    """Shorten the time after which a thread hands the interpreter over to one that waits for it."""
     sys.setswitchinterval(SWITCH_INTERVAL)
 
 
 def freeze() -> None:
-    """Keep interpreter and timers from delaying a loop that begins now: no collection of garbage from here on."""
+    """Keep interpreter and timers from delaying a loop that begins now: garbage is not collected from here on."""
     hand_over_quickly()
     tighten_timers()
     gc.collect()
@@ -244,8 +248,8 @@ def freeze() -> None:
 def assign(count: int) -> list[int | None]:
     """Processors for `count` laboratories on this machine, the master's first; None leaves one free.
 
-    As many different ones as are allowed; all free where there is but one. Where there are fewer than
-    laboratories, they are given out in turn, except that the master's stays its own if there are three or more.
+    Each laboratory gets a different processor where there are enough; with one alone all stay free. With fewer
+    processors than laboratories they are shared in turn; from three on the master keeps one to itself.
     """
     processors: list[int | None] = [*preferred()]
     if len(processors) < 2:
@@ -256,9 +260,9 @@ def assign(count: int) -> list[int | None]:
 
 
 def preferred() -> list[int]:
-    """Allowed processors, best first: one of each core before its twins, the highest number first.
+    """Allowed processors, best first: one hardware thread of each core before the others, the highest number first.
 
-    Processor 0 comes last among its like: most interrupts land on it.
+    Processor 0 comes last among equals, because most interrupts are handled there.
     """
     if sys.platform != "linux":
         return []
@@ -267,12 +271,12 @@ def preferred() -> list[int]:
 
 
 def twin(processor: int) -> int:
-    """Place of a processor among those that share its core, 0 where it is the first or alone."""
+    """Index of a processor among the hardware threads of its core, 0 where it is the first or alone."""
     folder = f"/sys/devices/system/cpu/cpu{processor}/topology"
     sharing = first_line(Path(folder) / "thread_siblings_list").replace("-", ",").split(",")
     return sharing.index(str(processor)) if str(processor) in sharing else 0
 
 
 def listed(processors: set[int]) -> str:
-    """Processors as a reader writes them: 'processors 0, 1'."""
+    """Processors in words: 'processors 0, 1'."""
     return f"processor{'s' if len(processors) > 1 else ''} {', '.join(map(str, sorted(processors)))}"

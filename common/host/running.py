@@ -1,8 +1,7 @@
-"""Tests that run on this machine in real time: a small file each, so that commands find them, and none joins another.
+"""Registers the tests that run on this machine in real time, one small file each, so that commands find them.
 
-The files of a user lie in a folder of that user.
-Their names, which say the test and the process, can be read by everybody:
-other users' tests disturb one as much as one's own. What is in them is for their owner alone.
+The files of a user lie in a folder of that user. Their names, which contain the test and the process, can be read by
+everybody, because the tests of other users disturb a test as much as one's own. Only their owner can read the content.
 """
 
 from __future__ import annotations
@@ -24,7 +23,9 @@ FOLDER = (
     "RTHS_RUNNING"  # environment variable: another place for the folders, for tests side by side on purpose
 )
 RUN = "run"  # the role of one that is a whole test
-STARTED_LATER_S = 2.0  # a process younger than a file by more has taken the number of the one that wrote it
+# A process that started later than its file by more than this has reused the process number of the file's writer. The
+# start time is known to about 1 s only (`btime` in /proc/stat is in whole seconds); 2 s are on the safe side.
+STARTED_LATER_S = 2.0
 
 
 class Running(NamedTuple):
@@ -38,7 +39,7 @@ class Running(NamedTuple):
 
 
 class Neighbour(NamedTuple):
-    """What everybody may know of a test that runs here."""
+    """What every user may know of a test that runs here."""
 
     test: str
     process: int
@@ -58,7 +59,7 @@ def place() -> Path:
 
 @contextlib.contextmanager
 def announced(plan: Plan, endpoint: str, role: str = RUN) -> Iterator[None]:
-    """While the context lasts, the test can be found; where nothing can be written it cannot, and runs all the same."""
+    """Register the test while the context lasts; where the file cannot be written, the test runs without it."""
     folder = place()
     path = folder / f"{plan.test.name}-{os.getpid()}.json"
     entry = Running(plan.test.name, endpoint, str(plan.base.resolve()), plan.toml(), role)
@@ -77,7 +78,7 @@ def announced(plan: Plan, endpoint: str, role: str = RUN) -> Iterator[None]:
 
 
 def found() -> list[Running]:
-    """The whole tests of this user whose process is alive, files of dead ones cleared away."""
+    """The whole tests of this user whose process is alive; the files of ended ones are removed."""
     entries = []
     for path in sorted(place().glob("*-*.json")):
         try:
@@ -93,7 +94,7 @@ def found() -> list[Running]:
 
 
 def neighbours() -> list[Neighbour]:
-    """Tests of all users of this machine but that of this process and of the one that has started it, oldest first."""
+    """Tests of all users of this machine, oldest first, without those of this process and of its parent."""
     seen = (neighbour(path) for path in home().glob("rths-*/*-*.json"))
     family = (os.getpid(), os.getppid())
     return sorted((one for one in seen if one and one.process not in family), key=lambda one: one.since)

@@ -1,4 +1,4 @@
-"""Signals of the user and of the system as a wish to stop: counted and answered, they end nothing by themselves."""
+"""Turns signals of the user and of the system into a request to stop, which the loop reads when it may stop."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ STDERR = 2
 
 
 class Stopping(Protocol):
-    """A wish to stop as a loop sees it."""
+    """A request to stop as a loop sees it."""
 
-    presses: int  # how often it was expressed
+    presses: int  # how often it was made
 
     def __call__(self) -> str:
         """The reason, empty while there is none."""
 
 
 class Stopper:
-    """Turns the signals of a user who wants to stop into a reason; from the second one on `answer` is said.
+    """Catches the signals by which a user asks a process to stop; from the second one on it prints `answer`.
 
-    A loop asks for the reason when it may stop, so that a signal never cuts a rig's motion short. The answer is written
-    by the handler itself, past Python's buffers, so that it comes where the loop hangs in a rig as well.
+    A loop asks for the reason when it may stop, so that a signal never cuts a rig's motion short. The handler itself
+    writes the answer, past Python's buffers, so that the user sees it even while the loop waits in a call of a rig.
     """
 
     def __init__(self, answer: Callable[[], str] | None = None) -> None:
@@ -49,13 +49,13 @@ class Stopper:
 
     @staticmethod
     def ignore() -> None:
-        """From now on: a process that has done its work ends with its own exit code, not with a late signal's."""
+        """Ignore the signals from now on, so that a finished process ends with its own exit code."""
         for number in taken():
             signal.signal(number, signal.SIG_IGN)
 
 
 def taken() -> list[signal.Signals]:
-    """The signals that mean a wish to stop; not a hang-up that was ignored from the start (`nohup`)."""
+    """The signals that mean a request to stop; without a hang-up that was ignored from the start (`nohup`)."""
     numbers = [getattr(signal, name) for name in STOPPING if hasattr(signal, name)]
     hang_up = getattr(signal, "SIGHUP", None)
     return [one for one in numbers if one != hang_up or signal.getsignal(one) is not signal.SIG_IGN]

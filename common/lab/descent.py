@@ -20,14 +20,14 @@ Command = TypeVar("Command", bound=tuple[float, ...])
 class Resting(NamedTuple):
     """How far a rig is on its ramp to rest."""
 
-    left: float  # s at most, where no interval is left out
-    text: str  # what it does, and how long at most
+    left: float  # longest remaining time, s, if no interval is missed
+    text: str  # the present phase, and the longest remaining time, in words
 
 
 class Descent(Generic[Command]):
-    """Knows the last two commands written, from which `begin` makes a ramp when the rig is to come to rest.
+    """Keeps the last two commands written, from which `begin` makes the ramp when the rig is to come to rest.
 
-    `channels` are those of the rig's laboratory, None where there is none.
+    `channels` are those of the laboratory, None for a master without a rig, whose ramp is not recorded.
     """
 
     def __init__(
@@ -51,7 +51,7 @@ class Descent(Generic[Command]):
         self._measured: tuple[float, ...] | None = None
 
     def wrote(self, command: Command) -> None:
-        """A command went to the rig."""
+        """Take note of a command that was written to the rig."""
         self._before, self._last = self._last, command
 
     @property
@@ -75,18 +75,21 @@ class Descent(Generic[Command]):
         return self._last
 
     def ease(self, tick: int) -> None:
-        """One interval: read, move on, write; raises EmergencyStopError where the rig says so."""
+        """One interval of the ramp: read, compute the next command, write it.
+
+        Raises EmergencyStopError from the rig.
+        """
         try:
             measured = self._rig.read()
         except EmergencyStopError:
             raise
-        except RigError as error:  # it comes to a hold without measurements
+        except RigError as error:  # without measurements the ramp ends at the hold
             self._failed(error, tick)
             measured = None
         self.step(tick, measured)
 
     def step(self, tick: int, measured: tuple[float, ...] | None) -> None:
-        """One interval of which the measurement is known, None where the rig gives none."""
+        """One interval of the ramp with its measurement, None where the rig could not be read."""
         ramp = self._ramp or self._begin(tick)
         command = self._command(*ramp.step(measured))
         self._measured = measured
@@ -100,7 +103,7 @@ class Descent(Generic[Command]):
             self._lab.sample_ramp(ramp_topic(self._lab.name), tick, *command, *(measured or self._blank))
 
     def _written(self, command: Command, tick: int) -> bool:
-        """Write a command; whether the rig takes no more, and rests where it is."""
+        """Write a command; return whether the rig failed, so that it takes no more commands and rests where it is."""
         try:
             self._rig.write(command)
         except EmergencyStopError:
@@ -113,7 +116,7 @@ class Descent(Generic[Command]):
         return False
 
     def _failed(self, error: RigError, tick: int) -> None:
-        """After an orderly end a rig's failure is the cause that latches; after a trip the first cause stays."""
+        """Trip because the rig failed on the ramp of an orderly end; after a trip the first cause stays."""
         if self._lab.safety.cause is None:
             self._lab.fail(Event.TRIP, error, code="rig", tick=tick)
 

@@ -1,4 +1,4 @@
-"""A laboratory's loop in time, real or virtual: fetch messages, wait, tick, and leave in order."""
+"""Drives a laboratory's loop through a test, in real or virtual time: handshake, ticks, ramp to rest, leaving."""
 
 from __future__ import annotations
 
@@ -15,14 +15,17 @@ from common.plan.plan import Plan
 from common.protocol.exchange import State
 from common.safety.modes import Mode
 
-# how often the handshake looks after itself: often beside its requests, which are repeated every 100 ms
+# How often the handshake is polled: twenty times per repetition of a request (100 ms), so that polling adds little
+# delay.
 IDLE_NS = 5_000_000
-# how long the last words may take where the recorder is not waited for: five leases of the link
+# How long the closing messages are repeated where the recorder is not waited for: five leases of the link, within which
+# a connection that broke is noticed and opened again.
 LEAVE_NS = 5_000_000_000
-PROGRESS_NS = 200_000_000
+PROGRESS_NS = 200_000_000  # between two reports of progress: five a second are as many as a user can read
 RESTING_NS = (
-    500_000_000  # between two reports of the ramp to rest: the user is not kept waiting for the next one
+    500_000_000  # between two reports of the ramp to rest, which takes a few seconds at most by default
 )
+LATE_SHARE = 4  # on the ramp a tick late by more than a quarter of the interval is left out: see `ramp`
 
 
 class DrivenLoop(Protocol):
@@ -32,19 +35,19 @@ class DrivenLoop(Protocol):
     ticks: int
 
     def take(self, received: Received) -> None:
-        """Act on a message of a role."""
+        """Act on a received message."""
 
     def poll(self) -> None:
-        """Move the handshake on."""
+        """Take the next step of the handshake."""
 
     def earliest(self, tick: int) -> int:
         """When a tick may begin, ns."""
 
     def latest(self, tick: int) -> int:
-        """When it begins whether its message has come or not, ns."""
+        """When a tick begins even if its message has not come, ns."""
 
     def heard(self, tick: int) -> bool:
-        """Whether its message has come."""
+        """Whether the message of a tick has come."""
 
     def nominal(self, tick: int) -> int:
         """When a tick begins if nothing is late, ns."""
@@ -56,13 +59,13 @@ class DrivenLoop(Protocol):
         """One interval on the ramp to rest."""
 
     def tell(self) -> None:
-        """Tell the other laboratories of the end, again and again; may be called at any time."""
+        """Tell the other laboratories that the test ends, and repeat it; may be called at any time."""
 
     def finish(self) -> None:
         """All ticks are done."""
 
     def stop(self, reason: str) -> None:
-        """Somebody wants the test to end."""
+        """End the test early for this reason."""
 
     def disarm_rig(self) -> None:
         """Disarm the rig, once."""
@@ -71,11 +74,11 @@ class DrivenLoop(Protocol):
         """Bring the rig to a stop."""
 
     def leave(self, *, last: bool = False) -> None:
-        """Last words, again after a while; `last` where nothing follows them."""
+        """Send the closing messages, and repeat them; `last` where nothing follows them."""
 
     @property
     def left(self) -> bool:
-        """Whether the last words have been received."""
+        """Whether the closing messages have been received."""
 
     @property
     def completed(self) -> bool:
@@ -87,7 +90,7 @@ class DrivenLoop(Protocol):
 
     @property
     def others_rest(self) -> float:
-        """How long the laboratories that are reached through this one take at most to come to rest, s."""
+        """The longest time that the laboratories reached through this one take to come to rest, s."""
 
     @property
     def awaited(self) -> str:
@@ -95,7 +98,7 @@ class DrivenLoop(Protocol):
 
     @property
     def progress(self) -> Mapping[str, float]:
-        """What a user watches."""
+        """The figures of the progress report: see `common.terminal.plain_report.facts`."""
 
     @property
     def resting(self) -> Resting:
@@ -103,7 +106,7 @@ class DrivenLoop(Protocol):
 
 
 def drive(loop: DrivenLoop, stopping: Callable[[], str], surroundings: Surroundings) -> None:
-    """Run a test to its end; `stopping` gives the reason to end it early, empty while there is none."""
+    """Run a test to its end; `stopping` returns the reason to end it early, empty while there is none."""
     try:
         handshake(loop, stopping)
         if loop.lab.running:
@@ -117,7 +120,7 @@ def drive(loop: DrivenLoop, stopping: Callable[[], str], surroundings: Surroundi
         if loop.lab.safety.mode is Mode.EMERGENCY_STOP:
             loop.disarm_rig()
         stay(loop, stopping)
-    except Exception:  # whatever goes wrong in this program, the rig does not stay armed
+    except Exception:  # an error of this program must not leave the rig armed
         loop.disarm()
         raise
     loop.disarm()
@@ -126,7 +129,7 @@ def drive(loop: DrivenLoop, stopping: Callable[[], str], surroundings: Surroundi
 
 
 def handshake(loop: DrivenLoop, stopping: Callable[[], str]) -> None:
-    """Until the start is agreed or the test is over."""
+    """Run the handshake until the start is agreed or the test is over."""
     lab = loop.lab
     waited = Waited(lab.clock.now())
     while lab.exchange.state in (State.IDLE, State.REGISTERED, State.ARMED) and not stopping():
@@ -137,7 +140,7 @@ def handshake(loop: DrivenLoop, stopping: Callable[[], str]) -> None:
 
 
 def run(loop: DrivenLoop, stopping: Callable[[], str]) -> int:
-    """All ticks, fewer where the test ends before the last; the one that would come next."""
+    """Run the ticks until the last one or the test's early end; return the number of the tick that would come next."""
     lab = loop.lab
     reported = 0
     for tick in range(lab.plan.ticks):
@@ -157,12 +160,13 @@ def run(loop: DrivenLoop, stopping: Callable[[], str]) -> int:
 
 
 def ramp(loop: DrivenLoop, tick: int) -> None:
-    """The ramp to rest from a tick on, an interval at a time; those that were missed are left out, never caught up.
+    """The ramp to rest from a tick on, one interval at a time; missed intervals are left out and never caught up.
 
-    A tick that is late by more than a part is left out too: two commands in quick succession would be a step.
+    A tick that is late by more than a quarter of the interval is left out too: the rig would get two commands within
+    three quarters of an interval and follow them a third faster than the ramp's velocity allows.
     """
     lab = loop.lab
-    late = lab.interval_ns // 4
+    late = lab.interval_ns // LATE_SHARE
     reported = -RESTING_NS
     while lab.safety.mode is Mode.RAMPING:
         tick += max(-((loop.nominal(tick) + late - lab.clock.now()) // lab.interval_ns), 0)
@@ -179,7 +183,7 @@ def ramp(loop: DrivenLoop, tick: int) -> None:
 
 
 def stay(loop: DrivenLoop, stopping: Callable[[], str]) -> None:
-    """Where the plan wants it, a latched laboratory stays until an operator resets it, the master until all are."""
+    """With `wait_for_reset`, stay until an operator has reset this laboratory; the master stays until all are reset."""
     lab = loop.lab
     while lab.plan.safety.wait_for_reset and (lab.safety.latched or loop.needed) and not stopping():
         fetch(loop, lab.clock.now() + IDLE_NS)
@@ -188,9 +192,9 @@ def stay(loop: DrivenLoop, stopping: Callable[[], str]) -> None:
 
 
 def wait(loop: DrivenLoop, tick: int) -> None:
-    """Sleep until the time of a tick, take what has come, and wait for its message as long as it may be waited for.
+    """Sleep until the time of a tick, take all messages that have come, and wait for the tick's own until `latest`.
 
-    A laboratory that was held up itself reports that first, before it reads how the others have reacted.
+    A laboratory that was held up reports its own overrun before it reads how the others have reacted to it.
     """
     lab, clock = loop.lab, loop.lab.clock
     clock.sleep_until(loop.earliest(tick))
@@ -205,26 +209,26 @@ def wait(loop: DrivenLoop, tick: int) -> None:
 
 
 def take_all(loop: DrivenLoop) -> None:
-    """Take every message that is there."""
+    """Take every message that has arrived."""
     receive = loop.lab.endpoint.receive
     while (received := receive()) is not None:
         loop.take(received)
 
 
 def fetch(loop: DrivenLoop, deadline: int) -> None:
-    """Take one message that comes before the deadline."""
+    """Take one message if it comes before the deadline (ns)."""
     received = loop.lab.endpoint.receive(max(deadline - loop.lab.clock.now(), 0) * 1e-9)
     if received is not None:
         loop.take(received)
 
 
 def leave(loop: DrivenLoop, over: int) -> None:
-    """Send the last words until they are received, for a bounded time; the recorder may still ask for what it lacks.
+    """Repeat the closing messages until they are received, for a bounded time.
 
-    A recorder that is held up is waited for as long as during the test, counted from when it was last heard, and then
-    has as long as any other to come back to the link and to ask. A laboratory that routes for others stays while they
-    come to rest, at most for the longest ramp to rest after the ticks were `over`; the recorder's time counts from
-    then.
+    Meanwhile the recorder may ask for samples that it lacks.
+    The recorder's patience counts from when it was last heard, as during the test, and `LEAVE_NS` is added for it to
+    come back to the link and ask. A laboratory that routes for others stays while they come to rest, at most for the
+    longest ramp to rest after the time `over` (ns) of the last tick; the recorder's time counts from then.
     """
     lab = loop.lab
     begun, patience = lab.clock.now(), round(lab.plan.recording.patience * 1e9)
@@ -250,5 +254,5 @@ def coming_to_rest(loop: DrivenLoop, rest: int) -> bool:
 
 
 def longest_leave(plan: Plan) -> float:
-    """How long the last words of a laboratory may take at most, s."""
+    """The longest time that `leave` takes where no other laboratory is on its ramp to rest, s."""
     return LEAVE_NS * 1e-9 + plan.recording.patience

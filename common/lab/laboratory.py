@@ -1,4 +1,4 @@
-"""What the loops of both laboratories share: place in the protocol, stream to the recorder, reports."""
+"""What the master's and a slave's loop share: state in the protocol, stream to the recorder, reports."""
 
 from __future__ import annotations
 
@@ -24,17 +24,20 @@ from common.safety.modes import Cause, Mode, Safety, Turn
 from common.signals import Signal
 
 SLOW_RIG = "slow_rig"  # code of the event of a rig whose calls take too long, and of the message that says so
-# an unanswered request is sent again after this long: many round trips even on a slow link, and no wait for a user
+# An unanswered request is repeated after this time: a hundred round trips of a local network, and too short for a user
+# to notice.
 REPEAT_NS = 100_000_000
 
 NO_VALUES: Mapping[str, float] = MappingProxyType({})
 
-HANDSHAKE = {Event.REGISTER: Turn.CONFIGURE, Event.ARM: Turn.ARM}  # what they are to the rig
-MODES = {mode: number for number, mode in enumerate(Mode)}  # as an event's values have them
+HANDSHAKE = {Event.REGISTER: Turn.CONFIGURE, Event.ARM: Turn.ARM}  # the rig's turn that goes with each event
+MODES = {
+    mode: number for number, mode in enumerate(Mode)
+}  # the numbers that stand for modes in an event's values
 
 
 class Setting(NamedTuple):
-    """What a loop is given by its surroundings."""
+    """What every laboratory's loop is built with."""
 
     plan: Plan
     endpoint: Endpoint
@@ -43,7 +46,7 @@ class Setting(NamedTuple):
 
 
 class Laboratory:
-    """State shared by the master's and the slave's loop; composed by both. `topics` are those of its recording."""
+    """The state that both kinds of loop hold: `topics` are those of the test's recording, with their signals."""
 
     def __init__(self, name: str, setting: Setting, topics: Mapping[str, Sequence[Signal]]) -> None:
         self.name = name
@@ -54,10 +57,10 @@ class Laboratory:
         self.exchange = Exchange()
         self.safety = Safety(self._turned)
         self.tick = 0  # the newest one that has begun
-        self.answers: dict[int, tuple[bool, str]] = {}  # to the operator's presses
+        self.answers: dict[int, tuple[bool, str]] = {}  # by the operator's press: accepted, and a sentence
         self._exact_ns = setting.plan.test.interval * 1e9
         self.interval_ns = round(self._exact_ns)
-        self.loss_ns = setting.plan.link.loss_timeout * 1e9  # silence after which another role is lost
+        self.loss_ns = setting.plan.link.loss_timeout * 1e9  # silence after which a role counts as lost
         self._overrun_ns = setting.plan.safety.overrun * self.interval_ns
         self._even = self._exact_ns == self.interval_ns
         self.start_ns = 0  # own clock, tick 0
@@ -73,28 +76,28 @@ class Laboratory:
         self.recorder_heard_ns = setting.clock.now()
 
     def enter(self, session: int) -> None:
-        """Take part in a session."""
+        """Join a session."""
         self.exchange.session = session
         self.endpoint.enter(session)
         self.outlet = Outlet(session, self.name, kept_items(self.plan, self.name), self._rows)
 
     def move(self, event: Event) -> None:
-        """One step of the handshake, agreed with the others."""
+        """Take a step of the handshake that is agreed with the other laboratories."""
         self.exchange.happen(event)
         if event in HANDSHAKE:
             self.safety.take(HANDSHAKE[event])
         self.report("state", {"lab": self.name, "state": self.exchange.state.value})
 
     def tick_ns(self, tick: int) -> int:
-        """Nominal time of a tick on this laboratory's clock; a loop asks ten times per tick."""
+        """Nominal time of a tick on this laboratory's clock, ns; called ten times per tick."""
         return self.start_ns + (tick * self.interval_ns if self._even else round(tick * self._exact_ns))
 
     def unix_ns(self, tick: int) -> int:
-        """Nominal Unix time of a tick on the master's base."""
+        """Nominal Unix time of a tick by the master's clock, ns."""
         return self.epoch_ns + (tick * self.interval_ns if self._even else round(tick * self._exact_ns))
 
     def tick_at(self, elapsed_ns: int) -> int:
-        """The tick whose interval a time after the first tick falls into."""
+        """The tick whose interval contains a time (ns) after the first tick; half a ns allows for rounded stamps."""
         return math.floor((elapsed_ns + 0.5) / self._exact_ns)
 
     def note(
@@ -122,7 +125,7 @@ class Laboratory:
             self.outlet.add("event", at, at, (t, self.name, "info", "traceback", details, {}))
 
     def _turned(self, before: Mode, turn: Turn, after: Mode) -> None:
-        """Record and report a change of the safety mode; before the start is agreed there is no time of it."""
+        """Report a change of the safety mode, and record it once the start is agreed and it has a test time."""
         self.report("mode", {"lab": self.name, "mode": after.value})
         if self.start_ns:
             text = f"{before.value} → {after.value} ({turn.value})"
@@ -134,19 +137,19 @@ class Laboratory:
             )
 
     def tell_news(self, tick: int) -> None:
-        """Record frames that were rejected lately, while the test runs."""
+        """Record the frames that were rejected since the last call, while the test runs."""
         if (news := self.endpoint.news(self.clock.now())) is not None:
             self.note(news["code"], news["text"], level=news["level"], tick=tick, values=news["values"])
 
     def sample_ramp(self, topic: str, tick: int, *values: float) -> None:
-        """Record one interval of the ramp to rest: commands written, then readings."""
+        """Record one interval of the ramp to rest; `values` are the commands written, then the measurements."""
         if self.recorded:
             at = self.unix_ns(tick)
             t = tick * self.plan.test.interval
             self.outlet.add(topic, at, at, (tick, t, self.safety.mode.value, *values))
 
     def at_rest(self, tick: int, values: Mapping[str, float]) -> None:
-        """The rig is at rest; `values` say how it came there."""
+        """Take note that the rig is at rest; `values` hold the ramp's duration (s), travel (m) and last command."""
         self.tick = tick
         self.safety.at_rest()
         if self.safety.cause is not None:
@@ -167,7 +170,7 @@ class Laboratory:
         remote: bool = False,
         values: Mapping[str, float] = NO_VALUES,
     ) -> None:
-        """End the test for this laboratory; the first cause stays, with the `values` that belong to it."""
+        """End the test for this laboratory, unless it has ended; `values` are recorded with the cause."""
         if self.exchange.ended:
             return
         self.exchange.happen(event, remote=remote, cause=str(error))
@@ -183,7 +186,7 @@ class Laboratory:
             self.say_why()
 
     def emergency(self, error: EmergencyStopError) -> None:
-        """Latch the emergency stop, also where the test has ended before."""
+        """Latch the emergency stop, even if the test has ended already."""
         if self.exchange.ended:
             self.note("emergency", str(error), level="error", tick=self.tick)
             self.safety.trip(self.cause("emergency", error), Turn.EMERGENCY)
@@ -191,12 +194,12 @@ class Laboratory:
             self.fail(Event.TRIP, error, code="emergency", tick=self.tick)
 
     def say_why(self) -> None:
-        """Tell the other laboratory that this one has stopped, and why."""
+        """Tell the other laboratories that this one has stopped, and why."""
         if self.exchange.session:
             self.endpoint.send(Trip(self.exchange.session, self.name, self._trip_code, self.exchange.cause))
 
     def lost(self, who: str, seconds: float, tick: int = 0) -> None:
-        """End the test because someone has been silent for too long."""
+        """End the test because a role, `who`, has been silent for `seconds`."""
         self.fail(Event.LOSE, LostError(f"{who} has been silent for {seconds:g} s."), code="lost", tick=tick)
 
     def cause(self, code: str, error: RthsError) -> Cause:
@@ -209,7 +212,11 @@ class Laboratory:
         self.fail(Event.TRIP, error, code="limit", tick=tick, values=violation.values)
 
     def overrun(self, late_ns: int, tick: int) -> bool:
-        """End the test where a tick comes too many intervals late, because the rig's motion meanwhile is unknown."""
+        """End the test if a tick comes `late_ns` late and that is too much; return whether it did.
+
+        What the rig did meanwhile is unknown. The rig itself is the cause where its calls took half of the delay or
+        more.
+        """
         if late_ns <= self._overrun_ns:
             return False
         most = self.plan.safety.overrun
@@ -224,18 +231,18 @@ class Laboratory:
         return True
 
     def watch(self, rig: GuardedRig) -> None:
-        """Take account of how long a rig's calls take."""
+        """Measure how long a rig's calls take."""
         self._rig_name = rig.name
         rig.measure(self.clock.now, self.rig_time)
 
     def slow_rig(self, tick: int) -> None:
-        """End the test because this laboratory's own rig has put it behind."""
+        """End the test because the calls of this laboratory's own rig took too long."""
         error = RigError(f"{self._rig_name}: {self.rig_time.sentence()}.")
         self.fail(Event.TRIP, error, code=SLOW_RIG, tick=tick, values={"behind": self.rig_time.behind * 1e-9})
 
     @property
     def kept_by_rig(self) -> bool:
-        """Whether the rig alone has put this laboratory behind by an interval: it then sends nothing."""
+        """Whether the rig's calls alone have delayed this laboratory by an interval or more."""
         return self.rig_time.behind >= self.interval_ns
 
     def silent(self, who: str, tick: int) -> None:
@@ -251,10 +258,10 @@ class Laboratory:
         self.fail(Event.LOSE, error, code="watchdog", tick=tick, values={"intervals": float(most)})
 
     def tripped(self, lab: str, trip: Trip, tick: int) -> None:
-        """End the test because the other laboratory has stopped its rig.
+        """End the test because another laboratory has stopped its rig.
 
-        Where it has missed this one, whose own rig was too slow, that is the cause. Where this one has missed it, and
-        it says that its rig was too slow, that is the cause as well, although it comes to be known afterwards.
+        Where that laboratory missed messages because this one's own rig was too slow, the slow rig is the cause. Where
+        this laboratory missed messages and the other one reports a slow rig, that becomes the cause afterwards.
         """
         error = InterlockError(f"The {title(lab)} stopped the test: {trip.text}")
         if not self.exchange.ended and trip.code == State.LOST.value and self.kept_by_rig:
@@ -266,9 +273,9 @@ class Laboratory:
             self.note("remote_trip", str(error), level="error", tick=tick)
 
     def listen_to_recorder(self, message: Message) -> None:
-        """Take note of the recorder's state, and send again what it has missed.
+        """Take note of the recorder's state, and send again the samples that it has missed.
 
-        Once the test has begun, only the recorder of its session counts; any other is ignored.
+        Once the test has begun, messages of any recorder but the one of its session are ignored.
         """
         if isinstance(message, Recorder):
             if self.exchange.belongs(message.session) or self.exchange.state is State.IDLE:
@@ -283,7 +290,7 @@ class Laboratory:
                 self.endpoint.send(piece)
 
     def send_samples(self, *, everything: bool = False) -> None:
-        """Send what the recorder shall have."""
+        """Send the full pieces of the stream to the recorder, or `everything`."""
         for piece in self.outlet.pieces(everything=everything):
             self.endpoint.send(piece)
 
@@ -294,7 +301,7 @@ class Laboratory:
         return recorder is not None and 0 != recorder.session == self.exchange.session
 
     def recorder_has_all(self) -> bool:
-        """Whether the recorder says that it has this laboratory's whole stream."""
+        """Whether the recorder has confirmed this laboratory's whole stream."""
         recorder = self.recorder
         if recorder is None or not self.recorded:
             return False

@@ -1,6 +1,6 @@
 """What a machine lacks for a rig of the user's, in sentences before anything moves.
 
-The wake-up lateness is measured by the bare timing loop in the place that the laboratory's process was given.
+The bare timing loop measures the lateness of wake-ups at the priority and on the processor that the process was given.
 """
 
 from __future__ import annotations
@@ -17,7 +17,10 @@ MEASURED_S = 1.0  # 500 wake-ups at 2 ms: pauses that come every second or more 
 
 
 def lacks(plan: Plan, granted: Granted) -> list[str]:
-    """One sentence for each thing; none where all laboratories are emulated, as nothing can be hurt there."""
+    """One sentence for each thing that is missing; none where all laboratories are emulated and nothing can be damaged.
+
+    The call takes `MEASURED_S`.
+    """
     if plan.emulated:
         return []
     bare = BareLoop()
@@ -27,7 +30,7 @@ def lacks(plan: Plan, granted: Granted) -> list[str]:
 
 
 def lateness(plan: Plan, found: Mapping[str, float]) -> list[str]:
-    """A sentence on wake-ups that came late by a whole interval or more, if there were too many."""
+    """A sentence on wake-ups that came late by a whole interval or more, if there were any."""
     if not found.get("late"):
         return []
     interval, most = plan.test.interval * 1e3, plan.safety.overrun

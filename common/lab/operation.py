@@ -1,4 +1,4 @@
-"""What a laboratory does when an operator asks for it: stop, stop at once, reset."""
+"""What a laboratory does at an operator's request: stop in order, stop at once, reset."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Operated(Protocol):
 
 
 def obey(loop: Operated, wish: Operator) -> None:
-    """Do what an operator of this test wants, once per press, and answer every time it is asked."""
+    """Obey a request of this test's operator once per press, and answer each repetition of it."""
     lab = loop.lab
     if wish.plan != lab.plan.digest() or wish.word not in WORDS:
         return
@@ -40,7 +40,7 @@ def obey(loop: Operated, wish: Operator) -> None:
 
 
 def _done(loop: Operated, wish: Operator) -> tuple[bool, str]:
-    """Whether it was done, and a sentence."""
+    """Do what is requested; return whether it was done, and a sentence."""
     lab, reason = loop.lab, wish.reason or "no reason given"
     if wish.word == RESET:
         return _reset(loop)
@@ -58,6 +58,6 @@ def _reset(loop: Operated) -> tuple[bool, str]:
     if not safety.latched:
         return False, f"There is nothing to reset: the laboratory is {safety.mode.value}."
     if standing := loop.standing():
-        return False, f"The cause is not gone: {standing}"
+        return False, f"The cause is still there: {standing}"
     safety.reset()
     return True, "The laboratory is idle."

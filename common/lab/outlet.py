@@ -1,8 +1,7 @@
 """A laboratory's stream to the recorder: items in order, sent in pieces, kept for sending again.
 
-The pieces are sent between ticks, so that nothing is written in the loop and a slow recorder costs it nothing. What
-is kept is bounded by the plan, so that every laboratory is full after the same time of test and grows no more, however
-long that is.
+The pieces are sent between ticks, so that the loop writes no file and a slow recorder does not delay it. How much is
+kept follows from the plan, so that the memory of every laboratory stops growing after the same time of any test.
 """
 
 from __future__ import annotations
@@ -19,22 +18,30 @@ from common.protocol.messages import Finished, Message, Resend, Samples
 from common.recording.rows import Item, RowPacker
 from common.roles import MASTER
 
-PIECE = 16  # items; at 500 ticks per second a piece leaves every 16 to 32 ms, so that a flush has it in 0.1 s
-AT_ONCE = "event"  # the topic that fills no piece first: a laboratory that has stopped adds no more items to fill one
-PATIENCES = 6  # of the plan's with its recorder are kept for sending again: at the default a minute
-KEPT_BYTES = 64 << 20  # of them at most, which tall buildings with many slaves reach
-EARLY = 4_000  # pieces that wait for one before them; what comes beyond is asked for again
-EARLY_BYTES = 32 << 20  # of them
-BURST = 5  # pieces sent again at one request: they leave between ticks, and each costs some 50 µs
+PIECE = 16  # items: at 500 ticks per second a piece leaves every 16 to 32 ms, so the file has it within 0.1 s
+AT_ONCE = (
+    "event"  # the topic whose items are sent at once: a stopped laboratory adds no more items to fill a piece
+)
+# Items of so many times the recorder's patience are kept for sending again, at the default of 10 s those of a minute:
+# enough for a recorder that was silent for nearly its whole patience and then asks for its holes five pieces at a time.
+PATIENCES = 6
+KEPT_BYTES = (
+    64 << 20
+)  # at most, for tall buildings with many slaves; a minute of the default test takes 10 MB
+EARLY = (
+    4_000  # pieces that wait for a missing one: at 16 items each more than the minute that the sender keeps
+)
+EARLY_BYTES = 32 << 20  # of them, half of what the sender keeps; what does not fit is asked for again
+BURST = 5  # pieces sent again at one request: they leave between ticks, and each takes some 50 µs
 
 
 def kept_seconds(plan: Plan) -> float:
-    """How much of a test a laboratory keeps for sending again, s."""
+    """The length of the part of a test that a laboratory keeps for sending again, s."""
     return PATIENCES * plan.recording.patience
 
 
 def kept_items(plan: Plan, lab: str) -> float:
-    """The items of that time: each tick gives one of the laboratory's own, and the master's one more per slave."""
+    """The number of items in `kept_seconds`: one per tick, and for the master one more per slave."""
     per_tick = 1 + len(plan.roles) if lab == MASTER else 1
     return kept_seconds(plan) / plan.test.interval * per_tick
 
@@ -51,7 +58,7 @@ class Outlet:
         self._kept = kept
         self._item = rows.item
         self._pending: list[Item] = []
-        self._sent: deque[Samples] = deque()  # one joining the other
+        self._sent: deque[Samples] = deque()  # consecutive: each begins where the one before ends
         self._sent_bytes = 0
         self._hurry = False
         self.total = 0
@@ -64,7 +71,7 @@ class Outlet:
         self.total += 1
 
     def pieces(self, *, everything: bool = False) -> list[Message]:
-        """The messages to send now: whole pieces, or `everything` that waits, as where an event is among it."""
+        """The messages to send now: full pieces, or `everything` that waits, as is done for an event."""
         messages: list[Message] = []
         if len(self._pending) < PIECE and not everything and not self._hurry:
             return messages
@@ -85,7 +92,7 @@ class Outlet:
             self._sent_bytes -= len(sent.popleft().items)
 
     def again(self, request: Resend) -> list[Message]:
-        """The first pieces, at most `BURST`, that hold items asked for, as far as they are still kept."""
+        """The first pieces, at most `BURST`, that hold requested items and are still kept."""
         if not 0 <= request.first <= request.last < self.total:
             return []
         sent = self._sent
@@ -94,24 +101,24 @@ class Outlet:
         return [piece for piece in pieces if piece.first <= request.last]
 
     def finished(self) -> Finished:
-        """The message that says how long the stream is."""
+        """The message with the length of the stream."""
         return Finished(self._session, self._lab, self.total)
 
 
 def pairs(packed: bytes) -> tuple[Item, ...]:
-    """The items of a piece, as `Outlet` packs them; their types are not checked."""
+    """The items of a piece as `Outlet` packs them: topics and rows, whose types are not checked."""
     items: tuple[Item, ...] = msgpack.unpackb(packed, use_list=False)
     return items
 
 
 def pack_nexts(nexts: Mapping[str, int]) -> bytes:
-    """How far the recorder is with each stream, as its message carries it."""
+    """The number of the next item of each stream by role, packed as the recorder's message carries it."""
     packed: bytes = msgpack.packb(dict(nexts))
     return packed
 
 
 def next_of(packed: bytes, lab: str) -> int:
-    """The item of a stream that the recorder waits for, 0 where its message does not say."""
+    """The number of the item of a stream that the recorder waits for, 0 where its message does not hold it."""
     try:
         found = msgpack.unpackb(packed)
     except (ValueError, msgpack.UnpackException):
@@ -121,10 +128,11 @@ def next_of(packed: bytes, lab: str) -> int:
 
 
 class Inlet:
-    """Receiving end of one stream: hands items on in order, and says which are missing.
+    """Receiving end of one stream: hands items on in order, and lists which are missing.
 
-    `unpack` gives the items of a piece, None where it holds what cannot be recorded: such a piece is counted and
-    counts as missing. `most` bounds the stream's items, so that no number in a message makes it go on for ever.
+    `unpack` returns the items of a piece, or None where they cannot be recorded: such a piece is counted as rejected
+    and stays missing. `most` bounds the number of items, so that a wrong number in a message cannot make the stream
+    endless.
     """
 
     def __init__(self, unpack: Callable[[bytes], tuple[Item, ...] | None] = pairs, most: int = 2**62) -> None:
@@ -134,11 +142,13 @@ class Inlet:
         self.rejected = 0
         self._unpack = unpack
         self._most = most
-        self._early: dict[int, tuple[tuple[Item, ...], int]] = {}  # items, and bytes they came in
+        self._early: dict[
+            int, tuple[tuple[Item, ...], int]
+        ] = {}  # by first item: items, and bytes of the piece
         self._held = 0
 
     def take(self, piece: Samples) -> list[Item]:
-        """The items that are now complete and in order; repeated pieces give none."""
+        """The items that are complete and in order with this piece; a repeated piece gives none."""
         if piece.first < self.next or piece.first in self._early:
             return []
         items = self._unpack(piece.items) if piece.first < self._most else None
@@ -154,7 +164,7 @@ class Inlet:
         return []
 
     def end(self, finished: Finished) -> None:
-        """The stream ends after so many items."""
+        """Take note of the length of the stream."""
         if finished.total <= self._most:
             self.total = finished.total
         else:
@@ -171,16 +181,16 @@ class Inlet:
         return items
 
     def _forget(self) -> None:
-        """Discard pieces that begin within others that were handed on: they do not belong to this stream."""
+        """Discard pieces that begin within others that were handed on: they belong to another sender."""
         for first in [first for first in self._early if first < self.next]:
             self._held -= self._early.pop(first)[1]
 
     def missing(self) -> tuple[int, int] | None:
-        """First and last item of the first hole, None where there is none."""
+        """First and last missing item of the first hole, None where there is none."""
         return next(iter(self.holes()), None)
 
     def holes(self) -> Iterator[tuple[int, int]]:
-        """First and last item of every hole, in order."""
+        """First and last missing item of every hole, in order."""
         expected = self.next
         for first in sorted(self._early):
             if first > expected:
@@ -200,5 +210,5 @@ class Inlet:
 
     @property
     def complete(self) -> bool:
-        """Whether the stream has ended and all of it, but what is lost, was handed on."""
+        """Whether the stream has ended and all items were handed on, except those given up."""
         return self.total is not None and self.next >= self.total

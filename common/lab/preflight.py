@@ -1,6 +1,6 @@
-"""What must hold before anything moves: risks by name, who takes them, and what sensors and link must pass.
+"""Pre-flight: the checks of sensors and link before anything moves, and the risks that a user accepts by name.
 
-The partition and the simulated peaks are judged in `loop/nominal/preflight.py`, the disk by the recorder.
+`loop/nominal/preflight.py` judges the partition and the simulated peaks, the recorder judges the disk.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ SENSORS_PASSED = "Sensor check at rest: passed"
 
 
 class PreflightCheck(NamedTuple):
-    """What was looked at, in words with its figures, and the risk that was found."""
+    """What was checked, in words with its figures, and the risk that was found."""
 
     text: str
     risk: Risk | None = None
@@ -56,10 +56,10 @@ def refusal(risks: Sequence[Risk]) -> RefusedError:
 
 
 class Gate:
-    """What one laboratory must pass before it moves, and what came of it.
+    """The checks that one laboratory must pass before it moves, and their results.
 
-    `accepted` are the names of the risks that are taken. What was overruled and what was passed stays here until it
-    can be told the recording, once the start is agreed.
+    `accepted` are the names of the accepted risks. Results are kept until `note` records them, since an event needs a
+    test time, which exists once the start is agreed.
     """
 
     def __init__(self, accepted: Collection[str] = ()) -> None:
@@ -68,7 +68,7 @@ class Gate:
         self.passed: list[tuple[str, str]] = []  # code of the event, and its text
 
     def judge(self, checks: Iterable[PreflightCheck], code: str = PASSED) -> None:
-        """Let checks pass or overrule their risks; raises RefusedError where one is not accepted."""
+        """Take the results of checks; raises RefusedError where a risk was found that is not accepted."""
         made = list(checks)
         refusing, overruled = check([one.risk for one in made if one.risk], self.accepted)
         if refusing:
@@ -77,7 +77,7 @@ class Gate:
         self.passed += [(code, f"pre-flight: {one.text}.") for one in made if one.risk is None]
 
     def note(self, lab: Laboratory) -> None:
-        """Record and report what was passed and what was overruled; once."""
+        """Record and report each check that was passed and each risk that was accepted, once."""
         for code, text in self.passed:
             lab.note(code, text)
         for risk in self.overruled:
@@ -89,9 +89,9 @@ class Gate:
 
 
 def link_risk(round_trips_s: Sequence[float], lost: int, plan: Plan) -> Risk | None:
-    """The risk of a link that loses exchanges, or brings too many later than the interval; None where it serves.
+    """The risk of a link that loses exchanges or delays too many beyond the interval; None where it is good enough.
 
-    `round_trips_s` are those of the exchanges that came back, s.
+    `round_trips_s` (n,) are those of the exchanges that came back, s; `lost` is how many did not.
     """
     interval, share = plan.test.interval, plan.preflight.late_share
     late = sum(trip > interval for trip in round_trips_s)
@@ -110,19 +110,19 @@ def link_risk(round_trips_s: Sequence[float], lost: int, plan: Plan) -> Risk | N
 
 
 def link_text(round_trips_s: Sequence[float], lost: int, plan: Plan) -> str:
-    """What a link has passed, in words."""
+    """The result of a link's check that was passed, in words."""
     late = sum(trip > plan.test.interval for trip in round_trips_s)
     return f"Link check: {len(round_trips_s)} exchanges, {lost or 'none'} lost, {late} late, {quantiles(round_trips_s)}"
 
 
 def link_check(round_trips_s: Sequence[float], lost: int, plan: Plan) -> PreflightCheck:
-    """The link's check, for a gate."""
+    """The check of a link by its round trips (s) and the number of lost exchanges."""
     risk = link_risk(round_trips_s, lost, plan)
     return PreflightCheck("" if risk else link_text(round_trips_s, lost, plan), risk)
 
 
 def quantiles(round_trips_s: Sequence[float]) -> str:
-    """Median and 99th percentile of round trips in words: the smallest that as many do not exceed."""
+    """Median and 99th percentile of round trips (s) in words, by the nearest-rank method."""
     ranked = sorted(round_trips_s)
     p50, p99 = (ranked[math.ceil(part * len(ranked)) - 1] for part in (0.5, 0.99))
     return f"round trip p50 {p50 * 1e3:.2f} ms, p99 {p99 * 1e3:.2f} ms"
@@ -143,7 +143,7 @@ def sensor_risk(
     """The risk of the first channel that does not read like a sound sensor of a rig at rest; None where all do.
 
     `readings` (n, channels) at rest, `limits` by name, `noise` the plan's rms by name; all in the channels' units.
-    Figures of a `hidden` rig are kept back.
+    Figures of a `hidden` rig are left out of the sentence.
     """
     for place, name in enumerate(names):
         values = [float(row[place]) for row in readings]
@@ -156,7 +156,10 @@ def sensor_risk(
 
 
 def unsound(values: Sequence[float], limit: float, rms: float) -> tuple[str, str, str] | None:
-    """What is wrong with one channel at rest, its figures and the remedy; None where nothing is."""
+    """What is wrong with one channel at rest, its figures and the remedy; None where it is sound.
+
+    `rms` is the nominal noise, 0 for none, in the unit of `values` and `limit`.
+    """
     if not all(map(math.isfinite, values)):
         return "is not finite", f"{values}"[:80], "look at its cable and its driver"
     offset, spread = mean_and_rms(values)
@@ -185,13 +188,13 @@ def unsound(values: Sequence[float], limit: float, rms: float) -> tuple[str, str
 
 
 def mean_and_rms(values: Sequence[float]) -> tuple[float, float]:
-    """Mean, and rms about it."""
+    """Mean, and rms deviation from it."""
     mean = math.fsum(values) / len(values)
     return mean, math.sqrt(math.fsum((value - mean) ** 2 for value in values) / len(values))
 
 
 class SensorsAtRest:
-    """Judges the sensors of a laboratory's rig as it is armed, by its `limits` and its `noise` (rms) by name."""
+    """Judges the sensors of a rig when it is armed, by the `limits` and the nominal `noise` (rms) of each channel."""
 
     def __init__(
         self, gate: Gate, setting: Setting, limits: Mapping[str, float], noise: Mapping[str, float]
@@ -209,7 +212,10 @@ class SensorsAtRest:
         hidden: bool,
         paced: bool,
     ) -> None:
-        """Read as often as the plan says, an interval apart where `paced`; raises RigError where unsound."""
+        """Read as often as the plan says, an interval apart where `paced`.
+
+        Raises RefusedError where a sensor is unsound.
+        """
         plan, readings = self._plan, []
         for _ in range(plan.preflight.readings):
             if paced:
@@ -221,7 +227,7 @@ class SensorsAtRest:
     def skip(self, kind: str, *, hidden: bool) -> None:
         """Take note of a rig of the class `kind` that cannot be read at rest.
 
-        A hidden rig, one of a reality, is reported like one whose check passed, so that nothing tells the two apart.
+        A hidden rig, one of a reality, is reported like one whose check passed, so that the recording does not show it.
         """
         skipped = f"Sensor check skipped: class {kind} does not set idle_readings = True"
         self._gate.judge([PreflightCheck(SENSORS_PASSED if hidden else skipped)], SENSORS)

@@ -1,4 +1,4 @@
-"""A laboratory as a process of its own: link, loop, exit code."""
+"""Runs a laboratory as a process of its own: link, loop, exit code."""
 
 from __future__ import annotations
 
@@ -33,16 +33,16 @@ if TYPE_CHECKING:
 
 
 class Assembly(Protocol):
-    """How a laboratory is put together: the module `assembly` of the master or the slave."""
+    """The module `assembly` of the master or the slave, which builds the laboratory's loop."""
 
     def warm_up(self, reality: Reality) -> None:
         """Compile the kernels."""
 
     def preflight(self, plan: Plan) -> list[PreflightCheck]:
-        """What can be judged before the link opens."""
+        """The checks that can be made before the link opens."""
 
     def build_loop(self, setting: Setting, reality: Reality, *, gate: Gate | None = None) -> DrivenLoop:
-        """The laboratory's loop, with the gate that its rig must pass."""
+        """The laboratory's loop; `gate` holds the risks that are accepted."""
 
 
 def conduct(
@@ -68,7 +68,7 @@ def conduct(
     if role == SLAVE:
         role = plan.slave_role(args.name or "")
         reality = reality.of(role)
-    assembly.warm_up(reality)  # at ordinary priority: it computes for a second
+    assembly.warm_up(reality)  # at ordinary priority, since it computes for a second
     gate.judge(assembly.preflight(plan))
     granted = realtime.prepare(args.rt, args.processor)
     for text in lacking.lacks(plan, granted):
@@ -101,13 +101,16 @@ def conduct(
 
 
 def last_word(error: RthsError, report: Report) -> RthsError:
-    """The error that ends a process, marked where the report has said it already."""
+    """The error that ends a process, marked if the report has printed it already."""
     error.said = isinstance(report, PlainReport) and str(error) in report.errors
     return error
 
 
 class MasterSearch:
-    """A wish to stop, asked for again and again while a master is looked for: says now and then how long it takes."""
+    """The request to stop while a process looks for its master.
+
+    It also reports at intervals how long that has taken.
+    """
 
     def __init__(self, role: str, plan: Plan, report: Report, stopping: Callable[[], str]) -> None:
         self._role = role
@@ -118,14 +121,14 @@ class MasterSearch:
         self._waited = Waited(self._clock.now())
 
     def __call__(self) -> str:
-        """The wish, empty while there is none."""
+        """The reason to stop, empty while there is none."""
         if text := self._waited.news(f"the {MASTER}", self._patience, self._clock.now()):
             self._report("waiting", {"lab": self._role, "text": text})
         return self._stopping()
 
 
 def answer(loop: DrivenLoop) -> str:
-    """The answer of a laboratory to a second wish to stop: what it is doing, since that wish changes nothing."""
+    """The answer of a laboratory to a second request to stop, which changes nothing: what the laboratory is doing."""
     lab = loop.lab
     if lab.safety.mode is not Mode.RAMPING:
         return f"{lab.name}: is {lab.safety.mode.value.replace('_', ' ')}, and leaves as soon as it may."
@@ -133,7 +136,7 @@ def answer(loop: DrivenLoop) -> str:
 
 
 def announcement(plan: Plan, role: str, endpoint: str) -> AbstractContextManager[None]:
-    """Lets `rths run` find a laboratory that was started by itself; one that `rths run` has started it announces."""
+    """Registers a laboratory that was started by itself as running; `rths run` registers those that it starts."""
     return nullcontext() if running.announced_already() else running.announced(plan, endpoint, role)
 
 
@@ -146,7 +149,7 @@ def join(
     listen: str = "",
     connect: str = "",
 ) -> ZenohLink:
-    """A role's link in the test that a plan describes, with certificates where the plan names their folder.
+    """Open a role's link to a test, with certificates where the plan names their folder.
 
     Raises:
         InputError: the endpoint or a certificate cannot be used.

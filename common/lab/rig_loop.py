@@ -1,4 +1,4 @@
-"""What the loops of both laboratories do alike: alarms of a tick, the ramp to rest, the last words."""
+"""What the master's and the slave's loop have in common: alarms of a tick, ramp to rest, closing messages."""
 
 from __future__ import annotations
 
@@ -13,13 +13,15 @@ from common.rig import GuardedRig
 from common.safety.modes import Mode, Turn
 from common.safety.watchdog import WatchdogFinding
 
-SAY_NS = REPEAT_NS // 2  # between two times that a laboratory says the same of its end
+# Time between repetitions of a closing message. They are not requests that somebody answers, so they are repeated twice
+# as often: the default `loss_timeout` of 1 s then has twenty of them.
+SAY_NS = REPEAT_NS // 2
 
 
 class RigLoop:
-    """A loop around one rig; what it does in a tick, and what it says of its end, is the subclass's.
+    """A loop around one rig; the subclass defines a tick and the messages about the test's end.
 
-    `standing` says of a measurement why it keeps a latched state from being reset, empty where it does not.
+    `standing` returns the reason why a measurement forbids the reset of a latched state, an empty text if it does not.
     """
 
     def __init__(
@@ -34,10 +36,10 @@ class RigLoop:
         self._disarmed = False
         self._said_ns = -REPEAT_NS
 
-    # -- what the subclass says ---------------------------------------------------------------------
+    # -- what the subclass defines ------------------------------------------------------------------
 
     def _finding(self, tick: int) -> tuple[WatchdogFinding, str]:
-        """What the watchdog says at a tick that came in time, and of whom."""
+        """The watchdog's finding at a tick that came in time, and the partner that it concerns."""
         raise NotImplementedError
 
     def _say_end(self) -> None:
@@ -46,17 +48,21 @@ class RigLoop:
 
     @property
     def _ends(self) -> bool:
-        """Whether there is an end that they have to be told of."""
+        """Whether the test ends and the other laboratories have to be told."""
         raise NotImplementedError
 
     # -- alarms -------------------------------------------------------------------------------------
 
     def _alarmed(self, tick: int, late_ns: int, *, late: bool) -> bool:
-        """Trip where this loop came far too late, or a partner has been silent for too long; hold before that."""
+        """Trip if this loop is far too late or a partner was silent for too long; return whether it tripped.
+
+        After a shorter silence the laboratory holds. `late_ns` is the lateness of the tick, `late` whether it counts as
+        late.
+        """
         lab = self.lab
         if lab.overrun(late_ns, tick):
             return True
-        if late:  # the silence may be this loop's own
+        if late:  # the messages may have come while this loop was held up
             return False
         finding, who = self._finding(tick)
         if finding is WatchdogFinding.RAMP:
@@ -106,7 +112,7 @@ class RigLoop:
             self.tell()
 
     def standing(self) -> str:
-        """Why the cause of a latched state persists, empty where it is gone."""
+        """Why the cause of a latched state persists, an empty text where it is gone."""
         try:
             return self._standing(self._rig.read())
         except RigError as error:
@@ -123,7 +129,7 @@ class RigLoop:
             self._say_end()
 
     def _due(self, *, last: bool = False) -> bool:
-        """Whether it is time to say something again, or the `last` time, and takes note of it."""
+        """Whether a closing message is due, which the `last` one always is; takes note of the time."""
         now = self.lab.clock.now()
         if not last and now - self._said_ns < SAY_NS:
             return False
@@ -131,6 +137,6 @@ class RigLoop:
         return True
 
     def _hand_over(self) -> None:
-        """Give the recorder the rest, and say how much there is."""
+        """Send the recorder the rest of the stream and its length."""
         self.lab.send_samples(everything=True)
         self.lab.endpoint.send(self.lab.outlet.finished())

@@ -1,7 +1,7 @@
-"""What a laboratory's process says of the machine it runs on: real-time shape, the host's share, a bare timing loop.
+"""Records the machine that a laboratory's process runs on: real-time settings, load, a bare timing loop.
 
-Events of the recording: `real_time` as the ticks begin; `machine`, `rejected` where frames were, and, from the master,
-`bare_loop` as they end.
+It records the event `real_time` when the ticks begin. When they end it records `machine`, `rejected` if frames were
+rejected, and, at the master, `bare_loop`.
 """
 
 from __future__ import annotations
@@ -19,10 +19,9 @@ CODES = ("real_time", "machine", "bare_loop", "rejected")
 
 
 class Surroundings:
-    """Watches from the first tick to the last; `timed` where a bare timing loop runs beside the test.
+    """Watches from the first tick to the last; where `timed`, a bare timing loop runs beside the test.
 
-    `rejected` counts the rejected frames by reason as they come; the `gate` of the pre-flight says what was passed
-    and what was overruled.
+    `rejected` holds the counts of rejected frames by reason, and `gate` the results of the pre-flight.
     """
 
     def __init__(
@@ -43,7 +42,7 @@ class Surroundings:
         self._watch: Watch | None = None
 
     def begin(self) -> None:
-        """The ticks are about to begin."""
+        """Record the settings and start the measurement; called before the first tick."""
         level = "warning" if self._granted.missing and not self._lab.plan.emulated else "info"
         self._lab.note("real_time", sentence(self._granted), level=level, values=self._granted.values())
         self._gate.note(self._lab)
@@ -52,7 +51,7 @@ class Surroundings:
         self._watch = Watch()
 
     def end(self, tick: int) -> None:
-        """The ticks are over; nothing is said of a test that never began."""
+        """Record the results after the last tick; nothing is recorded of a test that never began."""
         if self._watch is None:
             return
         text = ", ".join(f"{name} {value}" for name, value in facts().items())

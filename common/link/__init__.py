@@ -1,1 +1,1 @@
-"""How messages get from one process to another: zenoh or memory, who may say what, delays, what is rejected."""
+"""How messages get from one process to another: zenoh or memory, access control, delays, rejected frames."""

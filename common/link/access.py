@@ -1,7 +1,7 @@
 """zenoh's access control on the link: which role may publish and subscribe on which route.
 
-The master's session routes and applies it to every other, by the common name of its certificate. Whatever is not
-allowed here is denied: other keys, wildcards, deletions, queries, tokens.
+The master's session routes all messages and applies these rules to every other session, by the common name of its
+certificate. Whatever is not allowed here is denied: other keys, wildcards, deletions, queries, tokens.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from common.roles import OBSERVER, OPERATOR, RECORDER
 
 
 def guests(slaves: Sequence[str]) -> tuple[str, ...]:
-    """The roles that dial the master."""
+    """The roles that connect to the master."""
     return (*slaves, RECORDER, OPERATOR, OBSERVER)
 
 
@@ -36,9 +36,9 @@ def access_control(slaves: Sequence[str], key: Callable[[Route], str]) -> dict[s
 
 
 def rules_of(role: str, says: Sequence[str], hears: Sequence[str]) -> list[dict[str, object]]:
-    """What one role may do: `ingress` is what the master's session gets from it, `egress` what it hands to it.
+    """The rules of one role: `ingress` is what the master's session receives from it, `egress` what it sends to it.
 
-    A publisher sends only what the router has told it that somebody wants: hence `wanted`.
+    A publisher sends only on keys for which the router has told it of a subscriber, which the rule `wanted` allows.
     """
     allowed = (
         ("says", "ingress", "put", says),

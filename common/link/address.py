@@ -1,4 +1,4 @@
-"""Endpoints: where a process listens or dials, written as tcp/HOST:PORT."""
+"""Endpoints, at which a process listens or to which it connects, written as tcp/HOST:PORT."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def secured(endpoint: str) -> str:
 
 
 def dialled(endpoint: str) -> str:
-    """An endpoint over TLS that can be dialled; raises InputError for an IPv6 address, which zenoh takes for a name."""
+    """An endpoint over TLS to connect to; raises InputError for an IPv6 address, which zenoh takes for a host name."""
     if "/[" in endpoint:
         raise InputError(
             f"'{endpoint}' cannot be dialled with [link.security]: give the master's name, or IPv4."
@@ -46,7 +46,7 @@ def place(endpoint: str) -> tuple[str, int]:
 
 
 def loopback(endpoint: str) -> bool:
-    """Whether an endpoint can be reached from this machine only; so can an empty one."""
+    """Whether an endpoint can be reached from this machine only; True for an empty one."""
     host = place(endpoint)[0]
     with contextlib.suppress(ValueError):
         return ipaddress.ip_address(host).is_loopback

@@ -1,7 +1,7 @@
-"""A process's access to messages; over a transport by the codec, with rejected frames counted by reason.
+"""A process's access to messages: it encodes and decodes them over a transport, and counts rejected frames by reason.
 
-Which role may send which message is a table here, and so is which message may come before its receiver or its
-sender takes part in a session, under the key that all share.
+Tables state which role may send which message, and which messages may come under the key that all processes share,
+because their sender or receiver does not take part in a session yet.
 """
 
 from __future__ import annotations
@@ -44,7 +44,8 @@ from common.roles import MASTER, OPERATOR, RECORDER, SLAVE, kind_of
 
 CHANNELS: dict[type, str] = {Command: TICK, Feedback: TICK, Samples: SAMPLES, Finished: SAMPLES}
 
-# bytes of a frame: a tick's has numbers only; a control message some texts; a piece the items of many storeys
+# Bytes of a frame. A tick's message has at most fourteen numbers of nine bytes and the check; a control message has at
+# most three texts of 4000 characters, of four bytes each; a piece of samples is bounded by the codec.
 LARGEST = {TICK: 256, CONTROL: 1 << 16, SAMPLES: codec.MOST_FRAME}
 
 SPOKEN: Mapping[str, frozenset[type]] = {
@@ -69,11 +70,12 @@ SPOKEN: Mapping[str, frozenset[type]] = {
     OPERATOR: frozenset({Operator}),
 }
 
-OPEN = frozenset(
-    {Register, Waiting, Refused, Arm, Recorder, Operator, Answer}
-)  # may come under the key that all share
-ALWAYS_OPEN = frozenset({Register, Arm, Operator, Answer})  # for those too who take part in no session
-SIGNED = frozenset({Trip, Samples, Finished})  # say as `lab` whom they are from
+# messages that may come under the key that all share
+OPEN = frozenset({Register, Waiting, Refused, Arm, Recorder, Operator, Answer})
+ALWAYS_OPEN = frozenset(
+    {Register, Arm, Operator, Answer}
+)  # those always sent under it: a receiver may lack a session
+SIGNED = frozenset({Trip, Samples, Finished})  # messages that name their sender in the field `lab`
 
 
 def channel_of(kind: type) -> str:
@@ -81,7 +83,7 @@ def channel_of(kind: type) -> str:
     return CHANNELS.get(kind, CONTROL)
 
 
-# by kind of role and channel, what may come there
+# the messages that may come from a kind of role on a channel
 ALLOWED: dict[tuple[str, str], frozenset[type]] = {
     (role, channel): frozenset(kind for kind in kinds if channel_of(kind) == channel)
     for role, kinds in SPOKEN.items()
@@ -90,7 +92,7 @@ ALLOWED: dict[tuple[str, str], frozenset[type]] = {
 
 
 class Received(NamedTuple):
-    """A valid message, from whom, when its frame arrived and when it was decoded (own clock, ns)."""
+    """A valid message, the role that sent it, when its frame arrived and when it was decoded (own clock, ns)."""
 
     message: Message
     role: str = ""
@@ -102,15 +104,15 @@ class Endpoint(Protocol):
     """A process's access to the messages of a test."""
 
     def enter(self, session: int) -> None:
-        """Take part in a session: what is sent from now on belongs to it."""
+        """Join a session: messages sent from now on belong to it."""
 
     def expect(self, measured: Mapping[str, int]) -> None:
-        """A feedback must have as many measured channels as its sender's laboratory, which `measured` gives by role."""
+        """From now on a feedback must have as many measured channels as `measured` gives for its sender's role."""
 
     def send(self, message: Message, to: str = "") -> int:
-        """Hand a message to the link, `to` one role alone where it is named; never blocks.
+        """Hand a message to the link, for all who listen or for the role `to` alone; never blocks.
 
-        When it was encoded and handed over, own clock, ns.
+        Returns when it was encoded, own clock, ns.
         """
 
     def receive(self, timeout: float = 0.0) -> Received | None:
@@ -126,8 +128,9 @@ class Endpoint(Protocol):
 class FrameEndpoint:
     """Sends and receives the messages of one session as frames over a transport.
 
-    Frames of a session are under its key. A control message that is not of the sender's own session, or that must be
-    understood without one, is under the key that all share, and only those of `OPEN` are accepted under it.
+    Frames of a session are checked with its key. A control message that is not of the sender's own session, or that
+    must be understood without one, is checked with the key that all share; only the messages in `OPEN` are accepted
+    under that key.
     """
 
     def __init__(self, transport: Transport, plan_digest: str, clock: Clock | None = None) -> None:
@@ -143,15 +146,15 @@ class FrameEndpoint:
         transport.listen(self._heard)
 
     def enter(self, session: int) -> None:
-        """Use the key of a session from now on; what must be understood before it still is."""
+        """Use the key of a session from now on; messages under the key that all share are still understood."""
         self._place = (session, codec.session_key(session, self._digest))
 
     def expect(self, measured: Mapping[str, int]) -> None:
-        """Reject every feedback that has not as many measured channels as its role."""
+        """Reject every feedback whose number of measured channels is not that of its role."""
         self._measured = measured
 
     def send(self, message: Message, to: str = "") -> int:
-        """Hand a message to the link; when it was encoded, ns."""
+        """Hand a message to the link; returns when it was encoded, ns."""
         channel = CHANNELS.get(type(message), CONTROL)
         session, key = self._place
         if channel == CONTROL:
@@ -216,7 +219,7 @@ class FrameEndpoint:
 def check_open(message: Message) -> None:
     """Raise RejectedFrame where a message must not come under the key that all share.
 
-    A recorder says under it only that it is ready: that it records a session, or cannot, is under the session's key.
+    A recorder reports under that key that it is ready; what it reports of a session comes under the session's key.
     """
     if type(message) not in OPEN or (isinstance(message, Recorder) and message.session):
         raise RejectedFrame(Reject.OPEN_KEY)

@@ -1,4 +1,4 @@
-"""Messages on their way from the link's threads to the loop."""
+"""The queue of messages from the link's threads to the loop."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Item = TypeVar("Item")
 class Inbox(Generic[Item]):
     """A queue for several producers and one consumer, who may wait with a timeout.
 
-    Not `queue.SimpleQueue`: in CPython 3.11 its `get` waits for ever where a signal interrupts it and the
+    `queue.SimpleQueue` is not used, because in CPython 3.11 its `get` never returns if a signal interrupts it and the
     timeout has passed by then.
     """
 
@@ -30,7 +30,7 @@ class Inbox(Generic[Item]):
             pass
 
     def get(self, timeout: float) -> Item | None:
-        """The next item, waiting at most `timeout` s; None where none came, or earlier on a false alarm."""
+        """The next item, waiting at most `timeout` s; None where none came, possibly before the timeout has passed."""
         if not self._items and timeout > 0.0:
             self._there.acquire(timeout=timeout)
         try:

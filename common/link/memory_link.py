@@ -1,4 +1,4 @@
-"""A link within one process, for virtual time and for tests: messages go from hand to hand."""
+"""A link within one process, for virtual time and for tests: it hands messages over without encoding them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from common.roles import SLAVE
 
 
 class MemoryHub:
-    """What one role sends is at once in the queues of those who hear it; all must join before the first message.
+    """Puts what one role sends into the queues of those that hear it; all must join before the first message.
 
     `slaves` are the roles of all slaves of the test.
     """
@@ -24,17 +24,17 @@ class MemoryHub:
         self._members: dict[str, MemoryEndpoint] = {}
 
     def join(self, role: str, clock: Waiter) -> MemoryEndpoint:
-        """The access of one role, which waits on a clock of its own."""
+        """The endpoint of one role, which waits on the clock given."""
         return self._members.setdefault(role, MemoryEndpoint(self, role, clock))
 
     def hearers(self, role: str, kind: type, to: str) -> list[MemoryEndpoint]:
-        """Those who hear a role's messages of a kind, `to` one role alone where it is named."""
+        """The endpoints that hear a role's messages of a kind, sent to all or to the role `to` alone."""
         route = Route(role, CHANNELS.get(kind, CONTROL), to)
         return [member for hearer, member in self._members.items() if route in heard(hearer, self._slaves)]
 
 
 class MemoryEndpoint:
-    """One role's access to a MemoryHub; by its `clock` its messages are stamped on arrival, and waited for."""
+    """One role's endpoint at a MemoryHub; `clock` stamps its messages on arrival and lets it wait for them."""
 
     def __init__(self, hub: MemoryHub, role: str, clock: Waiter) -> None:
         self.clock = clock
@@ -44,13 +44,13 @@ class MemoryEndpoint:
         self._hearers: dict[tuple[type, str], list[MemoryEndpoint]] = {}
 
     def enter(self, session: int) -> None:
-        """Memory needs no key."""
+        """Do nothing: messages in memory have no key."""
 
     def expect(self, measured: Mapping[str, int]) -> None:
-        """Memory brings what was sent."""
+        """Do nothing: messages in memory arrive as they were sent."""
 
     def send(self, message: Message, to: str = "") -> int:
-        """Put a message into the queue of every role that hears it; the present time, ns."""
+        """Put a message into the queue of every role that hears it; returns the present time, ns."""
         route = (type(message), to)
         hearers = self._hearers.get(route)
         if hearers is None:
@@ -60,7 +60,7 @@ class MemoryEndpoint:
         return self.clock.now()
 
     def arrive(self, message: Message, role: str) -> None:
-        """Take in what a role has sent."""
+        """Take in a message of a role."""
         now = self.clock.now()
         self._queue.append(Received(message, role, now, now))
         self.clock.wake()
@@ -72,8 +72,8 @@ class MemoryEndpoint:
         return self._queue.popleft() if self._queue else None
 
     def news(self, now_ns: int) -> dict[str, Any] | None:
-        """Memory carries no frames, so none is rejected."""
+        """None: without frames none is rejected."""
         return None
 
     def close(self) -> None:
-        """Nothing to leave."""
+        """Do nothing: there is no connection to close."""

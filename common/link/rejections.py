@@ -9,13 +9,15 @@ from typing import Any, NamedTuple
 
 from common.protocol.codec import Reject
 
-# between two reports: as often as a user can read them, however many frames a stranger sends
+# between two reports: a second, so that a user can read them however many frames a stranger sends
 NEWS_NS = 1_000_000_000
-UNTOLD = frozenset({Reject.UNREGISTERED.value})  # a process in no test hears those of others
+UNTOLD = frozenset(
+    {Reject.UNREGISTERED.value}
+)  # not reported: a process in no test receives frames of other tests
 
 
 class RejectionCount(NamedTuple):
-    """The rejections for one reason: when they began, and as which role the sender of the last one spoke."""
+    """The rejections for one reason: when they began (ns), and which role the sender of the last one claimed."""
 
     first_ns: int
     role: str
@@ -38,13 +40,13 @@ class Rejections:
         with self._lock:
             first_ns = self.seen[name].first_ns if name in self.seen else now_ns
             self.seen[name] = RejectionCount(first_ns, role)
-            self.counts[name] += 1  # last: `news` looks for who was seen
+            self.counts[name] += 1  # after `seen`, which `news` reads for every reason that has a count
         self._fresh = self._fresh or name not in UNTOLD
 
     def news(self, now_ns: int) -> dict[str, Any] | None:
-        """An event on what was rejected since the last one; at most one a second, None where there is nothing new.
+        """An event on the frames rejected since the last one, at most one a second; None where there is nothing new.
 
-        `code`, `level` and `text` are those of an event; its `values` the counts of the whole test by reason.
+        It holds `code`, `level` and `text` of the event, and as `values` the counts of the whole test by reason.
         """
         if not self._fresh or now_ns - self._told_ns < NEWS_NS:
             return None
@@ -67,5 +69,5 @@ class Rejections:
 
 
 def told(counts: Mapping[str, int]) -> dict[str, int]:
-    """The counts that a test's events tell, by reason."""
+    """The counts that the events of a test report, by reason."""
     return {name: count for name, count in sorted(counts.items()) if name not in UNTOLD}

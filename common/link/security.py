@@ -1,4 +1,4 @@
-"""Certificates of the link: one role's own, checked before anything is dialled, and why a dial was refused.
+"""Certificates of the link: one role's own, checked before it connects, and why a connection was refused.
 
 A role reads three files of the plan's `[link.security] folder` and no other: `authority.pem`, `ROLE.pem`, `ROLE.key`.
 `rths keys` makes them.
@@ -25,7 +25,7 @@ TLS = "transport/link/tls"
 
 
 class Identity(NamedTuple):
-    """The files by which a role shows who it is, and knows others of the same authority."""
+    """The files by which a role authenticates itself and recognizes certificates of the same authority."""
 
     role: str
     authority: Path
@@ -33,7 +33,10 @@ class Identity(NamedTuple):
     key: Path
 
     def settings(self) -> dict[str, object]:
-        """Settings of zenoh: both ends show a certificate, names are verified, an expired one ends the link."""
+        """Settings for zenoh.
+
+        Both ends show a certificate, host names are verified, an expired certificate ends the link.
+        """
         own = {
             f"{TLS}/{end}_{what}": str(path)
             for end in ("listen", "connect")
@@ -49,7 +52,7 @@ class Identity(NamedTuple):
     def refusal(self, endpoint: str) -> str:
         """Why the master does not take this role's certificate, or this role the master's; empty where unknown.
 
-        TLS knows no roles: what the master lets a certificate say is not to be seen here.
+        TLS knows no roles, so this does not show which routes the master's access control allows the certificate.
         """
         context = ssl.create_default_context(cafile=str(self.authority))
         context.load_cert_chain(self.certificate, self.key)
@@ -57,7 +60,7 @@ class Identity(NamedTuple):
 
 
 def identity(plan: Plan, role: str, now: datetime | None = None) -> Identity:
-    """A role's files in the folder that the plan names, checked; `now` is read from the clock where not given.
+    """A role's files in the folder that the plan names, after their check; without `now` the clock gives the time.
 
     Raises:
         InputError: a file is missing or unreadable, or the certificate is another role's, of another authority, or
@@ -72,7 +75,7 @@ def identity(plan: Plan, role: str, now: datetime | None = None) -> Identity:
 
 
 def check(found: Identity, now: datetime, lasting: timedelta) -> None:
-    """Raises InputError where a master or slave could not show who it is with these files, from `now` for `lasting`."""
+    """Raises InputError where a role cannot authenticate itself with these files from `now` for the time `lasting`."""
     authority, own = certificate(found.authority), certificate(found.certificate)
     name = common_name(own)
     if name != found.role:
@@ -84,7 +87,7 @@ def check(found: Identity, now: datetime, lasting: timedelta) -> None:
         own.verify_directly_issued_by(authority)
     except (ValueError, TypeError, InvalidSignature):
         raise InputError(
-            f"{found.certificate} is not of the authority in {found.authority}: "
+            f"{found.certificate} was not issued by the authority in {found.authority}: "
             "take both from one run of `rths keys`."
         ) from None
     for path, one in ((found.authority, authority), (found.certificate, own)):
@@ -133,11 +136,11 @@ def content(path: Path) -> bytes:
     except OSError as error:
         raise InputError(
             f"Cannot read {path}, which [link.security] asks for: {error.strerror}; make it with `rths keys`, "
-            "or bring it from where that was run."
+            "or copy it from the machine where that was run."
         ) from None
 
 
 def common_name(found: x509.Certificate) -> str:
-    """The common name of a certificate's owner, empty without any."""
+    """The common name of a certificate's owner, empty where it has none."""
     names = found.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
     return str(names[0].value) if names else ""

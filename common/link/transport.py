@@ -9,7 +9,7 @@ from common.roles import MASTER, OBSERVER, OPERATOR, RECORDER, SLAVE
 
 
 class Packet(NamedTuple):
-    """One received frame: from which role, on which channel, when (own clock, ns)."""
+    """One received frame: the role that sent it, its channel, and when it arrived (own clock, ns)."""
 
     role: str
     channel: str
@@ -18,7 +18,7 @@ class Packet(NamedTuple):
 
 
 class Route(NamedTuple):
-    """What one role says on a channel: to all who hear it, or `to` one role alone."""
+    """The messages of one role on a channel: to all that hear it, or to the role `to` alone."""
 
     role: str
     channel: str
@@ -30,7 +30,7 @@ CHANNELS = (TICK, CONTROL, SAMPLES)
 
 
 def addressed(slave: str) -> str:
-    """How the master's frames for one slave are addressed: by its role where it has a name, not at all otherwise."""
+    """The address of the master's frames for one slave: its role where it has a name, otherwise empty."""
     return slave if slave != SLAVE else ""
 
 
@@ -49,7 +49,7 @@ def said(role: str, slaves: Sequence[str]) -> tuple[Route, ...]:
 
 
 def heard(role: str, slaves: Sequence[str]) -> tuple[Route, ...]:
-    """The routes that a role listens to: a slave hears what the master says to it or to all, no other slave."""
+    """The routes that a role listens to; a slave hears the master's messages to it or to all, and no other slave's."""
     labs = (MASTER, *slaves)
     if role == MASTER:
         here = [Route(slave, channel) for slave in slaves for channel in (TICK, CONTROL)]
@@ -74,10 +74,10 @@ class Transport(Protocol):
     """One process's access to the link."""
 
     def send(self, channel: str, frame: bytes, to: str = "") -> None:
-        """Hand a frame to the link, `to` one role alone where it is named; never blocks."""
+        """Hand a frame to the link, for all that hear the channel or for the role `to` alone; never blocks."""
 
     def listen(self, heard: Callable[[Packet], None]) -> None:
-        """From now on call `heard` with every frame, from a thread of the link's own; once."""
+        """Call `heard` with every frame from now on, in a thread of the link; may be called once."""
 
     def close(self) -> None:
         """Leave the link."""

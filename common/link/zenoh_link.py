@@ -1,9 +1,9 @@
 """The link over eclipse-zenoh; the only file that imports it.
 
-The master's session routes, so that a slave and a recorder that only dial the master also hear each
-other. One publisher per channel, express, at real-time priority, dropped rather than blocked when the
-network is congested: a late frame is worth nothing, and a blocked loop would be a fault (docs/decisions).
-With certificates the link is TLS, and the master's session holds every other to the routes of its role.
+The master's session routes, so that a slave and a recorder that connect to the master alone also hear each other.
+Each channel has one publisher, express and at real-time priority. When the network is congested frames are dropped
+rather than the sender blocked: a late frame is useless, and a blocked loop would be a fault (docs/decisions).
+With certificates the link is TLS, and the master's session restricts every other one to the routes of its role.
 """
 
 from __future__ import annotations
@@ -28,21 +28,27 @@ from common.link.transport import SAMPLES, Packet, Route, heard, said
 from common.protocol.codec import MOST_FRAME
 from common.roles import MASTER, SLAVE
 
-# decides nothing about a rig, since the loops judge silence by messages: it only frees the link of a dead peer
+# After this silence zenoh drops a dead peer. The loops judge silence by their messages, so no rig depends on it; a
+# second exceeds the pauses of a machine (0.5 s were seen), which should not cost the connection.
 LEASE_MS = 1000
-ATTEMPT_MS = 500  # opening a session cannot be interrupted, so it is tried again and again for this long
-# A connection on which nobody completes zenoh's handshake is dropped after this time. Our own processes give a dial up
-# after half of it. With zenoh's 10 s, strangers who say nothing keep everybody else out for as long.
+# Opening a session cannot be interrupted, so it is attempted for this time again and again; a user who stops the
+# process waits for half a second at most.
+ATTEMPT_MS = 500
+RETRY_MS = (
+    20  # between the connection attempts within it: short beside the second that a process takes to start
+)
+# A connection on which zenoh's handshake is not completed is dropped after this time. Our own processes give up an
+# attempt after half of it. With zenoh's default of 10 s, silent strangers would keep everybody else out for as long.
 ACCEPT_MS = 2 * ATTEMPT_MS
-# So many such connections are open at a time, and others wait until they are dropped. It is half of the 1024 open files
-# that a process usually may have.
+# Largest number of such connections at a time; others wait until these are dropped. It is half of the 1024 open files
+# that a process may usually have.
 ACCEPT_PENDING = 512
-# zenoh puts the fragments of a message together up to this size and drops a larger one while it comes in. No frame of
-# ours is larger than MOST_FRAME (a piece of the stream to the recorder has some 2 kB, 50 kB with 100 storeys), and the
-# codec rejects any that is; the rest is for zenoh's header with the key. Its default is 1 GiB.
+# zenoh assembles the fragments of a message up to this size and drops a larger one while it comes in. No frame of ours
+# is larger than MOST_FRAME (a piece of the stream to the recorder has some 2 kB, 50 kB with 100 storeys), and the codec
+# rejects any that is; 4 kB more are for zenoh's header with the key. zenoh's default is 1 GiB.
 MOST_MESSAGE = MOST_FRAME + (1 << 12)
 PREFIX = "rths"
-REFUSED = "zenoh_link_tls=warn"  # log of zenoh's that names every dial it refuses
+REFUSED = "zenoh_link_tls=warn"  # filter of zenoh's log that shows every refused TLS connection
 YIELD = getattr(os, "sched_yield", lambda: None)  # not every system has it
 
 if TYPE_CHECKING:
@@ -58,7 +64,11 @@ def configuration(role: str, listen: str, connect: str) -> zenoh.Config:
         "connect/endpoints": [connect] if connect else [],
         "connect/timeout_ms": ATTEMPT_MS,
         "connect/exit_on_failure": True,
-        "connect/retry": {"period_init_ms": 20, "period_max_ms": 20, "period_increase_factor": 1},
+        "connect/retry": {
+            "period_init_ms": RETRY_MS,
+            "period_max_ms": RETRY_MS,
+            "period_increase_factor": 1,
+        },
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,
         "transport/unicast/accept_timeout": ACCEPT_MS,
@@ -73,13 +83,13 @@ def configuration(role: str, listen: str, connect: str) -> zenoh.Config:
 
 
 def insert(config: zenoh.Config, settings: Mapping[str, object]) -> None:
-    """Set what is at these paths of a configuration."""
+    """Set the values at these paths of a configuration."""
     for path, value in settings.items():
         config.insert_json5(path, json.dumps(value))
 
 
 def secure(config: zenoh.Config, identity: Identity, test: str, slaves: Sequence[str]) -> None:
-    """Show a certificate and ask for one; the master's session holds every other to its role's routes."""
+    """Configure TLS with certificates of both ends, and at the master the access control of every other role."""
     insert(config, identity.settings())
     if identity.role == MASTER:
         insert(config, {"access_control": access_control(slaves, partial(key, test))})
@@ -92,12 +102,15 @@ def reach(
     stopping: Callable[[], str],
     refusal: Callable[[str], str],
 ) -> zenoh.Session:
-    """A session that has reached the master, tried for `seconds`; `refusal` says why an endpoint takes nobody in.
+    """A session connected to the master, attempted for `seconds`.
+
+    `stopping` returns the reason to give up, and `refusal` why an endpoint refuses the certificate; both return an
+    empty text where there is none.
 
     Raises:
-        InputError: the certificate is refused, which waiting does not cure.
-        LostError: nothing listens there.
-        InterlockError: somebody wants to stop.
+        InputError: the certificate is refused, which does not change by waiting.
+        LostError: no master was reached in time.
+        InterlockError: the user asked to stop.
     """
     deadline = time.monotonic() + seconds
     while True:
@@ -113,7 +126,7 @@ def reach(
 
 
 def unrefused(_: str) -> str:
-    """No certificate is refused on an open link."""
+    """An empty text: without certificates none can be refused."""
     return ""
 
 
@@ -188,9 +201,10 @@ class ZenohLink:
             ) from None
 
     def watch(self, noticed: Callable[[str], None]) -> None:
-        """Tell of everybody whose certificate is the authority's but of no role of the test, from a thread of zenoh's.
+        """Call `noticed` for every peer whose certificate is valid but of no role of the test, in a thread of zenoh's.
 
-        Those who have joined already are told of too; where this end does not listen with an identity, nobody is.
+        It is called for peers that have joined already too. Where this end does not listen with certificates, nothing
+        is reported.
         """
         if self._expected is None:
             return
@@ -200,13 +214,13 @@ class ZenohLink:
             name = event.link.auth_identifier
             if event.kind == zenoh.SampleKind.PUT and name not in expected:
                 noticed(
-                    f"'{name}' has joined with a certificate of no role in this test: nothing of it passes."
+                    f"'{name}' has joined with a certificate of no role in this test: its messages are blocked."
                 )
 
         self._session.info.declare_link_events_listener(joined, history=True)
 
     def listen(self, heard: Callable[[Packet], None]) -> None:
-        """From now on call `heard` with every frame, from the thread of zenoh's that receives it."""
+        """Call `heard` with every frame from now on, in the thread of zenoh's that receives it."""
         self._subscribers += [
             self._session.declare_subscriber(
                 name, zenoh.handlers.Callback(calling(heard, route), indirect=False)
@@ -217,16 +231,16 @@ class ZenohLink:
     def send(self, channel: str, frame: bytes, to: str = "") -> None:
         """Hand a frame to the link; dropped where the network is congested."""
         self._publishers[channel, to].put(frame)
-        YIELD()  # to the link's own thread on this processor, which writes the frame
+        YIELD()  # lets the link's thread run on this processor, which writes the frame
 
     def close(self) -> None:
-        """Leave the link; without it, zenoh's threads would keep the process alive."""
+        """Close the session; otherwise zenoh's threads would keep the process alive."""
         with contextlib.suppress(zenoh.ZError):  # closing fails where the peer has gone
             self._session.close()  # type: ignore[no-untyped-call]
 
 
 def calling(heard: Callable[[Packet], None], route: Route) -> Callable[[zenoh.Sample], None]:
-    """A callback of zenoh's that hands a route's frames on, stamped as they arrive."""
+    """A callback for zenoh that stamps a route's frames on arrival and hands them to `heard`."""
     now = time.monotonic_ns
     attached: set[int] = set()
 
@@ -241,10 +255,10 @@ def calling(heard: Callable[[Packet], None], route: Route) -> Callable[[zenoh.Sa
 
 
 def stay_attached() -> None:
-    """Let the interpreter keep what it knows of the calling thread, one of zenoh's, until the process ends.
+    """Let the interpreter keep its thread state of the calling thread, one of zenoh's, until the process ends.
 
-    Called by a thread that Python did not start, it would make and drop a thread state with every frame, which costs
-    more than the rest of the call.
+    Otherwise it would create and delete that state with every frame, because Python did not start the thread; that
+    takes longer than the rest of the call.
     """
     ctypes.pythonapi.PyGILState_Ensure()
 

@@ -1,4 +1,4 @@
-"""Whether the building, the specimens and the actuators of a plan fit together."""
+"""Checks that the building, the specimens and the actuators of a plan fit together."""
 
 from __future__ import annotations
 
@@ -10,17 +10,21 @@ from typing import Any
 
 from common.errors import PlanError
 from common.plan.kinds import COLUMN, OWN, TABLE, known_kind
+from common.plan.laboratory_tables import Actuator, ServoHydraulics
 from common.plan.plan import Plan
 from common.plan.schema import StoreysOrMatrix
-from common.plan.tables import Actuator, Experimental, ServoHydraulics, Structure
+from common.plan.tables import Experimental, Structure
 from common.roles import name_of
 
-ASYMMETRY = 1e-9  # of the largest entry, that rounding may make
+ASYMMETRY = 1e-9  # of the largest entry: far above double precision, far below the digits that a user writes
 OF_FOPDT = ("gain", "delay", "time_constant")
 
 
 def with_modal_damping(structure: Structure, given: dict[str, Any]) -> Structure:
-    """The structure as it was `given`, without the dashpots' default where a damping ratio stands in their place."""
+    """The structure from the values `given`.
+
+    Where they hold a damping ratio, the default of the dashpots is dropped.
+    """
     if structure.damping_ratio == 0.0 or "damping" in given:
         return structure
     return replace(structure, damping=(0.0,) * len(structure.mass))
@@ -41,18 +45,18 @@ def check(plan: Plan) -> None:
 
 
 def specimens(plan: Plan) -> dict[str, Plan]:
-    """The plan as every role with a column sees it, by what stands before its tables' names in the file."""
+    """The plan as each role with a column sees it, by the prefix of its tables' names in the file."""
     return of_kind(plan, COLUMN)
 
 
 def of_kind(plan: Plan, kind: str) -> dict[str, Plan]:
-    """The plan as every role with that kind of laboratory sees it, by what stands before its tables' names."""
+    """The plan as each role with that kind of laboratory sees it, by the prefix of its tables' names in the file."""
     hosting = [role for role, one in plan.kinds.items() if known_kind(one) == kind]
     return {f"{role}." if name_of(role) else "": plan.of(role) for role in hosting}
 
 
 def is_matrix(stiffness: StoreysOrMatrix) -> bool:
-    """Whether a stiffness is a matrix, not one value per storey."""
+    """Whether a stiffness is a matrix rather than one value per storey."""
     return any(isinstance(row, tuple) for row in stiffness)
 
 
@@ -105,8 +109,8 @@ def check_matrix(rows: Sequence[Any], storeys: int) -> None:
                 )
     if not positive_definite(rows):
         raise PlanError(
-            "stiffness in [structure] is a matrix that is not positive definite, so the building would not stand: "
-            "look at its signs."
+            "stiffness in [structure] is a matrix that is not positive definite, so the building would be unstable: "
+            "check its signs."
         )
 
 
@@ -131,7 +135,10 @@ def cholesky(rows: Sequence[Sequence[float]]) -> list[list[float]] | None:
 
 
 def stiffness_of_drift(rows: Sequence[Sequence[float]], storey: int) -> float:
-    """Stiffness (N/m) `1/(eᵀ·K⁻¹·e)` of a positive definite matrix against the drift e of a storey, from 1."""
+    """Stiffness (N/m) `1/(eᵀ·K⁻¹·e)` of a matrix K against the drift e of a storey, counted from 1.
+
+    0 where K is singular.
+    """
     factor = cholesky(rows)
     if factor is None:
         return 0.0
@@ -144,16 +151,16 @@ def stiffness_of_drift(rows: Sequence[Sequence[float]], storey: int) -> float:
 
 
 def check_damping(structure: Structure) -> None:
-    """Dashpots and a damping ratio of all modes exclude each other."""
+    """Raise PlanError where both dashpots and a damping ratio of all modes are given."""
     if structure.damping_ratio > 0.0 and any(structure.damping):
         raise PlanError(
-            f"[structure] has damping and a damping_ratio of {structure.damping_ratio:g}: give one of them, as the "
-            "ratio stands in place of the dashpots."
+            f"[structure] has damping and a damping_ratio of {structure.damping_ratio:g}: give one of them, because "
+            "the ratio replaces the dashpots."
         )
 
 
 def check_column(plan: Plan, where: str) -> None:
-    """A specimen cannot stand for more columns than its storey has, nor for a share of a matrix."""
+    """Raise PlanError where a specimen represents more columns than its storey has, or a share of a matrix."""
     column = plan.column
     if column.represents > column.columns_per_storey:
         raise PlanError(
@@ -168,7 +175,7 @@ def check_column(plan: Plan, where: str) -> None:
 
 
 def check_shares(plan: Plan, columns: Mapping[str, Plan]) -> None:
-    """The specimens of one storey cannot stand for more columns together than it has."""
+    """Raise PlanError where the specimens of one storey together represent more columns than it has."""
     by_storey: dict[int, list[tuple[str, Fraction]]] = {}
     for where, seen in columns.items():
         share = Fraction(seen.column.represents, seen.column.columns_per_storey)
@@ -177,15 +184,15 @@ def check_shares(plan: Plan, columns: Mapping[str, Plan]) -> None:
         if sum(share for _, share in shares) > 1:
             parts = ", ".join(f"{share} by {where}" for where, share in shares)
             raise PlanError(
-                f"The specimens of storey {storey} stand for more columns than it has ({parts}): lower represents, or "
+                f"The specimens of storey {storey} represent more columns than it has ({parts}): lower represents, or "
                 "place one of them in another storey."
             )
 
 
 def check_experimental(plan: Plan, columns: Mapping[str, Plan], experimental: Experimental) -> None:
-    """One specimen cannot take over more than the building has; nor all of a floor's mass or of a matrix.
+    """Raise PlanError where [structure.experimental] does not fit the one specimen or the building.
 
-    Whether a device of the user's own follows a drift is known to its class alone, so that it may be the one.
+    A device of the user's own may be the specimen, because only its class knows whether it follows a drift.
     """
     devices = of_kind(plan, OWN)
     if len(columns) > 1 or not (columns or devices):
@@ -199,7 +206,7 @@ def check_experimental(plan: Plan, columns: Mapping[str, Plan], experimental: Ex
 
 
 def check_taken_over(plan: Plan, storey: int, experimental: Experimental) -> None:
-    """What a specimen takes over of a storey must be there."""
+    """Raise PlanError where a specimen takes over more of a storey than there is, or all of a mass or of a matrix."""
     place = storey - 1
     matrix = is_matrix(plan.structure.stiffness)
     limits = {"mass": ("floor", plan.structure.mass[place])}
@@ -220,7 +227,7 @@ def check_taken_over(plan: Plan, storey: int, experimental: Experimental) -> Non
 
 
 def check_actuator(plan: Plan, where: str) -> None:
-    """Parameters belong to the model that is chosen, and servo-hydraulics move a specimen with a mass."""
+    """Raise PlanError for parameters of the model not chosen, and for servo-hydraulics without a specimen's mass."""
     actuator, plain = plan.actuator, Actuator()
     if actuator.model == "fopdt":
         if actuator.servo != ServoHydraulics():
@@ -232,8 +239,8 @@ def check_actuator(plan: Plan, where: str) -> None:
     for name in OF_FOPDT:
         if getattr(actuator, name) != getattr(plain, name):
             raise PlanError(
-                f"{name} in [{where}actuator] is of the model 'fopdt', but 'servo_hydraulic' is chosen: leave it "
-                f"out and look at [{where}actuator.servo]."
+                f"{name} in [{where}actuator] belongs to the model 'fopdt', but 'servo_hydraulic' is chosen: leave it "
+                f"out and use [{where}actuator.servo]."
             )
     if plan.column.mass == 0.0:
         raise PlanError(

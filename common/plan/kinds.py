@@ -1,6 +1,6 @@
 """The names of kinds of laboratory as a plan gives them, and the tables of a plan that each kind takes.
 
-What a kind is stands in `laboratories`; a kind of the user's is a class in a file.
+The package `laboratories` defines the kinds; a kind of the user's is a class in a file.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ TABLES_OF_KIND: Mapping[str, tuple[str, ...]] = {
 
 
 def planned(role: str, given: str) -> str:
-    """The kind of a role for which a plan gives this text, which is empty where it gives none."""
+    """The kind of a role for which a plan gives this text; the default of the role where the text is empty."""
     return given or (COLUMN if role == MASTER else TABLE)
 
 
 def known_kind(kind: str) -> str:
-    """The kind by which `TABLES_OF_KIND` knows a kind: `own` for a class of the user's."""
+    """The key of a kind in `TABLES_OF_KIND`: `own` for a class of the user's, otherwise the kind itself."""
     return OWN if ":" in kind else kind
 
 
 def check_kind(given: object, where: str) -> str:
-    """The kind as a plan gives it; raises PlanError where it is none, or where a named slave would have none."""
+    """The kind as a plan gives it; raises PlanError where it is unknown, or where a named slave is given none."""
     known = (COLUMN, TABLE) if "." in where else (COLUMN, TABLE, NONE)
     if isinstance(given, str) and (given in ("", *known) or ":" in given):
         return given

@@ -1,6 +1,6 @@
 """Limits of a plan on commands and measurements: beyond one of them a laboratory stops its rig.
 
-A limit trips, it never clamps. NaN is beyond any limit, and nothing else is beyond an infinite one.
+A limit trips the test and never clamps a value. NaN is beyond every limit, also beyond an infinite one.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ class LimitViolation(NamedTuple):
     name: str
     value: float
     limit: float
-    unit: str = ""  # of a limit that is none of the plan's own
+    unit: str = ""  # of a limit of a user's kind, which the plan's table of limits does not hold
 
     @property
     def values(self) -> dict[str, float]:
-        """What is recorded with it."""
+        """The value and the limit, as the event records them."""
         return {self.name: self.value, "limit": self.limit}
 
     @property
     def sentence(self) -> str:
-        """What was violated, by how much, in a sentence."""
+        """The value and the limit in a sentence."""
         limit = f"{self.limit:g} {UNITS.get(self.name, self.unit)}".rstrip()
         return f"{self.name} is {self.value:.6g}, beyond its limit of {limit}."
 
@@ -39,7 +39,7 @@ class LimitViolation(NamedTuple):
 
 
 class Standstill(NamedTuple):
-    """A sensor that has given one value so many times in a row."""
+    """A frozen sensor: it has given the same value `times` times in a row."""
 
     channel: str
     value: float
@@ -48,18 +48,18 @@ class Standstill(NamedTuple):
 
     @property
     def values(self) -> dict[str, float]:
-        """What is recorded with it."""
+        """The value and the number of readings, as the event records them."""
         return {self.channel: self.value, "readings": float(self.times)}
 
     def __str__(self) -> str:
         return (
-            f"{self.channel} is frozen: {self.times} readings in a row of {self.value:.6g} while its rig moved; look "
-            "at its cable and its driver, or set its noise in [sensors] to 0."
+            f"{self.channel} is frozen: {self.times} readings in a row of {self.value:.6g} while its rig moved; check "
+            "its cable and its driver, or set its noise in [sensors] to 0."
         )
 
 
 def violated(limits: Mapping[str, float], **values: float) -> LimitViolation | None:
-    """The first of some values, by the names of their limits, that is beyond its own."""
+    """The first value that is beyond its limit; None where none is. `values` go by the names of their limits."""
     for name, value in values.items():
         most = limits.get(name, math.inf)
         if not abs(value) <= most:

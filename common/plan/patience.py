@@ -1,9 +1,9 @@
-"""Safety figures of a test whose laboratories are all emulated: the machine's pauses must not end it.
+"""Safety figures of a test whose laboratories are all emulated, which pauses of the machine must not end.
 
-A rig of a user's must be at rest within milliseconds of a message that stays away. Emulated laboratories can hurt
-nobody, and they run on laptops and in containers that pause a process for tens of milliseconds. So where the plan
-names no rig, the figures that it does not write out take the values below. They follow from the plan alone, because
-every process of a test derives them for itself and their digests are compared.
+A user's rig must be brought to rest within milliseconds after messages stop coming. Emulated laboratories can damage
+nothing, and they run on laptops and in containers that pause a process for tens of milliseconds. So where the plan
+names no rig, the figures that it does not set take the values below. They follow from the plan alone, because every
+process of a test derives them for itself and their digests are compared.
 """
 
 from __future__ import annotations
@@ -17,33 +17,34 @@ from common.plan.kinds import COLUMN, OWN, TABLE, known_kind
 from common.plan.plan import OVERRUN, Plan
 from common.roles import MASTER
 
-# s. Pauses of 50 ms are to be borne; beside other load they were seen to reach 0.5 s, and four such may coincide.
+# s. Pauses of 50 ms have to be tolerated; under other load they were seen to reach 0.5 s, and four of these may
+# coincide (those of master, slave, recorder and operating system).
 PATIENCE = 2.0
-NOTICED = (
-    0.1  # s; a shorter silence is a pause that the contract expects, and is not worth a change of the mode
-)
-LOST_SHARE = (
-    0.01  # of the exchanges: one that a pause held up for 100 ms is asked again, and may count as lost
-)
-SHOCK = 10.0  # on the table's acceleration: a target that is 50 ms ahead was seen to take 53 m/s², 100 ms the double
+NOTICED = 0.1  # s: a shorter silence is an expected pause, twice 50 ms, and does not change the mode
+# Of the exchanges. One that a pause held up for 100 ms is sent again and counts as lost; 1 % of the thousand exchanges
+# allows ten such pauses during the check.
+LOST_SHARE = 0.01
+# Factor on the limit of the table's acceleration, 30 m/s² by default. After a pause of 50 ms the table took 53 m/s² to
+# reach its target, and twice as much after 100 ms; 300 m/s² covers pauses up to a quarter of a second.
+SHOCK = 10.0
 
 Figure = Callable[["Plan"], float]
 
 
 def intervals(seconds: float) -> Figure:
-    """So many intervals as a time has."""
+    """The number of intervals in a time (s), rounded up, as a function of the plan."""
     return lambda plan: math.ceil(seconds / plan.test.interval - 1e-9)
 
 
 # A slave whose commands were held up moves to the newest one within an interval: its rates then show the pause.
 FIGURES: Mapping[str, Figure] = {
-    "link.loss_timeout": lambda _: 2.5 * PATIENCE,  # beyond a silence and a pause of one's own together
+    "link.loss_timeout": lambda _: 2.5 * PATIENCE,  # longer than a partner's pause and one's own together
     "safety.hold_after": intervals(NOTICED),
     "safety.ramp_after": intervals(PATIENCE),
     OVERRUN: intervals(PATIENCE),
     "safety.message_age": lambda _: (
         PATIENCE
-    ),  # a laboratory that is behind by `overrun` sends messages as old
+    ),  # a laboratory that is late by `overrun` sends messages of that age
     "preflight.lost": lambda plan: math.ceil(LOST_SHARE * plan.preflight.exchanges),
     "preflight.late_share": lambda _: 1.0,  # late ticks are reported while the test runs
     "limits.table_velocity": lambda _: math.inf,
@@ -61,13 +62,13 @@ OF_KIND = {  # the limits among them, by the kind of laboratory whose slaves the
     COLUMN: ("actuator_velocity", "actuator_acceleration", "actuator_step", "column_error"),
 }
 TABLES = tuple(dict.fromkeys(name.partition(".")[0] for name in FIGURES))
-TOGETHER = {"safety.hold_after", "safety.ramp_after"}  # each must suit the other
+TOGETHER = {"safety.hold_after", "safety.ramp_after"}  # where the plan sets one of them neither is eased
 
 
 def eased(plan: Plan, given: Mapping[str, Any]) -> Plan:
-    """The plan with patient figures for those that `given`, the tables of its file, does not write out.
+    """The plan with eased figures for those that `given`, the tables of its file, does not set.
 
-    A figure is never made stricter than it is with a rig, and a plan that names a rig stays as it is.
+    A figure is never made stricter than it is with a rig, and a plan that names a rig is returned as it is.
     """
     if not plan.emulated:
         return plan
@@ -81,26 +82,26 @@ def eased(plan: Plan, given: Mapping[str, Any]) -> Plan:
 
 
 def foreign_to(plan: Plan) -> set[str]:
-    """The figures of kinds of laboratory that no slave of the plan hosts.
+    """The limits of the kinds of laboratory that no slave of the plan hosts.
 
-    The master's own laboratory misses no command: its late ticks are made up for one by one.
+    They are not eased: the master's own laboratory misses no command, because late ticks are caught up one by one.
     """
     hosted = {kind for role, kind in plan.kinds.items() if role != MASTER}
     return {f"limits.{name}" for kind, names in OF_KIND.items() if kind not in hosted for name in names}
 
 
 def strict(plan: Plan) -> Plan:
-    """The plan with the figures that hold beside a rig, in place of those that were eased."""
+    """The plan with the figures that hold with a rig in place of the eased ones."""
     return replace(with_figures(plan, {name: standard(name) for name in plan.eased}), eased=())
 
 
 def standard(name: str) -> float:
-    """A figure that is not written out, as it holds beside a rig."""
+    """The default of a figure, which holds with a rig where the plan does not set it."""
     return figure(Plan, name)
 
 
 def figure(plan: Plan | type[Plan], name: str) -> float:
-    """A figure of a plan by the name of its table and its own."""
+    """A figure of a plan by its name, `table.key`."""
     table, _, key = name.partition(".")
     return float(getattr(getattr(plan, table), key))
 
@@ -118,14 +119,14 @@ def with_figures(plan: Plan, figures: Mapping[str, float]) -> Plan:
 
 
 def sentence(plan: Plan) -> str:
-    """Which figures were eased, their values beside those with a rig, and why."""
+    """The eased figures with their values, those that hold with a rig in brackets, and the reason."""
     figures = (f"{name.partition('.')[2]} {figure(plan, name):g} ({standard(name):g})" for name in plan.eased)
     own = any(known_kind(kind) == OWN for kind in plan.kinds.values())
     return (
         "All laboratories are emulated, so a pause of this machine does no harm and does not end the test. "
-        f"Figures that the plan does not set are larger than beside a rig (in brackets): {', '.join(figures)}. "
-        + "Limits of a kind of your own on how its command moves do not hold. " * own
-        + "A late tick is made up for and counted."
+        f"Figures that the plan does not set are larger than with a rig (in brackets): {', '.join(figures)}. "
+        + "Limits of a kind of your own on the rates of its command are not checked. " * own
+        + "A late tick is caught up and counted."
     )
 
 

@@ -1,4 +1,4 @@
-"""The plan: one TOML file that describes a test, loaded alike by both laboratories."""
+"""The plan: one TOML file that describes a test, which every process of the test loads."""
 
 from __future__ import annotations
 
@@ -12,24 +12,26 @@ import tomli_w
 
 from common.errors import InputError
 from common.plan.kinds import NONE, TABLES_OF_KIND, known_kind, planned
-from common.plan.schema import nearest, plain
-from common.plan.tables import (
+from common.plan.laboratory_tables import (
     Actuator,
     Column,
     CompensatorTable,
     Control,
     Damper,
     DeviceTable,
-    GroundMotionTable,
     LaboratoryTable,
+    ShakingTable,
+    SlaveLaboratory,
+)
+from common.plan.schema import nearest, plain
+from common.plan.tables import (
+    GroundMotionTable,
     Limits,
     Link,
     Preflight,
     RecordingTable,
     SafetyTable,
     SensorsTable,
-    ShakingTable,
-    SlaveLaboratory,
     Structure,
     Test,
     Tolerances,
@@ -43,12 +45,12 @@ FOLLOWS_IN = "table.compensator"
 
 @dataclass(frozen=True)
 class Plan:
-    """A test, fully described; `base` is the folder that its relative paths start from.
+    """The full description of a test; `base` is the folder from which its relative paths start.
 
-    `slaves` holds the slaves by name in the order of the file; it is empty where there is one without a name.
-    `follows_in` is the table of the file that the table's compensator comes from, for sentences about it.
-    `eased` names the figures that the file does not write out and that are patient because all laboratories are
-    emulated (common/plan/patience.py).
+    `slaves` holds the slaves by name in the order of the file; it is empty where there is one slave without a name.
+    `follows_in` is the table of the file that the table's compensator comes from, for messages about it.
+    `eased` names the figures that the file does not set and that are eased because all laboratories are emulated
+    (common/plan/patience.py).
     """
 
     test: Test = Test()
@@ -83,7 +85,7 @@ class Plan:
 
     @property
     def makes_good(self) -> bool:
-        """Whether a tick that comes late is made up for: an emulated rig knows no time but its ticks."""
+        """Whether late ticks are caught up: for emulated rigs time passes by ticks only."""
         return OVERRUN in self.eased
 
     @property
@@ -97,12 +99,12 @@ class Plan:
         return round(self.test.duration / self.test.interval)
 
     def tick_ns(self, tick: int) -> int:
-        """Nominal time of a tick after the first, ns; rounded for each tick, so that nothing adds up."""
+        """Nominal time of a tick after the first, ns; each is rounded by itself, so that errors do not accumulate."""
         return round(tick * (self.test.interval * 1e9))
 
     @property
     def window(self) -> int:
-        """Intervals by which a message may be late or ahead and still be fresh."""
+        """The number of intervals by which a fresh message may be late or ahead."""
         return max(round(self.safety.message_age / self.test.interval), 1)
 
     @property
@@ -121,7 +123,7 @@ class Plan:
         return {role: kind for role, text in given.items() if (kind := planned(role, text)) != NONE}
 
     def of(self, role: str) -> Plan:
-        """The plan as the master or one slave sees it: what is its laboratory's own stands in the usual places.
+        """The plan as the master or one slave sees it: the tables of its laboratory replace the plan's common ones.
 
         Raises:
             InputError: the plan has no such slave.
@@ -160,7 +162,7 @@ class Plan:
         return replace(self, slaves=slaves, **parts)
 
     def with_ticks(self, ticks: int) -> Plan:
-        """The plan over another number of control intervals."""
+        """The plan with another number of control intervals."""
         test = replace(self.test, duration=ticks * self.test.interval)
         return replace(self, test=test)
 
@@ -177,13 +179,13 @@ class Plan:
         return tables
 
     def tables_of(self, name: str) -> dict[str, Any]:
-        """The tables of a named slave: those that its kind of laboratory takes, and its kind where it is given."""
+        """The tables of a named slave that its kind of laboratory takes, and its kind where the plan gives it."""
         lab = plain(self.slaves[name])
         wanted = (*TABLES_OF_KIND[known_kind(planned(slave_role(name), lab["kind"]))], "rig")
         return {part: lab[part] for part in (*(["kind"] if lab["kind"] else []), *wanted)}
 
     def written(self) -> dict[str, Any]:
-        """As `tables`, without the figures that were eased: beside a rig they are strict again."""
+        """As `tables`, without the eased figures, so that a plan to which a rig is added has the strict ones."""
         tables = self.tables()
         for name in self.eased:
             table, _, key = name.partition(".")
@@ -191,22 +193,22 @@ class Plan:
         return tables
 
     def toml(self) -> str:
-        """The plan as TOML text, all defaults written out but those that hold for emulated laboratories alone."""
+        """The plan as TOML text, with all defaults but those that hold for emulated laboratories only."""
         return tomli_w.dumps(self.written())
 
     def digest(self) -> str:
-        """Sixteen hex digits that agree where two plans describe the same test; the recording's folder is free."""
+        """Sixteen hex digits, equal for two plans that describe the same test; [recording] is left out of them."""
         tables = {name: table for name, table in self.tables().items() if name != "recording"}
         if self.slaves:
-            tables["order"] = list(self.slaves)  # their place decides on the order of recorded values
+            tables["order"] = list(self.slaves)  # recorded values per slave stand in this order
         text = json.dumps(tables, sort_keys=True)
         return hashlib.blake2b(text.encode(), digest_size=8).hexdigest()
 
 
-BESIDE = ("slaves", "base", "follows_in", "eased")  # no tables of a file
+BESIDE = ("slaves", "base", "follows_in", "eased")  # fields that are not tables of a file
 TABLES = tuple(name for name in Plan.__dataclass_fields__ if name not in BESIDE)
 INTERFACE = tuple(dict.fromkeys(name for names in TABLES_OF_KIND.values() for name in names))
-"""The tables that a named slave may have of its own, those of all kinds."""
+"""The tables that a named slave of any kind may have of its own."""
 
 
 def resolve(plan: Plan, path: str) -> Path:
@@ -215,12 +217,12 @@ def resolve(plan: Plan, path: str) -> Path:
 
 
 def ideal(plan: Plan) -> Plan:
-    """The plan with transfer systems that follow at once, and no compensation.
+    """The plan with transfer systems that follow their command at once, and without compensation.
 
-    The compensator's `[compensator.force]` goes with it, its unit delay too, and the actuator's command is a ramp even
-    where the plan holds it. The ramp brings the specimen to its target at the interval's end at the interval's mean
-    velocity, so that its dashpot is felt half an interval late and its mass a whole one; its spring is not late.
-    Tolerances of servo-hydraulics that the ideal actuator does not have are left out.
+    `[compensator.force]` is left out too, with its unit delay, and the actuator's command is a ramp even where the plan
+    holds it. The ramp brings the specimen to its target at the interval's end at the interval's mean velocity, so the
+    force of its dashpot is half an interval late, that of its mass a whole one, and that of its spring is not late.
+    Tolerances of servo-hydraulics are left out, because the ideal actuator has none of their parameters.
     """
     kept = {
         name: value

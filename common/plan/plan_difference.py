@@ -1,9 +1,9 @@
 """The description of a plan that processes exchange at the handshake, and the keys in which two plans differ.
 
 The text is the plan's digest, a blank, and as JSON every key that is not at its default, with the package's version.
-It stays below the length of a message's text: where values would not fit, four hex digits of each stand in their
-place, and where these do not either, the digest stands alone. Text that comes over the wire is not trusted: it is
-only compared and shown, clipped.
+It must not exceed the length of a message's text: where it would, each value is replaced by four hex digits, and where
+that is not enough the digest stands alone. Text that comes over the network is not trusted: it is only compared and
+shown, clipped.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from common.plan.patience import strict
 from common.plan.plan import Plan
 from common.protocol.codec import MOST_TEXT
 
-MOST_KEYS = 6  # named in a sentence, which is to be read at once
+MOST_KEYS = 6  # named in one sentence, which then takes about five lines of a terminal
 MOST_SHOWN = 40  # characters of a name or a value in a sentence: most keys of a plan are shorter
 VERSION = "rths"  # beside the keys, which all hold a point
 HASHED = "#"  # before the digits of a value that did not fit
 
 
 def said(plan: Plan) -> str:
-    """What a process says of its plan."""
+    """The text by which a process describes its plan to another."""
     digest, values = plan.digest(), changed(plan)
     for content in (values, {name: hashed(text) for name, text in values.items()}):
         text = f"{digest} {json.dumps(content, separators=(',', ':'))}"
@@ -35,7 +35,7 @@ def said(plan: Plan) -> str:
 
 
 def digest_of(text: str) -> str:
-    """The digest in what a process said of its plan."""
+    """The digest in a description of a plan."""
     return text.partition(" ")[0]
 
 
@@ -67,7 +67,7 @@ def hashed(text: str) -> str:
 
 
 def differences(plan: Plan, heard: str, me: str, other: str) -> str:
-    """How the plan that another process has `heard` of differs from this one, in words; `me` and `other` by role."""
+    """How the plan described by `heard` differs from this one, in words; `me` and `other` are the two roles."""
     theirs = understood(heard)
     if theirs is None:
         return f"({other} {shown(digest_of(heard))}, {me} {plan.digest()})"
@@ -84,7 +84,7 @@ def differences(plan: Plan, heard: str, me: str, other: str) -> str:
 
 
 def understood(heard: str) -> dict[str, str] | None:
-    """The keys of what another process said of its plan; None where it is nothing of the kind."""
+    """The keys in another process's description of its plan; None where the text is not valid."""
     try:
         found = json.loads(heard.partition(" ")[2])
     except (ValueError, RecursionError):

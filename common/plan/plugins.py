@@ -51,7 +51,7 @@ def _from_file(path: Path) -> ModuleType:
             "that names it."
         )
     digest = hashlib.blake2b(bytes(path.resolve()), digest_size=8).hexdigest()
-    name = f"rths_plugin_{path.stem}_{digest}"  # the same in every process, as what is compiled of it is kept by name
+    name = f"rths_plugin_{path.stem}_{digest}"  # the same in every process, because compiled kernels are kept by name
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
         raise InputError(f"{path} is no Python file.")
@@ -67,7 +67,7 @@ def construct(
     where: str,
     methods: Mapping[str, Sequence[str]] = NO_METHODS,
 ) -> Any:
-    """An instance that has `methods`, by name with their parameters.
+    """An instance of a user's class, after a check that it has all `methods`, which go by name with their parameters.
 
     Raises:
         InputError: with the class's own complaint where the options do not fit, or for a method that it lacks.
@@ -91,7 +91,7 @@ def construct(
 
 
 def unfit(method: object, parameters: Sequence[str]) -> str:
-    """What is wrong with a method that is called with so many parameters, empty where it serves."""
+    """What is wrong with a method that is called with these parameters; empty where nothing is."""
     if method is None:
         return "lacks a method"
     if not callable(method):

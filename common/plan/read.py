@@ -1,4 +1,4 @@
-"""Reads a plan: from a TOML file, a text or plain values, with command-line values in place of its own; all checked."""
+"""Reads and checks a plan: from a TOML file, a text or plain values, with values of the command line in their place."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ from typing import Any
 from common.errors import PlanError
 from common.plan import building, patience
 from common.plan.kinds import TABLES_OF_KIND, check_kind, known_kind, planned
+from common.plan.laboratory_tables import RigTable, SlaveLaboratory
 from common.plan.plan import INTERFACE, TABLES, Plan
 from common.plan.schema import fill, nearest, plain
-from common.plan.tables import RigTable, SlaveLaboratory
 from common.plan.toml_file import tables_in, text_of
 from common.roles import MASTER, slave_role
 
-# eight laboratories on one master take 0.17 ms of a tick of 2 ms (docs/reference/benchmarks.md)
+# With eight slaves the master works 0.17 ms of a tick of 2 ms (docs/reference/benchmarks.md); sixteen take about a
+# sixth of it, and more have not been measured.
 MOST_SLAVES = 16
 SLAVE_NAME = re.compile(r"[a-z][a-z0-9_]*")
 NOMINAL = ("structure", "column", "actuator", "table", "damper", "sensors")
@@ -86,7 +87,7 @@ def with_test(
 
 
 def check_laboratories(plan: Plan) -> None:
-    """Raise PlanError where a kind is none, or no process would have a laboratory."""
+    """Raise PlanError where a kind is unknown, or no process would have a laboratory."""
     for role in (MASTER, "slave"):
         check_kind(getattr(plan, role).kind, role)
     if not plan.kinds:
@@ -96,7 +97,7 @@ def check_laboratories(plan: Plan) -> None:
 
 
 def named_slaves(given: object) -> dict[str, dict[str, Any]]:
-    """The slaves that [slave] names, none where it holds the rig of the only one.
+    """The slaves that [slave] names, none where it describes the only slave, which has no name.
 
     Raises:
         PlanError: names and a rig are mixed, a name is not valid, or there are too many.
@@ -122,7 +123,7 @@ def named_slaves(given: object) -> dict[str, dict[str, Any]]:
     if "rig" in given:
         names = ", ".join(name for name in given if name != "rig")
         raise PlanError(
-            f"[slave] holds a rig beside the slaves {names}: name that one too, as [slave.NAME.rig]."
+            f"[slave] holds a rig beside the slaves {names}: give that rig to a named slave, as [slave.NAME.rig]."
         )
     if len(given) > MOST_SLAVES:
         raise PlanError(f"[slave] names {len(given)} slaves, but there may be at most {MOST_SLAVES}.")
@@ -166,7 +167,7 @@ def check_tolerances(plan: Plan) -> None:
 
 
 def uncertain(where: str, table: dict[str, Any]) -> list[str]:
-    """The parameters of a table that are uncertain: its numbers without those that are chosen freely."""
+    """The parameters of a table that may have a tolerance: its numbers without those that the plan chooses."""
     names = []
     for key, value in table.items():
         name = f"{where}.{key}"
@@ -180,7 +181,7 @@ def uncertain(where: str, table: dict[str, Any]) -> list[str]:
 
 
 def check_safety(plan: Plan) -> None:
-    """A laboratory holds before it ramps."""
+    """Raise PlanError unless a laboratory holds before it ramps."""
     safety = plan.safety
     if safety.hold_after >= safety.ramp_after:
         raise PlanError(

@@ -1,7 +1,6 @@
-"""The reality: what the laboratories really do where it is not what the plan says.
+"""The reality: how the laboratories differ from the plan.
 
-It is given to the laboratories only. Nothing of it, its name included, reaches a recording, a log or a
-report.
+It is given to the laboratories only. No part of it, including its name, reaches a recording, a log or a report.
 """
 
 from __future__ import annotations
@@ -14,10 +13,10 @@ from typing import Any
 from common.errors import PlanError
 from common.plan.building import OF_FOPDT
 from common.plan.kinds import TABLES_OF_KIND, known_kind
+from common.plan.laboratory_tables import RigTable
 from common.plan.plan import Plan
 from common.plan.read import from_tables
 from common.plan.schema import fill, nearest
-from common.plan.tables import RigTable
 from common.plan.toml_file import load_tables
 from common.roles import MASTER, SLAVE, slave_role
 
@@ -25,23 +24,23 @@ Entry = tuple[str, Mapping[str, float]]  # name of an effect of the catalogue, a
 
 TRUE_TABLES = ("ground_motion", "structure", "column", "actuator", "table", "damper", "device", "sensors")
 OF_LABORATORY = ("actuator", "column", "table", "damper", "device")  # true tables that a named slave may have
-DESIGNED = (
-    "place",
-    "ratio",
-    "scale",
-    "compensator",
-    "limits",
-)  # of [device]: chosen, never otherwise in reality
-MERGED = ("experimental", "servo", "parameters", "noise")
+# keys of [device] that the plan chooses, so that reality cannot differ in them
+DESIGNED = ("place", "ratio", "scale", "compensator", "limits")
+MERGED = (
+    "experimental",
+    "servo",
+    "parameters",
+    "noise",
+)  # inner tables that keep the keys that a reality does not give
 KNOWN = ("seed", "master", "slave", "link", "effect", *TRUE_TABLES)
 
 
 @dataclass(frozen=True)
 class Reality:
-    """What differs from the plan; the plan itself where nothing does.
+    """The true parameters, rigs and effects of a test.
 
-    `whole` is the reality of the whole test where this is that of one role alone, which `role` and `place` (of all
-    slaves, from 0) then name.
+    For a reality of one role alone, `role` and `place` (its index among the slaves) name the role, and `whole` is the
+    reality of the whole test.
     """
 
     plan: Plan  # with the true parameters in place of the nominal ones
@@ -50,9 +49,11 @@ class Reality:
     slave: RigTable
     link: RigTable = field(default_factory=RigTable)
     base: Path = Path()
-    hidden: frozenset[str] = frozenset()  # roles whose rig no recording may name
-    effects: tuple[Entry, ...] = ()  # laid over the emulated laboratories, in this order
-    only: tuple[str, ...] = ()  # the role whose laboratory each effect is laid over alone, empty for all
+    hidden: frozenset[str] = frozenset()  # roles whose rig must not be named in a recording
+    effects: tuple[Entry, ...] = ()  # applied to the emulated laboratories in this order
+    only: tuple[
+        str, ...
+    ] = ()  # for each effect the one role to whose laboratory it is applied, empty for all
     slaves: dict[str, RigTable] = field(default_factory=dict)  # by role, where the plan names them
     role: str = SLAVE
     place: int = 0
@@ -77,7 +78,7 @@ class Reality:
 
 
 def as_planned(plan: Plan) -> Reality:
-    """The laboratories are what the plan says."""
+    """The reality in which all laboratories are as planned."""
     slaves = {slave_role(name): lab.rig for name, lab in plan.slaves.items()}
     return Reality(plan, plan.test.seed, plan.master.rig, plan.slave.rig, base=plan.base, slaves=slaves)
 
@@ -122,10 +123,10 @@ def from_reality(tables: dict[str, Any], plan: Plan, base: Path) -> Reality:
 
 
 def laboratories(tables: dict[str, Any], plan: Plan) -> dict[str, dict[str, Any]]:
-    """What the reality says of master and slaves, by role.
+    """The tables of a reality for the master and the slaves, by role.
 
     Raises:
-        PlanError: it is no table, or names a slave that the plan does not.
+        PlanError: one of them is not a table, or names a slave that the plan does not have.
     """
     slaves = tables.get("slave", {})
     if plan.slaves and isinstance(slaves, dict):
@@ -152,13 +153,13 @@ def laboratories(tables: dict[str, Any], plan: Plan) -> dict[str, dict[str, Any]
 
 
 def tables_of(plan: Plan, role: str) -> tuple[str, ...]:
-    """What a reality may say of a named slave: its rig, and the true tables that its kind of laboratory takes."""
+    """The tables that a reality may give for a named slave: its rig, and those that its kind of laboratory takes."""
     taken = TABLES_OF_KIND[known_kind(plan.kinds[role])]
     return ("rig", *(name for name in OF_LABORATORY if name in taken))
 
 
 def alone(entry: Mapping[str, Any], plan: Plan) -> str:
-    """The role that an effect names by `slave` or `laboratory`, empty where it holds for all.
+    """The role that an effect names by `slave` or `laboratory`, empty where it applies to all.
 
     Raises:
         PlanError: the plan has no such laboratory, or both are given.
@@ -184,7 +185,7 @@ def alone(entry: Mapping[str, Any], plan: Plan) -> str:
 
 
 def entries(given: object) -> tuple[Entry, ...]:
-    """The effects of `[[effect]]` tables: a name and numbers; whether the catalogue knows them is seen later."""
+    """The effects of `[[effect]]` tables: a name and numbers, which are not compared with the catalogue here."""
     if not isinstance(given, list) or not all(isinstance(entry, dict) for entry in given):
         raise PlanError("effects are given as [[effect]] tables with a name and parameters.")
     result = []
@@ -201,9 +202,10 @@ def entries(given: object) -> tuple[Entry, ...]:
 
 
 def true_plan(tables: dict[str, Any], plan: Plan) -> Plan:
-    """The plan with the reality's parameters in place of its own; what holds for all slaves before a slave's own.
+    """The plan with the reality's parameters in place of its own.
 
-    Its tolerances are the plan's, whose nominal parameters they are of.
+    A table of one slave comes after the one for all slaves. The tolerances stay the plan's, because they belong to its
+    nominal parameters.
     """
     merged = plan.tables()
     del merged["tolerances"]
@@ -223,25 +225,25 @@ def true_plan(tables: dict[str, Any], plan: Plan) -> Plan:
 
 
 def true_table(name: str, planned: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
-    """A planned table with what a reality gives of it."""
+    """A planned table with the values that a reality gives for it."""
     kept = replaced(name, planned, given)
     return kept | within(kept, given)
 
 
 def check_device(tables: Mapping[str, Any], where: str) -> None:
-    """Raise PlanError where [device] gives what is chosen and cannot be otherwise in reality."""
+    """Raise PlanError where [device] gives a key that the plan chooses, so that reality cannot differ in it."""
     for key in table_of(tables, "device", where):
         if key in DESIGNED:
             raise PlanError(
-                f"{key} in [{where}] is chosen by the plan and cannot be otherwise in reality: leave it out."
+                f"{key} in [{where}] is chosen by the plan and cannot be different in reality: leave it out."
             )
 
 
 def replaced(name: str, planned: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
-    """What stays of a planned table beside what a reality gives of it.
+    """The keys of a planned table that stay beside the values that a reality gives.
 
-    Parameters of the planned actuator do not where its model is another; dashpots and a damping ratio stand in
-    each other's place where one of them is given.
+    Where the reality has another actuator model, the parameters of the planned model go. Dashpots replace a damping
+    ratio, and a damping ratio replaces dashpots.
     """
     gone: tuple[str, ...] = ()
     if name == "actuator" and given.get("model", planned.get("model")) != planned.get("model"):
@@ -254,7 +256,7 @@ def replaced(name: str, planned: Mapping[str, Any], given: Mapping[str, Any]) ->
 
 
 def within(planned: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
-    """What a reality gives of one table; a table within it whose keys are fixed keeps what is not given."""
+    """The values that a reality gives for one table; inner tables in `MERGED` keep the planned keys not given."""
     return {
         name: planned[name] | value
         if name in MERGED and isinstance(value, dict) and name in planned
@@ -272,7 +274,7 @@ def table_of(tables: Mapping[str, Any], name: str, where: str) -> dict[str, Any]
 
 
 def rig(entry: dict[str, Any], lab: str, planned: RigTable, plan_base: Path, base: Path) -> RigTable:
-    """The rig of a laboratory, with the path of its class made absolute."""
+    """The rig of a laboratory from a reality, or else as planned, with an absolute path of its class."""
     chosen, start = (planned, plan_base)
     if "rig" in entry:
         chosen, start = fill(RigTable, entry["rig"], f"{lab}.rig"), base

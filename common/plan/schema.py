@@ -1,4 +1,4 @@
-"""Dataclasses filled from TOML tables: every key, type and range is checked before anything moves."""
+"""Fills dataclasses from TOML tables, and checks every key, type and range."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ StoreysOrMatrix = tuple[Any, ...]  # one number per storey, or one row of a matr
 
 
 NAME = "[a-z0-9_-]+"
-PATTERNS = {NAME: "lower-case letters, digits, - and _"}  # of texts, in words for the user
+PATTERNS = {NAME: "lower-case letters, digits, - and _"}  # the patterns in words for the user
 
 
 @dataclasses.dataclass(frozen=True)
 class Rule:
-    """What a value must fulfil, beside its type."""
+    """The text, the unit and the allowed range of a key."""
 
     text: str
     unit: str = ""
@@ -66,7 +66,7 @@ class Rule:
 
 
 class Allowed(TypedDict, total=False):
-    """What a key allows, as `Rule` holds it."""
+    """The fields of `Rule` that describe the allowed range of a key."""
 
     unit: str
     above: float
@@ -84,10 +84,10 @@ def key(
     more: bool = False,
     **allowed: Unpack[Allowed],
 ) -> Any:
-    """Field of a plan's table: a default, a text for the reference, and what is allowed.
+    """Field of a plan's table: a text for the reference, a default, and the allowed range.
 
-    Without a default the key must be given. With `more`, the field is a dict that takes every further number of the
-    table: the parameters of a model that a registry checks by the model's name.
+    Without a default the key must be given. With `more`, the field is a dict that takes all other numbers of the table:
+    the parameters of a model, which the model's registry checks.
     """
     rule = Rule(text, **allowed)
     metadata = {"rule": rule, "more": more}
@@ -97,12 +97,12 @@ def key(
 
 
 def inner(table: type[Any]) -> Any:
-    """Field of a plan's table that is a table of its own, at its defaults where the plan does not give it."""
+    """Field of a plan's table that is itself a table, with its defaults where the plan does not give it."""
     return dataclasses.field(default_factory=table, metadata={"table": table, "more": False})
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
-    """A hint that names the known word nearest to `word`, or lists all of them."""
+    """A hint with the known word nearest to `word`, or with all known words where none is near."""
     names = sorted(known)
     match = difflib.get_close_matches(word, names, n=1)
     return f"did you mean {match[0]}?" if match else "known here: " + ", ".join(names)
@@ -170,7 +170,10 @@ def matrix_row(row: object, unit: str, name: str) -> Storeys:
 
 
 def as_type(kind: str, value: object, name: str, unit: str | None = "") -> Any:
-    """`value` as a float, int, bool, str or table; for a float an int or a text with a unit may stand, in SI `unit`."""
+    """`value` as a float, int, bool, str or table; a float may be given as an int or as a text with a unit.
+
+    Such a text is converted to the SI `unit`. Raises PlanError where the value is of another type.
+    """
     if kind == "float" and isinstance(value, int | float) and not isinstance(value, bool):
         return float(value)
     if kind == "float" and isinstance(value, str):
@@ -195,7 +198,7 @@ def in_range(value: Any, rule: Rule, name: str) -> Any:
 
 
 def plain(table: Any) -> dict[str, Any]:
-    """A table's dataclass back as nested plain values, in TOML's own types, defaults included."""
+    """The values of a table's dataclass as nested values of TOML's types, defaults included."""
     result: dict[str, Any] = {}
     for field in table_fields(table):
         value = getattr(table, field.name)

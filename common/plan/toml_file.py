@@ -1,4 +1,4 @@
-"""A TOML file of the user's as plain values, or one sentence on what is wrong with it."""
+"""Reads a user's TOML file into plain values; its errors are one sentence each."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from common.errors import PlanError
 
 
 def text_of(path: Path, kind: str) -> str:
-    """The text of a file; `kind` is what it should be, in a word. Raises PlanError where it cannot be read."""
+    """The text of a file; `kind` names what it should hold, such as "plan". Raises PlanError if it cannot be read."""
     try:
         return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
@@ -19,7 +19,7 @@ def text_of(path: Path, kind: str) -> str:
 
 
 def tables_in(text: str, name: str) -> dict[str, Any]:
-    """The tables of a TOML text; `name` stands in errors. Raises PlanError where it is none."""
+    """The tables of a TOML text; `name` stands in errors. Raises PlanError where the text is not TOML."""
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:

@@ -1,4 +1,4 @@
-"""Numbers with units in a plan: `"160 t"`, `"12.5 kN/mm"`, `"4.87 mm"`, as the SI value that the key is in."""
+"""Converts numbers with units in a plan, such as `"160 t"`, `"12.5 kN/mm"` or `"4.87 mm"`, to SI values."""
 
 from __future__ import annotations
 
@@ -14,31 +14,32 @@ if TYPE_CHECKING:
 
 NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?(?P<unit>\D.*)?$", re.DOTALL)
 ONE = r"[^\W\d]+(?:[²³]|(?:\^|\*\*)-?\d)?"  # a unit and its power
-UNIT = re.compile(
-    rf"%|\(?{ONE}\)?(?:\s*[·*/ ]\s*\(?{ONE}\)?)*\)?"
-)  # pint computes whatever it reads, 9**9**9 too
-LONGEST = 60  # characters; the longest unit that a key has takes 11
+# the units that are handed to pint, which would otherwise evaluate any expression, 9**9**9 too
+UNIT = re.compile(rf"%|\(?{ONE}\)?(?:\s*[·*/ ]\s*\(?{ONE}\)?)*\)?")
+LONGEST = (
+    60  # characters: ample for 17 digits with an exponent and for the longest unit of a key, 11 characters
+)
 ACCELERATION = "m/s²"
-ANY = (Exception,)  # pint passes on what its parser, Python's tokens and decimal raise
-OF_ACCELERATION = {"g": "g_n", "gal": "cm/s²", "Gal": "cm/s²"}  # elsewhere g is a gram and gal a gallon
+ANY = (Exception,)  # pint lets exceptions of its parser, of Python's tokenizer and of decimal through
+OF_ACCELERATION = {"g": "g_n", "gal": "cm/s²", "Gal": "cm/s²"}  # for other keys g means gram and gal gallon
 SAME = {"kp": "kgf", "Kip": "kip", "Kips": "kip", "kips": "kip", "tonf": "t * g_n", "ms2": "m/s²"}
 
 
 @cache
 def registry() -> Any:
-    """The units that pint knows, with decimal numbers, so that 4.87 mm are 0.00487 m to the last bit."""
+    """Pint's units with decimal numbers, so that 4.87 mm become exactly the float 0.00487 m."""
     import pint
 
     return pint.UnitRegistry(non_int_type=Decimal)
 
 
 def in_si(text: str, unit: str | None, name: str) -> float:
-    """The number that a text such as "12.5 kN/mm" stands for, in the SI unit of its key.
+    """The value of a text such as "12.5 kN/mm" in the SI unit of its key.
 
     Args:
-        text: a number with a unit behind it; "%" is a hundredth.
-        unit: that of the key, as in "N/m"; empty for a plain number, None where only the model knows it and any fits.
-        name: what a sentence calls the key.
+        text: a number followed by its unit; "%" is a hundredth.
+        unit: that of the key, such as "N/m"; empty for a plain number, None where any unit is accepted.
+        name: the name of the key in errors.
 
     Raises:
         PlanError: the text is no number with a unit, or its unit is one of another quantity.
@@ -53,7 +54,7 @@ def in_si(text: str, unit: str | None, name: str) -> float:
 
 
 def converted(number: Decimal, given: str, unit: str | None, name: str) -> float:
-    """A number in a unit that was given, in the unit of the key; raises PlanError where they do not fit."""
+    """A number with the unit `given`, converted to the `unit` of the key; raises PlanError where they do not fit."""
     import pint
 
     unknown = PlanError(

@@ -1,1 +1,1 @@
-"""The protocol between the processes of a test: messages, their bytes, and the states that they agree on."""
+"""The protocol between the processes of a test: messages, their encoding, and the states of a test."""

@@ -1,10 +1,10 @@
-"""Messages to bytes and back: msgpack arrays of fixed fields behind a keyed 64-bit check.
+"""Encodes messages as frames and decodes them: msgpack arrays of fixed fields, followed by a keyed 64-bit check.
 
-A frame is `msgpack([kind, field, …]) + check`. Messages of numbers alone, those of a tick among them, have each number
-in its widest form (int 64, float 64), so that all frames of such a kind have one layout. What does not have exactly the
-fields, types and ranges of a known message, or whose check fails, is rejected with a reason and reaches nobody. A
-frame's size is bounded before anything else is done with it; what msgpack makes of hostile content within that size
-takes at most some sixty bytes of memory per byte of the frame, until it is thrown away.
+A frame is `msgpack([kind, field, …]) + check`. Messages that hold numbers only, those of a tick among them, have each
+number in its widest form (int 64, float 64), so that all frames of such a kind have one layout. A frame that does not
+have exactly the fields, types and ranges of a known message, or whose check fails, is rejected with a reason. The size
+of a frame is checked first; unpacking hostile content within that size takes at most some sixty bytes of memory per
+byte of the frame, for a short time.
 """
 
 from __future__ import annotations
@@ -21,13 +21,18 @@ import msgpack
 
 from common.protocol.messages import MOST_CHANNELS, Message
 
-CHECK_SIZE = 8  # bytes: of damaged frames one in 2^64 passes
-MOST = 2**62  # of a whole number; in ns a century and a half
-# characters of a text: a rig's own words, or all keys of a plan that differ from their defaults
+CHECK_SIZE = 8  # bytes: one damaged frame in 2^64 passes
+MOST = 2**62  # largest whole number: in ns 146 years, and the sum of two still fits 64 bits
+# Characters of a text: an error message of a rig, or the keys of a plan that differ from their defaults. The plans that
+# ship need up to 2000 characters.
 MOST_TEXT = 4_000
-# bytes of a frame on any channel: twenty times the largest piece of samples, that of 100 storeys
+# Bytes of a frame on any channel: some twenty times the largest piece of samples of 100 storeys.
 MOST_FRAME = 1 << 20
-LEAST = {"shift_ns": -MOST, "command_seq": -1, "heard_seq": -1}  # of these whole numbers; 0 of all others
+LEAST = {
+    "shift_ns": -MOST,
+    "command_seq": -1,
+    "heard_seq": -1,
+}  # smallest value of these whole numbers, 0 for all others
 
 MESSAGES: tuple[type[Any], ...] = get_args(Message)
 KINDS = {message: kind for kind, message in enumerate(MESSAGES)}
@@ -49,8 +54,8 @@ class Reject(Enum):
     SENDER = "sender"
 
 
-class RejectedFrame(ValueError):  # noqa: N818 - it is a finding about a frame, counted rather than shown
-    """A frame that is no valid message."""
+class RejectedFrame(ValueError):  # noqa: N818 - it describes a frame and is counted rather than shown
+    """Raised for a frame that is not a valid message, with the reason."""
 
     def __init__(self, reason: Reject) -> None:
         super().__init__(reason.value)
@@ -67,8 +72,8 @@ ARRAY = 0x90  # msgpack's mark of an array of up to 15 items, plus their count
 def checker(names: Sequence[str], types: Sequence[type]) -> Callable[..., bool]:
     """A function that tells whether the items of a message of numbers, its kind first, are in their ranges.
 
-    It is written out as one expression: after a wake-up the caches hold other things, and each further call costs
-    more than the comparisons do.
+    It is generated as one expression, because right after a wake-up the processor's caches are cold and each function
+    call takes longer than the comparisons.
     """
     hints = dict(zip(names, types, strict=True))
     whole = [f"{LEAST.get(name, 0)} <= {name} <= {MOST}" for name in names if hints[name] is int]
@@ -80,9 +85,9 @@ def checker(names: Sequence[str], types: Sequence[type]) -> Callable[..., bool]:
 
 
 class _Layout:
-    """The payload of a message that holds numbers only: two bytes for array and kind, then a mark and eight bytes each.
+    """The payload of a message that holds numbers only: two bytes for array and kind, then nine bytes per number.
 
-    It is msgpack like any other, read and written by `struct`, which takes a third of the time.
+    It is valid msgpack, but `struct` reads and writes it, which takes a third of the time.
     """
 
     def __init__(self, names: Sequence[str], types: Sequence[type]) -> None:
@@ -92,7 +97,7 @@ class _Layout:
         self.admits = checker(names, types[1:])
         self._write = struct.Struct(">BB" + "".join(f"B{letter}" for _, letter in fields)).pack
         self.read = struct.Struct(">xB" + "".join(f"x{letter}" for _, letter in fields)).unpack
-        # the loop's thread alone encodes; the numbers of a message take their places among the marks
+        # only the loop's thread encodes, so the numbers of each message can replace those of the last one in place
         self._slots: list[Any] = [ARRAY + len(types), 0, *(item for mark in self.marks for item in (mark, 0))]
 
     def pack(self, kind: int, numbers: Sequence[int | float]) -> bytes:
@@ -104,10 +109,10 @@ class _Layout:
 
 
 class _Shape:
-    """What the items of one frame must be: exact types, whole numbers and texts in range, floats finite.
+    """The requirements on the items of one frame: exact types, whole numbers and texts in range, floats finite.
 
-    The first item is the kind of the message. Checks are calls into C wherever they can be: they run twice a tick.
-    `channels` are how many numbers stand in place of the message's last field, which is a tuple of them; 0 for none.
+    The first item is the kind of the message. The checks use functions written in C where they can, since they run
+    twice a tick. `channels` is the number of floats in the message's last field, which is a tuple of them, or 0.
     """
 
     def __init__(self, message: type[Any], channels: int = 0) -> None:
@@ -127,14 +132,14 @@ class _Shape:
         self.layout = _Layout(self.names, self.types) if set(self.types) <= NUMBERS.keys() else None
 
     def _items(self, kind: type, *, but: Container[str] = ()) -> Callable[[Sequence[Any]], tuple[Any, ...]]:
-        """What takes the items of a type out of a frame's, but for those of these names."""
+        """A function that returns the items of a type from those of a frame, without the fields named in `but`."""
         places = [
             place
             for place, name in enumerate(self.names, start=1)
             if self.types[place] is kind and name not in but
         ]
         first, *_ = places or [0]
-        # the getter of a single place gives no tuple; the kind, a small count, is a harmless second
+        # an itemgetter of one place returns no tuple, so the kind, a small whole number, is added as a second place
         return itemgetter(*places, *[first] * (2 - len(places)))
 
     def admits(self, items: Sequence[Any]) -> bool:
@@ -151,22 +156,23 @@ class _Shape:
 
 
 def is_text(text: str) -> bool:
-    """Whether a message may hold a text: not too long, and nothing in it that moves a terminal's cursor."""
+    """Whether a message may hold a text: it is not too long and all its characters are printable."""
     return len(text) <= MOST_TEXT and text.isprintable()
 
 
 def as_text(text: str) -> str:
-    """A text as a message may hold it: clipped, a space in place of what cannot be printed."""
+    """A text that a message may hold: clipped, with a space in place of each character that is not printable."""
     return text if is_text(text) else "".join(c if c.isprintable() else " " for c in text[:MOST_TEXT])
 
 
-# `msgpack.packb` allocates and frees a buffer of a megabyte with every call; this one is the loop's thread's alone
+# `msgpack.packb` allocates and frees a buffer of a megabyte with every call, so packers are kept. `PACKER` is used by
+# the loop's thread, `REPACKER` by the link's threads, which hold the interpreter's lock while they pack.
 PACKER = msgpack.Packer()
-REPACKER = msgpack.Packer()  # the link's threads', which hold the interpreter's lock while they pack
+REPACKER = msgpack.Packer()
 
 
 def shapes(message: type[Any]) -> list[_Shape]:
-    """The shapes that a message can have: one, or one per count of channels where its last field holds them."""
+    """The shapes that a message can have: one, or one per number of channels where its last field is a tuple."""
     several = get_origin(get_type_hints(message)[message._fields[-1]]) is tuple
     return [_Shape(message, count) for count in range(1, MOST_CHANNELS + 1)] if several else [_Shape(message)]
 
@@ -181,20 +187,20 @@ LAYOUTS = {
 
 
 class Key(Protocol):
-    """A keyed hash that has taken nothing in yet."""
+    """A keyed hash without any input so far."""
 
     def copy(self) -> Key:
-        """Another one like it."""
+        """A copy of the hash in its present state."""
 
     def update(self, data: bytes, /) -> None:
-        """Take in some bytes."""
+        """Add bytes to the input."""
 
     def digest(self) -> bytes:
-        """The check of what was taken in."""
+        """The check of the input."""
 
 
 def session_key(session: int, plan_digest: str) -> Key:
-    """Key of the check within a session; before one is agreed, session 0 gives a key that all share."""
+    """The key of the check within a session; session 0, before one is agreed, has a key that all processes share."""
     text = f"{session}:{plan_digest}" if session else "unregistered"
     secret = hashlib.blake2b(text.encode(), digest_size=32).digest()
     return hashlib.blake2b(digest_size=CHECK_SIZE, key=secret)
@@ -220,7 +226,7 @@ def encode(message: Message, key: Key) -> bytes:
 
 
 def fit(message: Message) -> Message:
-    """A message with its texts as a frame may hold them: a rig's own words may be long, or of several lines."""
+    """A message whose texts a frame may hold: an error message of a rig may be too long or have several lines."""
     texts = SHAPES[KINDS[type(message)]][0].texts
     fields: list[Any] = list(message)
     if all(is_text(fields[place - 1]) for place in texts):
@@ -234,8 +240,8 @@ def fit(message: Message) -> Message:
 def decode(frame: bytes, key: Key, *, allowed: Container[type] = KINDS, largest: int = MOST_FRAME) -> Message:
     """The message of a frame; raises RejectedFrame with the reason if it is not valid.
 
-    `allowed` are the kinds that may come this way, `largest` bounds the frame's bytes. A message has exactly one
-    valid frame: one that is packed in another way than by `encode` is rejected.
+    `allowed` holds the message types that may come on this route, and `largest` is the largest size in bytes. Each
+    message has exactly one valid frame: a frame that is packed in another way than by `encode` is rejected.
     """
     if not CHECK_SIZE < len(frame) <= largest:
         raise RejectedFrame(Reject.LENGTH)
@@ -261,7 +267,7 @@ NO_LAYOUT: tuple[_Shape | None, _Layout | None] = (None, None)
 
 
 def _unpacked(payload: bytes, allowed: Container[type]) -> tuple[_Shape, list[Any]]:
-    """Shape and items of a payload that has no layout of its own; raises RejectedFrame where it is no message's."""
+    """Shape and items of a payload without a fixed layout; raises RejectedFrame where it is not a message."""
     try:
         items = msgpack.unpackb(payload)
     except (ValueError, msgpack.UnpackException):

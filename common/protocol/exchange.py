@@ -1,7 +1,7 @@
-"""The protocol of a test as a table: what each laboratory may do in which state.
+"""The protocol of a test as a table: which event may happen in which state, and the state that follows.
 
-Sans-IO: no clock, socket or thread. The loops feed events in; what an event may not do in a state is
-an error that says whose fault it is.
+It contains no clock, socket or thread: the loops call it with events. An event that is not allowed in a state raises
+an error that tells whether this process or another one caused it.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from common.errors import LocalProtocolError, RemoteProtocolError
 
 
 class State(Enum):
-    """Where a laboratory stands in a test; `running` says whether ticks may go on."""
+    """The state of a laboratory in a test; `running` tells whether it runs ticks."""
 
     def __init__(self, name: str) -> None:
         self.running = name in ("scheduled", "running")
@@ -72,7 +72,7 @@ FINAL = frozenset(state for state, row in TRANSITIONS.items() if not row)
 
 
 class Exchange:
-    """One laboratory's place in the protocol, its session, and the newest message of each kind of frame."""
+    """One laboratory's state in the protocol, its session, the cause of its end, and the newest message number."""
 
     def __init__(self) -> None:
         self.state = State.IDLE
@@ -81,7 +81,7 @@ class Exchange:
         self.newest_seq = -1
 
     def happen(self, event: Event, *, remote: bool = False, cause: str = "") -> None:
-        """Move on by an event of this side, or of the other (`remote`).
+        """Go to the state that follows an event of this laboratory, or of another one where `remote`.
 
         Raises:
             LocalProtocolError, RemoteProtocolError: the table has no such event in this state.
@@ -102,7 +102,7 @@ class Exchange:
         return self.session != 0 and session == self.session
 
     def fresh(self, seq: int) -> bool:
-        """Whether a frame is newer than all before; takes note of it."""
+        """Whether a message number is higher than all before; if so it becomes the newest."""
         if seq <= self.newest_seq:
             return False
         self.newest_seq = seq

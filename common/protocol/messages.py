@@ -8,7 +8,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-MOST_CHANNELS = 6  # of a feedback: its frame then has fifteen items, as many as the shortest head counts
+MOST_CHANNELS = (
+    6  # of a feedback: its frame then has fifteen items, the most that msgpack's shortest array head counts
+)
 
 
 class Register(NamedTuple):
@@ -20,7 +22,10 @@ class Register(NamedTuple):
 
 
 class Waiting(NamedTuple):
-    """Slave to master, while it belongs to no test: a process is here; `instance` tells it from others of its name."""
+    """Slave to master, until it is registered: it is there.
+
+    `instance` is a random number that identifies the process.
+    """
 
     session: int
     instance: int
@@ -34,14 +39,14 @@ class Registered(NamedTuple):
 
 
 class Refused(NamedTuple):
-    """Slave to master: will not take part, and why."""
+    """Slave to master: it does not take part, and why."""
 
     session: int
     reason: str
 
 
 class Arm(NamedTuple):
-    """Master to slave: the process of this `instance` shall make its rig ready; any other is superfluous."""
+    """Master to slave: the process of this `instance` shall arm its rig; any other one shall leave."""
 
     session: int
     instance: int
@@ -91,7 +96,7 @@ class Command(NamedTuple):
     seq: int
     sent_ns: int
     shift_ns: int  # how far the slave's clock has drifted from the master's since the start, estimated
-    heard_seq: int  # newest feedback that came over the wire, in use or not yet; -1 for none
+    heard_seq: int  # newest feedback that came over the link, in use or not yet; -1 for none
     target: float  # of the laboratory's transfer system, m
     effort: float  # of its motor, N; 0 where it has none
     velocity: float  # of the target, m/s
@@ -105,9 +110,11 @@ class Feedback(NamedTuple):
     session: int
     seq: int
     command_seq: int  # in force
-    command_received_ns: int  # when it came, delay of a link plug-in included; told once, 0 afterwards
-    heard_seq: int  # newest command that came over the wire, in force or not yet; -1 for none
-    heard_ns: int  # when that one came
+    command_received_ns: (
+        int  # when it came, with a link plug-in's delay; in the first feedback only, 0 in later ones
+    )
+    heard_seq: int  # newest command that came over the link, in force or not yet; -1 for none
+    heard_ns: int  # when that command came
     started_ns: int  # start of the tick: the measurements are of this moment
     sent_ns: int
     measured: tuple[float, ...]  # the channels of the laboratory's kind, in its order, 1 to `MOST_CHANNELS`
@@ -122,14 +129,14 @@ class Stop(NamedTuple):
 
 
 class Stopped(NamedTuple):
-    """Slave to master: the rig is disarmed; after a trip it is the last word."""
+    """Slave to master: the rig is disarmed; after a trip this is the slave's last message."""
 
     session: int
     ticks: int
 
 
 class Trip(NamedTuple):
-    """Either way: this laboratory has stopped its rig, and why."""
+    """Laboratory to laboratory: this one has stopped its rig, and why."""
 
     session: int
     lab: str
@@ -138,7 +145,7 @@ class Trip(NamedTuple):
 
 
 class Operator(NamedTuple):
-    """Operator to the laboratories: stop, stop at once, or reset; `press` tells one press from its repetitions."""
+    """Operator to the laboratories: stop, stop at once, or reset; repetitions of one press have the same `press`."""
 
     session: int
     plan: str  # digest
@@ -148,7 +155,7 @@ class Operator(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """Laboratory to operator: what a press has led to."""
+    """Laboratory to operator: whether a press was obeyed, and a sentence."""
 
     session: int
     press: int
@@ -180,7 +187,7 @@ class Recorder(NamedTuple):
     state: str  # ready, recording, stopping, failed, done
     plan: str  # as in Register
     reason: str
-    nexts: bytes  # by role, the item that comes next
+    nexts: bytes  # by role, the number of the next item that the recorder expects (common/lab/outlet.py)
 
 
 class Resend(NamedTuple):

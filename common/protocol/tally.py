@@ -1,15 +1,15 @@
-"""What became of the messages of one direction, told at their receiving end by their numbers."""
+"""Counts at the receiving end what happened to each message of one direction, by its number."""
 
 from __future__ import annotations
 
 from collections import Counter
 
 NOT_SEEN, REJECTED, ADMITTED, USED = range(4)
-AHEAD, REPEATED = "ahead", "repeated"  # reasons of frames that the sender of a test has not sent: see Tally
+AHEAD, REPEATED = "ahead", "repeated"  # reasons that point to another sender than that of the test: see Tally
 
 
 class Tally:
-    """Admits what is fresh and keeps the fate of every number; `ticks` are those of the test.
+    """Admits fresh messages and keeps the result for every number; `ticks` is the number of ticks of the test.
 
     A message is fresh if its number is higher than all before and if it was sent within `window` intervals of its
     arrival, by the receiver's clock; a message that an interrupted transport delivers late is not fresh, nor is a
@@ -24,7 +24,7 @@ class Tally:
         self.reasons: Counter[str] = Counter()
 
     def admit(self, seq: int, expected: int) -> bool:
-        """Whether a message is fresh; `expected` is the tick in which it came."""
+        """Whether the message `seq` is fresh; `expected` is the tick in which it came. It is counted either way."""
         window, fates = self._window, self._fates
         if self._newest < seq < len(fates) and expected - window <= seq <= expected + window:
             self._newest = seq
@@ -45,26 +45,26 @@ class Tally:
         return "stale"
 
     def lose(self, seq: int) -> None:
-        """An emulated link has lost a message that was admitted."""
+        """Take note that a link plug-in has lost a message that was admitted."""
         self._fates[seq] = NOT_SEEN
 
     def use(self, seq: int) -> None:
-        """A message has come into force."""
+        """Take note that a message is in force."""
         if 0 <= seq < len(self._fates):
             self._fates[seq] = USED
 
     @property
     def used(self) -> int:
-        """Messages that came into force."""
+        """The number of messages that were in force."""
         return self._fates.count(USED)
 
     @property
     def rejected(self) -> int:
-        """Messages that came and never were in force: too late, or overtaken by a newer one."""
+        """The number of messages that came but were never in force: too late, or after a newer one."""
         return self._fates.count(REJECTED) + self._fates.count(ADMITTED)
 
     def values(self, prefix: str) -> dict[str, float]:
-        """Used and rejected messages and the frames turned away by reason, each name with a prefix."""
+        """The counts of used and rejected messages, and those of rejections by reason; each name has a prefix."""
         counts = {"used": self.used, "rejected": self.rejected} | {
             f"turned_away.{reason}": count for reason, count in sorted(self.reasons.items())
         }

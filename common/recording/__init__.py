@@ -1,4 +1,4 @@
-"""Recordings: MCAP files with protobuf messages and their schemas inside; the only package that imports that library.
+"""Recordings: MCAP files with protobuf messages and their schemas; the only package that imports the MCAP library.
 
-Everything is derived from the table in `signals.py`. A file is readable up to its last flush, finished or not.
+All schemas derive from the table in `signals.py`. A file is readable up to its last flush, finished or not.
 """

@@ -1,4 +1,4 @@
-"""The account of a recovery: what was recovered of a damaged recording, and what is lost, by topic and number."""
+"""The account of a recovery: the recovered and the lost messages of a damaged recording, by topic and number."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from common.recording.salvage import FileHole
 
 
 class Missing(NamedTuple):
-    """Messages of a topic lost with a piece of the file: sequence numbers, log times (ns) of their neighbours."""
+    """Messages of a topic lost with a part of the file: sequence numbers, and log times (ns) of the messages beside."""
 
     first: int
     last: int
@@ -20,9 +20,9 @@ class Missing(NamedTuple):
 
 @dataclass
 class Topic:
-    """What is left of a topic; `unrecorded` counts messages that were not in the file before the damage either.
+    """What was recovered of a topic; `unrecorded` counts messages that were missing before the damage too.
 
-    The numbers of the ramp to rest of a laboratory, `ramp_of`, go on behind those of its ticks; all others begin at 0.
+    The sequence of a laboratory's ramp to rest, `ramp_of`, continues that of its ticks; all others begin at 0.
     """
 
     ramp_of: str = ""
@@ -34,7 +34,7 @@ class Topic:
     holes: int = 0  # in the file before the last message
 
     def take(self, sequence: int, log_ns: int, holes: int) -> None:
-        """Take note of a message behind so many holes of the file."""
+        """Take note of a message; `holes` is the number of holes in the file before it."""
         expected = self.last[0] + 1 if self.last else sequence if self.ramp_of else 0
         if sequence > expected and holes > self.holes:
             after = self.last[1] if self.last else None
@@ -47,7 +47,7 @@ class Topic:
         self.holes = holes
 
     def end(self, written_count: int, begin: int = 0) -> None:
-        """Take note of how many messages the file held when it was finished, and of where those of a ramp may begin."""
+        """Take note of how many messages the finished file held, and of a ramp's first possible sequence number."""
         lacking = written_count - self.kept - self.lost
         if (
             self.ramp_of
@@ -65,7 +65,7 @@ class Topic:
 
     @property
     def until(self) -> int:
-        """The sequence number behind the last that was written, as far as it is known."""
+        """The sequence number after the last one written, as far as it is known."""
         last = self.last[0] if self.last else -1
         return max([last, *(hole.last for hole in self.missing)]) + 1
 
@@ -84,11 +84,11 @@ class Recovery:
     size: int
     finished: bool
     holes: list[FileHole]
-    chunks: int = 0  # whole
+    chunks: int = 0  # undamaged
     chunks_written: int | None = None  # by the summary of a finished file
     topics: dict[str, Topic] = field(default_factory=dict)
     parts: list[str] = field(default_factory=list)  # metadata and attachments that are missing or damaged
-    undefined: int = 0  # messages of a channel that nothing in the file describes any more
+    undefined: int = 0  # messages of a channel whose schema or channel record is lost
 
     @property
     def lossy(self) -> list[FileHole]:
@@ -97,24 +97,24 @@ class Recovery:
 
     @property
     def bytes_lost(self) -> int:
-        """Bytes that could not be read, without those of indices."""
+        """Bytes that could not be read, without those of chunk indices and the summary."""
         return sum(hole.end - hole.offset for hole in self.lossy)
 
     @property
     def chunks_lost(self) -> int:
-        """Chunks that are lost; of an unfinished file those whose beginning is still to be seen."""
+        """The number of lost chunks; for an unfinished file only those whose head is still readable."""
         seen = sum(hole.chunks for hole in self.lossy)
         return seen if self.chunks_written is None else max(self.chunks_written - self.chunks, 0)
 
     @property
     def complete(self) -> bool:
-        """Whether nothing is lost of what was in the file."""
+        """Whether nothing of the file's content is lost."""
         lost = any(topic.missing for topic in self.topics.values())
         return not (self.lossy or lost or self.parts or self.undefined)
 
     @property
     def origin_ns(self) -> int:
-        """Log time of sequence 0, by the first topic that tells it."""
+        """Log time (ns) of sequence 0, from the first topic with two messages."""
         for topic in self.topics.values():
             if topic.first and topic.last and topic.last[0] > topic.first[0]:
                 (first, begin), (last, end) = topic.first, topic.last

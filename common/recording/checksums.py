@@ -1,4 +1,4 @@
-"""Checksums of metadata, which have none in the format: one more metadata record that holds those of the others."""
+"""Checksums of metadata records, which MCAP does not protect: an additional metadata record holds them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import json
 import zlib
 from collections.abc import Mapping
 
-CHECKSUMS = "checksums"  # name of that record, and in it of the checksum of its other values
+CHECKSUMS = "checksums"  # name of that record, and of the value in it that is its own checksum
 
 
 def checksum(name: str, values: Mapping[str, str]) -> str:
@@ -15,16 +15,16 @@ def checksum(name: str, values: Mapping[str, str]) -> str:
 
 
 def sealed(checksums: Mapping[str, str]) -> dict[str, str]:
-    """The values of the record that holds the checksums of others by name, several of a name with a space between."""
+    """The values of the record that holds `checksums` by name; several records of one name are separated by spaces."""
     return {**checksums, CHECKSUMS: checksum(CHECKSUMS, checksums)}
 
 
 def opened(values: Mapping[str, str]) -> dict[str, str] | None:
-    """The checksums in a record of them, None where it is damaged itself."""
+    """The checksums in such a record, None where it is damaged itself."""
     others = {name: value for name, value in values.items() if name != CHECKSUMS}
     return others if sealed(others) == dict(values) else None
 
 
 def fits(name: str, values: Mapping[str, str], checksums: Mapping[str, str]) -> bool:
-    """Whether a metadata record is as it was written, as far as there is a checksum of it."""
+    """Whether a metadata record fits its checksum; True where there is none."""
     return name not in checksums or checksum(name, values) in checksums[name].split()

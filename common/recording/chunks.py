@@ -1,4 +1,4 @@
-"""Messages and their index packed in one call each, which takes a third of the time of the MCAP library's own way."""
+"""Packs messages and their index with one call each, in a third of the time of the MCAP library's own code."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mcap.opcode import Opcode
 from mcap.records import Message, MessageIndex, Statistics
 from mcap.writer import ChunkBuilder, Writer  # type: ignore[attr-defined]
 
-# of the MCAP library's writer, which has no other places to hook in
+# private attributes of the MCAP library's writer, which has no public way to replace its chunk builder
 BUILDER, STATISTICS = "_Writer__chunk_builder", "_Writer__statistics"
 MESSAGE = struct.Struct("<BQHIQQ")  # opcode, length of the record, channel, sequence, log and publish time
 INDEX = struct.Struct("<BQHI")  # opcode, length of the record, channel, bytes of the entries
@@ -22,25 +22,25 @@ ENTRY = 16  # bytes of an entry: log time and place
 
 
 class Block(NamedTuple):
-    """Messages that are encoded already, one after the other."""
+    """Encoded messages, one after the other."""
 
-    records: memoryview  # as they stand in a chunk
-    channels: list[int]  # of each message
-    entries: list[list[int]]  # each one's log time, ns, and place among the records
+    records: memoryview  # the records as a chunk holds them
+    channels: list[int]  # channel number of each message
+    entries: list[list[int]]  # log time (ns) of each message, and its offset in `records`
 
 
 class PackedIndex(MessageIndex):
-    """Where one channel's messages stand in a chunk."""
+    """The index of one channel's messages in a chunk."""
 
     def write(self, stream: RecordBuilder) -> None:
-        """Write it as one record."""
+        """Write the index as one record."""
         size = ENTRY * len(self.records)
         head = INDEX.pack(Opcode.MESSAGE_INDEX, INDEX.size - PREFIX + size, self.channel_id, size)
         stream.write(head + struct.pack(f"<{2 * len(self.records)}Q", *chain.from_iterable(self.records)))
 
 
 class PackedChunks(ChunkBuilder):
-    """Builds the same chunks as the library's builder, byte for byte."""
+    """Builds chunks that equal those of the library's builder byte by byte."""
 
     def add_message(self, message: Message) -> None:
         """Add a message to the chunk that is being built."""
@@ -57,7 +57,7 @@ class PackedChunks(ChunkBuilder):
         self.record_writer.write(head + message.data)
 
     def add_block(self, block: Block, statistics: Statistics) -> None:
-        """Add messages that are encoded already, and count them."""
+        """Add encoded messages, and count them in the statistics."""
         base, indices, counts = (
             self.record_writer.count,
             self.message_indices,
@@ -85,9 +85,10 @@ class PackedChunks(ChunkBuilder):
 
 
 def pack_messages(writer: Writer, most: int) -> Callable[[Block], None]:
-    """Have a writer that has written nothing yet pack messages so; what adds a block of encoded ones to it.
+    """Let a writer that has written nothing yet use `PackedChunks`; returns the function that adds a block to it.
 
-    A chunk of more than `most` bytes is full. A writer that builds chunks elsewhere is only slower.
+    A chunk of more than `most` bytes is full. With a version of the library that keeps its chunk builder elsewhere, the
+    function adds the messages one by one, which is slower.
     """
     statistics = getattr(writer, STATISTICS, None)
     if type(getattr(writer, BUILDER, None)) is not ChunkBuilder or type(statistics) is not Statistics:
@@ -104,7 +105,7 @@ def pack_messages(writer: Writer, most: int) -> Callable[[Block], None]:
 
 
 def add_apart(writer: Writer, block: Block) -> None:
-    """Add messages that are encoded already by the library's own means, one by one."""
+    """Add encoded messages one by one through the library's public functions."""
     ends = [place for _, place in block.entries[1:]] + [len(block.records)]
     for (_, place), end in zip(block.entries, ends, strict=True):
         _, _, channel, sequence, log_ns, publish_ns = MESSAGE.unpack_from(block.records, place)

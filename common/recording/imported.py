@@ -1,17 +1,17 @@
-"""What an imported recording says of the data logger that its channels came through.
+"""What an imported recording states about the data logger that recorded its channels.
 
-`rths import` writes a metadata record `import`, and `imported` reads it back with types:
+`rths import` writes a metadata record `import`, and `imported` reads it into typed records:
 
     found = imported(run)                                # None: the test was recorded by rths itself
     if found is not None:
         stated = found.channel(MASTER, "column_force")   # topic and name of the signal, as in `run.columns`
-        seen = stated.through(prediction, interval)      # what that logger would have recorded of a prediction
+        seen = stated.through(prediction, interval)      # as that logger would have recorded of a prediction
         step = stated.resolution                         # m, N, …: of a converter or of printed decimals
         gain = stated.calibration                        # relative tolerance of the channel's gain
         found.static, stated.interpolated, stated.rate
 
-What a map does not state is zero or None: unknown, not absent. A recording whose `import` record holds the name of
-its data alone states nothing of any channel.
+Values that the import map does not state are zero or None, which means that they are unknown. A recording whose
+`import` record holds only the name of its data states nothing about any channel.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ from numpy.typing import NDArray
 from common.errors import InputError
 
 if TYPE_CHECKING:
-    from common.recording.reader import Run
+    from common.recording.run import Run
 
 IMPORT = "import"  # metadata of an imported recording
-FILTERS = ("butterworth", "bessel")  # what stands before the converters of data loggers
+FILTERS = ("butterworth", "bessel")  # the low-pass filters usual before the converters of data loggers
 Samples = NDArray[np.float64]
 
 
@@ -46,7 +46,7 @@ class LoggerFilter:
 
     @cached_property
     def transfer(self) -> tuple[Samples, Samples]:
-        """Coefficients of numerator and denominator in s, the highest power first."""
+        """Coefficients of numerator and denominator in s (rad/s), the highest power first."""
         from scipy import signal
 
         omega = 2.0 * math.pi * self.cutoff
@@ -63,7 +63,7 @@ class LoggerFilter:
         return np.asarray(np.polyval(above, s) / np.polyval(below, s), dtype=np.complex128)
 
     def filtered(self, values: Samples, interval: float) -> Samples:
-        """A signal (ticks,) behind the filter, ramped between ticks and at its first value before them."""
+        """A signal (ticks,) after the filter, linear between ticks and constant at its first value before them."""
         from scipy import signal
 
         above, below, _ = signal.cont2discrete(self.transfer, interval, method="foh")
@@ -72,18 +72,18 @@ class LoggerFilter:
 
 @dataclass(frozen=True)
 class ImportedChannel:
-    """What is stated of one channel; SI units."""
+    """What is stated about one channel; SI units."""
 
     filter: LoggerFilter | None = None
-    delay: float = 0.0  # s, by which it was recorded too late
-    resolution: float = 0.0  # step, 0 where it is not stated
+    delay: float = 0.0  # s by which its samples are late
+    resolution: float = 0.0  # quantization step, 0 where it is not stated
     calibration: float = 0.0  # relative tolerance of its gain
-    interpolated: bool = False  # its samples did not stand on the ticks
-    rate: float = 0.0  # Hz of the data, 0 where time has no meaning
-    known: bool = False  # given as a value, not measured
+    interpolated: bool = False  # whether its samples were interpolated to the ticks
+    rate: float = 0.0  # sampling rate of the data, Hz; 0 where times have no meaning
+    known: bool = False  # whether it was given as a constant rather than measured
 
     def through(self, values: Samples, interval: float) -> Samples:
-        """What the logger would have recorded of true values (ticks,), without noise: behind its filter and delay."""
+        """True values (ticks,) as the logger would have recorded them without noise: after its filter and delay."""
         seen = self.filter.filtered(values, interval) if self.filter else values
         if self.delay == 0.0:
             return seen
@@ -96,19 +96,19 @@ NOTHING_STATED = ImportedChannel()
 
 @dataclass(frozen=True)
 class ImportedData:
-    """What is stated of the whole file, and of its channels by topic and name."""
+    """What is stated about the whole file, and about its channels by topic and name."""
 
     data: str  # name of the file that was imported
-    static: bool = False  # times have no meaning: nothing of rates or of the dynamics of sensors can be seen
+    static: bool = False  # times have no meaning, so the data show no rates and no dynamics of sensors
     channels: Mapping[str, Mapping[str, ImportedChannel]] = field(default_factory=dict)
-    as_is: bool = False  # its units and signs are the user's, whatever they look like
+    as_is: bool = False  # units and signs are not checked for plausibility, at the user's request
 
     def channel(self, topic: str, name: str) -> ImportedChannel:
-        """What is stated of a signal; of one that the map does not name nothing."""
+        """What is stated about a signal; `NOTHING_STATED` for one that the map does not name."""
         return self.channels.get(topic, {}).get(name, NOTHING_STATED)
 
     def metadata(self) -> dict[str, str]:
-        """As it stands in a recording."""
+        """The values of the metadata record."""
         tables = {
             topic: {name: _plain(row) for name, row in rows.items()} for topic, rows in self.channels.items()
         }
@@ -117,7 +117,7 @@ class ImportedData:
 
 
 def imported(run: Run) -> ImportedData | None:
-    """What an imported recording states, None where rths recorded the test itself.
+    """What an imported recording states, None for a recording of a test by rths itself.
 
     Raises:
         InputError: the metadata record is damaged.
@@ -139,13 +139,13 @@ def imported(run: Run) -> ImportedData | None:
 
 
 def exchange_known(run: Run) -> bool:
-    """Whether a recording tells which message was used when: without numbers or stamps the link cannot be judged."""
+    """Whether a recording tells which message was used when; without numbers or stamps the link cannot be judged."""
     names = {name for columns in run.columns.values() for name in columns}
     return any(name.endswith("_seq") or name.endswith("_one_way") for name in names)
 
 
 def _plain(channel: ImportedChannel) -> dict[str, Any]:
-    """What differs from nothing stated."""
+    """The stated values of a channel, without those that equal `NOTHING_STATED`."""
     empty = asdict(NOTHING_STATED)
     return {name: value for name, value in asdict(channel).items() if value != empty[name]}
 

@@ -1,7 +1,7 @@
 """The records of a recording's file one by one: where each ends, what it holds, and what a chunk unpacks to.
 
-Everything that opens a recording takes its records from here: `reader` reads on from the file's beginning up to damage,
-`salvage` looks for what is whole behind damage as well.
+All code that opens a recording takes its records from here: `reader` reads the file from its beginning up to damage,
+and `salvage` also searches for undamaged records behind damage.
 """
 
 from __future__ import annotations
@@ -20,32 +20,39 @@ from mcap.records import Chunk, McapRecord
 from mcap.stream_reader import StreamReader
 from mcap.writer import MCAP0_MAGIC
 
-# bytes of a record that is looked at: a thousand times the chunk that this software writes
-RECORD_LIMIT = 64 << 20
-DAMAGE = (McapError, ValueError, struct.error, zstandard.ZstdError, MemoryError)  # what libraries raise on it
+RECORD_LIMIT = (
+    64 << 20
+)  # bytes of the largest record that is read: a thousand chunks as this software writes them
+DAMAGE = (
+    McapError,
+    ValueError,
+    struct.error,
+    zstandard.ZstdError,
+    MemoryError,
+)  # raised by the libraries on damage
 HEAD = struct.Struct("<BQ")  # opcode and length of a record
 MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 FOOTER_SIZE = HEAD.size + 20 + len(MCAP0_MAGIC)
 
 
 class GrowingFile:
-    """A file read in pieces, as long as it is at this moment."""
+    """A file that may be growing, read in pieces; `size` is its length when the object was made."""
 
     def __init__(self, stream: io.BufferedReader) -> None:
         self._stream = stream
         self.size = stream.seek(0, io.SEEK_END)
 
     def at(self, offset: int, length: int) -> bytes:
-        """Bytes from a place on, fewer at the end."""
+        """`length` bytes from an offset on, fewer at the end of the file."""
         self._stream.seek(offset)
         return self._stream.read(length)
 
 
 def framed(source: GrowingFile, offset: int, end: int) -> tuple[int, int] | None:
-    """Opcode and end of the record at a place; None where it does not end before `end`.
+    """Opcode and end of the record at an offset; None where it does not end before `end`.
 
     Raises:
-        ValueError: its length is none of a recording's.
+        ValueError: the record is larger than `RECORD_LIMIT`.
     """
     head = source.at(offset, HEAD.size)
     if len(head) < HEAD.size:
@@ -58,20 +65,20 @@ def framed(source: GrowingFile, offset: int, end: int) -> tuple[int, int] | None
 
 
 def parsed(record: bytes) -> Any:
-    """A record, with its opcode and length, as the MCAP library reads it; a chunk stays packed."""
+    """The MCAP library's object for the bytes of a record, with its opcode and length; a chunk stays packed."""
     stream = io.BytesIO(record + MCAP0_MAGIC)  # which follows a footer
     return next(StreamReader(stream, skip_magic=True, emit_chunks=True).records)
 
 
 def written(record: McapRecord) -> bytes:
-    """A record as it stands in a file."""
+    """The bytes of a record, with its opcode and length."""
     builder = RecordBuilder()
     record.write(builder)
     return bytes(builder.end())  # type: ignore[no-untyped-call]
 
 
 def as_written(record: bytes) -> Any:
-    """A record that gives the same bytes when it is written again; raises ValueError where it does not."""
+    """The record of these bytes, if writing it again gives the same bytes; raises ValueError where it does not."""
     found = parsed(record)
     if written(found) != record:
         raise ValueError("not as written")
@@ -79,10 +86,10 @@ def as_written(record: bytes) -> Any:
 
 
 def content(chunk: Chunk) -> bytes:
-    """The records of a chunk, packed in any way that the format knows.
+    """The unpacked records of a chunk, which may be compressed in any way that MCAP defines.
 
     Raises:
-        ValueError: they are not those that were written, or more than any chunk of a recording holds.
+        ValueError: size or checksum are not those stated, or the content is larger than `RECORD_LIMIT`.
     """
     size = zstandard.frame_content_size(chunk.data) if chunk.compression == "zstd" else 0
     if max(size, chunk.uncompressed_size) > RECORD_LIMIT:
@@ -109,7 +116,7 @@ def _lz4(chunk: Chunk) -> bytes:
 
     try:
         return bytes(LZ4FrameDecompressor().decompress(chunk.data, max_length=chunk.uncompressed_size))
-    except RuntimeError as error:  # which is how the library says it
+    except RuntimeError as error:  # raised by the library on damage
         raise ValueError(str(error)) from None
 
 
@@ -123,14 +130,14 @@ def inner(data: bytes) -> Iterator[tuple[int, bytes]]:
 
 
 class RecordingSummary(NamedTuple):
-    """The end of a finished recording, where its checksum is right."""
+    """The summary section of a finished recording: its offset in the file, and its records."""
 
     start: int
     records: list[Any]
 
 
 def summary(source: GrowingFile) -> RecordingSummary | None:
-    """The summary of a finished recording; None where there is none, or a damaged one."""
+    """The summary of a finished recording; None where there is none or its checksum is wrong."""
     tail = source.at(max(source.size - FOOTER_SIZE, 0), FOOTER_SIZE)
     if len(tail) < FOOTER_SIZE or not tail.endswith(MCAP0_MAGIC) or tail[0] != Opcode.FOOTER:
         return None

@@ -1,4 +1,4 @@
-"""A finished recording of all that is whole in a damaged one, with an account of what is lost."""
+"""Writes the undamaged content of a damaged recording into a new finished one, with an account of the losses."""
 
 from __future__ import annotations
 
@@ -24,39 +24,41 @@ from common.roles import ramps_of
 from common.terminal import outputs
 
 RECOVERY = "recovery"  # metadata of a recovered recording
-DAMAGED = " (damaged)"  # after the name of what is there, but not as it was written
-SEEN_ELSEWHERE = 1_000_000  # weight of a definition under a checksum against those without
+DAMAGED = " (damaged)"  # appended to the name of a metadata record that does not fit its checksum
+# Weight of a definition under a checksum against one without. A file holds fewer copies of a definition than this (one
+# per `REPEAT_BYTES`, so 1 TB), so that copies without a checksum never outvote one with it.
+CHECKED_WEIGHT = 1_000_000
 COPIED = (Opcode.CHUNK, Opcode.METADATA, Opcode.ATTACHMENT)
 
 
 class Definitions:
-    """Schemas and channels by number: those under a checksum, else those most often found alike."""
+    """Schemas and channels by number: of several copies the one under a checksum, else the most frequent one."""
 
     def __init__(self) -> None:
         self._votes: dict[tuple[int, int], Counter[bytes]] = {}
 
     def add(self, opcode: int, record: bytes, *, sure: bool) -> None:
-        """One more copy."""
+        """Add a copy; `sure` if it was protected by a checksum."""
         votes = self._votes.setdefault((opcode, parsed(record).id), Counter())
-        votes[record] += SEEN_ELSEWHERE if sure else 1
+        votes[record] += CHECKED_WEIGHT if sure else 1
 
     def of(self, opcode: int) -> dict[int, Any]:
-        """Those of one opcode, by number."""
+        """The definitions of one opcode, by number."""
         found = sorted((number, votes) for (kind, number), votes in self._votes.items() if kind == opcode)
         return {number: parsed(votes.most_common(1)[0][0]) for number, votes in found}
 
 
 class Survey:
-    """What a file holds: the places of what is whole, the holes, and all that describes its messages."""
+    """The content of a file: the places of undamaged records, the holes, and the definitions of its messages."""
 
     def __init__(self, path: Path, source: GrowingFile) -> None:
         self.definitions = Definitions()
-        self.places: list[tuple[int, int, int]] = []  # opcode, begin and end of what is copied
+        self.places: list[tuple[int, int, int]] = []  # opcode, begin and end of each record to copy
         self.holes: list[FileHole] = []
         self.header = Header("", "rths")
         self.checksums: dict[str, str] = {}
         self.statistics: Statistics | None = None
-        self.promised: Counter[str] = Counter()  # attachments, by the summary
+        self.promised: Counter[str] = Counter()  # attachments that the summary lists, by name
         self._bounds = Bounds(path, source.size)
         end = summary(source)
         self.finished = end is not None
@@ -99,11 +101,9 @@ class Survey:
 
 
 def recover(path: Path, output: Path, *, force: bool = False) -> Recovery:
-    """Write all that is whole in a recording into a new, finished one; the account of it.
+    """Write the undamaged content of a recording into a new, finished one, and return the account of it.
 
-    A file that exists is replaced with `force` only.
-
-    Memory does not grow with the file beyond a few hundred bytes per chunk.
+    An existing output is replaced only with `force`. Memory grows by a few hundred bytes per chunk of the file.
 
     Raises:
         InputError: nothing can be recovered, a file cannot be read or written, or the output exists already.
@@ -128,7 +128,7 @@ def recover(path: Path, output: Path, *, force: bool = False) -> Recovery:
 
 
 class Copy:
-    """The output being written; what becomes of each topic goes into the account."""
+    """Writes the output, and completes the account of each topic."""
 
     def __init__(
         self, source: GrowingFile, found: Survey, account: Recovery, stream: io.BufferedWriter
@@ -142,10 +142,10 @@ class Copy:
         self._writer = Writer(stream, chunk_size=CHUNK_SIZE, compression=CompressionType.ZSTD)
 
     def write(self) -> None:
-        """Write all, and have it on the disk.
+        """Write everything, and flush it to the disk.
 
         Raises:
-            InputError: nothing describes the messages, or the file changes while it is read.
+            InputError: no definition of the messages is left, or the file changes while it is read.
         """
         account = self._account
         self._writer.start(self._survey.header.profile, self._survey.header.library)
@@ -183,7 +183,7 @@ class Copy:
         found = judge(self._source, offset, end)
         if found is None or found.opcode != opcode:
             raise InputError(
-                f"{self._account.path} changes while it is read: recover it when its recorder has ended."
+                f"{self._account.path} changes while it is read: recover it after its recorder has ended."
             )
         record = found.record
         if opcode == Opcode.CHUNK:
@@ -226,6 +226,6 @@ class Copy:
         held = [(topic, counts[number]) for number, (_, topic) in self._channels.items() if number in counts]
         for topic, count in sorted(
             held, key=lambda each: each[0].ramp_of != ""
-        ):  # where ticks end comes first
+        ):  # ramps after the ticks before them
             laboratory = self._account.topics.get(topic.ramp_of)
             topic.end(count, laboratory.until if laboratory else 0)

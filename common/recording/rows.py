@@ -1,7 +1,7 @@
 """Items of a laboratory's stream: a topic, and its values as one row of bytes.
 
-A topic of numbers alone has a fixed layout, which is packed once, where the values are computed, and which the
-recorder's kernels read; rows of any other topic, of events among them, are msgpack.
+A plain topic, which holds numbers only, has a fixed layout: the laboratory packs it once, and the recorder's kernels
+read it. Rows of any other topic, such as events, are msgpack.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from common.signals import FieldType, Signal
 
 Item = tuple[str, bytes]  # topic and row
 
-STAMPS = 16  # bytes of log and publish time, with which a row of numbers begins
+STAMPS = 16  # bytes of log and publish time at the beginning of a plain row
 HEAD = struct.Struct("<qqI")  # log and publish time in ns, and the tick
 LETTERS: Mapping[FieldType, str] = {
     FieldType.NUMBER: "d",
@@ -25,26 +25,26 @@ LETTERS: Mapping[FieldType, str] = {
     FieldType.INDEX: "i",
     FieldType.STAMP: "q",
     FieldType.FLAG: "?",
-}  # how struct names what a row holds of a signal
+}  # struct's letters for the types of signals
 
 
 def is_plain(rows: Sequence[Signal]) -> bool:
-    """Whether a topic holds numbers alone, its tick first."""
+    """Whether a topic is plain: it holds numbers only, the tick first."""
     return rows[0].kind is FieldType.COUNT and all(row.kind in LETTERS for row in rows)
 
 
 def layout(rows: Sequence[Signal], storeys: int) -> struct.Struct:
-    """A row of a plain topic: log and publish time, and all numbers in the order of the signal table."""
+    """The layout of a plain topic's row: log and publish time, and all numbers in the order of the signal table."""
     return struct.Struct("<qq" + "".join(LETTERS[row.kind] * row.count(storeys) for row in rows))
 
 
 def layouts(topics: Mapping[str, Sequence[Signal]], storeys: int) -> dict[str, struct.Struct]:
-    """The layouts of those topics that are plain."""
+    """The layouts of the plain ones among topics, by topic."""
     return {topic: layout(rows, storeys) for topic, rows in topics.items() if is_plain(rows)}
 
 
 class RowPacker:
-    """Makes items of topics; `storeys` are those of the building."""
+    """Packs values into items; `storeys` is the building's number of storeys."""
 
     def __init__(self, topics: Mapping[str, Sequence[Signal]], storeys: int) -> None:
         self._pack: dict[str, Callable[..., bytes]] = {
@@ -52,7 +52,7 @@ class RowPacker:
         }
 
     def item(self, topic: str, log_ns: int, publish_ns: int, values: Iterable[Any]) -> Item:
-        """An item; signals of several numbers stand with all of them among the values of a plain topic."""
+        """An item; for a plain topic `values` are all its numbers, those of storeys one by one."""
         pack = self._pack.get(topic)
         if pack is None:
             return other(topic, log_ns, publish_ns, values)

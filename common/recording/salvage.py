@@ -1,8 +1,9 @@
-"""What is whole in a damaged recording: every record judged by itself, and the next one found behind damage.
+"""Finds the whole records of a damaged recording: judges each by itself, and searches for the next one behind damage.
 
-A chunk is whole where its checksum is right. Any other record is whole where, read and written again, it gives the same
-bytes; of an attachment these include its checksum. A record without a checksum is not whole where a whole chunk begins
-in it: it lost bytes and runs on into the chunk. Behind damage only records count that noise does not give by chance.
+A chunk is whole if its checksum is right. Any other record is whole if reading and writing it again gives the same
+bytes; those of an attachment include its checksum. A record without a checksum is not whole if a whole chunk begins
+within it: then it has lost bytes and its length reaches into the chunk. After damage the search resumes only at records
+that random bytes do not form by chance (`ANCHORS`).
 """
 
 from __future__ import annotations
@@ -27,16 +28,17 @@ from common.recording.records import (
     inner,
 )
 
-WINDOW = 1 << 20  # bytes that are searched at a time
+WINDOW = 1 << 20  # bytes searched at a time: 1 MiB keeps the memory small and makes few calls
 ANCHORS = (Opcode.CHUNK, Opcode.ATTACHMENT, Opcode.METADATA, Opcode.SCHEMA, Opcode.CHANNEL)
-GUARDED = (Opcode.CHUNK, Opcode.ATTACHMENT)  # by a checksum of their own
-# an anchor's opcode, and a length below the limit in little-endian order; looked ahead for, since two may overlap
+GUARDED = (Opcode.CHUNK, Opcode.ATTACHMENT)  # records with a checksum of their own
+# An anchor's opcode and a little-endian length of at most `RECORD_LIMIT`; a look-ahead, because two matches may
+# overlap.
 ANCHOR = re.compile(b"(?=[" + re.escape(bytes(ANCHORS)) + rb"][\s\S]{3}[\x00-\x04]\x00{4})")
 INDEX_HEAD, INDEX_ENTRY = HEAD.size + 6, 16  # bytes of a message index, and of each message in it
 
 
 class WholeRecord(NamedTuple):
-    """A whole record: its place in the file, the record (None of a message index), and what a chunk unpacks to."""
+    """A whole record: its place in the file, the record (None for a message index), and a chunk's unpacked content."""
 
     offset: int
     end: int
@@ -46,10 +48,10 @@ class WholeRecord(NamedTuple):
 
 
 class FileHole(NamedTuple):
-    """Bytes that are no whole record, how many chunks began in them, and whether content may have been lost with them.
+    """Bytes that form no whole record, how many chunks begin in them, and whether content may be lost with them.
 
-    Nothing is lost with the index of a chunk or with the summary at the end, which are made anew. Where a chunk
-    begins in a hole that is as short as an index, the index is gone, and the chunk stands in its place.
+    The index of a chunk and the summary at the end are no loss, because they are made again. Where a chunk begins in a
+    hole that is as short as an index, bytes of the index were cut out and the chunk stands in its place.
     """
 
     offset: int
@@ -59,7 +61,7 @@ class FileHole(NamedTuple):
 
 
 def judge(source: GrowingFile, offset: int, end: int) -> WholeRecord | None:
-    """The whole record at a place, None where there is none before `end`."""
+    """The whole record at an offset, None where there is none before `end`."""
     record, data = None, b""
     try:
         frame = framed(source, offset, end)
@@ -82,7 +84,7 @@ def judge(source: GrowingFile, offset: int, end: int) -> WholeRecord | None:
 
 
 def check_index(head: bytes) -> None:
-    """Raise ValueError where a message index is not as long as its entries, whose bytes it has counted."""
+    """Raise ValueError where the length of a message index does not fit the number of bytes of its entries."""
     _, length, _, counted = struct.unpack("<BQHI", head)
     if counted != length - 6 or counted % INDEX_ENTRY:
         raise ValueError("length of the index")
@@ -90,14 +92,14 @@ def check_index(head: bytes) -> None:
 
 def overruns(source: GrowingFile, offset: int, after: int, end: int) -> bool:
     """Whether a whole chunk begins in a record without a checksum, which goes from `offset` to `after`."""
-    # with the head of a chunk that begins at its very end
+    # the bytes after the record belong to the head of a chunk that begins at the record's last byte
     data = source.at(offset, after - offset + HEAD.size - 1)
     places = (offset + found.start() for found in ANCHOR.finditer(data, HEAD.size))
     return any(chunk_end(source, place) and judge(source, place, end) for place in places)
 
 
 def chunk_end(source: GrowingFile, offset: int) -> int:
-    """The end of a chunk with a whole head, whatever its content and what follows it; 0 if there is none."""
+    """The end of a chunk whose head is whole, whatever its content; 0 where no such head is at the offset."""
     head = source.at(offset, HEAD.size + 40)
     if len(head) < HEAD.size + 40:
         return 0
@@ -137,7 +139,7 @@ def index_size(data: bytes) -> int:
 
 
 def resume(source: GrowingFile, offset: int, end: int) -> tuple[int, int]:
-    """Where the next whole record begins behind damage at `offset`, and the heads of chunks passed on the way."""
+    """The offset of the next whole record behind damage at `offset`, and how many heads of chunks were passed."""
     chunks = 0
     while offset < end:
         after = chunk_end(source, offset)
@@ -151,7 +153,7 @@ def resume(source: GrowingFile, offset: int, end: int) -> tuple[int, int]:
 
 
 def anchor(source: GrowingFile, offset: int, end: int) -> int:
-    """The next place before `end` that looks like the beginning of an anchor, else `end`."""
+    """The next offset before `end` at which the bytes match the beginning of an anchor, else `end`."""
     while offset < end:
         found = ANCHOR.search(source.at(offset, min(WINDOW, end - offset)))
         if found:

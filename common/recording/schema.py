@@ -22,7 +22,7 @@ _TYPES = {
 
 
 def message_name(topic: str) -> str:
-    """The message of a topic; those of slaves of one kind have one in common."""
+    """The name of a topic's message type, without a slave's name: `SlaveRamp` of `slave_ramp.roof`."""
     return "".join(map(str.capitalize, kind_of(topic).split("_")))
 
 

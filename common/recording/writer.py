@@ -1,4 +1,4 @@
-"""Writing a recording."""
+"""Writes a recording as an MCAP file."""
 
 from __future__ import annotations
 
@@ -24,15 +24,19 @@ from common.recording.schema import message_class, message_name, schema_file
 from common.roles import SLAVE
 from common.signals import Signal, shared
 
-CHUNK_SIZE = 64 * 1024  # bytes, unpacked: so little is lost with a damaged chunk, and it still packs well
-REPEAT_BYTES = 1 << 20  # schemas and channels, some kilobytes, stand in the file again after so much of it
+CHUNK_SIZE = (
+    64 * 1024
+)  # bytes, unpacked: a damaged chunk loses a quarter of a second, and it still compresses well
+REPEAT_BYTES = (
+    1 << 20
+)  # schemas and channels, some kilobytes, are repeated after so many bytes: less than a percent
 SIGNALS = "signals"  # metadata: by topic, JSON of name -> [unit, text]
 SHARED = "shared"  # of a channel: JSON of the fields that hold a value per slave -> the slaves' roles
-SYNC = getattr(os, "fdatasync", os.fsync)  # not every system has the cheaper one
+SYNC = getattr(os, "fdatasync", os.fsync)  # fdatasync is cheaper, but not every system has it
 
 
 class Spool:
-    """What the MCAP library writes into: held in memory until `drain`, so that it knows when a disk fails."""
+    """The stream that the MCAP library writes into: it holds all bytes until `drain`, which reports a disk's errors."""
 
     def __init__(self, stream: io.FileIO) -> None:
         self._stream = stream
@@ -40,19 +44,19 @@ class Spool:
         self._drained = 0
 
     def write(self, data: bytes) -> int:
-        """Hold some bytes."""
+        """Add bytes to those held."""
         self._held += data
         return len(data)
 
     def tell(self) -> int:
-        """The place in the file at which the next byte will stand."""
+        """The offset in the file of the next byte."""
         return self._drained + len(self._held)
 
     def flush(self) -> None:
-        """Draining is a step of its own, whose errors are dealt with."""
+        """Do nothing: `drain` writes the bytes."""
 
     def drain(self) -> None:
-        """Write what is held; raises OSError, with what was half-written cut off again."""
+        """Write the bytes held; on an OSError the part just written is cut off again, and the error is raised."""
         written = 0
         try:
             while written < len(self._held):
@@ -66,17 +70,16 @@ class Spool:
 
 
 def packed(values: Mapping[str, Any]) -> str:
-    """A table as it stands in a recording."""
+    """A table as JSON, as a recording's metadata hold it."""
     return json.dumps(values, ensure_ascii=False)
 
 
 class Recording:
     """A recording being written.
 
-    `topics` are the channels it holds, in the names of the signal table; `slaves` the roles of the test's slaves.
-    Schemas and channels stand in the first chunk, and outside chunks at the begin and once per `REPEAT_BYTES`, so that
-    no damage at one place makes the rest unreadable; metadata, which the format does not protect, have a checksum in
-    one of their own.
+    `topics` are its topics with their signals, `slaves` the roles of the test's slaves. Schemas and channels stand in
+    the first chunk, and outside chunks at the beginning and once per `REPEAT_BYTES`, so that damage at one place does
+    not make the rest unreadable. Metadata, which MCAP does not protect, have checksums in a record of their own.
     """
 
     def __init__(
@@ -93,7 +96,7 @@ class Recording:
             self._stream = path.open("wb", buffering=0)
         except OSError as error:
             raise InputError(
-                f"Cannot write the recording {path}: {error.strerror}; give a writable place with -o."
+                f"Cannot write the recording {path}: {error.strerror}; give a writable file with -o."
             ) from None
         self._spool = Spool(self._stream)
         self._writer = Writer(
@@ -104,7 +107,7 @@ class Recording:
         self._writer.start(profile="", library="rths")
         self._names = {topic: [row.name for row in rows] for topic, rows in topics.items()}
         self._classes: dict[str, type[Any]] = {}
-        self.channels: dict[str, int] = {}  # numbers under which the file knows its topics
+        self.channels: dict[str, int] = {}  # the file's channel numbers by topic
         self._numbers = dict.fromkeys(topics, 0)
         self._checksums: dict[str, str] = {}
         self._sealed = True
@@ -125,7 +128,7 @@ class Recording:
         }
 
     def _described(self, topic: str, rows: tuple[Signal, ...], storeys: int) -> int:
-        """The schema of a topic; topics with the same fields share one, others of its kind have a number."""
+        """The schema of a topic; topics with the same fields share one, different ones of a kind are numbered."""
         number = 1
         while True:
             variant = str(number) if number > 1 else ""
@@ -159,7 +162,10 @@ class Recording:
         self._define_at = self._spool.tell() + REPEAT_BYTES
 
     def add(self, topic: str, log_ns: int, publish_ns: int, values: tuple[Any, ...] | list[Any]) -> None:
-        """Write one message; `values` in the order of the signal table. The sequence is the message's seq."""
+        """Write one message; `values` are in the order of the signal table.
+
+        The sequence number is the value of `seq`.
+        """
         names = self._names[topic]
         message = self._classes[topic](**dict(zip(names, values, strict=True)))
         sequence = values[0] if names[0] == "seq" else self._numbers[topic]
@@ -169,11 +175,11 @@ class Recording:
             log_time=log_ns,
             publish_time=publish_ns,
             sequence=int(sequence) & 0xFFFFFFFF,
-            data=message.SerializeToString(deterministic=True),  # tables of an event's values in one order
+            data=message.SerializeToString(deterministic=True),  # an event's values in a fixed order
         )
 
     def add_block(self, block: Block) -> None:
-        """Write messages that are encoded already; the sequence of each is its seq."""
+        """Write encoded messages; the sequence number of each is the value of `seq`."""
         self._add_block(block)
 
     def describe(self) -> None:
@@ -208,11 +214,11 @@ class Recording:
         self._spool.drain()
 
     def sync(self) -> None:
-        """Have the operating system put it onto the disk, where there is one behind the file."""
+        """Let the operating system write the file to the disk; nothing is done for a device without storage."""
         try:
             SYNC(self._stream.fileno())
         except OSError as error:
-            if error.errno != errno.EINVAL:  # of a device that keeps nothing, as /dev/null
+            if error.errno != errno.EINVAL:  # raised for a device without storage such as /dev/null
                 raise
 
     def close(self, summary: Mapping[str, str]) -> None:
@@ -225,5 +231,5 @@ class Recording:
         self._stream.close()
 
     def abandon(self) -> None:
-        """Close without index, after the disk has failed."""
+        """Close without summary and index, after the disk has failed."""
         self._stream.close()

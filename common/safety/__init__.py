@@ -1,1 +1,1 @@
-"""How a laboratory keeps itself safe: its state machine, its watchdog, its ramp to rest."""
+"""The safety of a laboratory: its state machine, its watchdog, its ramp to rest."""

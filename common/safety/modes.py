@@ -1,7 +1,7 @@
 """The safety state machine of a laboratory as a table: what its rig may do, and how it comes to rest.
 
-It stands beside the protocol of a test (common/protocol/exchange.py), which says what the laboratories have agreed on.
-A state that is latched is left by an operator's reset alone, and only when its cause is gone.
+The protocol of a test (common/protocol/exchange.py) is a second state machine, for what the laboratories have agreed
+on. Only an operator's reset leaves a latched mode, and only when its cause is gone.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from common.errors import LocalProtocolError
 class Mode(Enum):
     """What a laboratory's rig may do."""
 
-    __hash__ = object.__hash__  # each member is one object; the library's own takes the name's, in Python
+    __hash__ = object.__hash__  # faster than the library's, which hashes the name in Python
 
     IDLE = "idle"
     CONFIGURED = "configured"
@@ -29,7 +29,7 @@ class Mode(Enum):
 
 
 class Turn(Enum):
-    """What leads from one mode to another."""
+    """A transition from one mode to another."""
 
     __hash__ = object.__hash__
 
@@ -84,22 +84,21 @@ TURNS: dict[Mode, dict[Turn, Mode]] = {
 
 LATCHED = frozenset({Mode.SAFE, Mode.EMERGENCY_STOP})
 
-STILL_LATCHED = (
-    "it is latched in its safe state since the test before: `rths reset` lets it go."  # refuses a test
-)
+# the reason with which a latched laboratory refuses a test
+STILL_LATCHED = "it is latched in its safe state since the last test: `rths reset` releases it."
 
 
 class Cause(NamedTuple):
-    """Why a laboratory came to a latched state: the first reason, which stays."""
+    """The first reason why a laboratory came to a latched mode."""
 
     code: str
     text: str
     t: float  # test time, s
-    lab: str  # where it began
+    lab: str  # the laboratory that found it
 
 
 class Safety:
-    """One laboratory's mode; `told` hears of every change as (from, turn, to)."""
+    """One laboratory's mode; `told` is called with every change as (mode before, turn, mode after)."""
 
     def __init__(self, told: Callable[[Mode, Turn, Mode], None]) -> None:
         self.mode = Mode.IDLE
@@ -108,11 +107,14 @@ class Safety:
         self._presses: set[int] = set()
 
     def allows(self, turn: Turn) -> bool:
-        """Whether a turn may be taken now."""
+        """Whether a turn is possible in the present mode."""
         return turn in TURNS[self.mode]
 
     def take(self, turn: Turn) -> None:
-        """Take a turn; raises LocalProtocolError where the table has none, or a reset that was not admitted."""
+        """Take a turn.
+
+        Raises LocalProtocolError where the mode has no such turn, or the cause is not cleared at a reset.
+        """
         row = TURNS[self.mode]
         if turn not in row or (turn is Turn.RESET and self.cause is not None):
             raise LocalProtocolError(f"'{turn.value}' is not a turn of the mode '{self.mode.value}'.")
@@ -120,39 +122,39 @@ class Safety:
         self._told(before, turn, self.mode)
 
     def follow(self, turn: Turn) -> None:
-        """Take a turn where the mode has it; elsewhere it changes nothing."""
+        """Take a turn if the present mode has it; otherwise nothing changes."""
         if self.allows(turn):
             self.take(turn)
 
     def trip(self, cause: Cause, turn: Turn = Turn.TRIP) -> None:
-        """Latch the first cause, and leave for the safe state where something could move."""
+        """Keep the first cause, and take the turn if the present mode has it."""
         if self.cause is None and (self.allows(turn) or self.mode is Mode.RAMPING):
             self.cause = cause
         self.follow(turn)
 
     def at_rest(self) -> None:
-        """The rig has come to rest at the end of its ramp."""
+        """Take note that the rig is at rest at the end of its ramp."""
         self.take(Turn.SECURED if self.cause is not None else Turn.SETTLED)
 
     def pressed(self, press: int) -> bool:
-        """Take note of an operator's press; whether it is a new one, which a repeated, held or replayed one is not."""
+        """Take note of an operator's press; returns whether it is new, rather than repeated, held or replayed."""
         new = press not in self._presses
         self._presses.add(press)
         return new
 
     def reset(self) -> None:
-        """Leave a latched state; its cause is forgotten."""
+        """Leave a latched mode and clear its cause."""
         self.cause = None
         self.take(Turn.RESET)
 
     @property
     def latched(self) -> bool:
-        """Whether only an operator's reset leads on."""
+        """Whether only an operator's reset leaves the present mode."""
         return self.mode in LATCHED
 
     @property
     def moving(self) -> bool:
-        """Whether commands go to the rig."""
+        """Whether commands are written to the rig."""
         return self.mode in (Mode.RUNNING, Mode.HOLDING, Mode.RAMPING)
 
 

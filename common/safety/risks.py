@@ -1,4 +1,4 @@
-"""Risks by name: reasons not to move a rig, which a user may take by their names."""
+"""Risks by name: reasons not to move a rig, which a user may accept by name."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ NAMES = ("partition", "peaks", "sensors", "link", "disk")
 
 
 class Risk(NamedTuple):
-    """One reason not to move; the sentence says what, with which figures, and what to do."""
+    """One reason not to move a rig; the sentence states it with its figures and a remedy."""
 
     name: str
     sentence: str
 
 
 def known(names: Iterable[str]) -> tuple[str, ...]:
-    """The names of risks that somebody accepts, each once.
+    """The names of the accepted risks, each once.
 
     Raises:
         InputError: there is no such risk.

@@ -1,4 +1,4 @@
-"""A change of speed with bounded acceleration and jerk, in closed form."""
+"""A change of velocity with bounded acceleration and jerk (S-curve), in closed form."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from math import copysign, sqrt
 
 
 class SpeedChange:
-    """From one speed (m/s) to another without acceleration at either end: jerk, constant acceleration, jerk back.
+    """From velocity `before` to `after` (m/s), with zero acceleration at both ends.
 
-    `acceleration` (m/s²) is reached where the change is large enough, `jerk` (m/s³) always.
+    The profile has constant jerk, constant acceleration, and constant jerk back. The bound `acceleration` (m/s²) is
+    reached if the change is large enough, the bound `jerk` (m/s³) always.
     """
 
     def __init__(self, before: float, after: float, acceleration: float, jerk: float) -> None:
@@ -22,10 +23,10 @@ class SpeedChange:
         self._whole = 0.5 * (before + after) * self.duration  # the profile is symmetric
 
     def travel(self, t: float) -> float:
-        """How far it has come (m) a time (s) after its begin."""
+        """The displacement (m) at the time t (s) after the beginning."""
         if t >= self.duration:
             return self._whole + (self._after * (t - self.duration) if self._after else 0.0)
-        if t > self._rise + self._flat:  # the way back from its end
+        if t > self._rise + self._flat:  # computed backwards from the end
             left = self.duration - t
             return self._whole - self._after * left + self._jerk * left**3 / 6.0
         first = min(t, self._rise)

@@ -1,7 +1,7 @@
 """The application's watchdog: how many intervals ago the last fresh message came.
 
-The transport's own liveness is not asked: eclipse-zenoh notices a dead peer after its lease, long after a rig
-has to be at rest.
+The transport's own liveness is not used: eclipse-zenoh notices a dead peer after its lease of a second, when a rig
+must have been at rest for long.
 """
 
 from __future__ import annotations
@@ -12,22 +12,22 @@ from common.plan.tables import SafetyTable
 
 
 class WatchdogFinding(IntEnum):
-    """What the watchdog wants at a tick; the worse, the higher."""
+    """The watchdog's finding at a tick, in the order of severity."""
 
     FINE = 0
     HOLD = 1
     RAMP = 2
 
 
-ROUND_TRIP = 2  # intervals that an echo may be later than a message: it has gone both ways
+ROUND_TRIP = 2  # intervals by which an echo may lag behind a message, because it has travelled both ways
 
 
 class Watchdog:
-    """Counts own intervals without a fresh message, and those in which the echo of one's own has not moved.
+    """Counts intervals without a fresh message, and intervals in which the echoed message number did not advance.
 
-    A partner that sends does not necessarily receive: the number that its messages echo must advance as well, with a
-    round trip of allowance. Intervals in which the own loop came too late are not counted; the limit `overrun`
-    is for those.
+    A partner that sends does not necessarily receive: the number of one's own newest message, which its messages echo,
+    must advance too, with an allowance of a round trip. Intervals in which this loop itself was late are not counted;
+    the limit `overrun` is for those.
     """
 
     def __init__(self, safety: SafetyTable, interval: float) -> None:
@@ -38,15 +38,14 @@ class Watchdog:
 
     @property
     def missed(self) -> int:
-        """Intervals of silence, by messages or by echoes beyond their round trip."""
+        """Intervals of silence: without a message, or without an echo beyond the allowance."""
         unanswered = self._unechoed - ROUND_TRIP
         return unanswered if unanswered > self._unheard else self._unheard
 
     def look(self, tick: int, seq: int, echo: int) -> WatchdogFinding:
-        """One interval: the tick whose message is due, the newest one's own number, and the one it echoes.
+        """Count an interval: the message of `tick` is due, the newest one has the number `seq` and echoes `echo`.
 
-        Until the first message has come, it may be as late as a message may be old: the delay of a link is not
-        silence.
+        The first message may be late by `message_age`, because a link with a delay is not silent.
         """
         fresh = seq > self._seq and tick - seq <= self._age
         if fresh and echo > self._echo >= 0:  # as in nearly every tick

@@ -1,1 +1,1 @@
-"""What every command shares: options, errors as one sentence, files that it writes, safe text."""
+"""What every command shares: options, errors as one sentence, output files, text that is safe for a terminal."""

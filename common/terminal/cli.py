@@ -1,4 +1,4 @@
-"""What the three processes share at their command lines: options, reports, errors as one sentence."""
+"""What all command lines share: options, reports, errors as one sentence."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser that puts a wrong command line into one sentence."""
+    """A parser that reports a wrong command line in one sentence."""
 
     def error(self, message: str) -> NoReturn:
-        """Say what is wrong and where help is; exit code 2."""
+        """Print what is wrong and where help is, and exit with code 2."""
         self.exit(2, f"rths: {shown(message)}; see {self.prog} --help.\n")
 
 
@@ -62,7 +62,7 @@ def plan_arguments(parser: argparse.ArgumentParser, *, optional: bool = False) -
 
 
 def reality_argument(parser: argparse.ArgumentParser) -> None:
-    """The option that says what the laboratory really does."""
+    """The option for the file of the reality."""
     parser.add_argument(
         "--reality",
         type=Path,
@@ -72,7 +72,7 @@ def reality_argument(parser: argparse.ArgumentParser) -> None:
 
 
 def connect_argument(parser: argparse.ArgumentParser) -> None:
-    """The option that says where the master is."""
+    """The option for the master's endpoint."""
     parser.add_argument(
         "--connect",
         default=DEFAULT_ENDPOINT,
@@ -82,29 +82,30 @@ def connect_argument(parser: argparse.ArgumentParser) -> None:
 
 
 def rt_arguments(parser: argparse.ArgumentParser) -> None:
-    """Options of a laboratory's process: how real time it shall be."""
+    """The option for the real-time mode of a laboratory's process."""
     parser.add_argument(
         "--rt",
         choices=realtime.MODES,
         default="auto",
-        help="real-time priority, locked memory, own processor: as available (auto), all or refuse (on), none (off)",
+        help="real-time priority, locked memory, own processor: what is available (auto), all or no test (on), none "
+        "(off)",
     )
 
 
 def processor_argument(parser: argparse.ArgumentParser) -> None:
-    """The option that binds a laboratory's process."""
+    """The option that binds a laboratory's process to a processor."""
     parser.add_argument(
         "--processor", type=int, metavar="N", help="the one processor to run on (default: any)"
     )
 
 
 def recording_argument(parser: argparse.ArgumentParser, more: str = "", **options: Any) -> None:
-    """FILE, the recording that a command reads; `more` is said of it."""
+    """FILE, the recording that a command reads; `more` is added to its help text."""
     parser.add_argument("file", type=Path, metavar="FILE", help=f"a recording (MCAP){more}", **options)
 
 
 def output_argument(parser: argparse.ArgumentParser, metavar: str, text: str, **options: Any) -> None:
-    """The option that says where a command writes."""
+    """The option for the output of a command."""
     parser.add_argument("-o", "--output", type=Path, metavar=metavar, help=text, **options)
 
 
@@ -124,60 +125,61 @@ def force_argument(parser: argparse.ArgumentParser) -> None:
 
 
 def accept_argument(parser: argparse.ArgumentParser) -> None:
-    """The option that takes a risk by its name; `accepted_risks` reads it."""
+    """The option that accepts a risk by its name; `accepted_risks` reads it."""
     parser.add_argument(
         "--accept-risk",
         action="append",
         default=[],
         metavar="NAME",
-        help=f"run although pre-flight names this risk ({', '.join(risks.NAMES)}); may be repeated, is recorded",
+        help=f"run the test although pre-flight finds this risk ({', '.join(risks.NAMES)}); may be repeated, and is "
+        "recorded",
     )
 
 
 def accepted_risks(args: argparse.Namespace) -> tuple[str, ...]:
-    """Names of the risks that the command line accepts; raises InputError for an unknown name."""
+    """The names of the risks that the command line accepts; raises InputError for an unknown name."""
     return risks.known(args.accept_risk)
 
 
 def load_plan(args: argparse.Namespace) -> Plan:
-    """The plan that the command line asks for; raises PlanError."""
+    """The plan of the command line with its options; raises PlanError."""
     return plans.with_test(
         plans.load(plan_path(args.plan)), duration=args.duration, scale=args.scale, seed=args.seed
     )
 
 
 def plan_path(name: str | None) -> Path:
-    """The file behind the name of a plan that ships, or the path itself."""
+    """The file of a plan that ships, by its name, or the path itself."""
     if name is None or (name in SHIPPED and not Path(name).exists()):
         return Path(__file__).resolve().parents[2] / "rths" / "plans" / f"{name or 'default'}.toml"
     return Path(name)
 
 
 def load_reality(path: Path | None, plan: Plan) -> Reality:
-    """The reality of the command line, the plan itself where there is none; raises PlanError."""
+    """The reality of the command line, as planned where there is none; raises PlanError."""
     return realities.load(path, plan) if path else realities.as_planned(plan)
 
 
 def json_report(kind: str, data: Mapping[str, Any]) -> None:
-    """One JSON object per line on standard output; a test goes on where its reader has gone."""
+    """Print one JSON object per line on standard output; a test goes on even if its reader has closed the pipe."""
     with contextlib.suppress(OSError):
         sys.stdout.write(json.dumps({"kind": kind, **data}) + "\n")
         sys.stdout.flush()
 
 
 def text_report(kind: str, data: Mapping[str, Any]) -> None:
-    """Plain lines on standard error."""
+    """Print plain lines on standard error."""
     if line := plain(kind, data):
         say(line)
 
 
 def reporter(as_json: bool, duration: float) -> Report:
-    """The report that the command line asks for, of a test of `duration` s."""
+    """The report that the command line asks for; `duration` is that of the test, s."""
     return json_report if as_json else PlainReport(duration)
 
 
 def guarded(main: Callable[[], int]) -> int:
-    """Run a command; a user's mistake becomes one sentence on standard error and an exit code."""
+    """Run a command; an RthsError becomes one sentence on standard error and an exit code."""
     try:
         with interruptible(), escaping():
             return answered(main)
@@ -190,7 +192,10 @@ def guarded(main: Callable[[], int]) -> int:
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C as a class of its own: a KeyboardInterrupt in `exec` makes Python end by the signal, whatever the code."""
+    """Raised for Ctrl-C.
+
+    A plain KeyboardInterrupt within `exec` would make Python end by the signal, without the exit code.
+    """
 
 
 def interrupt(*_: object) -> NoReturn:
@@ -200,7 +205,7 @@ def interrupt(*_: object) -> NoReturn:
 
 @contextlib.contextmanager
 def interruptible() -> Iterator[None]:
-    """Within the context Ctrl-C raises Interrupted, unless a handler of its own is set."""
+    """Let Ctrl-C raise Interrupted within the context, unless another handler is set."""
     ours = threading.current_thread() is threading.main_thread()
     ours = ours and signal.getsignal(signal.SIGINT) is signal.default_int_handler
     if ours:
@@ -213,9 +218,9 @@ def interruptible() -> Iterator[None]:
 
 
 def answered(main: Callable[[], int]) -> int:
-    """Run a command and write out all its output, so that a closed pipe is noticed here and not at exit.
+    """Run a command and flush its output, so that a closed pipe is noticed here and not at exit.
 
-    Where an error ends the command, its exit code stays, although the reader of the output has gone.
+    Where an error ends the command, its exit code stays even if the reader of the output has closed the pipe.
     """
     try:
         return main()
@@ -232,7 +237,7 @@ def answered(main: Callable[[], int]) -> int:
 
 
 def complained(text: str, code: int) -> int:
-    """Say an error after all that was printed before it; its exit code."""
+    """Print an error after all earlier output; returns its exit code."""
     drain()
     with contextlib.suppress(OSError):  # a terminal that was closed
         sys.stderr.write(f"rths: {shown(text)}\n")
@@ -240,7 +245,7 @@ def complained(text: str, code: int) -> int:
 
 
 def drain() -> None:
-    """Write what standard output still holds; nowhere, where its reader has gone."""
+    """Flush standard output; the rest is discarded where its reader has closed the pipe."""
     try:
         sys.stdout.flush()
     except BrokenPipeError:
@@ -248,5 +253,5 @@ def drain() -> None:
 
 
 def unread() -> None:
-    """The reader of standard output has gone: discard what is still to be written."""
+    """Discard all further output, because the reader of standard output has closed the pipe."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

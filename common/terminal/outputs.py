@@ -1,8 +1,8 @@
-"""Where commands write: nothing that exists is replaced unless the user insists, and nothing half-done is left.
+"""Output files of commands: existing files are replaced only with --force, and no incomplete file is left.
 
-A command judges its outputs before it begins to work (`checked`), then makes them. What is computed goes into a
-temporary file beside its place and takes its name when it is whole (`writing`). A recording that is written while a
-test runs must be readable at any moment, so its name is taken at once (`reserved`).
+A command checks its outputs before it begins to work (`checked`). Results are written into a temporary file in the
+same folder, which is renamed when it is complete (`writing`). A recording must be readable while the test runs, so its
+name is taken at once (`reserved`).
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from typing import TextIO
 
 from common.errors import InputError
 
-MODE = 0o666  # less the user's umask, as of any new file
+MODE = 0o666  # before the user's umask, as for any new file
 STANDARD = {"/dev/stdout": 1, "/dev/fd/1": 1, "/proc/self/fd/1": 1, "/dev/stderr": 2}
 
 
 def checked(path: Path, force: bool = False, inputs: Iterable[Path] = ()) -> Path:
-    """The path itself, where a command that reads `inputs` may write a file there.
+    """The path itself, if a command that reads `inputs` may write a file there.
 
     Raises:
         InputError: a file is there and `force` is not given, it is one of the inputs, or no file can be written there.
@@ -37,7 +37,7 @@ def checked(path: Path, force: bool = False, inputs: Iterable[Path] = ()) -> Pat
             raise InputError(f"Cannot write {path}: the command reads it; give another name for the output.")
     folder = path.parent
     if not (there(folder) and folder.is_dir()):
-        raise InputError(f"There is no folder {folder} for {path.name}: make it, or give another name.")
+        raise InputError(f"There is no folder {folder} for {path.name}: create it, or give another name.")
     taken = there(path)
     if taken and path.is_dir():
         raise InputError(f"Cannot write {path}: it is a folder; give the name of a file.")
@@ -49,7 +49,7 @@ def checked(path: Path, force: bool = False, inputs: Iterable[Path] = ()) -> Pat
 
 
 def there(path: Path) -> bool:
-    """Whether the name is taken, be it by a link that leads nowhere; raises InputError where no file can have it."""
+    """Whether the name is taken, even by a broken link; raises InputError where no file can have that name."""
     try:
         path.lstat()
     except FileNotFoundError:
@@ -60,7 +60,7 @@ def there(path: Path) -> bool:
 
 
 def exists(path: Path) -> InputError:
-    """The error of a command that would replace a file."""
+    """The error for an output that would replace a file."""
     return InputError(f"{path} exists and is not replaced: give another name, or --force to replace it.")
 
 
@@ -73,7 +73,7 @@ def same(one: Path, other: Path) -> bool:
 
 
 def is_stream(path: Path) -> bool:
-    """Whether a path is a pipe, a device or the command's own standard output: there is nothing to replace in it."""
+    """Whether a path is a pipe, a device or the command's own standard output, which hold nothing to replace."""
     if str(path) in STANDARD:
         return True
     try:
@@ -84,20 +84,20 @@ def is_stream(path: Path) -> bool:
 
 
 def aside(*paths: Path | None) -> TextIO:
-    """Where a command says what it has done: standard error where one of its outputs is the standard output."""
+    """The stream for a command's messages: standard error where one of its outputs is the standard output."""
     return sys.stderr if any(STANDARD.get(str(path)) == 1 for path in paths) else sys.stdout
 
 
 def target(path: Path) -> Path:
-    """The file that a path means: what links lead to."""
+    """The file that a path leads to through all links."""
     return Path(os.path.realpath(path))
 
 
 @contextlib.contextmanager
 def writing(path: Path, force: bool = False, inputs: Iterable[Path] = ()) -> Iterator[Path]:
-    """A temporary file to fill in the context; at its end it takes the name `path`, and after an error it is gone.
+    """A temporary file to fill within the context; at its end it is renamed to `path`, after an error it is removed.
 
-    It has the ending of `path`. A stream gets it as a whole at the end.
+    It has the suffix of `path`. If `path` is a stream, the file's content is written into it at the end.
 
     Raises:
         InputError: a file is there and `force` is not given, or none can be written.
@@ -123,14 +123,14 @@ def writing(path: Path, force: bool = False, inputs: Iterable[Path] = ()) -> Ite
 
 
 def named(temporary: Path, path: Path, place: Path, force: bool) -> None:
-    """Give a file its name; raises InputError where another command took the name meanwhile."""
+    """Rename the temporary file; raises InputError where another command has taken the name meanwhile."""
     if not force:
         claim(path)
     temporary.replace(path if not force else place)
 
 
 def claim(path: Path) -> None:
-    """Make an empty file and so reserve its name; raises InputError where a file is there."""
+    """Create an empty file to reserve its name; raises InputError where a file is there."""
     try:
         os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, MODE))
     except FileExistsError:
@@ -140,7 +140,7 @@ def claim(path: Path) -> None:
 
 
 def poured(file: Path, path: Path) -> None:
-    """Write a file's content into a stream, behind what was printed before."""
+    """Write a file's content into a stream, after all earlier output."""
     sys.stdout.flush()
     number = STANDARD.get(str(path))
     with file.open("rb") as source, open(path if number is None else os.dup(number), "wb") as sink:  # noqa: PTH123 - a descriptor
@@ -155,9 +155,9 @@ def write_text(path: Path, text: str, force: bool = False) -> None:
 
 @contextlib.contextmanager
 def reserved(path: Path, force: bool = False) -> Iterator[Path]:
-    """A file that is this command's from now on, for a recording to begin in; gone after the context if still empty.
+    """Reserve a file for a recording that begins later; it is removed after the context if it is still empty.
 
-    With `force` a file that exists stays as it is until the recording begins.
+    With `force` an existing file stays as it is until the recording begins.
 
     Raises:
         InputError: a file is there and `force` is not given, or none can be written.
@@ -175,7 +175,7 @@ def reserved(path: Path, force: bool = False) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def free_name(folder: Path, stem: str, ending: str) -> Iterator[Path]:
-    """A new file of the name `stem` that is this command's, `stem-2` where it is taken; gone if it stays empty.
+    """Reserve a new file named `stem`, or `stem-2` and so on where it is taken; it is removed if it stays empty.
 
     Raises:
         InputError: none can be written there.
@@ -197,7 +197,7 @@ def free_name(folder: Path, stem: str, ending: str) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def folder(path: Path, force: bool = False) -> Iterator[Path]:
-    """A folder for the files of a command, made where there is none; gone if it was made and stays empty.
+    """A folder for the files of a command, created if there is none; it is removed if it was created and stays empty.
 
     Raises:
         InputError: there are files in it and `force` is not given, or none can be written there.

@@ -1,4 +1,4 @@
-"""What a process of a test says on standard error: each thing once, in plain lines."""
+"""The report of a process on standard error in plain lines, each error once."""
 
 from __future__ import annotations
 
@@ -9,23 +9,25 @@ from typing import Any
 
 from common.terminal.printable import shown
 
-LINE_EVERY = 5.0  # s of test from one line of progress to the next, where there is no terminal to draw on
+LINE_EVERY = (
+    5.0  # s of test between two lines of progress, where there is no terminal: eight for the default test
+)
 
 
 class PlainReport:
-    """Lines of one process; `duration` is that of the test, s.
+    """The lines of one process; `duration` is that of the test, s.
 
-    The error that ends a laboratory's test is said when it happens, with the mark of a command's last word, because
-    the ramp to rest and a reset may take long: whoever passes it on afterwards does not repeat it.
+    The error that ends a laboratory's test is printed when it happens, in the form of a command's error, because the
+    ramp to rest and a reset may take long. `errors` holds it, so that the command does not print it again at its end.
     """
 
     def __init__(self, duration: float) -> None:
-        self.errors: set[str] = set()  # what was said of them
+        self.errors: set[str] = set()  # texts of the errors printed
         self._duration = duration
         self._next = 0.0
 
     def __call__(self, kind: str, data: Mapping[str, Any]) -> None:
-        """Say one report, where it is for the user."""
+        """Print one report, if it is for the user."""
         if kind == "progress":
             self._progress(data)
             return
@@ -42,14 +44,14 @@ class PlainReport:
 
 
 def say(line: str) -> None:
-    """Write a line, as long as anybody reads it: a closed terminal ends no test."""
+    """Print a line; a closed terminal is ignored, since it must not end a test."""
     with contextlib.suppress(OSError):
         sys.stderr.write(shown(line) + "\n")
         sys.stderr.flush()
 
 
 def plain(kind: str, data: Mapping[str, Any]) -> str:
-    """A report as a line, empty where it is for programs only."""
+    """A report as a line, an empty text where it is for programs only."""
     match kind:
         case "state":
             return f"{data['lab']}: {data['state']}"

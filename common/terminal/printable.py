@@ -1,10 +1,10 @@
-r"""Text that comes from elsewhere, made safe for a terminal: what would act on it is written out instead.
+r"""Makes text of other origin safe for a terminal: characters that control the terminal are escaped.
 
 A recording, a plan or a message may hold escape sequences, which move the cursor, set the window's title, hide a link
-or change what a reader sees of the lines before. `shown` writes such characters as Python does (`\u202e`), and leaves
-every letter, sign and space as it is. It is meant for a text within a line, so it writes line ends out too. Whatever a
-command prints goes through `Escaping`, which stands before standard output and standard error and works on single
-characters: it escapes all but line ends and tabs. The few sequences of our own go to the stream behind it (`behind`).
+or change the lines printed before. `shown` writes such characters as Python does (`\u202e`), and leaves all others as
+they are. It is meant for a text within a line, so it escapes line ends too. Everything that a command prints goes
+through `Escaping`, which replaces standard output and standard error and escapes all control characters but line ends
+and tabs. The few escape sequences of our own are written to the stream behind it (`behind`).
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ ANYWHERE = re.compile(f"[{ACTING}]")
 
 
 def written_out(found: re.Match[str]) -> str:
-    """A character as its number."""
+    """A character as an escape sequence of Python."""
     return found[0].encode("unicode_escape").decode("ascii")
 
 
 def shown(text: str) -> str:
-    """A text as one may print it within a line."""
+    """A text that may be printed within a line."""
     return WITHIN_LINE.sub(written_out, text)
 
 
@@ -40,7 +40,7 @@ Values = TypeVar("Values")
 
 
 def all_shown(value: Values) -> Values:
-    """Plain values, as JSON has them, or a record of them, with every text in them as one may print it."""
+    """Plain values as in JSON, or a dataclass of them, with every text in them safe to print."""
     return cast("Values", _all_shown(value))
 
 
@@ -62,7 +62,7 @@ def _all_shown(value: Any) -> Any:
 
 
 class Escaping:
-    """A text stream that writes out what would act on the terminal behind it; in all else it is that stream."""
+    """A text stream that escapes control characters for the stream behind it; otherwise it acts as that stream."""
 
     def __init__(self, stream: TextIO) -> None:
         self.behind = stream
@@ -82,13 +82,13 @@ class Escaping:
 
 
 def behind(stream: TextIO) -> TextIO:
-    """The stream that takes sequences of our own."""
+    """The stream to which our own escape sequences are written."""
     return stream.behind if isinstance(stream, Escaping) else stream
 
 
 @contextlib.contextmanager
 def escaping() -> Iterator[None]:
-    """Within it standard output and standard error are safe for a terminal."""
+    """Make standard output and standard error safe for a terminal within the context."""
     before = sys.stdout, sys.stderr
     sys.stdout, sys.stderr = (
         stream if isinstance(stream, Escaping) else Escaping(stream) for stream in before

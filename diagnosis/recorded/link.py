@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.stats import beta
 
-from common.recording.reader import Run
+from common.recording.run import Run
 from diagnosis.recorded.record import laid_out
 from diagnosis.signals.mask import Mask
 from loop.closed_loop import MessagesUsed

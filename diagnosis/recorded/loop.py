@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from common.recording.reader import share
+from common.recording.run import share
 from common.roles import MASTER
 from common.signals import shared
 from diagnosis.recorded.record import Record

@@ -12,7 +12,7 @@ from common.errors import InputError
 from common.plan.plan import Plan, ideal
 from common.plan.read import parse
 from common.recording.imported import ImportedData, imported
-from common.recording.reader import GROUND, Run
+from common.recording.run import GROUND, Run
 from common.roles import MASTER, SLAVE, title
 from common.signals import BUILDING as OF_BUILDING
 from common.signals import shared

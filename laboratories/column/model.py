@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from common.errors import InputError
-from common.plan.tables import Actuator, Column
+from common.plan.laboratory_tables import Actuator, Column
 from laboratories.column import specimen
 from laboratories.column.specimen import REACTION, Specimen
 from models import preisach

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from common.plan.tables import Column
+from common.plan.laboratory_tables import Column
 from models import preisach, specimens
 from models.compiled import jit, jit_apart
 from models.registry import Array

@@ -17,8 +17,8 @@ from typing import NamedTuple
 import numpy as np
 
 from common.errors import InputError
+from common.plan.laboratory_tables import Damper
 from common.plan.schema import nearest
-from common.plan.tables import Damper
 from laboratories.identification import checks, estimate
 from laboratories.identification.estimate import Estimate
 from models.compiled import jit

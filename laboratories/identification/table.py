@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from common.errors import InputError
-from common.plan.tables import Damper, ShakingTable
+from common.plan.laboratory_tables import Damper, ShakingTable
 from laboratories.identification import checks, estimate
 from laboratories.identification.estimate import Identified
 from laboratories.table import model as table_lab

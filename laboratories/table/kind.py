@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
+from common.plan.laboratory_tables import ForceCorrection
 from common.plan.plan import Plan
-from common.plan.tables import ForceCorrection
 from common.signals import TABLE_CHANNELS
 from laboratories.kind import Chosen, Coupling, Follows, Hysteresis, Kind, Limited, Machine, Pictured, Sensed
 from laboratories.table import model

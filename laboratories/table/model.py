@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from common.errors import InputError
-from common.plan.tables import Damper, ShakingTable
+from common.plan.laboratory_tables import Damper, ShakingTable
 from laboratories.column.model import substeps
 from models import preisach
 from models.compiled import jit

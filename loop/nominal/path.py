@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from common.plan.laboratory_tables import TableCompensator
 from common.plan.plan import Plan
-from common.plan.tables import TableCompensator
 from common.roles import MASTER
 from laboratories.column import model as column_lab
 from laboratories.column.kind import COLUMN

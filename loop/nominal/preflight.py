@@ -12,8 +12,8 @@ import numpy as np
 from common.lab.preflight import PreflightCheck
 from common.plan import patience
 from common.plan.kinds import TABLE
+from common.plan.laboratory_tables import Control
 from common.plan.plan import Plan
-from common.plan.tables import Control
 from common.roles import MASTER, name_of, title
 from common.safety.risks import Risk
 from laboratories.column.kind import COLUMN

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from common.plan.tables import ServoHydraulics
+from common.plan.laboratory_tables import ServoHydraulics
 from models.compiled import jit
 from models.registry import Array
 

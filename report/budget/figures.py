@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import InputError
-from common.recording.reader import Run, Values
+from common.recording.run import Run, Values
 from common.roles import MASTER, latency_topic, name_of
 from report.budget.limits import PERCENTILES, WAITS
 from report.facts.circumstances import NO_LATENCY, VIRTUAL, clock_of

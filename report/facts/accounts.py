@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from common.protocol.tally import AHEAD, REPEATED
-from common.recording.reader import Run, Values
+from common.recording.run import Run, Values
 from common.roles import MASTER, SLAVE
 from report.facts.laboratories import laboratories
 

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from common.plan.plan import Plan
-from common.recording.reader import CLOCK, Run
+from common.recording.run import CLOCK, Run
 from common.roles import LATENCY, MASTER, kind_of, title
 
 VIRTUAL, REAL, SIMULATION, IMPORT, UNKNOWN = "virtual", "real", "simulation", "import", ""

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from common import signals
 from common.plan.plan import Plan
 from common.recording.outcome import outcome
-from common.recording.reader import Run
+from common.recording.run import Run
 from common.roles import LATENCY, MASTER, kind_of
 from common.safety.modes import Mode
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from common.errors import InputError
 from common.plan.plan import Plan
-from common.recording.reader import Run
+from common.recording.run import Run
 from common.roles import kind_of, name_of
 from laboratories.device import Device
 from laboratories.identification import actuator, column, damper, device, step_response, table

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from common.plan.kinds import COLUMN, TABLE, planned
 from common.plan.plan import Plan
 from common.plan.read import parse
-from common.recording.reader import Run
+from common.recording.run import Run
 from common.roles import MASTER, SLAVE, kind_of
 from common.signals import RATES, Channels, Signal
 from laboratories.column.kind import COLUMN as COLUMN_KIND

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from common.host.lateness import MOST, WINDOW
-from common.recording.reader import Run
+from common.recording.run import Run
 from common.roles import LATENCY, kind_of
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from common.plan.plan import Plan
-from common.recording.reader import Run, Values
+from common.recording.run import Run, Values
 from common.roles import MASTER
 from laboratories.kind import Follows
 from loop.nominal.partition import matrices

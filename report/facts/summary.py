@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from common.errors import InputError
-from common.recording.reader import Run, Values
+from common.recording.run import Run, Values
 from common.roles import LATENCY, MASTER, SLAVE, kind_of, latency_topic, name_of
 from laboratories.column.kind import COLUMN
 from laboratories.kind import Follows

@@ -17,7 +17,8 @@ from common.host.clock import Clock
 from common.plan.plan import Plan
 from common.plan.read import parse
 from common.recording.outcome import outcome
-from common.recording.reader import Run, Tail, Values
+from common.recording.reader import Tail
+from common.recording.run import Run, Values
 from common.roles import LATENCY, MASTER, SLAVE, kind_of, latency_topic
 from common.safety.modes import Mode
 from report.facts.laboratories import LaboratoryFacts, laboratories

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from common.recording.reader import Values
+from common.recording.run import Values
 
 Group = Mapping[str, Values]  # ticks that are thinned together, by signal
 TIME = "t"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from common.recording.reader import Run
+from common.recording.run import Run
 from report.facts.circumstances import VIRTUAL, clock_of
 from report.pictures import histories, hysteresis, latency, spectra, synchronisation, tracking
 from report.pictures.figure import DOUBLE, SINGLE

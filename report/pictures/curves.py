@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import InputError
-from common.recording.reader import Run
+from common.recording.run import Run
 from report.text.formats import milliseconds
 
 if TYPE_CHECKING:

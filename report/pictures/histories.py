@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from common.recording.reader import Run
+from common.recording.run import Run
 from common.roles import MASTER
 from report.pictures.curves import curve, labs_of
 from report.pictures.figure import COLOURS, SMALL

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from common.recording.reader import Run
+from common.recording.run import Run
 from report.pictures.curves import Values, labs_of, moving
 from report.pictures.figure import SMALL
 from report.pictures.layout import panels

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from common.recording.reader import Run
+from common.recording.run import Run
 from report.facts.circumstances import VIRTUAL, clock_of
 from report.pictures.curves import Values, interval
 from report.pictures.figure import COLOURS

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from common.recording.reader import Run
+from common.recording.run import Run
 from common.roles import MASTER
 from report.pictures.curves import Curve, Values, curve, interval, labs_of, moving, pairs, planned
 from report.pictures.figure import COLOURS

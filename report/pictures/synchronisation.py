@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from common.recording.reader import Run
+from common.recording.run import Run
 from report.pictures.curves import Pair, pairs, quality
 from report.pictures.figure import COLOURS, REFERENCE
 from report.pictures.layout import legend_above, note, panels

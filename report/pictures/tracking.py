@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from common.recording.reader import Run
+from common.recording.run import Run
 from report.pictures.curves import Pair, pairs
 from report.pictures.layout import legend_above, shrink, wide
 from report.text.formats import axis_scale

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from typing import NamedTuple
 
-from common.recording.reader import Run
+from common.recording.run import Run
 from common.roles import name_of, title
 from common.terminal.telling import Tell
 from report.facts.laboratories import views

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from common.lab.preflight import ACCEPTED, LINK, PASSED, SENSORS
-from common.recording.reader import Run
+from common.recording.run import Run
 from report.page import frame, render
 from report.run import tables, verdict
 from report.run.drawing import Pictures

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from common.recording.outcome import outcome
-from common.recording.reader import CLOCK, GROUND, MACHINES, Run
+from common.recording.run import CLOCK, GROUND, MACHINES, Run
 from common.roles import MASTER, name_of
 from report.facts.laboratories import plan_of
 from report.page import breakable

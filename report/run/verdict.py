@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from common.plan.plan import Plan
-from common.recording.reader import Run
+from common.recording.run import Run
 from common.roles import LATENCY, MASTER, SLAVE, kind_of, name_of, title
 from report.facts.laboratories import LaboratoryFacts, laboratories, whole_plan
 from report.text.force_path import sentence as force_sentence

@@ -20,7 +20,7 @@ from common.terminal.telling import Tell, untold
 from report.text.progress import Progress
 
 if TYPE_CHECKING:
-    from common.recording.reader import Run
+    from common.recording.run import Run
     from diagnosis.report.records import Report
 
 

@@ -11,7 +11,7 @@ from common.errors import InputError
 from common.terminal import cli, outputs
 
 if TYPE_CHECKING:
-    from common.recording.reader import Run
+    from common.recording.run import Run
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -16,7 +16,7 @@ from common.terminal import cli, outputs
 from common.terminal.printable import shown
 
 if TYPE_CHECKING:
-    from common.recording.reader import Run
+    from common.recording.run import Run
     from laboratories.kind import Hysteresis
     from report.facts.laboratories import LaboratoryFacts
 
@@ -86,7 +86,7 @@ class Subject:
 def of_default_test() -> Subject:
     """The default test as it ships."""
     from common.plan import read as plans
-    from common.recording.reader import Run
+    from common.recording.run import Run
     from laboratories import kinds
     from report.facts.laboratories import alike, laboratories
 

@@ -15,7 +15,7 @@ from common.terminal import cli, outputs
 from common.terminal.printable import shown
 
 if TYPE_CHECKING:
-    from common.recording.reader import Run
+    from common.recording.run import Run
     from report.pictures import Picture
 
 FORMATS = ("png", "svg", "pdf")

@@ -18,7 +18,7 @@ from report.text.progress import Progress
 
 if TYPE_CHECKING:
     from common.plan.plan import Plan
-    from common.recording.reader import Run
+    from common.recording.run import Run
     from master.step import Outputs
 
 NOWHERE = (0.0, 0.0)  # position and force of a laboratory that is not there
@@ -192,7 +192,7 @@ def ground_of(recording: Run) -> Any:
     """The ground motion that the recording carries."""
     import numpy as np
 
-    from common.recording.reader import GROUND
+    from common.recording.run import GROUND
 
     if GROUND not in recording.attachments:
         raise InputError(f"{recording.path} carries no ground motion: it cannot be replayed.")

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 from common.errors import InputError
+from common.plan.laboratory_tables import CompensatorTable, Control
 from common.plan.plan import Plan, ideal
-from common.plan.tables import CompensatorTable, Control
 from common.roles import MASTER
 from common.terminal import cli, outputs
 from report.text.progress import Progress

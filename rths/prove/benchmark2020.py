@@ -14,7 +14,7 @@ from common.terminal import cli, outputs
 from report.text.progress import Progress
 
 if TYPE_CHECKING:
-    from common.plan.tables import CompensatorTable
+    from common.plan.laboratory_tables import CompensatorTable
 
 MOST_PLANTS = 1000
 PROCESSORS = len(os.sched_getaffinity(0))

@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks import recorder
 from benchmarks.recorder import Burst
-from common.recording.reader import Run
+from common.recording.run import Run
 from common.signals import TICK_TOPICS
 
 WHOLE = Burst(1500.0, 1499.0, 1400.0, 3000, 0, 0, 0, 0, 0.2)

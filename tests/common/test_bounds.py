@@ -75,7 +75,7 @@ def test_a_file_made_to_hurt_is_refused_early(
     with pytest.raises(InputError, match=HURTING[name][1]) as caught:
         READERS[reader](path)
     spent = time.process_time() - before
-    assert str(caught.value).startswith(f"{path} is not read on: it ")
+    assert str(caught.value).startswith(f"{path} is not read further: it ")
     assert spent < 5.0  # of this process alone; a minute without the bounds
     assert not path.with_suffix(".out").exists()
 

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from common.errors import PlanError
 from common.plan import building, reality
+from common.plan.laboratory_tables import Actuator, ServoHydraulics
 from common.plan.plan import Plan, ideal
 from common.plan.read import from_tables, parse
-from common.plan.tables import Actuator, ServoHydraulics
 from tests.helpers import SERVO_PLAN, with_table
 
 
@@ -74,7 +74,7 @@ WRONG = {
     "servo-hydraulics without a mass": ("[actuator]\nmodel = 'servo_hydraulic'\n", "give the moving mass"),
     "a lag of servo-hydraulics": (
         "[actuator]\nmodel = 'servo_hydraulic'\ntime_constant = 0.02\n[column]\nmass = 29.0\n",
-        "time_constant in .actuator. is of the model 'fopdt'",
+        "time_constant in .actuator. belongs to the model 'fopdt'",
     ),
     "servo-hydraulics of a lag": ("[actuator.servo]\nleakage = 2.0\n", "choose 'servo_hydraulic'"),
     "a tolerance of a choice": (
@@ -198,7 +198,7 @@ def test_a_reality_with_another_actuator_drops_the_parameters_of_the_planned_one
         "[actuator]\nmodel = 'servo_hydraulic'\n[actuator.servo]\nleakage = 2.0\n[column]\nmass = 9.0\n",
     )
     assert found.actuator == Actuator(model="servo_hydraulic", servo=ServoHydraulics(leakage=2.0))
-    with pytest.raises(PlanError, match="gain in .actuator. is of the model 'fopdt'"):
+    with pytest.raises(PlanError, match="gain in .actuator. belongs to the model 'fopdt'"):
         truth(planned, "[actuator]\nmodel = 'servo_hydraulic'\ngain = 1.1\n[column]\nmass = 9.0\n")
 
 

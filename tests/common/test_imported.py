@@ -18,7 +18,7 @@ from common.recording.imported import (
     exchange_known,
     imported,
 )
-from common.recording.reader import Run
+from common.recording.run import Run
 
 LOW_PASS = LoggerFilter("butterworth", 4, 100.0)
 FORCE = ImportedChannel(LOW_PASS, 0.004, 1.0, 0.01, interpolated=True, rate=1024.0)

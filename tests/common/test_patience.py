@@ -57,7 +57,7 @@ def test_limits_are_larger_for_the_kinds_that_slaves_host(name: str, kinds: set[
 
 def test_the_sentence_says_that_limits_of_a_kind_of_ones_own_do_not_hold() -> None:
     said = patience.sentence(parse('[slave]\nkind = "lab.py:Lab"\n', HERE))
-    assert "Limits of a kind of your own on how its command moves do not hold." in said
+    assert "Limits of a kind of your own on the rates of its command are not checked." in said
     assert "actuator" not in said
     assert "kind of your own" not in patience.sentence(parse("", HERE))
 

@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 
-from common import signals
 from common.errors import InputError
 from common.recording import chunks, index
 from common.recording.reader import read
@@ -215,12 +214,6 @@ def test_the_table_of_signals_is_the_contracts() -> None:
     }
     for topic, names in contract.items():
         assert [row.name for row in TOPICS[topic]][: len(names.split())] == names.split()
-
-
-def test_a_signal_is_found_by_name() -> None:
-    assert signals.signal("master", "column_force").unit == "N"
-    with pytest.raises(KeyError):
-        signals.signal("slave", "column_force")
 
 
 def test_messages_packed_in_one_call_are_the_librarys_to_the_byte(

@@ -213,7 +213,7 @@ def test_without_its_beginning_a_recording_is_read_by_the_copies_of_its_schemas(
     assert path.stat().st_size > REPEAT_BYTES
     filling = bytes(60_000) if kind == "zeros" else garbage(60_000)
     broken, output = damaged(path, tmp_path, lambda data: data.__setitem__(slice(0, 60_000), filling))
-    with pytest.raises(InputError, match="rths recover saves what is whole"):
+    with pytest.raises(InputError, match="`rths recover` saves the undamaged part"):
         read(broken)
     found = recover(broken, output)
     run = read(output)

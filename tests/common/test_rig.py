@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from common.errors import InputError, RigError
-from common.plan import tables
+from common.plan import laboratory_tables
 from common.plan.plan import Plan
 from common.plan.plugins import construct, find
 from common.plan.reality import as_planned
@@ -164,7 +164,7 @@ def test_a_link_without_fate_is_refused(short_plan: Plan, tmp_path: Path) -> Non
     (tmp_path / "net.py").write_text(
         "class Net:\n    def __init__(self, seed): pass\n    def fate(self, seq): pass\n"
     )
-    real = replace(as_planned(short_plan), link=tables.RigTable("net.py:Net"), base=tmp_path)
+    real = replace(as_planned(short_plan), link=laboratory_tables.RigTable("net.py:Net"), base=tmp_path)
     with pytest.raises(
         InputError, match=r"Net \(net.py\) named in \[link\] .* must have fate\(direction, seq, t\)"
     ):

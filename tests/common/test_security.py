@@ -165,7 +165,7 @@ def test_the_key_of_another_role_is_refused(copy: Path) -> None:
 def test_the_certificate_of_another_authority_is_refused(copy: Path, tmp_path: Path) -> None:
     made(tmp_path / "other")
     shutil.copy(tmp_path / "other/authority.pem", copy / "keys/authority.pem")
-    with pytest.raises(InputError, match=r"slave.pem is not of the authority in .*authority.pem"):
+    with pytest.raises(InputError, match=r"slave.pem was not issued by the authority in .*authority.pem"):
         security.identity(secure_plan(copy), "slave")
 
 

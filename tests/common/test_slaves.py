@@ -59,7 +59,7 @@ def test_a_tables_compensator_is_taken_whole() -> None:
 WRONG = {
     "a rig beside names": (
         "[slave.rig]\n[slave.roof.rig]\n",
-        r"\[slave\] holds a rig beside the slaves roof: name that one too",
+        r"\[slave\] holds a rig beside the slaves roof: give that rig to a named slave",
     ),
     "unknown part": (
         "[slave.roof.dampr]\nmass = 1.0\n",

@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.errors import InputError
-from common.recording.reader import Run, Tail, read
+from common.recording.reader import Tail, read
+from common.recording.run import Run
 from common.recording.writer import Recording
 from common.signals import TOPICS
 from tests.common.test_recording import example, write

@@ -12,9 +12,10 @@ import pytest
 
 from common.link.mailbox import LinkModel
 from common.plan import reality
+from common.plan.laboratory_tables import RigTable
 from common.plan.plan import Plan
-from common.plan.tables import RigTable
-from common.recording.reader import Run, read
+from common.recording.reader import read
+from common.recording.run import Run
 from diagnosis.recorded.link import LinkFinding, account, exchange_of, findings
 from loop.closed_loop import on_time
 from loop.exchange import exchange

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from common.errors import InputError
-from common.recording.reader import GROUND, Run, read
+from common.recording.reader import read
+from common.recording.run import GROUND, Run
 from diagnosis.diagnose import not_recorded, parts_of
 from diagnosis.recorded import record
 from tests.diagnosis.cases import Cases, short

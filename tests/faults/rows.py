@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from common.plan.plan import Plan
-from common.recording.reader import Run
+from common.recording.run import Run
 from common.roles import MASTER, kind_of
 
 COUNT = 56

@@ -17,7 +17,8 @@ from common.plan.plan import Plan
 from common.plan.reality import Reality, as_planned
 from common.protocol import codec
 from common.protocol.messages import Message
-from common.recording.reader import Run, read
+from common.recording.reader import read
+from common.recording.run import Run
 from common.roles import MASTER, SLAVE
 from tests.faults.rows import motion_after, motion_bound
 from validation.faults.apply import plan_of

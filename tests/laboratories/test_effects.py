@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from scipy.integrate import quad, solve_ivp, trapezoid
 
 from common.errors import InputError
+from common.plan.laboratory_tables import Actuator, Column, Damper, ShakingTable
 from common.plan.plan import Plan
 from common.plan.read import with_test
-from common.plan.tables import Actuator, Column, Damper, ShakingTable
 from common.rig import ColumnCommand, TableCommand
 from common.roles import SLAVE
 from laboratories.column import model as column_lab

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from common.plan.laboratory_tables import Actuator, Column, Damper, ShakingTable
 from common.plan.plan import Plan
-from common.plan.tables import Actuator, Column, Damper, ShakingTable
 from laboratories.column import model as column_lab
 from laboratories.sensors import noise
 from laboratories.table import model as table_lab

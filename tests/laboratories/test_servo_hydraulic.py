@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from common.errors import InputError
+from common.plan.laboratory_tables import Actuator, Column, ServoHydraulics
 from common.plan.plan import Plan
 from common.plan.read import parse, with_test
-from common.plan.tables import Actuator, Column, ServoHydraulics
 from laboratories.column import model as column_lab
 from laboratories.column.kind import COLUMN as KIND
 from laboratories.effects import lay

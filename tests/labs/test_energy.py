@@ -13,7 +13,8 @@ import pytest
 from common.plan import read as plans
 from common.plan import reality
 from common.plan.plan import Plan
-from common.recording.reader import Run, read
+from common.recording.reader import read
+from common.recording.run import Run
 from common.rig import ColumnMeasurement
 from common.terminal import cli
 from loop.nominal.partition import matrices

@@ -9,7 +9,8 @@ import pytest
 
 from common.plan.plan import Plan
 from common.plan.reality import as_planned
-from common.recording.reader import Run, read
+from common.recording.reader import read
+from common.recording.run import Run
 from common.safety.modes import Mode
 from laboratories.kinds import topics
 from loop import substructure

@@ -13,7 +13,8 @@ from common.plan import read as plans
 from common.plan.kinds import COLUMN
 from common.plan.plan import Plan
 from common.plan.read import parse
-from common.recording.reader import Run, read
+from common.recording.reader import read
+from common.recording.run import Run
 from common.roles import MASTER, SLAVE
 from common.terminal import cli
 from report.facts.summary import summarize

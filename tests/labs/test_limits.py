@@ -18,7 +18,8 @@ from common.plan.plan import Plan, ideal
 from common.plan.read import from_tables, with_test
 from common.plan.reality import Reality, from_reality
 from common.plan.tables import Limits
-from common.recording.reader import Run, read
+from common.recording.reader import read
+from common.recording.run import Run
 from common.terminal import cli
 from laboratories.checks import CHANGE, LAST, PATIENCE, take_written
 from loop import substructure

@@ -14,7 +14,8 @@ from common.link.endpoint import Received
 from common.plan import reality
 from common.plan.plan import Plan
 from common.protocol.messages import Answer, Operator
-from common.recording.reader import Run, read
+from common.recording.reader import read
+from common.recording.run import Run
 from common.safety.modes import Mode
 from report.facts.accounts import accounts
 from simulation import virtual

@@ -8,9 +8,9 @@ import math
 import numpy as np
 import pytest
 
+from common.plan.laboratory_tables import Actuator, CompensatorTable, Control
 from common.plan.plan import Plan, ideal
 from common.plan.read import from_tables, with_test
-from common.plan.tables import Actuator, CompensatorTable, Control
 from common.roles import SLAVE
 from common.signals import TOPICS
 from laboratories.column.kind import COLUMN

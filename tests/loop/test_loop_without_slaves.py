@@ -13,9 +13,9 @@ import pytest
 
 from common.errors import InputError
 from common.plan import read as plans
+from common.plan.laboratory_tables import CompensatorTable
 from common.plan.plan import Plan, ideal
 from common.plan.read import parse, with_test
-from common.plan.tables import CompensatorTable
 from common.roles import MASTER
 from common.signals import OF_STOREYS
 from laboratories import effects

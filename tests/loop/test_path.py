@@ -13,8 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as some
 
 from common.plan import read as plans
+from common.plan.laboratory_tables import CompensatorTable
 from common.plan.plan import Plan
-from common.plan.tables import CompensatorTable
 from loop.nominal import partition, preflight
 from loop.nominal.path import path_at
 from tests.helpers import with_table

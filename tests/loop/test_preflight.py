@@ -10,8 +10,8 @@ import pytest
 from scipy.optimize import brentq
 
 from common.plan import read as plans
+from common.plan.laboratory_tables import CompensatorTable, Control
 from common.plan.plan import Plan
-from common.plan.tables import CompensatorTable, Control
 from common.roles import MASTER, SLAVE
 from common.terminal import cli
 from loop import substructure

@@ -14,7 +14,8 @@ from common.plan import reality
 from common.plan.plan import Plan
 from common.plan.read import from_tables, parse, with_test
 from common.plan.reality import Reality
-from common.recording.reader import Run, read
+from common.recording.reader import read
+from common.recording.run import Run
 from common.roles import MASTER, SLAVE, kind_of
 from common.signals import TOPICS
 from laboratories.effects import CATALOGUE, lay

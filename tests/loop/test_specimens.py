@@ -165,7 +165,7 @@ def test_the_critical_delay_of_two_storeys_makes_the_loop_vibrate_undamped() -> 
 
 def test_more_columns_than_a_storey_has_are_refused() -> None:
     with pytest.raises(
-        PlanError, match=r"storey 1 stand for more columns than it has \(3/4 by \[column\], 1/2"
+        PlanError, match=r"storey 1 represent more columns than it has \(3/4 by \[column\], 1/2"
     ):
         columns((1, 3, 12.5e6), (1, 2, 12.5e6))
     columns((1, 3, 12.5e6), (2, 2, 12.5e6), storeys=TWO)

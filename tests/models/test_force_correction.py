@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from common.plan import read as plans
-from common.plan.tables import ForceCorrection
+from common.plan.laboratory_tables import ForceCorrection
 from common.terminal import cli
 from models import force_correction
 from validation.paper.experiments import free_damping, without_amd

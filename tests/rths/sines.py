@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from common.plan.plan import Plan
-from common.recording.reader import CLOCK
+from common.recording.run import CLOCK
 from common.recording.writer import Recording
 from common.signals import LATENCY as LATENCY_ROWS
 from common.signals import FieldType, Signal

@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from common.plan.laboratory_tables import LaboratoryTable, RigTable
 from common.plan.plan import Plan
 from common.plan.read import from_tables
-from common.plan.tables import LaboratoryTable, RigTable
-from common.recording.reader import CLOCK, Run, read
+from common.recording.reader import read
+from common.recording.run import CLOCK, Run
 from report.facts import circumstances, storeys
 from report.facts.laboratories import laboratories, plan_of
 from report.facts.summary import summarize

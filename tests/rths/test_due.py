@@ -12,7 +12,7 @@ import pytest
 
 from common.plan.plan import Plan
 from common.plan.read import with_test
-from common.recording.reader import Run
+from common.recording.run import Run
 from common.safety.modes import Mode
 from report.facts.due import due
 from report.run.verdict import completeness

@@ -22,10 +22,11 @@ from common import signals
 from common.plan import reality
 from common.plan.read import from_tables
 from common.recording.checksums import CHECKSUMS
-from common.recording.reader import Run, read
+from common.recording.reader import read
 from common.recording.recovery import recover
+from common.recording.run import Run
 from common.recording.writer import Recording
-from common.roles import latency_topic, ramp_topic
+from common.roles import kind_of, latency_topic, ramp_topic
 from common.signals import FieldType
 from rths.examine import layout
 from simulation import virtual
@@ -191,7 +192,7 @@ def by_rths(run: Run) -> dict[str, list[dict[str, Any]]]:
 
 
 def rows_of(topic: str, columns: dict[str, Any]) -> list[dict[str, Any]]:
-    kinds = {name: signals.signal(topic, name).kind for name in columns}
+    kinds = {row.name: row.kind for row in signals.TOPICS[kind_of(topic)]}
     cells = {
         name: [cell(kinds[name], value) for value in column.tolist()] for name, column in columns.items()
     }

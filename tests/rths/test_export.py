@@ -14,7 +14,8 @@ from pyarrow import parquet
 from scipy.io import loadmat
 
 from common import signals
-from common.recording.reader import Run, read
+from common.recording.reader import read
+from common.recording.run import Run
 from common.recording.writer import Recording
 from rths.examine import export
 from tests.rths import extremes
@@ -103,7 +104,7 @@ def wanted_units(found: Run) -> dict[str, str]:
             flat = topic.replace(".", "_")
             for field in found.columns[topic]:
                 if name.removeprefix(f"{flat}_").removesuffix("_1").removesuffix("_2") == field:
-                    units[name] = signals.signal(topic, field).unit
+                    units[name] = found.units[topic][field]
     return {name: unit for name, unit in units.items() if unit}
 
 

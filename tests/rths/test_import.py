@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from common.recording.imported import ImportedData, LoggerFilter, imported
-from common.recording.reader import Run, read
+from common.recording.reader import read
+from common.recording.run import Run
 
 PLAN = '[test]\ninterval = 0.01\nduration = 1.0\n[compensator]\nkind = "none"\n'
 TIMES = 0.01 * np.arange(400)

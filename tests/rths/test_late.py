@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common.recording.reader import Run, read
+from common.recording.reader import read
+from common.recording.run import Run
 from report.facts import late
 from report.facts.summary import summarize
 from report.run import verdict

@@ -10,10 +10,11 @@ import pytest
 
 from common.lab.preflight import Gate, RefusedError
 from common.plan import reality
+from common.plan.laboratory_tables import CompensatorTable
 from common.plan.plan import Plan
 from common.plan.read import with_test
-from common.plan.tables import CompensatorTable
-from common.recording.reader import Run, read
+from common.recording.reader import read
+from common.recording.run import Run
 from rths.__main__ import parser_for
 from rths.perform.run import start_all
 from simulation import virtual

@@ -11,7 +11,8 @@ import pytest
 
 from common.plan.read import load, with_test
 from common.plan.reality import as_planned
-from common.recording.reader import Run, read
+from common.recording.reader import read
+from common.recording.run import Run
 from rths.examine import replay
 from simulation import virtual
 from tests.helpers import ROOT

@@ -20,8 +20,8 @@ from common.lab.drive import longest_leave
 from common.lab.laboratory import Setting
 from common.link.memory_link import MemoryHub
 from common.plan import reality
+from common.plan.laboratory_tables import RigTable
 from common.plan.plan import Plan
-from common.plan.tables import RigTable
 from common.protocol.exchange import State
 from common.safety.ramp import MotionRamp
 from laboratories.longest import resting

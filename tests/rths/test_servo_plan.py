@@ -12,7 +12,8 @@ import pytest
 
 from common.plan import reality
 from common.plan.read import parse
-from common.recording.reader import Run, read
+from common.recording.reader import read
+from common.recording.run import Run
 from diagnosis.recorded import record
 from diagnosis.recorded.parts import Building
 from loop import closed_loop, substructure

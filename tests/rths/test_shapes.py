@@ -10,7 +10,8 @@ import pytest
 from bokeh.document import Document
 
 from common.host.clock import VirtualClock
-from common.recording.reader import Run, Tail, read
+from common.recording.reader import Tail, read
+from common.recording.run import Run
 from report.facts.laboratories import laboratories, views
 from report.facts.summary import summarize
 from report.live.feed import Feed

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from common.recording.reader import Run, read
+from common.recording.reader import read
+from common.recording.run import Run
 from tests.shapes import SHIPPED, plan_of
 from tests.system.test_real_time import finish, start, wait_for_ticks
 

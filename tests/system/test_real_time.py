@@ -19,7 +19,8 @@ import pytest
 
 from common.plan import read as plans
 from common.plan import reality
-from common.recording.reader import Run, read
+from common.recording.reader import read
+from common.recording.run import Run
 from simulation import virtual
 from tests.helpers import PATIENT, SLOW, patient
 from tests.processes import environment, tied

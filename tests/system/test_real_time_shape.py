@@ -13,7 +13,8 @@ import pytest
 
 from common.host.realtime import PRIORITY
 from common.link.zenoh_link import listenable
-from common.recording.reader import MACHINES, read
+from common.recording.reader import read
+from common.recording.run import MACHINES
 from tests.processes import environment, tied
 
 pytestmark = pytest.mark.slow

@@ -200,7 +200,7 @@ def test_a_slave_with_certificates_says_that_the_master_has_none(folder: Path) -
     endpoint = listenable()
     ear = Ear("master", None, listen=endpoint)
     try:
-        with pytest.raises(LostError, match=r"does not speak TLS, but this plan asks for it"):
+        with pytest.raises(LostError, match=r"does not use TLS, but this plan asks for it"):
             Ear("slave", identity(folder, "slave"), connect=endpoint, patience=0.1)
     finally:
         ear.link.close()
@@ -236,10 +236,12 @@ def test_with_certificates_of_another_authority_nobody_gets_in(
 ) -> None:
     made(tmp_path / "foreign")
     foreign = identity(tmp_path / "foreign", "slave")
-    with pytest.raises(InputError, match=r"is of another authority than .*foreign/authority.pem"):
+    with pytest.raises(InputError, match=r"was issued by another authority than .*foreign/authority.pem"):
         Ear("slave", foreign, connect=master[1])
     forged = identity(tmp_path / "foreign", "slave", authority=folder)
-    with pytest.raises(InputError, match=r"refused the certificate in .*foreign: it is of another authority"):
+    with pytest.raises(
+        InputError, match=r"refused the certificate in .*foreign: it was issued by another authority"
+    ):
         Ear("slave", forged, connect=master[1])
     for who in (foreign, forged):
         with pytest.raises(zenoh.ZError), bare(master[1], who):
@@ -337,7 +339,9 @@ def test_a_visitor_with_a_certificate_of_no_role_is_noticed_and_gets_nothing_thr
                 session.put(name(Route(role, CONTROL)), b"forged")
             assert noticed.wait(WAIT_S)
             assert found["slave"].next(SHORT_S) is None
-    assert told == ["'visitor' has joined with a certificate of no role in this test: nothing of it passes."]
+    assert told == [
+        "'visitor' has joined with a certificate of no role in this test: its messages are blocked."
+    ]
 
 
 # -- whole tests -----------------------------------------------------------------------------------------
@@ -423,7 +427,7 @@ def foreign_authority(folder: Path, other: Path) -> None:
     ("spoil", "sentence"),
     [
         (wrong_role, "is a certificate of 'recorder', but this is the slave"),
-        (foreign_authority, "is of another authority than"),
+        (foreign_authority, "was issued by another authority than"),
     ],
 )
 def test_a_slave_that_is_refused_says_why_and_ends_with_2(

@@ -11,7 +11,8 @@ from typing import Any
 
 import pytest
 
-from common.recording.reader import Run, read
+from common.recording.reader import read
+from common.recording.run import Run
 from tests.helpers import PATIENT, SLOW_TOWER
 from tests.system.test_real_time import equal_to_virtual_time, finish, free_port, start, wait_for_ticks
 

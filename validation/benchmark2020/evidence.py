@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
-from common.plan.tables import CompensatorTable
+from common.plan.laboratory_tables import CompensatorTable
 from common.terminal.telling import Tell
 from report.text.formats import percent
 from validation.benchmark2020.critical import Critical, critical_delays

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from common.plan.laboratory_tables import CompensatorTable
 from common.plan.plan import Plan
 from common.plan.read import load
-from common.plan.tables import CompensatorTable
 from loop import substructure
 
 PLAN = Path(__file__).resolve().parents[2] / "rths" / "plans" / "benchmark2020.toml"

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from common.plan.laboratory_tables import CompensatorTable
 from common.plan.plan import Plan
-from common.plan.tables import CompensatorTable
 from common.roles import MASTER
 from common.terminal.telling import Tell, untold
 from laboratories.column import specimen

@@ -10,7 +10,8 @@ import numpy as np
 
 from common.plan.plan import Plan
 from common.plan.reality import Reality
-from common.recording.reader import Run, read
+from common.recording.reader import read
+from common.recording.run import Run
 from diagnosis.report.records import Report
 from laboratories import kinds
 from simulation import virtual

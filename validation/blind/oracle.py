@@ -23,7 +23,7 @@ import numpy as np
 
 from common.plan import read as plans
 from common.plan.kinds import TABLES_OF_KIND, known_kind
-from common.recording.reader import Run
+from common.recording.run import Run
 from common.roles import MASTER, SLAVE, name_of
 from laboratories.effects.sites import LINK
 from laboratories.kinds import kind_of, kinds_of

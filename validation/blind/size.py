@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from common.plan import read as plans
-from common.recording.reader import Run, Values, read
+from common.recording.reader import read
+from common.recording.run import Run, Values
 from common.rig import command_of
 from common.roles import MASTER
 from laboratories.effects.sites import LINK

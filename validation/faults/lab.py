@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 
 from common.lab.drive import longest_leave
 from common.lab.laboratory import Setting
+from common.plan.laboratory_tables import RigTable
 from common.plan.plan import Plan
 from common.plan.reality import Reality
-from common.plan.tables import RigTable
 from common.reporting import Report
 from common.roles import MASTER, RECORDER
 from loop import substructure

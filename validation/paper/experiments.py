@@ -11,10 +11,12 @@ import numpy as np
 
 from common.lab.preflight import Gate
 from common.plan import read as plans
+from common.plan.laboratory_tables import Actuator, CompensatorTable, Control, TableCompensator
 from common.plan.plan import Plan, ideal
 from common.plan.reality import as_planned
-from common.plan.tables import Actuator, CompensatorTable, Control, GroundMotionTable, TableCompensator
-from common.recording.reader import Run, read
+from common.plan.tables import GroundMotionTable
+from common.recording.reader import read
+from common.recording.run import Run
 from common.terminal import cli
 from common.terminal.telling import Tell
 from loop import substructure

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from common.recording.reader import Run
+from common.recording.run import Run
 from report.facts.identification import identify, segments, step_ticks
 from report.pictures.figure import TEXT
 from report.pictures.layout import legend_above

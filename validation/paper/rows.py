@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from common.plan.plan import Plan
-from common.recording.reader import Run
+from common.recording.run import Run
 from loop.nominal.partition import critical_delay_of, damping_lost
 from models import indicators
 from models.registry import Array

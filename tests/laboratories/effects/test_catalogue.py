@@ -10,8 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.errors import InputError
+from common.plan.laboratory_tables import Damper, ShakingTable
 from common.plan.plan import Plan
-from common.plan.tables import Damper, ShakingTable, Structure
+from common.plan.tables import Structure
 from common.signals import TOPICS
 from laboratories import effects
 from laboratories.effects import CATALOGUE, lay, of_site

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from common.errors import InputError
-from common.plan.tables import Actuator, Column
+from common.plan.laboratory_tables import Actuator, Column
 from laboratories.column import model as column_lab
 from laboratories.identification import actuator, estimate, step_response
 

@@ -12,7 +12,7 @@ from scipy import signal
 from scipy.integrate import solve_ivp
 
 from common.errors import InputError
-from common.plan.tables import Damper, ShakingTable
+from common.plan.laboratory_tables import Damper, ShakingTable
 from laboratories.identification import damper, table
 from laboratories.table import model as table_lab
 from tests.rths.test_free_drive import DASHPOT, FRICTION, INTERVAL, MASS, drive

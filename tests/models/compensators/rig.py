@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from common.plan.tables import Actuator, Column
+from common.plan.laboratory_tables import Actuator, Column
 from laboratories.column import model as column_lab
 from models import compensators
 from models.compensators import Built

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy import signal
 
 from common.errors import InputError
-from common.plan.tables import Actuator
+from common.plan.laboratory_tables import Actuator
 from models import compensators
 from models.registry import Array
 from tests.models.compensators.rig import DT, L, T, ask, clock, delay, drive, response, sine, waves

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import InputError
-from common.plan.tables import Actuator
+from common.plan.laboratory_tables import Actuator
 from models import compensators
 from models.compensators import ats
 from models.registry import Array

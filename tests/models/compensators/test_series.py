@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from common.plan.tables import ServoHydraulics
+from common.plan.laboratory_tables import ServoHydraulics
 from models import compensators
 from models.compensators import inverse
 from models.transfer_systems import servo_hydraulic

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from common.recording.reader import Run
+from common.recording.run import Run
 from common.roles import MASTER, name_of, slave_role
 from report.budget.limits import PERCENTILES
 

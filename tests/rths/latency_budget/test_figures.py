@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from common import signals
 from common.errors import InputError
-from common.recording.reader import Run, read
+from common.recording.reader import read
+from common.recording.run import Run
 from common.recording.writer import Recording
 from report.budget.checks import longest_run
 from report.budget.figures import Bare, bare_loop, figures, measured

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.errors import InputError
-from common.recording.reader import Run
+from common.recording.run import Run
 from report.budget.checks import BudgetCheck
 from report.budget.figures import figures
 from report.budget.judge import judge

@@ -19,7 +19,8 @@ from common.host.clock import VirtualClock
 from common.plan import reality
 from common.plan.plan import Plan
 from common.plan.read import load, with_test
-from common.recording.reader import Run, Tail, length, read
+from common.recording.reader import Tail, length, read
+from common.recording.run import Run
 from common.recording.writer import Recording
 from common.signals import TOPICS
 from report.live.feed import EDGES, POINTS, POINTS_WHOLE, SILENT_NS, Feed

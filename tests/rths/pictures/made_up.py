@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from common.recording.reader import CLOCK, Run
+from common.recording.run import CLOCK, Run
 from common.roles import SLAVE
 from report.facts.circumstances import REAL
 from report.facts.summary import SEGMENTS

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common.recording.reader import Run
+from common.recording.run import Run
 from common.roles import SLAVE
 from report.facts.laboratories import laboratories
 from report.facts.summary import SEGMENTS, tracking

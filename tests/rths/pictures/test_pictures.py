@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common.recording.reader import Run, read
+from common.recording.reader import read
+from common.recording.run import Run
 from common.roles import SLAVE
 from report.pictures import PICTURES, figure
 from rths.examine import plot

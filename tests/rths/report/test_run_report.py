@@ -14,7 +14,8 @@ import pytest
 
 from common.plan import reality
 from common.plan.read import from_tables
-from common.recording.reader import Run, read
+from common.recording.reader import read
+from common.recording.run import Run
 from common.terminal.telling import untold
 from diagnosis.report.read import report as read_report
 from report.facts.summary import summarize

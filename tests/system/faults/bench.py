@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 from common.link.zenoh_link import listenable
 from common.plan import read as plans
 from common.plan.plan import Plan
-from common.recording.reader import Run, read
+from common.recording.reader import read
+from common.recording.run import Run
 from tests.faults.rows import motion_bound
 from tests.processes import environment, tied
 from tests.system.faults.rigs import Log, Wish

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from common.recording.reader import Run
+from common.recording.run import Run
 from tests.faults.rows import passed
 from tests.system.faults.bench import AT, INTERVAL, LABS, Bench, DisturbedError, Process, later, undisturbed
 from tests.system.faults.hostile import Stranger

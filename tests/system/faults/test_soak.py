@@ -21,7 +21,7 @@ import pytest
 from numpy.typing import NDArray
 
 from common.lab.outlet import kept_seconds
-from common.recording.reader import Run
+from common.recording.run import Run
 from tests.faults.rows import passed
 from tests.helpers import JUMPS
 from tests.system.faults.bench import (

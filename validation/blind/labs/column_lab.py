@@ -10,7 +10,7 @@ import numpy as np
 
 from common.errors import InputError
 from common.plan import schema
-from common.plan.tables import Actuator, Column
+from common.plan.laboratory_tables import Actuator, Column
 from common.plan.tables import SensorsTable as Levels
 from common.rig import ColumnCommand, ColumnMeasurement
 from validation.blind.labs import column_kernel, laying, sensors

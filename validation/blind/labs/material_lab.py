@@ -14,7 +14,7 @@ import numpy as np
 
 from common.errors import InputError
 from common.plan import schema
-from common.plan.tables import Column
+from common.plan.laboratory_tables import Column
 from common.plan.tables import SensorsTable as Levels
 from common.rig import ColumnCommand, ColumnMeasurement
 from validation.blind.labs import material_server, materials

@@ -10,7 +10,7 @@ import numpy as np
 
 from common.errors import InputError
 from common.plan import schema
-from common.plan.tables import Damper, ShakingTable
+from common.plan.laboratory_tables import Damper, ShakingTable
 from common.plan.tables import SensorsTable as Levels
 from common.rig import TableCommand, TableMeasurement
 from validation.blind.labs import laying, table_kernel

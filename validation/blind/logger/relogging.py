@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from common.plan.plan import Plan
-from common.recording.reader import GROUND, Run, Values, read
+from common.recording.reader import read
+from common.recording.run import GROUND, Run, Values
 from common.recording.writer import SIGNALS, Recording
 from common.roles import MASTER
 from laboratories import kinds
