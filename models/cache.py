@@ -1,7 +1,8 @@
-"""Where compiled kernels are kept between processes.
+"""The folder in which compiled kernels are kept between processes.
 
-Numba's on-disk cache looks at a function's own file only, so a kernel whose callee changed would be
-served stale. The folder is therefore named after the content of every file of the rooms that hold kernels.
+Numba's on-disk cache checks a function's own file only, so it would return an outdated kernel after a change of a
+function that the kernel calls. The folder is therefore named after the content of all files of the packages that hold
+kernels.
 """
 
 from __future__ import annotations

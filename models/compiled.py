@@ -1,12 +1,13 @@
-"""The one way kernels are compiled.
+"""The options with which all kernels are compiled.
 
-A kernel works on the arrays it is given: it allocates none and returns none, and its caller holds them while
-it runs. Numba therefore need not count references to them, and is told so. Counting costs several times the
-closed loop's own work, as what proves needless is dropped within a kernel, but hardly once many are merged.
+A kernel works on the arrays it is given: it allocates none and returns none, and its caller holds them while it runs.
+Numba therefore need not count references to them, and the option `_nrt` turns the counting off. With it the closed loop
+would take several times as long, because Numba removes needless counts within a single kernel, but hardly any once many
+kernels are merged.
 
-`_nrt` is neither documented nor promised by Numba, whose own functions use it (numba/numba#1204); where it is
-missing, references are counted and kernels are slower. With it, an allocation or a view returned does not
-compile; a tuple of views does, and whole arrays would come back in their place, so tests forbid any array.
+Numba neither documents nor guarantees `_nrt`, which its own functions use (numba/numba#1204); in a version without it,
+references are counted and kernels are slower. With the option, a kernel that allocates or returns a view does not
+compile. A tuple of views compiles, but whole arrays would be returned in their place, so a test forbids any array.
 """
 
 from __future__ import annotations
@@ -42,15 +43,15 @@ def jit(function: Function) -> Function:
 
 
 def plain(record: tuple[Any, ...]) -> tuple[Any, ...]:
-    """A record of arrays as plain tuples, records within it likewise.
+    """A record of arrays as a plain tuple, and records within it likewise.
 
-    A loop that calls one compiled step a tick hands these to the step's `enter`: Numba looks up the types of a
-    plain tuple in 1 µs, those of a named one in 3 to 8 µs.
+    A loop that calls one compiled step per tick passes these to the step's `enter`: Numba finds the types of a plain
+    tuple in 1 µs, those of a named one in 3 to 8 µs.
     """
     return tuple(plain(part) if isinstance(part, tuple) else part for part in record)
 
 
 def jit_apart(function: Function) -> Function:
-    """Compile a kernel that is seldom needed by those that call it: it stays out of them, and they stay lean."""
+    """Compile a kernel that its callers seldom need: it is not merged into them, so that they stay small."""
     compiled = numba.njit(cache=True, error_model="numpy", nogil=True, **UNCOUNTED)
     return cast(Function, compiled(function))

@@ -1,7 +1,7 @@
-"""Energies of a hybrid test while it runs: what the interface's error puts in, and what the integration makes up.
+"""Energies of a running hybrid test: the error energy of the interface and the energy error of the integration.
 
-Interface. The specimen is moved by `d_m`, where the numerical part asked for `d_t` (deformation over the storey's
-drift: the ratio), and resists with `f`, counted `represents` times:
+Interface. The specimen is deformed by `d_m` where the numerical part asked for `d_t` (`ratio` is deformation over
+storey drift), and its force is `f`, counted `represents` times:
 
     E_error = Σ represents·½(f_{k−1} + f_k)·Δ(d_m − d_t)/ratio
 
@@ -9,7 +9,7 @@ It is positive where the transfer system puts energy into the loop, as a delay �
 of amplitude A and frequency ω, from a specimen that is a spring k on the storey's drift.
 
 Source: Mosqueda, Stojadinovic and Mahin, Real-time error monitoring for hybrid simulation, J. Struct. Eng. 133
-(2007); Ahmadizadeh and Mosqueda (2009). `indicators.hybrid_simulation_error_energy` is the same of a recording.
+(2007); Ahmadizadeh and Mosqueda (2009). `indicators.hybrid_simulation_error_energy` computes it from a recording.
 
 Integration. Kinetic energy, what dashpots dissipate, the work of the numerical columns and of the specimen, less
 the work of the ground and of the dampers, is zero for exact motion. With works as Σ ½(F_{k−1} + F_k)·Δx, and as
@@ -18,10 +18,10 @@ the work of the ground and of the dampers, is zero for exact motion. With works 
     E_drift = ½·vᵀMv + D + W_columns + W_specimen − W_ground − W_damper = ½·vᵀMv − Σ ½(a_{k−1} + a_k)ᵀM·Δx
 
 so no force has to be known. The explicit Newmark method has `Δx = h/2·(v_{k−1} + v_k) − h²/4·(a_k − a_{k−1})`, hence
-`E_drift = h²/8·aᵀMa` and nothing that adds up: (ωh/2)² of a mode's strain energy, for ωh = 2 all of it. Beyond, it
-grows with the motion that no energy was put in for. What a method damps numerically counts as lost.
+`E_drift = h²/8·aᵀMa`, which does not accumulate: it is (ωh/2)² of a mode's strain energy, all of it at ωh = 2. Beyond
+that limit it grows with the motion, which no energy input explains. Numerical damping counts as energy lost.
 
-Both are compared with the largest energy that the ground has put in so far, `Σ −z̈·1ᵀMv·h`, and a floor.
+Both are divided by the largest energy input of the ground so far, `Σ −z̈·1ᵀMv·h`, plus a floor.
 """
 
 from __future__ import annotations
@@ -39,12 +39,12 @@ INTERVAL, RATIO, REPRESENTS, FLOOR, MASS = range(5)
 # places in `sums`
 ERROR, INERTIA, INPUT, LARGEST_INPUT, LAST_ERROR, LAST_FORCE, ERROR_SHARE, DRIFT_SHARE = range(8)
 
-# rows of `motion`: what the caller fills at every tick, and displacement and acceleration of the tick before
+# rows of `motion`: three that the caller fills at every tick, then displacement and acceleration of the tick before
 DISPLACEMENT, VELOCITY, ACCELERATION, LAST_DISPLACEMENT, LAST_ACCELERATION = range(5)
 
 
 class EnergyBalance(NamedTuple):
-    """The balance with its sums, which `step` moves on."""
+    """The balance with its running sums, which `step` updates."""
 
     fixed: Array
     sums: Array
@@ -72,9 +72,10 @@ def enter(
 def step(
     balance: EnergyBalance, ground_acceleration: float, target: float, measured: float, force: float
 ) -> bool:
-    """One tick, with the building's motion in `motion`: the shares come into `sums`; whether they are in their limits.
+    """Update the balance by one tick, whose motion of the building stands in `motion`.
 
-    `ground_acceleration` m/s², the specimen's `target` and `measured` deformation m and `force` N are of that tick.
+    `ground_acceleration` (m/s²), the specimen's `target` and `measured` deformation (m) and its `force` (N) are those
+    of the tick. The shares are written into `sums`; returns whether both are within their limits.
     """
     fixed, sums, motion = balance.fixed, balance.sums, balance.motion
     momentum, kinetic = 0.0, 0.0
@@ -95,5 +96,5 @@ def step(
     given = fixed[FLOOR] + sums[LARGEST_INPUT]
     sums[ERROR_SHARE] = sums[ERROR] / given
     sums[DRIFT_SHARE] = (kinetic - sums[INERTIA]) / given
-    within = abs(sums[ERROR_SHARE]) <= balance.most[0]  # not where it is NaN
+    within = abs(sums[ERROR_SHARE]) <= balance.most[0]  # False for NaN
     return within and abs(sums[DRIFT_SHARE]) <= balance.most[1]

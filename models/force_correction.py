@@ -1,4 +1,4 @@
-"""High-pass correction of the measured force: its phase lead makes up for what delay is left.
+"""High-pass correction of the measured force: its phase lead compensates the remaining delay.
 
     H(s) = √(1 + (ω_c/ω_0)²)·s/(s + ω_c)
 
@@ -6,8 +6,7 @@ At ω_0 the gain is one and the lead `atan(ω_c/ω_0)/ω_0`. The idea is that of
 version, Frontiers in Built Environment 6:145 (2020), doi 10.3389/fbuil.2020.00145; the normalisation to a
 gain of one at the structure's frequency is a choice made here. Discretised by the trapezoid rule.
 
-What it costs: a force that does not change is lost, so it belongs to specimens that vibrate about zero,
-not to one that yields to one side.
+It removes a constant force, so it suits specimens that vibrate about zero, not one that yields to one side.
 """
 
 from __future__ import annotations

@@ -1,17 +1,17 @@
-"""A force, or a displacement, over state and history: Preisach's operator in its play form, beside terms of the rate.
+"""A force or a displacement as a function of motion and history: a Preisach operator of plays, plus rate terms.
 
     y = Σᵢ ψᵢ(pᵢ, m) + φ(v/V, x/X),    pᵢ ← min(max(pᵢ, x/X − rᵢ), x/X + rᵢ),    m = max |x|/X so far
 
-Each ψᵢ is a broken line of the play pᵢ, with a part that changes as m passes thresholds (a system that ages); r₀ = 0
-is a function of x alone. Outside the last knot every line goes on straight. y is linear in the weights, so they are
-found by linear regression; the memory is the plays and m, so the law can be marched in any simulation. Bilinear,
-Masing's and flag-shaped hysteresis, clearance and friction are special cases, with radii on a grid.
+Each ψᵢ is a piecewise linear function of the play pᵢ, with a part that changes as m passes thresholds (ageing); with
+r₀ = 0 it is a function of x alone. Beyond the last knot every function continues straight. y is linear in the weights,
+so they are found by linear regression; the memory consists of the plays and m, so any simulation can step the law.
+Bilinear, Masing's and flag-shaped hysteresis, clearance and friction are special cases, with radii on a grid.
 
 P. Krejčí, Hysteresis, Convexity and Dissipation in Hyperbolic Equations (1996), section II.3: every Preisach operator
 is such a sum of functions of plays. A. Visintin, Differential Models of Hysteresis (1994), chapter IV.
 
-A law is one array: how many radii, knots and thresholds there are, X, V, then radii, knots, thresholds and weights.
-Without weights it is the grid alone, of which `features` gives what the weights multiply.
+A law is one array: the numbers of radii, knots and thresholds, X, V, then radii, knots, thresholds and weights. Without
+weights it is a grid alone, for which `features` returns the functions that the weights multiply.
 """
 
 from __future__ import annotations
@@ -29,40 +29,40 @@ NONE = np.zeros(0)  # no law
 
 
 class Grid(NamedTuple):
-    """Where a law's broken lines bend, all as shares of the reach."""
+    """Radii and knots of a law's piecewise linear functions, and its thresholds, all over the reach X."""
 
     radii: tuple[float, ...]
     knots: tuple[float, ...]  # on each side of zero
-    ages: tuple[float, ...]  # largest deformations so far from which on it ages
+    ages: tuple[float, ...]  # thresholds of the largest deformation so far
 
 
 def pack(grid: Grid, reach: float, speed: float) -> Array:
-    """A law without weights, of a motion that reaches `reach` m and `speed` m/s."""
+    """A law without weights for motions up to `reach` (m) and `speed` (m/s)."""
     head = (float(len(grid.radii)), float(len(grid.knots)), float(len(grid.ages)), reach, speed)
     return np.array([*head, *grid.radii, *grid.knots, *grid.ages])
 
 
 def memory(law: Array) -> Array:
-    """Memory of a law at rest: plays and largest deformation; then the features of the last step."""
+    """Memory of a law at rest: plays, largest deformation, then the features of the last step."""
     if law.size == 0:
         return np.zeros(0)
     return np.zeros(int(law[RADII]) + 1 + count(law))
 
 
 def count(law: Array) -> int:
-    """How many weights a law has."""
+    """The number of weights of a law."""
     return int(law[RADII] * (2 + 2 * law[KNOTS] + law[AGES])) + RATES
 
 
 def features(grid: Array, x: Array, v: Array) -> Array:
-    """What the weights multiply, (n, q), for a motion x (n,) m from rest with its rate v (n,) m/s."""
+    """The features (n, q), which the weights multiply, for a motion x (n,) m from rest with its rate v (n,) m/s."""
     result = np.empty((x.size, count(grid)))
     fill(grid, memory(grid), x, v, result)
     return result
 
 
 def play(law: Array, x: Array, v: Array) -> Array:
-    """What a law gives (n,) for a motion x (n,) m from rest with its rate v (n,) m/s."""
+    """The values of a law (n,) for a motion x (n,) m from rest with its rate v (n,) m/s."""
     size = law.size - count(law)
     result: Array = features(law, x, v) @ law[size:]
     return result
@@ -80,7 +80,7 @@ def fill(grid: Array, state: Array, x: Array, v: Array, result: Array) -> None:
 
 @jit_apart
 def step(law: Array, state: Array, x: float, v: float) -> float:
-    """What the law gives at a place x (m) with rate v (m/s), reached on a straight way; the memory moves on."""
+    """The value of a law at x (m) with rate v (m/s), reached monotonically from the last x; updates the memory."""
     first = int(law[RADII]) + 1
     number = state.size - first
     weights = law.size - number
@@ -93,7 +93,7 @@ def step(law: Array, state: Array, x: float, v: float) -> float:
 
 @jit
 def move(law: Array, state: Array, x: float, v: float) -> None:
-    """Move the memory on to a place, and write the features there behind it."""
+    """Update the memory to x (m) with rate v (m/s), and write the features behind it."""
     radii, knots, ages = int(law[RADII]), int(law[KNOTS]), int(law[AGES])
     here = x / law[REACH]
     state[radii] = max(state[radii], abs(here))

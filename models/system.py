@@ -1,6 +1,6 @@
-"""What the laboratories are: a plan's nominal models, and the unmodelled effects laid over them.
+"""The system under test: a plan's nominal models, and the unmodelled effects applied to them.
 
-With every effect at its null value a system is the plan alone, to the last bit.
+With every effect at its null value a system behaves exactly as the plan alone.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from common.plan.plan import Plan
 
 @dataclass(frozen=True)
 class ActuatorEffects:
-    """Laboratory A's transfer system, beyond its plan's model."""
+    """Effects on an actuator, beyond the plan's model."""
 
     velocity_limit: float = math.inf  # m/s
     backlash: float = 0.0  # m, whole play
@@ -25,22 +25,24 @@ class ActuatorEffects:
 
 @dataclass(frozen=True)
 class ColumnEffects:
-    """Laboratory A's specimen, beyond its plan's model."""
+    """Effects on a specimen, beyond the plan's model."""
 
     yield_displacement: float = math.inf  # m
     hardening: float = 0.0
     exponent: float = 2.0  # sharpness of the transition: Bouc-Wen's n, Menegotto and Pinto's R₀
-    law: float = 0.0  # of yielding, its place in `laboratories.column.specimen.LAWS`
+    law: float = 0.0  # index of the law of yielding in `laboratories.column.specimen.LAWS`
     unloading: float = 0.0  # exponent of the unloading stiffness, of a peak-oriented specimen
     degradation: float = (
-        0.0  # share of stiffness lost, once the largest deformation is well past the reference
+        0.0  # share of stiffness lost when the largest deformation is far beyond the reference
     )
     pinching: float = 0.0
     pinching_width: float = 1e-3  # m
     pinching_hardening: float = 0.0
     friction: float = 0.0  # N
     presliding: float = 10e-6  # m, deformation of the friction's contact before it slides
-    friction_velocity: float = 1e-6  # m/s, below which the friction falls off: F·tanh(|δ̇|/v)
+    friction_velocity: float = (
+        1e-6  # v of F·tanh(δ̇/v), m/s: below any motion of a test, so that it acts as Coulomb's
+    )
     viscous: float = 0.0  # N·s/m
     inertia: float = 0.0  # kg
     slip: float = 0.0  # m, whole gap
@@ -49,7 +51,7 @@ class ColumnEffects:
 
 @dataclass(frozen=True)
 class TableEffects:
-    """Laboratory B's shaking table, beyond second order with dead time."""
+    """Effects on a shaking table, beyond a second-order system with dead time."""
 
     gain: float = 1.0
     oil_frequency: float = math.inf  # Hz
@@ -57,41 +59,41 @@ class TableEffects:
     compliance: float = 0.0  # m/N
     backlash: float = 0.0  # m, whole play
     friction: float = 0.0  # m/s²: force over moving mass
-    friction_velocity: float = 1e-6  # m/s, below which it falls off
+    friction_velocity: float = 1e-6  # m/s, as in `ColumnEffects`
 
 
 @dataclass(frozen=True)
 class DamperEffects:
-    """Laboratory B's active mass damper, beyond a spring, a dashpot and a lagging motor."""
+    """Effects on an active mass damper, beyond a spring, a dashpot and a motor with lag."""
 
     gain: float = 1.0
     friction: float = 0.0  # N
-    friction_velocity: float = 1e-6  # m/s, below which it falls off
+    friction_velocity: float = 1e-6  # m/s, as in `ColumnEffects`
     force_limit: float = math.inf  # N
     offset: float = 0.0  # N, a constant force on the moving mass
     stop_stroke: float = math.inf  # m
     stop_stiffness: float = 0.0  # N/m
     learned: tuple[
         float, ...
-    ] = ()  # a law of `models.preisach` of the stroke that resists beside the spring, N
+    ] = ()  # a law of `models.preisach` for a force of the stroke beside the spring's, N
 
 
 @dataclass(frozen=True)
 class SensorEffects:
-    """One reading: `gain·delayed(lagged(value)) + bias + drift·t`, noise added, then rounded to the step."""
+    """Effects on a sensor: `gain·delayed(lagged(value)) + bias + drift·t`, plus noise, then rounded to the step."""
 
     gain: float = 1.0
     bias: float = 0.0
     drift: float = 0.0  # per s
     lag: float = 0.0  # s
     quantization: float = 0.0
-    noise: float = 0.0  # rms, beside the plan's
+    noise: float = 0.0  # rms, in addition to the plan's
     delay: float = 0.0  # s
 
 
 @dataclass(frozen=True)
 class LinkEffects:
-    """The network between the laboratories, each direction alike."""
+    """Effects on the network between the laboratories, in both directions."""
 
     delay: float = 0.0  # s
     jitter: float = 0.0  # s, standard deviation
@@ -101,7 +103,7 @@ class LinkEffects:
 
 @dataclass(frozen=True)
 class Effects:
-    """Everything that no plan describes; all null by default."""
+    """All effects that no plan describes; null by default."""
 
     time_shift: float = 0.0  # s, of the ground motion
     p_delta: float = 0.0  # N/m, of every storey
@@ -113,26 +115,26 @@ class Effects:
     sensors: dict[str, SensorEffects] = field(default_factory=dict)
     device: dict[str, float] = field(
         default_factory=dict
-    )  # what effects set on a device of a user's kind, by name
+    )  # parameters that effects set on a user's device, by name
 
 
 def times(factor: float, value: Any) -> Any:
-    """A number multiplied, or every one of nested tuples."""
+    """A number, or every number of nested tuples, multiplied by a factor."""
     return tuple(times(factor, item) for item in value) if isinstance(value, tuple) else factor * value
 
 
 @dataclass(frozen=True)
 class System:
-    """A plan whose parameters may have moved, with effects."""
+    """A plan, whose parameters may differ from the nominal ones, with effects."""
 
     plan: Plan
     effects: Effects = field(default_factory=Effects)
 
     def scaled(self, table: str, name: str, factor: float) -> System:
-        """The system with one parameter of the plan, or each of its storeys or a matrix's entries, multiplied.
+        """The system with one parameter of the plan multiplied, in every storey or entry of a matrix.
 
-        `name` may be that of a parameter in a table within it, `servo.gain`. What the specimen takes over of the
-        structure is a part of it and goes along, so that the numerical part has the same factor.
+        `name` may be that of a parameter in an inner table, such as `servo.gain`. The part of the structure that the
+        specimen takes over is multiplied too, so that the numerical part has the same factor.
         """
         part = getattr(self.plan, table)
         inner, _, key = name.rpartition(".")
@@ -152,12 +154,12 @@ class System:
         return replace(self, plan=replace(self.plan, **{table: part}))
 
     def laid(self, part: str, **values: float | tuple[float, ...]) -> System:
-        """The system with effects on one part replaced: a field of `Effects` that is a part itself."""
+        """The system with effects on one part replaced; `part` is a field of `Effects` that holds a dataclass."""
         changed = replace(getattr(self.effects, part), **values)
         return replace(self, effects=replace(self.effects, **{part: changed}))
 
     def sensed(self, signal: str, **values: float) -> System:
-        """The system with the effects on one reading replaced."""
+        """The system with the effects on one sensor replaced."""
         sensors = self.effects.sensors
         changed = replace(sensors.get(signal, SensorEffects()), **values)
         return replace(self, effects=replace(self.effects, sensors=sensors | {signal: changed}))

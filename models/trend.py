@@ -1,8 +1,8 @@
-"""Acceleration at the coming tick and its rate, from those of the last ticks.
+"""Acceleration at the coming tick and its rate, extrapolated from those of the last ticks.
 
-An explicit integrator knows displacement and velocity of the interval's end, but the acceleration only up
-to its beginning, and that carries the noise of the measured forces. A straight line through the last
-accelerations, by least squares, is read one interval ahead.
+An explicit integrator gives displacement and velocity at the interval's end, but the acceleration only at its
+beginning, with the noise of the measured forces. A straight line, fitted to the last accelerations by least squares,
+is evaluated one interval ahead.
 """
 
 from __future__ import annotations
@@ -10,7 +10,9 @@ from __future__ import annotations
 from models.compiled import jit
 from models.registry import Array
 
-RECENT = 6  # 12 ms at the default interval
+# Number of accelerations, 12 ms at the default interval: the fewest with which the extrapolated value has less noise
+# than a single acceleration. Its variance is 1/n + 3·(n + 1)/(n·(n − 1)) of theirs: 1.10 for n = 5, 0.87 for n = 6.
+RECENT = 6
 
 
 @jit

@@ -10,13 +10,13 @@ those of its plant.
 
 - The command of tick k−1 is reached at t_k, where it meets the measurement of tick k. A command that a limiter
   changed afterwards is not known here.
-- The derivatives of target and measurement are the same backward differences, so that what is learnt of one is true
-  of the other although they are late. Smoother derivatives would be later still and leave less margin of stability
-  at the resonance of the actuator's oil column.
-- The rule is integrated by the implicit Euler method, which here needs no equations solved: it adds `h·φᵀΓφ` to the
-  denominator. Whatever the gains, the error of the pair just seen falls and keeps its sign.
-- The coefficients rest unless the filtered measurement moved on by `trigger` within the last `memory`: noise alone
-  would draw those of the higher derivatives to zero.
+- The derivatives of target and measurement are the same backward differences, so that coefficients learnt from one
+  fit the other although both are late. Smoother derivatives would be later still and leave less stability margin at
+  the resonance of the actuator's oil column.
+- The rule is integrated by the implicit Euler method, which here needs no solution of equations: it adds `h·φᵀΓφ` to
+  the denominator. For any gains, the error of the pair just seen decreases and keeps its sign.
+- The coefficients adapt only if the filtered measurement changed by `trigger` within the last `memory` seconds:
+  noise alone would reduce those of the higher derivatives to zero.
 
 Not to be confused with `ats`, which solves for a window by least squares, nor with `series`, whose coefficients
 are given.
@@ -36,7 +36,7 @@ from models.registry import Array
 
 
 class AmbParams(NamedTuple):
-    """Start of the coefficients, exponents of the adaptive gains, and what they learn from."""
+    """Initial coefficients, exponents of the adaptive gains, low-pass filter, and the condition for adaptation."""
 
     a0: float = 0.99254  # –
     a1: float = 0.024889  # s
@@ -68,8 +68,13 @@ SOS = 15  # the low-pass
 
 ORDER = 4
 SECTIONS = ORDER // 2
-# the coefficients stand first in the memory
-TICKS, QUIET, ANCHOR, COMMAND = 4, 5, 6, 7  # calls; s since motion; where it was, m; last command, m
+# the coefficients are the first four places of the memory
+TICKS, QUIET, ANCHOR, COMMAND = (
+    4,
+    5,
+    6,
+    7,
+)  # calls; s since the last motion; position then, m; last command, m
 COMMAND_FILTER, MEASURED_FILTER = 8, 12
 FILTERED = 16  # filtered command, m
 TARGETS, MEASURED = 17, 21  # targets and filtered measurements, newest first
@@ -96,7 +101,7 @@ def state(params: Array, _interval: float) -> Array:
 
 @jit
 def rest(p: Array, s: Array, command: float, measured: float) -> None:
-    """Begin as if command and measurement had been these for long."""
+    """Initialize the memory as if command and measurement had been constant at these values (m)."""
     s[COMMAND] = command
     s[ANCHOR] = measured
     s[QUIET] = p[MEMORY]
@@ -108,43 +113,43 @@ def rest(p: Array, s: Array, command: float, measured: float) -> None:
 
 
 @jit
-def remember(s: Array, at: int, value: float) -> None:
-    """Put a value in front of those kept from `at` on."""
+def push(s: Array, at: int, value: float) -> None:
+    """Insert a value before those kept from place `at` on, and drop the oldest."""
     for i in range(KEPT - 1, 0, -1):
         s[at + i] = s[at + i - 1]
     s[at] = value
 
 
 @jit
-def slope(s: Array, at: int, interval: float) -> float:
-    """First derivative of the values kept from `at` on, by the backward difference."""
+def first_derivative(s: Array, at: int, interval: float) -> float:
+    """First derivative of the values kept from place `at` on, by the backward difference."""
     return (s[at] - s[at + 1]) / interval
 
 
 @jit
-def bend(s: Array, at: int, interval: float) -> float:
-    """Second derivative of those values."""
+def second_derivative(s: Array, at: int, interval: float) -> float:
+    """Second derivative of those values, by the backward difference."""
     return (s[at] - 2.0 * s[at + 1] + s[at + 2]) / interval**2
 
 
 @jit
-def twist(s: Array, at: int, interval: float) -> float:
-    """Third derivative of those values."""
+def third_derivative(s: Array, at: int, interval: float) -> float:
+    """Third derivative of those values, by the backward difference."""
     return (s[at] - 3.0 * s[at + 1] + 3.0 * s[at + 2] - s[at + 3]) / interval**3
 
 
 @jit
 def series_of(s: Array, at: int, interval: float) -> float:
-    """The coefficients' sum over the values kept from `at` on and their derivatives, m."""
-    early = s[0] * s[at] + s[1] * slope(s, at, interval)
-    return early + s[2] * bend(s, at, interval) + s[3] * twist(s, at, interval)
+    """The sum (m) of coefficients times the newest of the values kept from place `at` on and its derivatives."""
+    early = s[0] * s[at] + s[1] * first_derivative(s, at, interval)
+    return early + s[2] * second_derivative(s, at, interval) + s[3] * third_derivative(s, at, interval)
 
 
 @jit
 def observe(p: Array, s: Array, measured: float, interval: float) -> None:
-    """Filter the pair of t_k and note whether there is motion."""
+    """Filter command and measurement of t_k, and update the time since the last motion."""
     s[FILTERED] = low_pass.step(p, SOS, SECTIONS, s, COMMAND_FILTER, s[COMMAND])
-    remember(s, MEASURED, low_pass.step(p, SOS, SECTIONS, s, MEASURED_FILTER, measured))
+    push(s, MEASURED, low_pass.step(p, SOS, SECTIONS, s, MEASURED_FILTER, measured))
     s[QUIET] += interval
     if abs(s[MEASURED] - s[ANCHOR]) > p[TRIGGER]:
         s[ANCHOR] = s[MEASURED]
@@ -154,8 +159,8 @@ def observe(p: Array, s: Array, measured: float, interval: float) -> None:
 @jit
 def adapt(p: Array, s: Array, interval: float) -> None:
     """One step of the coefficients along the gradient of the pair of t_k."""
-    x, v = s[MEASURED], slope(s, MEASURED, interval)
-    a, j = bend(s, MEASURED, interval), twist(s, MEASURED, interval)
+    x, v = s[MEASURED], first_derivative(s, MEASURED, interval)
+    a, j = second_derivative(s, MEASURED, interval), third_derivative(s, MEASURED, interval)
     error = s[FILTERED] - series_of(s, MEASURED, interval)
     size = 1.0 + (1.0 + p[GAINS]) * x * x + (1.0 + p[GAINS + 1]) * v * v
     size += (1.0 + p[GAINS + 2]) * a * a + (1.0 + p[GAINS + 3]) * j * j
@@ -177,6 +182,6 @@ def step(p: Array, s: Array, wanted: Wanted, interval: float) -> float:
     observe(p, s, wanted.measured, interval)
     if s[QUIET] < p[MEMORY]:
         adapt(p, s, interval)
-    remember(s, TARGETS, wanted.target)
+    push(s, TARGETS, wanted.target)
     s[COMMAND] = series_of(s, TARGETS, interval)
     return s[COMMAND]

@@ -1,22 +1,22 @@
-"""Adaptive time series: the inverse of the actuator, found from what it did in the last second.
+"""Adaptive time series: the inverse of the actuator, identified from its motion in the last second.
 
     u = a₀·r + a₁·ṙ + a₂·r̈      (m; a₀ –, a₁ s, a₂ s²)
 
 with `a` from least squares of past commands on the measured displacement and its derivatives, both
 low-passed by the same filter, over a moving window: Chae, Kazemibidokhti and Ricles, Earthquake Engineering
-and Structural Dynamics 42 (2013) 1697–1715. Coefficients stay in boxes, move by a bounded rate, and only
-while there is motion: within the window's newest quarter `|measured|` was above the trigger and moved on by
-half of it. So a specimen left deformed teaches nothing, nor does the end of a motion seen alone, whose
-three columns look alike.
+and Structural Dynamics 42 (2013) 1697–1715. The coefficients have bounds and bounded rates of change, and they change
+only while there is motion: within the newest quarter of the window `|measured|` must have been above the trigger and
+must have changed by half of it. So nothing is learnt from a specimen that stays deformed, nor from the decaying end of
+a motion alone, in which the three columns are nearly proportional.
 
 - The command of tick k−1 is reached at t_k, where it meets the measurement of tick k. Derivatives are
   central differences, so both sides are those of t_{k−1}. A command that a limiter changed afterwards is
   not known here.
-- The window's normal equations are running sums. A second set, started anew each window, replaces them when
-  it has seen a whole one: rounding never gathers for longer, and no tick costs more than another.
-- Columns are scaled to length one, and the step from the present coefficients is damped by `DAMPING`: what
-  the window does not determine (a single sine leaves a₀ and a₂ to each other) stays as it was. A matrix that
-  is singular still, or not finite, leaves all of them.
+- The normal equations of the window are running sums. A second set of sums, started anew with each window, replaces
+  them when it covers a whole window: rounding errors accumulate for two windows at most, and all ticks cost the same.
+- Columns are scaled to length one, and the step from the present coefficients is damped by `DAMPING`: directions that
+  the window does not determine (a single sine cannot tell a₀ from a₂) stay as they are. If the matrix is singular all
+  the same, or not finite, no coefficient changes.
 
 Not to be confused with AMB (Galmez and Fermandois), which follows a gradient instead of solving for a
 window, nor with `inverse`, whose coefficients are given.
@@ -38,7 +38,7 @@ from models.registry import Array
 
 
 class AtsParams(NamedTuple):
-    """Start of the coefficients, what they learn from, and the bounds they keep."""
+    """Initial coefficients, window, trigger and filter, and the bounds of the coefficients."""
 
     lead: float = 0.044  # s; without a lag a₁ starts there, a₂ at lead²/2
     window: float = 1.0  # s
@@ -74,8 +74,13 @@ SOS = 13  # the low-pass
 
 ORDER = 6
 SECTIONS = ORDER // 2
-TIME = 0.05  # s; unit of time of the sums, which makes their columns of one size
-DAMPING = 1e-3  # of the step, in scaled columns
+TIME = 0.05  # s; unit of time of the sums, near 1/ω of 3 Hz, so that x, v and a in the sums have like sizes
+# Added to the diagonal of the scaled normal matrix, which is one: a direction with less than a thousandth of the
+# window's power, as noise of 3 % of the motion has, hardly changes the coefficients.
+DAMPING = 1e-3
+SINGULAR = (
+    0.1 * DAMPING
+)  # without rounding no pivot is below `DAMPING`, so a smaller one than this is rounding
 
 COEFFICIENTS = 0  # a₀, a₁, a₂
 TICKS, HEAD, QUIET, COMMAND = 3, 4, 5, 6  # calls; place in the ring; ticks since the trigger; last command
@@ -113,7 +118,7 @@ def state(params: Array, _interval: float) -> Array:
 
 @jit
 def gather(s: Array, at: int, sign: float, x: float, v: float, a: float, u: float) -> None:
-    """Add one row's products to the sums that stand at `at`, or take them away."""
+    """Add one row's products to the sums from place `at` on, or subtract them (`sign` −1)."""
     s[at] += sign * x * x
     s[at + 1] += sign * x * v
     s[at + 2] += sign * x * a
@@ -163,7 +168,11 @@ def observe(p: Array, s: Array, measured: float, interval: float) -> None:
 
 @jit
 def moving(p: Array, s: Array) -> bool:
-    """Whether the window holds enough motion to learn from."""
+    """Whether the window holds enough motion to adapt: see the module's text.
+
+    A sine of amplitude A has the variance A²/2, so that 8 times the variance exceeds the trigger squared where A
+    exceeds half the trigger.
+    """
     rows = min(s[TICKS], p[LENGTH])
     mean = s[SUMS + 9] / rows
     variance = s[SUMS] / rows - mean * mean
@@ -172,7 +181,7 @@ def moving(p: Array, s: Array) -> bool:
 
 @jit
 def toward(now: float, change: float, rate: float, least: float, most: float) -> float:
-    """A coefficient after a change bounded by its rate (per tick) and its box."""
+    """A coefficient after a change, bounded by its rate (per tick) and by its least and largest value."""
     return min(max(now + min(max(change, -rate), rate), least), most)
 
 
@@ -197,12 +206,12 @@ def adapt(p: Array, s: Array, interval: float) -> None:
     l1 = c01 / pivot0
     l2 = c02 / pivot0
     pivot1 = pivot0 - l1 * c01
-    if not pivot1 > 0.1 * DAMPING:
+    if not pivot1 > SINGULAR:
         return
     rest = c12 - l1 * c02
     l3 = rest / pivot1
     pivot2 = pivot0 - l2 * c02 - l3 * rest
-    if not pivot2 > 0.1 * DAMPING:
+    if not pivot2 > SINGULAR:
         return
     g1 -= l1 * g0
     z2 = (g2 - l2 * g0 - l3 * g1) / pivot2

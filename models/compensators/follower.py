@@ -1,4 +1,4 @@
-"""A programme of motion followed tick by tick behind a compensator: on the bench, and before a test."""
+"""Follows a programme of motion tick by tick through a compensator, in bench tests and before a test."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class ChosenCompensator(Protocol):
 
 
 class Follower:
-    """A programme behind a compensator; `table` of the plan is where that stands, for errors."""
+    """A programme with its compensator; `table` is the plan's table that holds the compensator, for errors."""
 
     def __init__(
         self,
@@ -44,7 +44,7 @@ class Follower:
         return float(self._motion[POSITION, tick])
 
     def __call__(self, tick: int, measured: float) -> tuple[float, float]:
-        """The target at t_k, and the command for the interval's end."""
+        """The target at t_k and the command for the interval's end, m, from the measurement (m) at t_k."""
         ahead, present = self._motion[:, tick + 1], self.wanted(tick)
         rates = float(ahead[RATE]), float(ahead[ACCELERATION]), float(ahead[JERK])
         wanted = float(ahead[POSITION]), *rates, present, measured

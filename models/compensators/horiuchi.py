@@ -40,7 +40,7 @@ STARTED, HEAD, HISTORY = 0, 1, 2  # in the state; from HISTORY on a ring of targ
 
 def cubic(place: float) -> list[tuple[int, float]]:
     """Ages in ticks and weights that interpolate a history at an age `place`, which may lie between ticks."""
-    if abs(place - round(place)) < 1e-9:
+    if abs(place - round(place)) < 1e-9:  # a whole number of ticks, but for the rounding of the division
         return [(round(place), 1.0)]
     first = max(math.floor(place) - 1, 0)
     nodes = range(first, first + 4)

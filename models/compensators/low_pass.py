@@ -27,14 +27,17 @@ def coefficients(kind: str, order: int, cutoff: float, interval: float) -> Array
 
 @jit
 def settle(p: Array, first: int, sections: int, s: Array, at: int, value: float) -> None:
-    """Put the filter whose memory stands at `at`, and whose sections stand from `first` on, to rest at a constant."""
+    """Set a filter to its steady state at a constant input.
+
+    Its memory begins at place `at` of `s`, and its `sections` sections at place `first` of `p`.
+    """
     for i in range(2 * sections):
         s[at + i] = p[first + 5 * sections + i] * value
 
 
 @jit
 def step(p: Array, first: int, sections: int, s: Array, at: int, value: float) -> float:
-    """One tick of that filter; direct form II transposed."""
+    """The output of that filter for the next input, in direct form II transposed."""
     for i in range(sections):
         b = first + 5 * i
         z = at + 2 * i

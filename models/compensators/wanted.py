@@ -1,4 +1,4 @@
-"""What every compensator is asked at a tick."""
+"""The input of every compensator at a tick."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 
 class Wanted(NamedTuple):
-    """What a compensator is asked for at t_k: the target at t_{k+1} with its rates, and where the system is."""
+    """The target at t_{k+1} with its rates, and target and measurement at t_k."""
 
     target: float  # m, at t_{k+1}, as its rates
     rate: float  # m/s

@@ -1,6 +1,6 @@
 """The programmes of bench tests: pieces of motion or force on the grid of ticks, joined.
 
-A programme starts and ends at rest; every piece is at rest at both ends and lies between still spans.
+A programme starts and ends at rest; every piece is at rest at both ends and lies between spans without motion.
 """
 
 from __future__ import annotations
@@ -24,12 +24,13 @@ __all__ = [
     "target",
 ]
 
-STILL = 0.5  # s, between pieces
+# s, between pieces: more than ten times the nominal actuator's delay of 44 ms, so that its response has ended
+STILL = 0.5
 POSITION, RATE, ACCELERATION, JERK = range(4)
 
 
 class ProgrammeSegment(NamedTuple):
-    """Where a piece lies: ticks `begin` to `end`, the latter excluded, and what it was made with."""
+    """The place of a piece: ticks `begin` to `end`, the latter excluded, and the parameters it was made with."""
 
     name: str
     begin: int
@@ -38,7 +39,7 @@ class ProgrammeSegment(NamedTuple):
 
 
 class Programme(NamedTuple):
-    """What is asked at every tick."""
+    """The commanded motion or force at every tick, and the places of its pieces."""
 
     motion: Array  # (4, ticks + 1): value (m or N) and its first three derivatives in time
     segments: tuple[ProgrammeSegment, ...]
@@ -79,7 +80,10 @@ def actuator(interval: float, seed: int) -> list[Piece]:
 
 
 def table(interval: float, _seed: int) -> list[Piece]:
-    """Steps of 2 mm and a sweep of 0.5 to 25 Hz, at most 10 mm and 3 m/s²."""
+    """Steps of 2 mm and a sweep of 0.5 to 25 Hz, at most 10 mm and 3 m/s².
+
+    The sweep covers the nominal table's natural frequency of 15 Hz, at a tenth of its limit of acceleration.
+    """
     return [
         steps(interval, height=2e-3, hold=0.5, count=8),
         sweep(interval, (0.5, 25.0), duration=40.0, amplitude=10e-3, curvature=3.0),
@@ -87,12 +91,15 @@ def table(interval: float, _seed: int) -> list[Piece]:
 
 
 def damper(interval: float, _seed: int) -> list[Piece]:
-    """A sweep of the motor's force of 20 N from 0.8 to 20 Hz."""
+    """A sweep of the motor's force of 20 N from 0.8 to 20 Hz.
+
+    It begins above the nominal damper's natural frequency of 0.3 Hz, at which that force would give a stroke of 1.8 m.
+    """
     return [sweep(interval, (0.8, 20.0), duration=40.0, amplitude=20.0, curvature=np.inf)]
 
 
 class Reach(NamedTuple):
-    """How far and how fast a target may go in a bench test of any laboratory."""
+    """The largest amplitude, velocity and acceleration of a target in a bench test."""
 
     amplitude: float  # m
     velocity: float  # m/s
@@ -100,8 +107,8 @@ class Reach(NamedTuple):
 
 
 def target(interval: float, reach: Reach) -> list[Piece]:
-    """Steps of a quarter of the reach, sines of 0.5 to 4 Hz and a sweep of 0.2 to 20 Hz within it."""
-    # the amplitude at which sweep and sines leave the reach's own for the bounded acceleration: there they are fastest
+    """Steps of a quarter of the amplitude, sines of 0.5 to 4 Hz and a sweep of 0.2 to 20 Hz within the reach."""
+    # where sweep and sines change from bounded amplitude to bounded acceleration they are fastest: v² = amplitude·most
     most = min(reach.acceleration, reach.velocity**2 / reach.amplitude)
     sines = [
         sine(

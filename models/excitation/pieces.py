@@ -16,7 +16,7 @@ class Piece(NamedTuple):
 
     name: str
     values: Array  # (ticks,), m or N
-    smooth: bool  # whether its derivatives mean anything to a compensator
+    smooth: bool  # whether it has derivatives that a compensator can use
     made_with: dict[str, float]
 
 

@@ -18,7 +18,7 @@ from models.ground_motion.header import EXAMPLE, UNITS, Header, columns
 from models.ground_motion.record import GroundMotion
 from models.ground_motion.source import MotionFile, number, read_source
 
-UNEVEN = 0.02  # of the interval; times are often written with few digits
+UNEVEN = 0.02  # of the interval: times with four decimals and an interval of 5 ms differ by that much
 COMMENTS = ("#", "%", "//")
 DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][-+]?\d+)?|[-+]?(?:nan|inf|infinity)", re.IGNORECASE)
@@ -77,7 +77,7 @@ def separator(lines: list[str]) -> str:
 
 
 def parts(line: str, mark: str) -> list[str]:
-    """The cells of a line."""
+    """The cells of a line, which are separated by `mark`."""
     cells = line.split() if mark == " " else line.split(mark)
     return [cell.strip().strip('"').strip() for cell in cells]
 

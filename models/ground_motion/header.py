@@ -1,4 +1,4 @@
-"""What the first line of a file of columns says: which column is time, which acceleration, and in which units."""
+"""Reads the header of a file of columns: which column is time, which acceleration, and their units."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Header(NamedTuple):
 
 
 def columns(cells: list[str], where: str) -> Header:
-    """What the header says of one or two columns; `where` stands in errors.
+    """The meaning of one or two columns by their header; `where` is the place for errors.
 
     Raises:
         InputError: a name or a unit is unknown, or the two columns are of one kind.
@@ -70,7 +70,7 @@ def columns(cells: list[str], where: str) -> Header:
 
 
 def said(word: str, pattern: re.Pattern[str]) -> tuple[str, str]:
-    """The unit of a column's name, as it is written and without its marks."""
+    """The unit in a column's name, as it is written, and with letters and digits only."""
     match = pattern.fullmatch(word)
     written = match[2].strip(" _-,:/()[]{}") if match else ""
     return written, re.sub(r"[^a-z0-9]", "", written)

@@ -50,7 +50,7 @@ READERS: dict[str, Reader] = {
 }
 COLUMNS = (".csv", ".dat", ".tsv", ".txt")
 LEAST_INTERVAL = (
-    1e-6  # s; nothing that shakes a building is sampled more often, so that the file means another unit
+    1e-6  # s: no ground motion is sampled more often, so a shorter one points to another unit of time
 )
 
 

@@ -23,7 +23,7 @@ class MotionFile:
 
     @property
     def version(self) -> str:
-        """What tells this file from another of the same record: its name and eight digits of its content."""
+        """The version of the record that this file holds: its name and eight hex digits of its content's digest."""
         return f"file {self.path.name}, digest {self.digest}"
 
     def at(self, index: int) -> str:
@@ -47,7 +47,7 @@ def read_source(path: Path) -> MotionFile:
 
 
 def printable(text: str) -> str:
-    """A piece of a file as a sentence may hold it."""
+    """Text of a file that is safe to show in a sentence: at most 60 characters, all of them printable."""
     return "".join(letter if letter.isprintable() else "?" for letter in text[:60])
 
 

@@ -1,4 +1,4 @@
-"""What every indicator asks of its signals."""
+"""The checks of signals that all indicators share."""
 
 from __future__ import annotations
 

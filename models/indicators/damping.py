@@ -1,4 +1,4 @@
-"""Damping as a test shows it, and what an imperfect path costs."""
+"""Damping identified from a free vibration, and damping lost by an imperfect transfer system."""
 
 from __future__ import annotations
 
@@ -11,9 +11,19 @@ from common.errors import InputError
 from models.indicators.checks import checked, moving
 from models.registry import Array
 
-LEAST = 20  # samples of a free vibration: four for each of the five numbers that are fitted
-BOUNDS = ([0.5, -1.0], [2.0, 1.0])  # damped frequency and decay over the frequency of the spectrum's peak
-STARTS = (0.002, 0.02, 0.1)  # damping ratios tried first
+LEAST = 20  # samples of a free vibration: four for each of the five parameters that are fitted
+# Bounds of damped frequency and decay, both over the frequency of the spectrum's peak: an octave on either side of it,
+# and damping ratios up to 0.7.
+BOUNDS = ([0.5, -1.0], [2.0, 1.0])
+STARTS = (
+    0.002,
+    0.02,
+    0.1,
+)  # damping ratios from which the fit starts, those of light, usual and heavy damping
+PADDING = 8  # factor on the length of the spectrum by zeros: its peak is then found to an eighth of a line
+TURN = (
+    0.05  # rad: phase of the delay per continuation step, small enough that Newton's method stays on its root
+)
 
 
 def free_vibration_damping(displacement: Array, interval: float) -> tuple[float, float]:
@@ -33,8 +43,8 @@ def free_vibration_damping(displacement: Array, interval: float) -> tuple[float,
     t = np.arange(displacement.size, dtype=np.float64) * interval
     scale = float(np.max(np.abs(displacement)))
     y = displacement / scale
-    spectrum = np.abs(np.fft.rfft(y - y.mean(), 8 * y.size))
-    omega = 2.0 * math.pi * float(np.fft.rfftfreq(8 * y.size, interval)[int(np.argmax(spectrum))])
+    spectrum = np.abs(np.fft.rfft(y - y.mean(), PADDING * y.size))
+    omega = 2.0 * math.pi * float(np.fft.rfftfreq(PADDING * y.size, interval)[int(np.argmax(spectrum))])
 
     def misfit(x: Array) -> Array:
         base = decaying(t, x[0] * omega, x[1] * omega)
@@ -59,7 +69,7 @@ def decaying(t: Array, damped: float, decay: float) -> Array:
 
 
 def damping_equivalent(stiffness: float, amplitude: float, delay: float, omega: float) -> tuple[float, float]:
-    """Dashpot (N·s/m) and stiffness (N/m) that a path of amplitude A and delay d (s) takes from the loop.
+    """Dashpot (N·s/m) and stiffness (N/m) that a transfer system of amplitude A and delay d (s) takes from the loop.
 
     `c_lost = k·A·sin(ωd)/ω`, `k_lost = k·(1 − A·cos ωd)` at ω (rad/s), for a stiffness k (N/m) behind it:
     the first harmonic of `k·A·x(t − d)`. Source: Horiuchi, Inoue, Konno and Namita, Real-time hybrid
@@ -70,7 +80,7 @@ def damping_equivalent(stiffness: float, amplitude: float, delay: float, omega: 
 
 
 def damping_points(dashpot: float, mass: float, stiffness: float) -> float:
-    """Damping ratio that a dashpot (N·s/m) is worth on a mass (kg) and stiffness (N/m): `c/(2·√(K·M))`."""
+    """Damping ratio of a dashpot (N·s/m) with a mass (kg) and a stiffness (N/m): `c/(2·√(K·M))`."""
     return dashpot / (2.0 * math.sqrt(stiffness * mass))
 
 
@@ -79,14 +89,14 @@ def apparent_damping(
 ) -> float:
     """Damping ratio of one degree of freedom whose experimental stiffness acts with amplitude A after a delay.
 
-    Dominant root of `M·s² + C·s + K − k + k·A·e^(−s·d) = 0`, followed from no delay by Newton's method. M kg,
-    C N·s/m, K N/m in all, k N/m experimental, d s.
+    It is that of the dominant root of `M·s² + C·s + K − k + k·A·e^(−s·d) = 0`, found by continuation from zero delay
+    with Newton's method. M in kg, C in N·s/m, K the whole and k the experimental stiffness in N/m, d in s.
 
     Raises:
         InputError: no root is found near the undelayed one.
     """
     s = cmath.sqrt(damping**2 - 4.0 * mass * stiffness + 0j) / (2.0 * mass) - damping / (2.0 * mass)
-    steps = max(1, math.ceil(abs(s) * delay / 0.05))
+    steps = max(1, math.ceil(abs(s) * delay / TURN))
     for number in range(1, steps + 1):
         share = number / steps
         late, size = share * delay, 1.0 + share * (amplitude - 1.0)
@@ -98,7 +108,7 @@ def newton(
     s: complex, mass: float, damping: float, total: float, k: float, size: float, late: float
 ) -> complex:
     """The characteristic equation's root next to `s`; raises InputError where there is none."""
-    for _ in range(50):
+    for _ in range(50):  # it converges quadratically, so that few are needed
         delayed = k * size * cmath.exp(-s * late)
         value = mass * s * s + damping * s + total - k + delayed
         change = value / (2.0 * mass * s + damping - late * delayed)

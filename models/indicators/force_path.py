@@ -1,7 +1,7 @@
-"""Delay and gain of the measured force against what the specimen's model gives at the measured displacement.
+"""Delay and gain of the measured force relative to the force of the specimen's model at the measured displacement.
 
-Indices of tracking compare displacements, so a force that comes late is not seen by them although it takes as much
-damping from the loop as a late displacement.
+Tracking indices compare displacements, so they do not show a late force, although it takes as much damping from the
+loop as a late displacement.
 """
 
 from __future__ import annotations
@@ -18,26 +18,34 @@ from models.registry import Array
 
 Spectra = NDArray[np.complex128]
 
-BLOCK = 2.0  # s; of the half-overlapping blocks that vouch for each other, shorter in a test of fewer than
+# s: length of the half-overlapping blocks, four cycles of the default building. It is shorter in a test that would have
+# fewer than `LEAST_BLOCKS` of them, with which Student's factor (2.14) is within 10 % of that of the normal law (1.96).
+BLOCK = 2.0
 LEAST_BLOCKS = 15
-LEAST_TICKS = 32  # of a block
-COHERENT = 0.9  # coherence from which on a frequency counts,
-CHANCE = 1e-7  # where so many blocks of noise do not reach it more often,
-EFFECTIVE = 4.0  # and this many blocks at least share its power: one strong block is coherent with anything
-ROUNDS = 4  # of aligning the signals: blocks of time cut off what is late
+LEAST_TICKS = 32  # of a block, which has fifteen frequencies between the mean and the highest one
+COHERENT = (
+    0.9  # least squared coherence at which a frequency counts: fifteen blocks give its phase to 3.5° (rms)
+)
+CHANCE = (
+    1e-7  # largest probability that noise alone has that coherence: one in 10^4 for a thousand frequencies
+)
+EFFECTIVE = (
+    4.0  # least number of blocks that share the power, because a single strong block is always coherent
+)
+ROUNDS = 4  # of aligning the signals: blocks cut off the late end of a signal, less of it with every round
 
 
 class ForcePath(NamedTuple):
-    """What the force does beside the displacement."""
+    """Delay and gain of the measured force relative to the expected one."""
 
     delay: float  # s, negative where the force leads
     interval: tuple[float, float]  # s, 95 %
     gain: float  # measured over expected, –
-    frequency: float  # Hz, at which they are meant
+    frequency: float  # Hz: mean frequency for which they hold
 
 
 class Cross(NamedTuple):
-    """Coherent frequencies, and there, by block, the cross-spectrum and the power of the expected force."""
+    """The coherent frequencies, and at them the cross-spectrum and the power of the expected force by block."""
 
     omega: Array  # (frequencies,) rad/s
     products: Spectra  # (blocks, frequencies)
@@ -87,7 +95,7 @@ def coarse(expected: Array, measured: Array, interval: float, most: float) -> fl
 
 
 def shifted(values: Array, ticks: float) -> Array:
-    """Values that come `ticks` later, on straight lines between them."""
+    """Values (n,) delayed by `ticks`, by linear interpolation."""
     places = np.arange(values.size, dtype=np.float64)
     return np.asarray(np.interp(places - ticks, places, values))
 
@@ -114,15 +122,15 @@ def blocks(values: Array, interval: float) -> Spectra:
 
 
 def effective(shares: Array) -> Array:
-    """How many blocks count, `(Σp)²/Σp²` over the first axis of their shares; 0 where all are 0."""
+    """The effective number of blocks, `(Σp)²/Σp²` over the first axis of their shares p; 0 where all are 0."""
     squares = np.sum(shares**2, axis=0)
     return np.asarray(np.sum(shares, axis=0) ** 2 / np.where(squares > 0.0, squares, 1.0))
 
 
 def cross(expected: Spectra, measured: Spectra, interval: float) -> Cross:
-    """What both have in common at the frequencies, other than zero, at which they are coherent over the blocks.
+    """Cross-spectrum and power at the frequencies, other than zero, at which both are coherent over the blocks.
 
-    A block holds at most half of the power there, so that the sums without it never vanish.
+    No block holds more than half of the power there, so that the jackknife's sums without one block never vanish.
 
     Raises:
         InputError: there are none.
@@ -136,14 +144,15 @@ def cross(expected: Spectra, measured: Spectra, interval: float) -> Cross:
     kept[[0, -1]] = False
     if not kept.any():
         raise InputError(
-            "The measured force is coherent with that of the specimen's model nowhere, or only for a moment."
+            "The measured force is coherent with that of the specimen's model at no frequency, or only for a moment: "
+            "use a longer recording with more motion."
         )
     omega = 2.0 * math.pi * np.fft.rfftfreq(2 * (kept.size - 1), interval)
     return Cross(np.asarray(omega[kept]), products[:, kept], powers[:, kept])
 
 
 def left(omega: Array, spectrum: Spectra) -> float:
-    """Delay (s) of least squares that a cross-spectrum of signals nearly aligned still holds."""
+    """The remaining delay (s) by least squares in the cross-spectrum of nearly aligned signals."""
     return -float(np.sum(omega * np.imag(spectrum)) / np.sum(omega**2 * np.abs(spectrum)))
 
 

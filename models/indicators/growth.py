@@ -6,9 +6,11 @@ import numpy as np
 
 from models.registry import Array
 
-PARTS = 4  # of the motion, of which the last two are compared
-GROWN = 1.02  # rms of the last part over that of the part before: more than integration and beats make of a motion
-GONE = 1e-6  # of the largest part, below which what is left is rounding
+PARTS = 4  # equal parts of the motion, of which the last two are compared
+GROWN = (
+    1.02  # least ratio of the last two rms values that counts as growth; rounding and beats stay below 2 %
+)
+GONE = 1e-6  # of the largest rms value: a motion below it counts as decayed to rounding
 
 
 def grows(motion: Array) -> bool:

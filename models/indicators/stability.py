@@ -1,4 +1,4 @@
-"""How much delay a partition bears."""
+"""The critical delay of a partition, and the stability indicator that follows from it."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 from common.errors import InputError
 from models.registry import Array
 
-ON_AXIS = 1e-6  # real part of an eigenvalue over its size up to which it lies on the imaginary axis
-STILL = 1e-9  # growth, frequency and angle that count as none
+ON_AXIS = 1e-6  # largest real part over size of an eigenvalue on the imaginary axis: rounding of a nearly double one
+STILL = 1e-9  # growth rate, frequency (both over the highest one) and angle (rad) that count as zero: above rounding
 
 
 def critical_delay(
@@ -124,7 +124,10 @@ def predictive_stability_indicator(critical: float) -> float:
 
 
 def sensitivity(indicator: float) -> str:
-    """How sensitive a partition with that indicator is to delay: slightly, moderately or extremely."""
+    """The sensitivity of a partition to delay by that indicator: slightly, moderately or extremely.
+
+    The classes are those of Maghareh et al. (2014): critical delays above 5 ms, 1 to 5 ms, and below 1 ms.
+    """
     if indicator > 0.7:
         return "slightly"
     return "moderately" if indicator >= 0.0 else "extremely"

@@ -1,4 +1,4 @@
-"""How a measurement follows its target: delay, amplitude, error."""
+"""Delay, amplitude and error of a measurement relative to its target."""
 
 from __future__ import annotations
 
@@ -14,27 +14,29 @@ from models.registry import Array
 
 Index = NDArray[np.int64]
 
-STILL = 1e-12  # of the whole signals' size: what rounding leaves of a part that does not move
-SETTLED = 1e-7  # s: a delay that moves by less from pass to pass stands, far below the 10 µs that are shown
-PASSES = 20  # two seconds of slow motion took 15
+STILL = 1e-12  # of the whole signals' size: a part that varies by less is constant up to rounding
+SETTLED = (
+    1e-7  # s: the iteration ends when the delay changes by less, a hundredth of the 10 µs that are shown
+)
+PASSES = 20  # at most; two seconds of slow motion needed 15
 AGREE_TICKS, AGREE_SHARE = 0.25, 0.03  # as `tracking_delay` says
-TIE = 1e-3  # correlation by which a peak may stand below the best and still be as good
+TIE = 1e-3  # a correlation peak lower than the best one by no more than this counts as equal
 
 
 class FrequencyEvaluation(NamedTuple):
-    """What the frequency evaluation index says."""
+    """Amplitude and delay by the frequency evaluation index."""
 
     amplitude: float  # measured over target, –
     delay: float  # s, negative where the measurement leads
-    frequency: float  # Hz, at which they are meant
+    frequency: float  # Hz: mean frequency for which they hold
 
 
 def frequency_evaluation_index(target: Array, measured: Array, interval: float) -> FrequencyEvaluation:
-    """Amplitude, delay and the frequency they are meant at, each weighted by the target's power.
+    """Amplitude, delay and mean frequency, each weighted by the target's power.
 
     `FEI = Σ (X_m/X_t)·|X_t|² / Σ |X_t|²`, amplitude `|FEI|`, delay `−arg(FEI)/(2π·f_eq)`, f_eq the mean
     frequency under |X_t|². `target` and `measured` (n,) in one unit, `interval` in s; means are removed and
-    a Hann window is laid over both. A delay beyond half a period of f_eq comes out a period short.
+    both are multiplied by a Hann window. A delay beyond half a period of f_eq is returned a period too short.
 
     Raises:
         InputError: signals empty, unequal, not finite or constant.
@@ -57,10 +59,10 @@ def frequency_evaluation_index(target: Array, measured: Array, interval: float) 
 def aligned_evaluation(target: Array, measured: Array, interval: float) -> FrequencyEvaluation:
     """The frequency evaluation index of a measurement that is first moved back by its own delay.
 
-    The index lays one window over both signals. A motion of few cycles, or one that drifts, then stands at another
-    place of the window in the measurement than in the target, and the part of the delay that the window takes is
-    missing: 12.0 ms came out of 18.9 in 3 s of El Centro. So the measurement is moved back by the delay found, by a
-    cubic spline, until nothing of it is left; the window then lies over the same motion in both.
+    The index uses the same window for both signals. A late motion of few cycles, or one that drifts, is weighted
+    differently by the window in the measurement than in the target, which biases the delay: in 3 s of El Centro it
+    gave 12.0 ms in place of 18.9 ms. So the measurement is moved back by the delay found, by a cubic spline, until no
+    delay is left; the window then weights the same motion in both.
 
     Raises:
         InputError: signals empty, unequal, not finite or constant, or no delay at which the phase vanishes.
@@ -83,12 +85,12 @@ def aligned_evaluation(target: Array, measured: Array, interval: float) -> Frequ
 
 
 def tracking_delay(by_index: float, by_correlation: float, interval: float) -> float | None:
-    """The delay (s) by the aligned index where correlation finds the same, None where the two differ.
+    """The delay (s) by the aligned index if correlation gives the same, None where the two differ.
 
-    They weigh the frequencies of a motion differently and err differently over few cycles, so that a delay on which
-    both agree does not hang on the method. A quarter of an interval or 3 % is what they differ by over 4 s and more of
-    three earthquakes, a sweep and a slow drift behind table and actuator; over a second of them they mostly differ by
-    more.
+    The two weight the frequencies of a motion differently and err differently over few cycles, so that a delay on
+    which both agree does not depend on the method. Over 4 s and more of three earthquakes, a sweep and a slow drift
+    through table and actuator they differed by at most a quarter of an interval or 3 %; over a second they mostly
+    differed by more.
     """
     allowed = max(AGREE_TICKS * interval, AGREE_SHARE * abs(by_correlation))
     return by_index if abs(by_index - by_correlation) <= allowed else None

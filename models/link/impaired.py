@@ -1,9 +1,9 @@
-"""A link plug-in that delays, scatters and loses messages; both directions alike, each with draws of its own.
+"""A link plug-in that delays and loses messages at random; both directions alike, each with random draws of its own.
 
     extra delay of a message = delay + g,    g ~ Gamma(1, jitter): mean and standard deviation are both `jitter`
 
-so that `delay` is the constant part, which no message beats. The Gamma law of shape one is the exponential: most
-messages come soon, some late (queues), none before its time. Messages may overtake each other.
+so that `delay` is the smallest extra delay. The Gamma distribution of shape one is the exponential distribution: most
+messages come soon and some late, as with queues. Messages may overtake each other.
 
 Losses follow the two-state chain of Gilbert (Bell Syst. Tech. J. 39 (1960) 1253-1265), every message lost in its bad
 state and none in the good one: the share `loss` of all messages is lost, in runs of `burst` on average. A run cannot
@@ -21,9 +21,9 @@ DRAWN = 256  # messages drawn at once: some ten microseconds
 
 
 class ImpairedLink:
-    """The network of a test; what becomes of a message depends on seed, direction and number alone.
+    """The network of a test; the delay or loss of a message depends on seed, direction and number alone.
 
-    The catalogue's effects on the link are there to be diagnosed: the watchdogs look at the real link beneath.
+    The catalogue's effects on the link are meant to be diagnosed, so the watchdogs judge the real link instead.
     """
 
     watched = False
@@ -45,7 +45,7 @@ class ImpairedLink:
         self._fates: dict[str, list[float | None]] = {direction: [] for direction in DIRECTIONS}
 
     def fate(self, direction: str, seq: int, t: float) -> float | None:
-        """Seconds of extra delay of a message sent at test time `t`, None for lost."""
+        """Extra delay (s) of the message of tick `seq`; None if it is lost. The test time `t` is not used."""
         fates = self._fates[direction]
         while len(fates) <= seq:
             lost, scatter = self._streams[direction].draw()
@@ -65,7 +65,7 @@ class Losses:
         self._lost = bool(generator.random() < loss)
 
     def draw(self) -> tuple[list[bool], np.ndarray[tuple[int], np.dtype[np.float64]]]:
-        """Which of the next messages are lost, and the scatter of all, of mean and deviation one."""
+        """Whether each of the next `DRAWN` messages is lost, and their random delays, of mean and deviation one."""
         lost = []
         for chance in self._generator.random(DRAWN).tolist():
             lost.append(self._lost)

@@ -1,7 +1,7 @@
-"""Force-deformation models of columns, independent of rate: one file each, listed here.
+"""Rate-independent force-deformation models of columns, one file each, listed here.
 
-They serve for the column in laboratory A and for the numerical columns of each storey. A model is a file
-with `Params`, `RULES`, `STATE_SIZE` and `step`; it is added by its line in `SPECIMENS` and one in `step`.
+They serve for experimental columns and for the numerical columns of each storey. A model is a file with `Params`,
+`RULES`, `STATE_SIZE` and `step`; a line in `SPECIMENS` and one in `step` add it.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from models.specimens import bilinear, bouc_wen, bwbn, clough, linear, menegotto
 
 
 def no_fault(_params: Any) -> str:
-    """Parameters that are each in their range fit together."""
+    """An empty text: a model without conditions between its parameters."""
     return ""
 
 

@@ -48,12 +48,12 @@ STIFFNESS, YIELD_DISPLACEMENT, HARDENING, SHARPNESS, BETA, GAMMA = range(6)
 DEFORMATION, HYSTERETIC = range(2)  # δ (m) and z of the last call
 STATE_SIZE = 2
 
-STEEPNESS = 0.05  # longest substep times the steepest slope; global error of z about 1e-7
-SETTLED = 1e-16  # change per substep from which on z has reached its bound
+STEEPNESS = 0.05  # longest substep times the steepest slope: the global error of z is then about 1e-7
+SETTLED = 1e-16  # relative change of z per substep, below the rounding of a double, at which z has reached its bound
 
 
 def fault(p: BoucWenParams) -> str:
-    """What is wrong with parameters that are each in their range, or nothing."""
+    """What is wrong with a combination of parameters that are each in their range; empty where nothing is."""
     if p.beta + p.gamma <= 0.0:
         return f"beta + gamma is {p.beta + p.gamma:g}, but must be above 0, or the force has no bound"
     return ""

@@ -54,7 +54,7 @@ STATE_SIZE = 4
 
 
 def fault(p: CloughParams) -> str:
-    """What is wrong with parameters that are each in their range, or nothing."""
+    """What is wrong with a combination of parameters that are each in their range; empty where nothing is."""
     if p.closing > 0.0 and p.crack_displacement <= 0.0:
         return "closing is above 0, so crack_displacement must be, too"
     if p.hardening + p.closing > 1.0:

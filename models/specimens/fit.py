@@ -7,8 +7,8 @@ reported is that of all rows. Two parameters are tied, as a path cannot tell the
 sum is another yield displacement), and the hardening of `clough` is sought as a share of what its open
 cracks leave.
 
-The intervals hold for independent errors of equal spread. What a model cannot follow is neither, so they
-say how sharply the minimum is cut rather than how far another column may be.
+The intervals hold for independent errors of equal variance. The errors of a model that does not fit are neither, so
+the intervals then describe how sharp the minimum is, not how much another column may differ.
 """
 
 from __future__ import annotations
@@ -30,17 +30,24 @@ from models.compiled import jit
 from models.registry import Array
 from models.specimens import SPECIMENS
 
-MOST_ROWS = 1200  # of a thinned record
-FOLLOWED = 600  # starting points followed to their minimum, times parameters squared; at least two are
-EVALUATIONS = 50  # most steps to a minimum: a start that has not come near it by then is given up
+MOST_ROWS = 1200  # of a thinned record: 600 blocks keep every turning point of some hundred cycles
+# Number of starting points that are followed to their minimum, times the number of parameters squared, because a step
+# costs about that; at least two points are followed.
+FOLLOWED = 600
+EVALUATIONS = (
+    50  # largest number of steps to a minimum: a start that has not come near it by then is given up
+)
 CONFIDENCE = 0.95
-WEAKEST = 1e-13  # smallest eigenvalue of the normal matrix, relative to its largest
-WIDEST = 50.0  # bound on the logarithm of a factor between estimate and interval
+WEAKEST = (
+    1e-13  # least eigenvalue of the normal matrix over its largest: smaller ones are rounding of a double
+)
+WIDEST = 50.0  # largest logarithm of interval over estimate: e^50 says that the parameter is not determined
+STEP = 1e-6  # of the central differences of the parameters: their error of second order is below 1e-11
 
 
 @dataclass(frozen=True)
 class SearchRange:
-    """Where a parameter is sought, and from which values; `unit` is what they are multiples of."""
+    """The range in which a parameter is searched and its starting values, as multiples of `unit`: see `scales`."""
 
     low: float
     high: float
@@ -59,6 +66,8 @@ class SpecimenFit:
     intervals: dict[str, tuple[float, float]]
 
 
+# The ranges are wide bounds around what columns of reinforced concrete and steel have; the secant stiffness is a lower
+# estimate of the elastic one, and a specimen that yields beyond five times the largest deformation looks elastic.
 STIFFNESS = SearchRange(0.2, 100.0, (1.2, 3.0), "secant")
 YIELDING = SearchRange(0.002, 5.0, (0.25, 0.6), "reach")
 HARDENING = SearchRange(0.0, 0.95, (0.05, 0.3), log=False)
@@ -162,7 +171,7 @@ def fit(
 
 
 def record(model: str, deformation: Array, force: Array) -> tuple[Array, Array]:
-    """Path (m) and force (N), checked.
+    """Path (m) and force (N) after a check.
 
     Raises:
         InputError: the model is unknown or the record cannot be fitted.
@@ -185,7 +194,7 @@ def record(model: str, deformation: Array, force: Array) -> tuple[Array, Array]:
 
 
 def scales(path: Array, force: Array) -> dict[str, float]:
-    """What the ranges are multiples of: the largest deformation (m), the secant (N/m), and one."""
+    """The units of the ranges: the largest deformation (m), the secant stiffness (N/m), and one."""
     reach = float(np.abs(path).max())
     return {"reach": reach, "secant": float(np.abs(force).max()) / reach, "": 1.0}
 
@@ -200,14 +209,14 @@ def thinned(path: Array, most: int) -> NDArray[np.intp]:
 
 
 def bounds(ranges: Mapping[str, SearchRange]) -> tuple[Array, Array]:
-    """Lowest and highest of what is sought."""
+    """Lower and upper bounds of the searched values."""
     low = [math.log(item.low) if item.log else item.low for item in ranges.values()]
     high = [math.log(item.high) if item.log else item.high for item in ranges.values()]
     return np.array(low), np.array(high)
 
 
 def parameters(model: str, x: Array, units: Array) -> dict[str, float]:
-    """The model's parameters from what is sought: logarithms, multiples and shares."""
+    """The model's parameters from the searched values, which are logarithms, multiples and shares."""
     ranges = FREE[model]
     values = {
         name: float(unit * (math.exp(value) if item.log else value))
@@ -221,10 +230,10 @@ def parameters(model: str, x: Array, units: Array) -> dict[str, float]:
 
 
 def sought(model: str, values: Mapping[str, float], units: Array) -> Array:
-    """What is sought, from the model's parameters; the inverse of `parameters`."""
+    """The searched values from the model's parameters; the inverse of `parameters`."""
     given = dict(values)
     if "beta" in given:
-        # any other sum of both is the same loop with another yield displacement
+        # another sum of both gives the same loop with another yield displacement
         total = given["beta"] + given.pop("gamma", 1.0 - given["beta"])
         if total > 0.0:
             given["beta"] /= total
@@ -258,7 +267,7 @@ def intervals(
     """95 % interval of every parameter, from the Jacobian of the misfit at the minimum."""
     rows, count = jacobian.shape
     weights, vectors = np.linalg.eigh(jacobian.T @ jacobian)
-    # a direction without influence is uncertain, not certain
+    # bounded from below, so that a direction without influence has a large variance
     weights = np.maximum(weights, WEAKEST * max(float(weights[-1]), 1e-300))
     covariance = (vectors / weights) @ vectors.T * (squares / (rows - count))
     factor = float(student.ppf(0.5 + 0.5 * CONFIDENCE, rows - count))
@@ -269,8 +278,8 @@ def intervals(
         log = ranged is not None and ranged.log
         gradient = np.array(
             [
-                (parameters(model, x + h, units)[name] - parameters(model, x - h, units)[name]) / 2e-6
-                for h in 1e-6 * np.eye(count)
+                (parameters(model, x + h, units)[name] - parameters(model, x - h, units)[name]) / (2.0 * STEP)
+                for h in STEP * np.eye(count)
             ]
         )
         half = factor * math.sqrt(float(gradient @ covariance @ gradient))

@@ -1,1 +1,1 @@
-"""Models of what imposes the computed motion: dead time, hydraulic actuator, shaking table."""
+"""Models of transfer systems, which impose the computed motion: dead time, hydraulic actuators."""

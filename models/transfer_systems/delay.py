@@ -21,7 +21,7 @@ from models.registry import Array
 
 
 class DelaySegments(NamedTuple):
-    """How an interval is split, and the delayed command at each border."""
+    """The segments of an interval, and the interpolation of the delayed command at each border."""
 
     lengths: Array  # (m,) s
     taps: Array  # (m + 1, 2): index into the history of written commands, and the weight of the older one
@@ -36,24 +36,27 @@ def split(interval: float, delay: float, substeps: int = 1, *, held: bool = Fals
     of a segment's end is that of the whole segment.
     """
     lag = delay / interval
-    whole = math.floor(lag + 1e-9)
+    whole = math.floor(lag + ROUNDED)
     rest = lag - whole
     borders = {i / substeps for i in range(substeps + 1)}
-    if rest > 1e-9:
+    if rest > ROUNDED:
         borders.add(rest)
     shares = sorted(borders)
     if held:
         middles = [0.5 * (early + late) for early, late in pairwise(shares)]
-        steps = [max(math.ceil(whole + (rest if rest > 1e-9 else 0.0) - share), 0) for share in middles]
+        steps = [max(math.ceil(whole + (rest if rest > ROUNDED else 0.0) - share), 0) for share in middles]
         return DelaySegments(
             np.diff(shares) * interval, np.array([(index, 0.0) for index in (steps[0], *steps)]), whole + 3
         )
     places = [1.0 + lag - share for share in shares]
-    if rest <= 1e-9:
+    if rest <= ROUNDED:
         places = [1.0 + whole - share for share in shares]
     taps = [(min(math.floor(place + 1e-12), whole + 1), place) for place in places]
     table = np.array([(index, max(place - index, 0.0)) for index, place in taps])
     return DelaySegments(np.diff(shares) * interval, table, whole + 3)
+
+
+ROUNDED = 1e-9  # of an interval: a delay that differs by less from whole intervals counts as whole
 
 
 @jit

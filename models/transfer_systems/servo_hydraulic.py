@@ -6,11 +6,11 @@
 
 C. E. Silva, D. Gomez, A. Maghareh, S. J. Dyke and B. F. Spencer, Benchmark control problem for real-time hybrid
 simulation, Mech. Syst. Signal Process. 135 (2020) 106381, after S. J. Dyke, B. F. Spencer, P. Quast and M. K. Sain,
-J. Eng. Mech. 121 (1995). The compliance c_f (m/N) of oil and frame that lies between piston and specimen is none of
-theirs; it is zero unless an effect says otherwise.
+J. Eng. Mech. 121 (1995). The compliance c_f (m/N) of oil and frame between piston and specimen is an addition; it is
+zero unless an effect sets it.
 
-All of it is linear but for w (N), what the specimen's force has beyond k·x: it is an input, held over a segment. The
-command moves on a straight line over a segment, so that one matrix exponential carries the state without error.
+The equations are linear except for w (N), the part of the specimen's force beyond k·x: it is an input, held constant
+over a segment. The command is linear over a segment, so that one matrix exponential propagates the state exactly.
 
 Not to be confused with `first_order`, whose motion does not depend on the specimen.
 """
@@ -71,9 +71,9 @@ def propagators(a: Array, b: Array, lengths: Array) -> Array:
 
 
 def scales(a: Array) -> Array:
-    """Sizes of the states and inputs beside a position of 1 m, (8,): between them lie fifteen powers of ten.
+    """Sizes (8,) of the states and inputs that belong to a position of 1 m.
 
-    With them the matrix is balanced, and its exponential keeps its digits.
+    They differ by fifteen powers of ten. Scaled by them the matrix is balanced, and its exponential is accurate.
     """
     force = -a[VELOCITY, POSITION] / a[VELOCITY, FORCE] - a[FORCE, VELOCITY]
     speed = np.sqrt(force * a[VELOCITY, FORCE])
