@@ -21,7 +21,7 @@ from diagnosis.fits.fitting import Data
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import Searcher
 from diagnosis.learned.learn import learn
-from diagnosis.recorded import link
+from diagnosis.recorded import link, link_effects
 from diagnosis.recorded.ground import Ground
 from diagnosis.recorded.joined import joined, refuse_others
 from diagnosis.recorded.laboratory import RecordedLaboratory
@@ -31,10 +31,13 @@ from diagnosis.recorded.record import LEAST_TICKS, Record
 from diagnosis.report.records import Report
 from models.system import System
 
-SHORTEST = 0.5  # s of a test that anything can be said of
+# s. A shorter recording is not judged: it holds less than one period of the default building's first mode (2 Hz).
+SHORTEST = 0.5
 BUILDING = ("ground_acceleration", "displacement")
-UNNAMED = ("partly", "unknown")  # outcomes that leave something without a name
-AGAINST = -0.7  # correlation from which on a sign is doubted
+UNNAMED = ("partly", "unknown")  # outcomes of a part in which some of the gap has no named cause
+# Correlation of a reading with its prediction below which its sign is doubted. It is that of two sines 135° apart,
+# which no delay of a stable test reaches: the compensated loop is unstable long before.
+AGAINST = -0.7
 
 
 def diagnose(
@@ -44,19 +47,18 @@ def diagnose(
     require: float | None = None,
     more: Mapping[str, Sequence[Record]] = MappingProxyType({}),
 ) -> dict[str, Report]:
-    """The reports on a test by role of the slave (contract, section 8), but for their verdicts in words.
+    """The reports on a test by role of the slave, without their verdicts in words, which the pages add.
 
-    Each is of the master and of one slave; in its closed loop the other slaves are what they were found to be. The one
-    on a test without slaves is the master's. `require` is the gap that may be left in each part. The laboratories are
-    searched in the recordings `more` of them as well: one cause must explain all; the report shows the first.
+    Each report covers the master and one slave; its closed loop holds the other slaves as they were diagnosed. A test
+    without slaves has one report, under the master's role. `require` is the gap that may be left in each part. Effects
+    must also explain `more` recordings of the same laboratories, if given; the report shows the first recording.
 
     Raises:
         InputError: the recording holds nothing that a model of the plan could predict, or one of `more` is not of the
             same laboratories.
     """
-    with threadpool_limits(
-        limits=1, user_api="blas"
-    ):  # small matrices: more threads only wait for each other
+    # The matrices are small, so that several BLAS threads would only wait for each other.
+    with threadpool_limits(limits=1, user_api="blas"):
         found = {role: examine(record, tell, more.get(role, ())) for role, record in records.items()}
         systems = {role: item.systems(noisy=False)[role] for role, item in found.items()}
         return {
@@ -93,7 +95,8 @@ def examine(record: Record, tell: Tell = untold, more: Sequence[Record] = ()) ->
     further = [part for other in more for part in parts_of(other)]
     rounded = readings.steps(record)
     datas, verdicts = [], []
-    late: float | None = None  # what a logger made of the forces that the building was computed from, s
+    # s, delay that a logger added to the forces from which the building was computed.
+    late: float | None = None
     for number, given in enumerate(parts, 1):
         part = given if late is None or not isinstance(given, LaboratoryPart) else given.logged(late)
         tell(part.name, number, len(parts))
@@ -120,7 +123,11 @@ def examine(record: Record, tell: Tell = untold, more: Sequence[Record] = ()) ->
 
 
 def judged(data: Data, scales: Scales) -> PartVerdict:
-    """The verdict on a part; a building that no effect makes exact is judged as one whose forces a logger recorded."""
+    """The verdict on a part.
+
+    Where no effect explains a building exactly, its recorded forces are taken to have passed a logger, and it is
+    judged once more with the logger's delay and gain as unknowns.
+    """
     verdict = judge(Searcher(data, scales).run())
     if isinstance(data.part, Building) and data.part.exact and verdict.outcome in ("partly", "unknown"):
         part = data.part.logged()
@@ -132,11 +139,11 @@ def judged(data: Data, scales: Scales) -> PartVerdict:
 
 
 def exchanged(record: Record) -> list[LinkFinding]:
-    """What the messages' numbers and stamps say of the exchange, where both ends were recorded."""
+    """Effects of the link that the messages' numbers and time stamps show, where both ends were recorded."""
     if not (record.run.has("master") and record.run.has("slave") and exchange_known(record.run)):
         return []
     account = link.account(record.run, record.plan.test.interval)
-    return link.findings(account, record.plan.test.interval)
+    return link_effects.findings(account, record.plan.test.interval)
 
 
 def together(more: Sequence[Record]) -> list[str]:
@@ -150,21 +157,21 @@ def of_plan(record: Record) -> list[str]:
     if not record.other_plan:
         return []
     return [
-        "The plan given asks for another structure, compensation or control than the recording's own: "
-        "the response gap holds that as well."
+        "The plan given has another structure, compensation or control than the recording's own plan: "
+        "the response gap includes this difference."
     ]
 
 
 def repeating(held: Mapping[str, float]) -> list[str]:
     """A sentence for each sensor that repeats samples."""
     return [
-        f"The sensor {name} repeats {100 * share:.2g} % of its samples to the last bit: it misses samples."
+        f"The sensor {name} repeats {100 * share:.2g} % of its samples exactly, so it misses samples."
         for name, share in held.items()
     ]
 
 
 def reversed_signs(datas: Sequence[Data]) -> list[str]:
-    """A sentence for each reading that runs against what the plan's model predicts."""
+    """A sentence for each reading whose sign is opposite to what the plan's model predicts."""
     result = []
     for data in datas:
         predicted = data.part.predict(data.system)
@@ -175,7 +182,7 @@ def reversed_signs(datas: Sequence[Data]) -> list[str]:
                 continue
             if np.corrcoef(read[there], said[there])[0, 1] < AGAINST:
                 result.append(
-                    f"{name} runs against what the plan predicts: check its sign and that of the command."
+                    f"{name} has the opposite sign of what the plan predicts: check its sign and the command's."
                 )
     return result
 
@@ -213,10 +220,12 @@ def not_recorded(record: Record) -> list[str]:
     for lab in record.labs:
         if lab.kind.name == COLUMN and not driven(record, lab) and record.has(*lab.measured):
             (command,) = lab.commands
-            result.append(f"{command} was not recorded: nothing can be said of the actuator.")
+            result.append(f"{command} was not recorded, so the actuator cannot be judged.")
     if record.run.has("master") and record.run.has("slave") and not exchange_known(record.run):
-        result.append("The recording holds no numbers or stamps of messages: the link cannot be judged.")
+        result.append("The recording holds no message numbers or time stamps, so the link cannot be judged.")
     missing = [name for lab in record.labs for name in lab.measured if not record.has(name)]
     if missing:
-        result.append(f"Not recorded: {', '.join(missing)}; what only they show cannot be decided.")
+        result.append(
+            f"Not recorded: {', '.join(missing)}. Effects that only these signals show cannot be found."
+        )
     return result

@@ -22,26 +22,26 @@ VERBS = {
     "stop": "stop a running test, in order or at once",
     "reset": "let laboratories leave their latched safe state",
     "init": "write a plan to begin with, and the skeleton of a rig",
-    "check": "describe a plan: periods, delays, peaks, likely slips of units, classes that it would run",
+    "check": "describe a plan: periods, delays, peaks, likely slips of units, classes of your own that it would run",
     "simulate": "compute the closed loop of nominal models",
     "bench": "test one part alone, recorded",
     "identify": "find a part's parameters in a bench recording",
     "inspect": "summarise a recording: completeness, peaks, tracking, latency",
     "report": "make one HTML page of a recording: verdict, pictures, tables, plan",
-    "recover": "save what is whole of a damaged recording in a new file",
+    "recover": "save the intact part of a damaged recording in a new file",
     "budget": "judge the latency of a recording against a budget",
     "plot": "draw a recording",
     "layout": "make a layout file with which Foxglove and Lichtblick show a recording",
-    "replay": "compute a recording's commands again and compare to the last bit",
+    "replay": "compute a recording's commands again and compare them to the last bit",
     "compare": "compare two recordings or simulations signal by signal",
     "reproduce": "compute the seed paper's numbers and figures again",
-    "benchmark2020": "play the field's public benchmark, and every compensator on it",
+    "benchmark2020": "run the field's public benchmark problem of 2020 with every compensator",
     "diagnose": "find the sim-to-real gap of a recording: where it lies, its cause, how far it closes",
-    "blind": "check the diagnosis on cases whose effect is withheld",
-    "keys": "make the certificates for a test on a closed link",
-    "faults": "simulate tests with random faults, and check what must hold in all of them",
+    "blind": "check the diagnosis on cases whose effects it is not told",
+    "keys": "make the certificates for a test on a secured link",
+    "faults": "simulate tests with random faults, and check the invariants that must hold in all of them",
     "doctor": "check whether this machine will keep the interval",
-    "import": "make a recording of data of your own",
+    "import": "make a recording from data of your own",
     "export": "write a recording as CSV, Parquet or MAT",
     "completion": "write a script that makes the shell complete commands, options and files",
 }
@@ -135,14 +135,14 @@ EXAMPLES = {
 
 
 def overview() -> str:
-    """What `rths --help` shows."""
+    """The text of `rths --help`."""
     width = max(map(len, VERBS))
     rows = "\n".join(f"  {verb:<{width}}  {text}" for verb, text in VERBS.items())
     codes = "\n".join(f"  {code}  {meaning}" for code, meaning in EXIT_CODES.items())
     return (
         "usage: rths VERB [options]\n       rths --version\n\n"
         "Distributed real-time hybrid testing: two laboratories, one structure, 2 ms.\n\n"
-        f"{rows}\n\nexit codes:\n{codes}\n\n'rths VERB --help' explains each with an example.\n"
+        f"{rows}\n\nexit codes:\n{codes}\n\n'rths VERB --help' explains a verb with an example.\n"
     )
 
 
@@ -152,10 +152,10 @@ def main() -> int:
 
 
 def command(words: Sequence[str]) -> int:
-    """Run what the command line says; its exit code.
+    """Run the command line; its exit code.
 
     Raises:
-        RthsError: it cannot be run, or failed.
+        RthsError: the command cannot be run, or failed.
     """
     if words and words[0] == "--version":
         sys.stdout.write(f"rths {version('rths')}\n")

@@ -43,17 +43,17 @@ def registering(text: str) -> str:
     """Shtab's script for zsh, made to register where it is sourced from a file too, not by `eval` alone.
 
     Raises:
-        InputError: the script does not ask how it is read in the way that is known.
+        InputError: this version of shtab writes another script, in which the place to change is not found.
     """
     if text.count(EVALUATED) != 1:
         raise InputError(
-            "The completions for zsh need another version of shtab: install that of requirements.lock."
+            "The completions for zsh need another version of shtab: install the one in requirements.lock."
         )
     return text.replace(EVALUATED, SOURCED)
 
 
 def whole() -> argparse.ArgumentParser:
-    """One parser of all commands, whose arguments say what completes them."""
+    """One parser of all commands, in which each argument has its completer."""
     from rths.__main__ import VERBS, fill
 
     parser = cli.Parser(prog="rths", description="Distributed real-time hybrid testing.")
@@ -68,7 +68,7 @@ def whole() -> argparse.ArgumentParser:
 
 
 def completer(action: argparse.Action) -> Mapping[str, Any] | None:
-    """What completes the values of an argument; None where nothing can, or where its choices do."""
+    """The completer of an argument's values; None where there is none, or where its choices complete it."""
     import shtab
 
     name = str(action.metavar)
@@ -84,19 +84,19 @@ def completer(action: argparse.Action) -> Mapping[str, Any] | None:
 
 
 def files(*patterns: str) -> Mapping[str, Any]:
-    """Files of some patterns; zsh takes one that stands alone in brackets for qualifiers of a file."""
+    """Completer of files with some patterns; a single one gets no brackets, which zsh would take for qualifiers."""
     import shtab
 
     return dict(shtab.glob(*patterns)) | {"zsh": f"_files -g '{either(patterns)}'"}
 
 
 def either(patterns: Sequence[str]) -> str:
-    """Patterns as one of zsh's."""
+    """Patterns as a single pattern of zsh."""
     return patterns[0] if len(patterns) == 1 else f"({'|'.join(patterns)})"
 
 
 def with_plans(name: str, *patterns: str) -> Mapping[str, Any]:
-    """Files of some patterns and the plans that ship; `name` becomes part of the shells' functions."""
+    """Completer of files with some patterns and of the plans that ship; `name` goes into the shells' functions."""
     found = files(*patterns)
     plans = " ".join(cli.SHIPPED)
     own = f"_rths_glob_{name}"  # by _glob_ shtab's bash script knows that these are files

@@ -33,8 +33,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def latency_budget(pytestconfig: pytest.Config) -> LatencyBudget:
     """Judge a recording: `latency_budget(recording, budget=None)` gives the report of one that is within.
 
-    The test fails with the table where the recording is over its budget, or with a sentence where it cannot be
-    read, and is skipped with the figures where the machine allows no verdict.
+    The test fails with the table if the recording is over its budget, and with a sentence if it cannot be read. It is
+    skipped, with the figures, if the machine allows no verdict.
     """
 
     def call(recording: str | Path, budget: str | Path | None = None) -> BudgetReport:
@@ -54,7 +54,7 @@ def expect(recording: str | Path, budget: str | Path | None) -> BudgetReport:
         report = assess(recording, budget)
     except RthsError as error:
         mistake = str(error)
-    if report is None:  # failed here, not in the handler: there pytest shows the error beside its own
+    if report is None:  # outside the handler, in which pytest would show the first error too
         pytest.fail(mistake, pytrace=False)
     if report.status == "over":
         pytest.fail(text(report), pytrace=False)

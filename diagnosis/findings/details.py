@@ -18,7 +18,7 @@ from diagnosis.findings.verdict import PartVerdict
 from diagnosis.findings.where import SiteTrace
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data, Fit
-from diagnosis.fits.search import remaining
+from diagnosis.fits.search import SEEN, remaining
 from diagnosis.recorded.laboratory import RecordedLaboratory
 from diagnosis.recorded.loop import simulated
 from diagnosis.recorded.paths import force_path, paths
@@ -45,10 +45,11 @@ from diagnosis.signals import windows
 from laboratories.effects import sites
 from models.registry import Array
 
-LISTED = 5  # tests
-SHOWN_UP_TO = 60.0  # Hz, above which nothing of a test moves
-CLASSES = 8  # of amplitude
-MUCH = 0.3  # of the noise, from which on what a candidate leaves speaks against it
+LISTED = 5  # next tests, the best separating ones: as many as a reader compares
+# Hz, four times the frequency of the default table: above, spectra show the sensors' noise alone.
+SHOWN_UP_TO = 60.0
+# Classes of amplitude; each holds an eighth of the samples, seconds of a test, so that its rms is well known.
+CLASSES = 8
 
 
 def details(
@@ -98,7 +99,7 @@ def facts(record: Record) -> TestFacts:
 
 
 def laboratory(lab: RecordedLaboratory) -> LaboratorySeen:
-    """What a laboratory consists of, under the names of the report."""
+    """The sites and sensors of a laboratory, under the names that the report uses."""
     machines, read = lab.kind.sites, sites.sensors(lab.kind)
     return LaboratorySeen(
         role=lab.role, sites=tuple(map(lab.site, machines)), sensors=tuple(map(lab.site, read))
@@ -178,7 +179,7 @@ def candidate(found: Diagnosis, entry: Candidate) -> Evidence:
             if set(fit.names) == own and own:
                 before = fitting.excess(verdict.search.commissioned)
                 explained.append(1.0 - fitting.excess(fit) / before if before else 0.0)
-                if (left := remaining(fit)) > MUCH:
+                if (left := remaining(fit)) > SEEN:
                     against.append(
                         f"leaves a residual of {left:.1f} times the noise in {verdict.search.data.part.name}"
                     )

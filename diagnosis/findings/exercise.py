@@ -1,4 +1,4 @@
-"""Effects that a recording could not have shown, because it never came near them."""
+"""Effects that a recording could not have shown, because its motion was too small for them."""
 
 from __future__ import annotations
 
@@ -7,12 +7,11 @@ import numpy as np
 from common.errors import InputError
 from diagnosis.findings.found import Diagnosis
 from diagnosis.fits import fitting
-
-FAINT = 0.3  # rms of an effect's trace over noise below which it could hide
+from diagnosis.fits.search import SEEN
 
 
 def not_exercised(found: Diagnosis) -> tuple[str, ...]:
-    """Catalogue effects that even at their strongest usual size would have hidden in the noise."""
+    """Names of the effects that even at the largest of their usual sizes would not have stood out of the noise."""
     result = []
     for verdict in found.verdicts:
         data, fit = verdict.search.data, verdict.search.chosen
@@ -29,6 +28,6 @@ def not_exercised(found: Diagnosis) -> tuple[str, ...]:
                 result.append(effect.name)
                 continue
             change = np.where(data.part.present, (more - whole) / data.sigma, 0.0)
-            if float(np.max(np.sqrt(np.mean(change**2, axis=0)))) < FAINT:
+            if float(np.max(np.sqrt(np.mean(change**2, axis=0)))) < SEEN:
                 result.append(effect.name)
     return tuple(result)

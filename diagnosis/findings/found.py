@@ -1,4 +1,4 @@
-"""Everything that was found in a recording, and the laboratories that it amounts to."""
+"""Everything that was found in a recording, and the systems of master and slave that follow from it."""
 
 from __future__ import annotations
 
@@ -41,9 +41,10 @@ class Diagnosis:
         *,
         noisy: bool = True,
     ) -> dict[str, System]:
-        """What master and slave are by role: parameters moved inside tolerances, and effects of some sites or of all.
+        """Systems of master and slave by role: nominal parameters as fitted, and the effects of some sites or of all.
 
-        Under the recording's own plans where none are given; without added noise of sensors where not `noisy`.
+        They are built on the recording's own plans where none are given, and without the sensors' added noise where
+        not `noisy`.
         """
         catalogue = self.record.catalogue
         systems = {role: System(plan) for role, plan in (plans or self.record.plans).items()}
@@ -63,7 +64,7 @@ class Diagnosis:
         return systems
 
     def corrected(self, plans: Mapping[str, Plan] | None = None, of: Of = "law") -> dict[str, System]:
-        """What master and slave are by role, with the effects of all sites and with what was learned."""
+        """Systems of master and slave by role, with the effects of all sites and the learned laws."""
         systems = self.systems(plans=plans)
         for law in self.learned:
             systems[law.role] = law.laid(systems[law.role], of)
@@ -71,7 +72,7 @@ class Diagnosis:
 
 
 def laid(system: System, verdict: PartVerdict, values: Values) -> System:
-    """A system with a part's parameters moved and some of its effects laid over it."""
+    """A system with the nominal parameters of a part as fitted and with some of its effects."""
     part, z = verdict.search.data.part, verdict.search.chosen.z
     for nuisance, place in zip(part.nuisances, z, strict=True):
         system = system if nuisance.of_record else nuisance.moved(system, float(place))

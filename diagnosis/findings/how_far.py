@@ -10,38 +10,39 @@ import numpy as np
 
 from diagnosis.findings import where
 from diagnosis.findings.found import Diagnosis
+from diagnosis.findings.gaps import RecordingGaps, held_out
 from diagnosis.findings.series import numbers, strongest
 from diagnosis.findings.where import SiteTrace
-from diagnosis.fits import fitting
-from diagnosis.recorded import link, loop
-from diagnosis.recorded.loop import RecordedLoop, closed_share, overall
+from diagnosis.recorded import loop
+from diagnosis.recorded.loop import closed_share, overall
 from diagnosis.recorded.record import Record
 from diagnosis.report.evidence import History, LoopShare, Step
 from diagnosis.report.records import Gap, HowFar, SignalGap
 from diagnosis.signals.mask import Mask
 from models.registry import Array
-from models.system import System
 
-QUIET = 0.2  # noise over a signal's rms from which on a part alone is not judged by it
-PLAYERS = 6  # sites among which shares are computed exactly
-LIKE_MISSED = (
-    "damper",
-    "column",
-    "table",
-    "device",
-)  # machines that a search blames for samples that are missed
-INTERLEAVED, OTHERS = "interleaved (interpolation)", "other recordings"  # what was judged on
-ROOM = 0.1  # of the floor, by which the response must exceed it to show an effect at all
+# Sites among which shares are computed exactly: each subset takes one simulation of the closed loop, and six sites have
+# 64 subsets.
+PLAYERS = 6
+# Machines to which a search ascribes the residual of a sensor that misses samples.
+LIKE_MISSED = ("damper", "column", "table", "device")
+INTERLEAVED, OTHERS = "interleaved (interpolation)", "other recordings"  # data on which the gap was judged
+# Share of the noise floor by which the response must exceed it to show an effect: the floor rests on two noisy
+# simulations, so that a smaller excess may be chance.
+ROOM = 0.1
 NOT_SHOWN = (
-    "The response of the loop hardly shows the gap: how far it closes is that of the readings of its part."
+    "The response of the closed loop hardly shows the gap, so the share that closes is that of the readings of the "
+    "part with the effect."
 )
 LEAVING = ("unknown", "partly")  # outcomes of parts with something left
-DRAWS = 200  # of the bootstrap
+DRAWS = 200  # of the bootstrap: its 5 % and 95 % points then rest on ten draws each
+BLOCK = 2.0  # s, blocks of the bootstrap: two withheld pieces of 1 s lie side by side, and errors within are correlated
+NO_SHARE = 1e-4  # sum of the shares, as gaps, below which the response shows none of the sites
 
 
 @dataclass(frozen=True)
 class Response:
-    """The response gap before and after, and each site's part in it."""
+    """The response gap without and with the effects found, and each site's share in it."""
 
     gap: Gap
     how_far: HowFar
@@ -53,80 +54,11 @@ class Response:
     warnings: tuple[str, ...]
 
 
-class Judge:
-    """Gaps of one recording under the hypotheses found in another, or in the same."""
-
-    def __init__(self, found: Diagnosis, record: Record, mask: Mask) -> None:
-        self.found, self.record, self.mask = found, record, mask
-        names = tuple(name for name in record.responses if record.has(name))
-        self.loop: RecordedLoop | None = None
-        if record.ground is not None and record.has("displacement", *record.targets) and names:
-            exchange = link.exchange_of(record.run, record.ticks) if found.link else None
-            self.loop = RecordedLoop(record, record.ground, exchange, names)
-
-    def signals(self, sites: frozenset[str] | None) -> Mapping[str, Array] | None:
-        """Simulated response with the effects of some sites, of all where None."""
-        linked = sites is None or "link" in sites
-        return self.simulated(self.found.systems(sites, self.record.plans), linked=linked)
-
-    def simulated(self, systems: Mapping[str, System], *, linked: bool = True) -> Mapping[str, Array] | None:
-        """Simulated response of systems, with the exchange that was found where `linked`."""
-        if self.loop is not None:
-            return self.loop.simulate(systems, linked=linked and bool(self.found.link))
-        return self.open(systems)
-
-    def open(self, systems: Mapping[str, System]) -> Mapping[str, Array]:
-        """Each part's own prediction, where no loop was recorded."""
-        result: dict[str, Array] = {}
-        for verdict in self.found.verdicts:
-            part = verdict.search.data.part
-            if not part.exact:
-                result |= dict(zip(part.signals, part.predict(systems[part.role]).T, strict=True))
-        return result
-
-    def gap(self, simulated: Mapping[str, Array] | None, mask: Mask | None = None) -> dict[str, float]:
-        """Gap per response signal."""
-        chosen = self.mask if mask is None else mask
-        if self.loop is not None:
-            return self.loop.gap(simulated, chosen)
-        known = simulated or {}
-        names = [
-            name
-            for name in self.record.responses
-            if name in known and self.record.has(name) and self.moves(name)
-        ]
-        result = {}
-        for name in names or [name for name in known if self.record.has(name)]:
-            there = self.record.present[name] & chosen
-            recorded = self.record.signals[name][there]
-            error = recorded - known[name][there]
-            level = float(np.mean(recorded**2))
-            result[name] = float(np.sqrt(np.mean(error**2) / level)) if level > 0.0 else 0.0
-        return result
-
-    def moves(self, name: str) -> bool:
-        """Whether a signal stands well out of its noise."""
-        level = float(np.sqrt(np.mean(self.record.signals[name] ** 2)))
-        return level > 0.0 and self.found.white.get(name, 0.0) < QUIET * level
-
-    def floor(self) -> dict[str, float]:
-        """Gap that noise alone makes."""
-        if self.loop is not None:
-            systems = self.found.systems(plans=self.record.plans, noisy=False)
-            return self.loop.floor(systems, self.found.white, self.mask)
-        result = {}
-        for name, white in self.found.white.items():
-            there = self.record.present[name] & self.mask
-            level = float(np.mean(self.record.signals[name][there] ** 2)) if there.any() else 0.0
-            result[name] = white / float(np.sqrt(level)) if level > 0.0 else 0.0
-        return result
-
-
 def judge(found: Diagnosis, validation: Sequence[Record]) -> Response:
-    """Gap before and after, shares of the sites."""
+    """The response gap of a recording without and with the effects found, on time that no fit has seen."""
     record = found.record
     held = held_out(record)
-    own = Judge(found, record, held)
+    own = RecordingGaps(found, record, held)
     nominal = bare(found, own)
     before, after = own.signals(frozenset()), own.signals(None)
     floors = own.floor()
@@ -162,12 +94,12 @@ def judge(found: Diagnosis, validation: Sequence[Record]) -> Response:
 
 
 def hardly_shown(found: Diagnosis, summary: HowFar) -> bool:
-    """Whether effects were named of which the response of the closed loop shows next to nothing."""
+    """Whether effects were named although the response of the closed loop hardly exceeds its noise."""
     before, floor = summary.before or 0.0, summary.noise_floor or 0.0
     return any(verdict.effects for verdict in found.verdicts) and before - floor < ROOM * floor
 
 
-def by_readings(own: Judge, summary: HowFar) -> HowFar:
+def by_readings(own: RecordingGaps, summary: HowFar) -> HowFar:
     """How far the gap of the readings closes in the parts with effects, each replayed by itself."""
     plans = own.record.plans
     known = [own.open(own.found.systems(frozenset(), plans)), own.open(own.found.systems(plans=plans))]
@@ -198,8 +130,8 @@ def by_readings(own: Judge, summary: HowFar) -> HowFar:
     )
 
 
-def waterfall(own: Judge, traces: Sequence[SiteTrace], summary: HowFar) -> tuple[Step, ...]:
-    """The overall gap on withheld time after each step: nominal, tolerances, site by site, noise."""
+def waterfall(own: RecordingGaps, traces: Sequence[SiteTrace], summary: HowFar) -> tuple[Step, ...]:
+    """The overall gap on withheld time after each correction: the tolerances, then one site after the other."""
     steps = [
         Step(label="nominal models", value=summary.nominal),
         Step(label="parameters within tolerances", value=summary.before),
@@ -215,7 +147,7 @@ def waterfall(own: Judge, traces: Sequence[SiteTrace], summary: HowFar) -> tuple
 
 
 def histories(
-    own: Judge, before: Mapping[str, Array] | None, after: Mapping[str, Array] | None
+    own: RecordingGaps, before: Mapping[str, Array] | None, after: Mapping[str, Array] | None
 ) -> tuple[History, ...]:
     """Response signals recorded and simulated, in the seconds in which they differ most."""
     if before is None or after is None:
@@ -237,12 +169,7 @@ def histories(
     return tuple(result)
 
 
-def held_out(record: Record) -> Mask:
-    """Ticks that no fit has seen."""
-    return fitting.withheld_ticks(record.ticks, record.plan.test.interval)
-
-
-def bare(found: Diagnosis, own: Judge) -> Mapping[str, Array] | None:
+def bare(found: Diagnosis, own: RecordingGaps) -> Mapping[str, Array] | None:
     """Response of the nominal models."""
     if own.loop is not None:
         return own.loop.simulate(own.record.systems, linked=False)
@@ -259,7 +186,7 @@ def bare(found: Diagnosis, own: Judge) -> Mapping[str, Array] | None:
 
 
 def gap_entry(
-    record: Record, own: Judge, nominal: Mapping[str, Array] | None, floors: Mapping[str, float]
+    record: Record, own: RecordingGaps, nominal: Mapping[str, Array] | None, floors: Mapping[str, float]
 ) -> Gap:
     """The gap between recording and nominal simulation, per signal and overall."""
     everywhere = np.ones(record.ticks, dtype=bool)
@@ -280,11 +207,11 @@ def gap_entry(
 
 
 def closed_interval(
-    own: Judge, before: Mapping[str, Array] | None, after: Mapping[str, Array] | None, floor: float
+    own: RecordingGaps, before: Mapping[str, Array] | None, after: Mapping[str, Array] | None, floor: float
 ) -> tuple[float, float]:
-    """90 % interval of the share closed, by drawing blocks of the withheld time anew."""
+    """90 % interval of the share closed, by a bootstrap over blocks of the withheld time."""
     interval = own.record.plan.test.interval
-    length = max(1, round(2.0 / interval))
+    length = max(1, round(BLOCK / interval))
     places = np.arange(own.record.ticks) // length
     ids = np.unique(places[own.mask])
     energy = []
@@ -317,14 +244,14 @@ def validated(found: Diagnosis, validation: Sequence[Record], own: HowFar) -> Ho
     """The same on other recordings of the laboratories, None where none of them holds a closed loop."""
     before, after, floor, alone = [], [], [], []
     for record in validation:
-        judge_ = Judge(found, record, np.ones(record.ticks, dtype=bool))
-        if judge_.loop is None:
+        gaps = RecordingGaps(found, record, np.ones(record.ticks, dtype=bool))
+        if gaps.loop is None:
             continue
-        bare_, whole = judge_.signals(frozenset()), judge_.signals(None)
-        before.append(overall(judge_.gap(bare_)))
-        after.append(overall(judge_.gap(whole)))
-        floor.append(overall(judge_.floor()))
-        alone.append(closed_interval(judge_, bare_, whole, floor[-1]))
+        bare_, whole = gaps.signals(frozenset()), gaps.signals(None)
+        before.append(overall(gaps.gap(bare_)))
+        after.append(overall(gaps.gap(whole)))
+        floor.append(overall(gaps.floor()))
+        alone.append(closed_interval(gaps, bare_, whole, floor[-1]))
     if not before:
         return None
     b, a, f = (float(np.mean(values)) for values in (before, after, floor))
@@ -341,13 +268,13 @@ def validated(found: Diagnosis, validation: Sequence[Record], own: HowFar) -> Ho
 
 
 def all_traces(found: Diagnosis) -> list[SiteTrace]:
-    """What every site with a gap does, in σ."""
+    """Trace of every site with a gap, in standard deviations of the noise."""
     result: list[SiteTrace] = []
     for verdict in found.verdicts:
         result += where.traces(verdict.search.data, verdict.search.chosen)
         if verdict.outcome in LEAVING:
             extra = where.unexplained(verdict.search.data, verdict.search.chosen)
-            if all(item.site != extra.site for item in result):  # a named site keeps what its effects do
+            if all(item.site != extra.site for item in result):  # a named site keeps the trace of its effects
                 result.append(extra)
     for reading in found.readings:
         site = found.record.catalogue[reading.effect].site
@@ -360,7 +287,7 @@ def all_traces(found: Diagnosis) -> list[SiteTrace]:
         if not any(
             name in item.search.data.part.signals and item.outcome in LEAVING for item in found.verdicts
         ):
-            continue  # samples that repeat explain nothing where nothing is left
+            continue  # where nothing is left, repeated samples explain nothing
         site = lab.site(f"sensor.{name.removeprefix(lab.ahead)}")
         gone = {site, *(one.site(place) for one in found.record.labs for place in LIKE_MISSED)}
         result = [
@@ -373,11 +300,11 @@ def all_traces(found: Diagnosis) -> list[SiteTrace]:
 
 
 def shares(
-    own: Judge, traces: Sequence[SiteTrace]
+    own: RecordingGaps, traces: Sequence[SiteTrace]
 ) -> tuple[dict[str, tuple[float, float, float]], tuple[LoopShare, ...]]:
-    """Share of the response gap each site is responsible for, with an interval from thirds of the time.
+    """Share of the response gap that each site causes, with its range over the thirds of the test.
 
-    Beside it the exact Shapley values, what each site takes away first, and what it takes away last.
+    Returned with it: exact Shapley values, and what correcting each site takes away as the first and as the last one.
     """
     sites = [trace.site for trace in sorted(traces, key=lambda item: -item.ratio)]
     if len(sites) < 2:
@@ -414,10 +341,10 @@ def shares(
 def normalised(
     found: Mapping[str, tuple[float, float, float]], traces: Sequence[SiteTrace]
 ) -> dict[str, float]:
-    """Shares that sum to one; where the response does not show a site, its trace in its own part decides."""
+    """Shares that sum to one; where the response shows none of the sites, the traces in their own parts decide."""
     sizes = {site: max(share, 0.0) for site, (share, _, _) in found.items()}
     ratios = {trace.site: trace.ratio for trace in traces}
-    if sum(sizes.values()) <= 1e-4:
+    if sum(sizes.values()) <= NO_SHARE:
         sizes = {site: ratios[site] for site in found}
     total = sum(sizes.values()) or 1.0
     return {site: size / total for site, size in sizes.items()}

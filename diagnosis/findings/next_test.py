@@ -1,8 +1,8 @@
-"""Which test would tell the remaining candidates apart: each simulated under the tests at hand.
+"""Which further test would tell the remaining candidates apart: both are simulated in each test of a short list.
 
-The separation of two hypotheses in a test is what remains of the difference of their predictions once the
-second one's own parameters and the nominal ones have been moved to imitate the first, in standard
-deviations of the sensors' noise (T-optimality, Atkinson and Fedorov, Biometrika 62 (1975) 57).
+The separation of two hypotheses in a test is what remains of the difference of their predictions once the second one's
+own parameters and the nominal ones have been fitted to imitate the first, in standard deviations of the sensors' noise
+(T-optimality, Atkinson and Fedorov, Biometrika 62 (1975) 57).
 """
 
 from __future__ import annotations
@@ -22,10 +22,16 @@ from diagnosis.fits.search import Search, exchanged_pair
 from diagnosis.recorded.parts import LaboratoryPart
 from models.registry import Array
 
-SECONDS = 10.0  # length of a test
-ENOUGH = 3.0  # standard deviations at which two hypotheses are told apart
-STEEPEST = 8.0  # largest velocity of a test, of what the recording reached
-MOST = 3  # pairs looked at
+SECONDS = 10.0  # length of a proposed test: one cycle of the slowest motion on the list, 0.1 Hz
+# Standard deviations from which on two hypotheses count as separated; by chance once in 370 times.
+ENOUGH = 3.0
+# 1/s, largest velocity of a proposed sine over the displacement that the recording reached. It bounds the sines above
+# 1.3 Hz, about where buildings respond, so that a rig is not asked for velocities that it has not shown.
+STEEPEST = 8.0
+MOST = 3  # pairs compared in each part: the nearest alternatives are the ones worth another test
+# Difference in cost up to which a candidate is worth another test. A fit prefers one hypothesis over another by 6
+# standard deviations at a cost of 36; beyond that the recording has decided.
+OPEN = 40.0
 
 
 class ChosenTest(NamedTuple):
@@ -53,11 +59,8 @@ def choices(found: Diagnosis) -> list[ChosenTest]:
     return sorted(result, key=lambda item: -item.separation)
 
 
-OPEN = 40.0  # cost difference up to which a candidate is worth another test
-
-
 def separations(search: Search, other: Fit) -> list[tuple[str, float]]:
-    """Every test of the menu with the separation of the chosen fit and another."""
+    """Every proposed test that the models can have, with the separation of the chosen fit and another."""
     found = []
     for name, data in menu(search.data):
         try:
@@ -68,7 +71,7 @@ def separations(search: Search, other: Fit) -> list[tuple[str, float]]:
 
 
 def separation(data: Data, one: Fit, other: Fit) -> float:
-    """Standard deviations between two hypotheses in a test."""
+    """Distance of two hypotheses in a test, in standard deviations of the noise."""
     truth = data.part.predict(fitting.lay(data, one.z, one.values))
     part = played(data, truth)
     problem = Problem(part, other.values)
@@ -81,7 +84,7 @@ def separation(data: Data, one: Fit, other: Fit) -> float:
 
 
 def played(data: Data, truth: Array) -> Data:
-    """The data of a test that has given `truth`, without the spikes and lines of the one that was recorded."""
+    """Data of a test whose readings are `truth` (ticks, signals), without the spikes and lines of the recorded one."""
     part = data.part
     if isinstance(part, LaboratoryPart):
         read = np.broadcast_to(part.present.any(axis=0), truth.shape).copy()
@@ -90,7 +93,7 @@ def played(data: Data, truth: Array) -> Data:
 
 
 def menu(data: Data) -> list[tuple[str, Data]]:
-    """Tests at hand in the part's laboratory: the same motion at other scales, sines, steps."""
+    """Tests to choose from in a part's laboratory: the same motion at other scales, sines, and slow cycles."""
     part = data.part
     if not isinstance(part, LaboratoryPart):
         return []
@@ -122,14 +125,14 @@ def menu(data: Data) -> list[tuple[str, Data]]:
 
 
 def sentence(found: list[ChosenTest], describe: Callable[[str], str] = str) -> str:
-    """The advice in one sentence, empty where nothing is open."""
+    """The advice in one sentence, empty where no two candidates need to be separated."""
     if not found:
         return ""
     best = found[0]
     first, second = (describe(name) for name in best.pair)
     if best.separation < ENOUGH:
         return (
-            f"No motion at hand separates {first} from {second} (the best one by {best.separation:.1f} standard "
+            f"No proposed motion separates {first} from {second} (the best one by {best.separation:.1f} standard "
             "deviations): check the sensor or the part by itself, with a dead weight or a second sensor."
         )
     apart = f"it separates {first} from {second} by {best.separation:.0f} standard deviations of the noise"

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from diagnosis.findings.found import Diagnosis
+from diagnosis.findings.gaps import QUIET
 from diagnosis.findings.verdict import PartVerdict, heard
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data
@@ -17,8 +18,6 @@ from diagnosis.report.records import NoiseEntry, PartOfGap
 from models.registry import Array
 from models.system import System
 
-QUIET = 0.2  # noise over a signal's rms from which on a part is not judged by it
-
 
 def parts(found: Diagnosis, require: float | None = None) -> tuple[PartOfGap, ...]:
     """The parts in the order of the test; `require` is the gap that may be left in each."""
@@ -26,7 +25,7 @@ def parts(found: Diagnosis, require: float | None = None) -> tuple[PartOfGap, ..
 
 
 def part(verdict: PartVerdict, learned: Sequence[LearnedLaw], require: float | None) -> PartOfGap:
-    """One part: each step's gap above noise less the next one's."""
+    """One part: what each correction in turn takes away from its gap above noise."""
     search = verdict.search
     data, bare, fit = search.data, search.commissioned, search.chosen
     noise = rms(heard(search) / levels(data), data)
@@ -66,7 +65,7 @@ def name_of(data: Data) -> str:
 
 
 def levels(data: Data) -> Array:
-    """Rms of each reading (signals,) that stands out of its noise; infinite for the others, where any does."""
+    """Rms of each reading (signals,), infinite for those that do not stand out of their noise while others do."""
     level = np.sqrt(np.mean(np.square(data.part.measured), axis=0))
     heard = (level > 0.0) & (data.white < QUIET * level)
     return np.where(heard, level, np.inf) if heard.any() else np.where(level > 0.0, level, np.inf)

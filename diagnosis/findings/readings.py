@@ -1,4 +1,4 @@
-"""Noise and rounding of readings: seen in the samples themselves, not in what the parts do."""
+"""Noise, rounding and repeated samples of readings, seen in the samples themselves without a model of the part."""
 
 from __future__ import annotations
 
@@ -12,10 +12,23 @@ from diagnosis.recorded.record import Record
 from diagnosis.signals.noise import quantum
 from models.registry import Array
 
-LOUDER = 2.5  # noise over what the plan and the other sensors' noise make expected
-REPEATED, STOOD = 1e-3, 0.5  # share of repeated samples: missed by the sensor, or a signal that stood still
-UNLIKE = 5.0  # steps over the range, times those of the other channels: more than a digit does not differ by chance
-LEAST = 2.0  # noise over the plan's, whatever the others do
+# A sensor counts as too noisy from LOUDER times the noise that the plan and the other sensors make expected, and from
+# LEAST times the plan's own: a plan rarely knows a sensor's noise better than within a factor of two.
+LOUDER, LEAST = 2.5, 2.0
+# Share of the planned noise that the others make expected at least, so that a quiet set does not alarm.
+QUIETEST = 0.4
+# Relative error, 95 % of the noise levels found in white noise: 2.3 % in 40 s at 2 ms, 3.5 % in 10 s.
+NOISE_ERROR = 0.03
+# Share of the planned noise, the least that is believed of all sensors together: below it none has noise.
+LEAST_SCALE = 1e-3
+# Share of repeated samples from which on a sensor misses samples (two equal samples of normal noise are impossible in
+# double precision), and from which on the signal stood still instead.
+REPEATED, STOOD = 1e-3, 0.5
+# Step over the range of a channel, times that of the other channels, from which on it rounds by itself. Decimal digits
+# differ between channels by up to a factor of ten, ranges of converters by two to four.
+UNLIKE = 5.0
+SAME = 1.01  # factor within which two steps are the same one
+DIGITS = 7  # significant digits up to which values count as printed text
 
 
 class SensorFinding(NamedTuple):
@@ -40,7 +53,7 @@ def effect_on(record: Record, name: str, fault: str) -> str:
 
 
 def steps(record: Record) -> dict[str, float]:
-    """Step of every reading that is rounded to one."""
+    """Rounding step of every reading that has one, by signal."""
     found = {}
     for name in read_by(record):
         if record.has(name):
@@ -51,7 +64,7 @@ def steps(record: Record) -> dict[str, float]:
 
 
 def resolutions(record: Record, rounded: dict[str, float]) -> dict[str, float]:
-    """The steps that were found, and the resolution that is stated of a channel where none was."""
+    """Rounding steps by signal: the resolution stated for a channel, replaced by the step found in its samples."""
     stated = record.stated
     if stated is None:
         return rounded
@@ -64,7 +77,7 @@ def resolutions(record: Record, rounded: dict[str, float]) -> dict[str, float]:
 
 
 def held(record: Record, rounded: dict[str, float]) -> dict[str, float]:
-    """Share of samples that repeat the one before to the last bit, of sensors whose noise rules that out."""
+    """Share of samples exactly equal to the one before, by sensor; only of sensors whose noise rules that out."""
     found = {}
     for name in read_by(record):
         if record.has(name) and name not in rounded and np.ptp(record.signals[name]) > 0.0:
@@ -76,13 +89,13 @@ def held(record: Record, rounded: dict[str, float]) -> dict[str, float]:
 
 
 def printed(values: Array) -> bool:
-    """Whether values went through a text of a few digits, in which neighbours may well be alike."""
+    """Whether values went through a text of a few digits, in which neighbours may well be equal; 200 samples tell."""
     some = values[:: max(1, values.size // 200)]
-    return all(float(f"{value:.7g}") == value for value in some.tolist())
+    return all(float(f"{value:.{DIGITS}g}") == value for value in some.tolist())
 
 
 def levels(datas: list[Data], noises: list[Array] | None = None) -> dict[str, float]:
-    """Noise of every reading, rms; `noises` of the parts (signals,), those of their data where none are given."""
+    """Rms noise of every reading; `noises` holds that of each part (signals,), its data's where none are given."""
     return {
         name: float(noise)
         for data, own in zip(datas, noises or [data.white for data in datas], strict=True)
@@ -93,9 +106,9 @@ def levels(datas: list[Data], noises: list[Array] | None = None) -> dict[str, fl
 
 
 def coarsest(record: Record, rounded: dict[str, float]) -> dict[str, float]:
-    """Step up to which a reading is rounded by the logger, by signal; empty where it does not round most of them.
+    """Largest step that the logger's own rounding explains, by signal; empty unless most readings are rounded.
 
-    A converter, or a text, rounds all channels to about as many digits; a sensor that steps does so by itself.
+    A converter or a text rounds all channels to about as many digits, while a sensor with coarse steps stands alone.
     """
     read = [name for name in read_by(record) if record.has(name) and np.ptp(record.signals[name]) > 0.0]
     if len(rounded) < 2 or len(rounded) <= len(read) / 2:
@@ -106,16 +119,16 @@ def coarsest(record: Record, rounded: dict[str, float]) -> dict[str, float]:
 
 
 def findings(record: Record, white: dict[str, float], rounded: dict[str, float]) -> list[SensorFinding]:
-    """Sensors that round coarsely, or are far noisier than planned and than the others."""
+    """Sensors that round coarsely, and sensors that are far noisier than planned and than the other ones."""
     planned = {name: level for lab in record.labs for name, level in lab.noise.items() if level > 0.0}
     plain = [name for name in white if name in planned and name not in rounded]
     ratios = {name: white[name] / planned[name] for name in plain}
-    usual = max(float(np.median(list(ratios.values()))) if ratios else 1.0, 1e-3)
+    usual = max(float(np.median(list(ratios.values()))) if ratios else 1.0, LEAST_SCALE)
     result = []
     coarse = coarsest(record, rounded) | resolutions(record, {})
     for name, step in rounded.items():
         noise = planned.get(name, 0.0) * usual
-        if step > max(noise, 1.01 * coarse.get(name, 0.0)):
+        if step > max(noise, SAME * coarse.get(name, 0.0)):
             size = step / np.sqrt(12.0) / noise if noise > 0.0 else 0.0
             result.append(
                 SensorFinding(effect_on(record, name, "quantization"), "step", step, (step, step), size)
@@ -125,9 +138,9 @@ def findings(record: Record, white: dict[str, float], rounded: dict[str, float])
     for name, ratio in ratios.items():
         others = [value for key, value in ratios.items() if key != name]
         expected = float(np.median(others)) if others else 1.0
-        if ratio > LOUDER * max(expected, 0.4) and ratio > LEAST:
+        if ratio > LOUDER * max(expected, QUIETEST) and ratio > LEAST:
             value = float(np.sqrt(max(white[name] ** 2 - (expected * planned[name]) ** 2, 0.0)))
-            bounds = (0.97 * value, 1.03 * value)
+            bounds = ((1.0 - NOISE_ERROR) * value, (1.0 + NOISE_ERROR) * value)
             result.append(
                 SensorFinding(effect_on(record, name, "noise"), "rms", value, bounds, ratio / expected)
             )

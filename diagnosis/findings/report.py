@@ -11,17 +11,17 @@ from common.terminal.telling import Tell, untold
 from diagnosis.findings import details, exercise, how_far, next_test, parts_table, rest, where
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.which import which
-from diagnosis.recorded.parts import LoggedForce, LoggedReadings
+from diagnosis.recorded.nuisances import LoggedForce, LoggedReadings
 from diagnosis.recorded.record import Record
 from diagnosis.report.records import Place, Report, Status, Tolerance
 
-STILL = 5.0  # rms of a signal over its noise below which it hardly moved
+STILL = 5.0  # rms of a signal over its noise below which nothing is judged: its noise alone is a gap of 20 %
 
 
 def build(
     found: Diagnosis, validation: Sequence[Record], tell: Tell = untold, require: float | None = None
 ) -> Report:
-    """The whole report, but for its verdict in words; `require` is the gap that may be left in each part."""
+    """The whole report without its verdict in words; `require` is the gap that may be left in each part."""
     tell("how far the gap closes", 0, 0)
     far = how_far.judge(found, validation)
     found, learned, doubts = rest.judged(found, validation)
@@ -46,7 +46,7 @@ def build(
 
 
 def status_of(found: Diagnosis) -> Status:
-    """The status in one word; what is not known of one part takes nothing away from what is named in another."""
+    """The status in one word. An unknown gap in one part does not hide the effects named in another."""
     if not found.verdicts or not moved(found):
         return "not_enough_data"
     outcomes = {verdict.outcome for verdict in found.verdicts}

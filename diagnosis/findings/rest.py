@@ -1,4 +1,4 @@
-"""How far what was learned closes the gap beside the named effects, and how the report shows it."""
+"""How far the learned laws close the gap beside the named effects, and how the report shows them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from scipy import ndimage
 
 from diagnosis.findings.found import Diagnosis
-from diagnosis.findings.how_far import Judge, held_out
+from diagnosis.findings.gaps import RecordingGaps, held_out
 from diagnosis.findings.series import numbers, strongest
 from diagnosis.learned.equations import Equation
 from diagnosis.learned.learn import LearnedLaw, Of
@@ -22,9 +22,14 @@ from diagnosis.report.records import LearnedGap
 from diagnosis.signals.mask import Mask
 from models import preisach
 
-FARTHER = 1.1  # times what the rest of the record reaches, from which on its strongest part is more than that
-WORSE = 1.02  # times the gap with named effects alone: what was learned and leaves more does not hold
-ENOUGH = 0.2  # of the strongest part: less than this, seen by no fit of effects, tells too little
+# Largest motion of the strongest part over that of the rest from which on judging there is extrapolation.
+FARTHER = 1.1
+# Gap with a learned law over that with the named effects alone beyond which the law is dropped: a law that changes
+# nothing at all makes a gap a little larger or smaller by chance.
+WORSE = 1.02
+# Share of the strongest part that no fit of effects must have seen, for it to be judged on that share alone; of every
+# five seconds two are withheld, so that the usual share is 0.4.
+ENOUGH = 0.2
 OTHERS, STRONGEST, INTERLEAVED = "other recordings", "strongest part", "interleaved (interpolation)"
 
 
@@ -41,16 +46,17 @@ class Gaps(NamedTuple):
 def judged(
     found: Diagnosis, validation: Sequence[Record]
 ) -> tuple[Diagnosis, LearnedGap | None, tuple[str, ...]]:
-    """What was found with the laws that hold, how far they close the gap, and what is to be said of those that do not.
+    """The findings without learned laws that do not hold, how far the others close the gap, and warnings.
 
-    On the recordings given for validation; without them on the strongest part of the recording, by laws of the rest.
+    Laws are judged on the recordings given for validation; without these on the strongest part of the recording, by
+    laws that were learned from the rest of it.
     """
     if not found.learned:
         return found, None, ()
     gap = on_others(found, validation) or on_itself(found)
     sites = tuple(law.site for law in found.learned)
     if gap.learned > WORSE * gap.named:
-        text = f"What was learned at {', '.join(sites)} does not hold on data that it has not seen: it is left out."
+        text = f"The law learned at {', '.join(sites)} does not hold on data not used for it and is left out."
         return replace(found, learned=()), None, (text,)
     closed = closed_share(gap.before, gap.learned, gap.floor)
     far = LearnedGap(
@@ -61,7 +67,7 @@ def judged(
 
 def on_others(found: Diagnosis, validation: Sequence[Record]) -> Gaps | None:
     """Means over the recordings given, None where none of them holds a closed loop."""
-    judges = [Judge(found, record, np.ones(record.ticks, dtype=bool)) for record in validation]
+    judges = [RecordingGaps(found, record, np.ones(record.ticks, dtype=bool)) for record in validation]
     gaps = [gaps_of(judge, "law", OTHERS) for judge in judges if judge.loop is not None]
     if not gaps:
         return None
@@ -72,22 +78,21 @@ def on_others(found: Diagnosis, validation: Sequence[Record]) -> Gaps | None:
 
 
 def on_itself(found: Diagnosis) -> Gaps:
-    """The strongest part of the recording by laws of the rest where they hold, else what lies between what was used."""
+    """Gaps on the strongest part, by laws learned from the rest where these hold; otherwise on the withheld seconds."""
     record = found.record
-    held = held_out(record)
     held = held_out(record)
     part = strongest_part(found)
     if part is not None:
         unseen = part & held
         mask = unseen if unseen.sum() > ENOUGH * part.sum() else part
-        found_there = gaps_of(Judge(found, record, mask), "weaker", STRONGEST)
+        found_there = gaps_of(RecordingGaps(found, record, mask), "weaker", STRONGEST)
         if found_there.learned <= WORSE * found_there.named:
             return found_there
-    return gaps_of(Judge(found, record, held), "interleaved", INTERLEAVED)
+    return gaps_of(RecordingGaps(found, record, held), "interleaved", INTERLEAVED)
 
 
 def strongest_part(found: Diagnosis) -> Mask | None:
-    """Ticks in which the motion at the foremost law goes farther than ever else, None where there are none such."""
+    """Ticks around the largest motion at the strongest law, None where the motion elsewhere is about as large."""
     first = max(found.learned, key=lambda law: law.regression.share)
     part = np.zeros(found.record.ticks, dtype=bool)
     part[slice(*first.regression.strongest)] = True
@@ -96,8 +101,8 @@ def strongest_part(found: Diagnosis) -> Mask | None:
     return part if farther else None
 
 
-def gaps_of(judge: Judge, of: Of, on: str) -> Gaps:
-    """The overall gaps of a recording under nothing found, under the effects, and under what was learned as well."""
+def gaps_of(judge: RecordingGaps, of: Of, on: str) -> Gaps:
+    """The overall gaps of a recording without effects, with the effects found, and with the learned laws as well."""
     plans = judge.record.plans
     corrected = judge.simulated(judge.found.corrected(plans, of))
     simulated = (judge.signals(frozenset()), judge.signals(None), corrected)
@@ -106,14 +111,14 @@ def gaps_of(judge: Judge, of: Of, on: str) -> Gaps:
 
 
 def abscissa(equation: Equation, part: slice) -> Abscissa:
-    """What a law is drawn over: the rate of the motion, or the motion."""
+    """Abscissa of the curve of a law: the rate of the motion, or the motion."""
     if equation.over == "velocity":
         return Abscissa(label="velocity (m/s)", values=numbers(equation.rate[part]))
     return Abscissa(label=f"{equation.over} (m)", values=numbers(equation.motion[part]))
 
 
 def shown(found: Diagnosis, law: LearnedLaw) -> LearnedRest:
-    """One law as the report holds it, with its curve in natural coordinates."""
+    """The report's entry of one law, with its curve in natural coordinates."""
     equation, regression = law.equation, law.regression
     interval = found.record.plan.test.interval
     part = strongest(equation.left, interval)

@@ -1,4 +1,4 @@
-"""What a search in one part says: how well it is explained, by what, how sure, and what it cannot tell apart."""
+"""The verdict on one part: how well which effects explain its gap, how surely, and which cannot be separated."""
 
 from __future__ import annotations
 
@@ -9,22 +9,38 @@ import numpy as np
 
 from diagnosis.fits import fitting, sensor_noise
 from diagnosis.fits.fitting import TOLERANCES, Data, Fit, Problem
-from diagnosis.fits.search import DATA_GAIN, MATERIAL, PRIOR_GAIN, Search, exchanged_pair, gaps, leaves, tied
+from diagnosis.fits.search import (
+    DATA_GAIN,
+    MATERIAL,
+    PRIOR_GAIN,
+    SEEN,
+    Search,
+    exchanged_pair,
+    gaps,
+    leaves,
+    tied,
+)
 from diagnosis.recorded.parts import MODEL_ERROR
 from diagnosis.report.records import Outcome
 from models.registry import Array
 
-HALF = 0.5  # share of a gap's energy from which on effects that leave something are named
-TEMPERATURE = 3.0  # by which score differences are divided before they are odds
-# probability that the cause is not in the catalogue
+# Share of a gap's energy from which on effects that leave something are named: what they explain then is the larger
+# part.
+HALF = 0.5
+# The two figures below turn costs into probabilities; they were set on draws of `rths blind --set tune` (ADR 0012).
+# Differences of cost are divided by TEMPERATURE, since what a model leaves is not quite white. DOUBT is the probability
+# that the true cause is not among the effects named, by outcome.
+TEMPERATURE = 3.0
 DOUBT = {"explained": 0.02, "partly": 0.12, "unknown": 0.9}
-CORRELATED = 2.0  # s, longer than what a model leaves is correlated
+# s, blocks over which gradients are summed: several periods of the slowest motion of a residual.
+CORRELATED = 2.0
 COVER = 1.96  # standard deviations of an interval of 95 %
-
-
-BOTH = 2.0  # solutions that err, the laboratory's and the replay's
-OWN = 0.4  # of a gap's rms that may be coloured noise where only the residual tells of it: a sixth of its energy
-PINNED = 1e-3  # tolerances from the bound within which a nominal parameter counts as pinned there
+BOTH = 2.0  # solutions with an error of their own: the laboratory's and the replay's
+# Share of a gap's rms that may be taken for coloured noise where only the residual itself is evidence: a sixth of its
+# energy.
+OWN = 0.4
+# Distance from the bound, in tolerances, within which a nominal parameter counts as pinned to it.
+PINNED = 1e-3
 
 
 @dataclass(frozen=True)
@@ -40,7 +56,7 @@ class Interval:
 
 @dataclass(frozen=True)
 class PartVerdict:
-    """What one part says."""
+    """The verdict on one part."""
 
     search: Search  # in the recording that is reported on
     outcome: Outcome
@@ -109,7 +125,7 @@ def seen_in(data: Data, verdict: PartVerdict) -> PartVerdict:
 
 
 def unnamed(search: Search) -> PartVerdict:
-    """A gap that no effect explains by half: nothing is named, the nearest are listed."""
+    """The verdict on a gap of which no effect explains half: nothing is named, and the nearest effects are listed."""
     near = (search.chosen, *search.alternatives)
     costs = np.array([fit.cost for fit in near])
     odds = np.exp(
@@ -126,21 +142,18 @@ def unnamed(search: Search) -> PartVerdict:
     )
 
 
-MISSED = 0.3  # systematic residual over noise that is unknown where no effect was found
-
-
 def without_effects(search: Search) -> Outcome:
-    """The outcome where no effect is named: unknown, or what tolerances explain, or nothing above the noise."""
-    if search.left > MISSED:
+    """The outcome where no effect is named: unknown, explained by the tolerances, or nothing above the noise."""
+    if search.left > SEEN:
         return "unknown"
     nominal = fitting.at(search.data, {}, np.zeros(search.chosen.z.size))
     return "tolerances" if leaves(nominal) else "none"
 
 
 def how_well(search: Search) -> Outcome:
-    """Explained where the noise accepts what is left and no nominal parameter is pinned; else partly, or not at all.
+    """Explained where what is left is noise and no nominal parameter is at its bound; otherwise partly, or unknown.
 
-    A law that stands in for another one leaves something that no noise makes, however much of the gap it closes.
+    An effect that only imitates the true one leaves a systematic residual, however much of the gap it closes.
     """
     if not (beyond_model_error(search.chosen) or pinned(search.chosen) or unproven(search)):
         return "explained"
@@ -155,7 +168,7 @@ def beyond_model_error(fit: Fit) -> bool:
 
 
 def heard(search: Search) -> Array:
-    """Rms noise (signals,) of a part's sensors as far as it is sure, else that of the highest frequencies."""
+    """Rms noise (signals,) of a part's sensors; that of the highest frequencies where the rest of it is doubtful."""
     data, fit = search.data, search.chosen
     if not unproven(search):
         return data.white
@@ -163,7 +176,7 @@ def heard(search: Search) -> Array:
 
 
 def unproven(search: Search) -> bool:
-    """Whether much of a gap is taken for noise that nothing but the residual itself speaks for."""
+    """Whether a large share of a gap is taken for noise for which the residual itself is the only evidence."""
     before, after = search.commissioned, search.chosen
     left = [
         np.sqrt(np.mean(np.square(fit.data.residual(fitting.lay(fit.data, fit.z, fit.values))), axis=0))
@@ -184,7 +197,7 @@ def pinned(fit: Fit) -> tuple[str, ...]:
 
 
 def certainty(search: Search) -> float:
-    """How sure it is that there is an effect at all, beyond tolerances and chance."""
+    """Probability that there is an effect at all: 0.5 at the limit of the search, towards one far above it."""
     before, after = search.commissioned, search.chosen
     margin = max(before.prior - after.prior, 0.0) / PRIOR_GAIN + max(before.chi - after.chi, 0.0) / DATA_GAIN
     return 1.0 - 0.5 * math.exp(-(margin - 1.0))
@@ -203,7 +216,7 @@ def equivalents(search: Search) -> tuple[tuple[str, ...], ...]:
 def scatter(fit: Fit) -> Array:
     """How much the gradient varies beyond white noise, from its sums over blocks (White 1980, Newey and West 1987).
 
-    What a model leaves comes and goes slowly, so samples are no independent witnesses.
+    What a model leaves changes slowly, so that neighbouring samples are not independent.
     """
     groups, signals = fit.reduced.shape
     seen_by_fit = np.where(fit.data.train[:, None], fit.reduced, 0.0)

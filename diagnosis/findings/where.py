@@ -12,19 +12,23 @@ import numpy as np
 from common.plan.kinds import COLUMN, TABLE
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data, Fit
-from diagnosis.fits.search import gaps
+from diagnosis.fits.search import SEEN, gaps
 from diagnosis.recorded.parts import ColumnAlone, LaboratoryPart
 from diagnosis.recorded.record import Record
 from diagnosis.signals import windows
 from models.registry import Array
 
-# set on draws of `rths blind --set tune` (docs/decisions/0012-diagnosis.md)
-CONSISTENT = 0.35  # share of a residual that another signal's must show to have the same cause
+CLEAR = 2.0  # force over its noise that a motion would make, from which on its absence blames the displacement sensor
+OWN_MOTION = 0.5  # Hz, above which an acceleration is integrated twice: below, sensor drift would dominate
+UNSEEN = 0.5  # motion over the noise of the displacement sensor below which that sensor cannot show it
+# A window belongs to a trace from this share of the trace's largest window on, but never above the second, so that the
+# strongest window always counts.
+PART_OF_PEAK, BELOW_PEAK = 0.25, 0.9
 
 
 @dataclass(frozen=True)
 class SiteTrace:
-    """What one site does to a part's signals, in σ."""
+    """What one site does to a part's signals, in standard deviations σ of the noise."""
 
     site: str
     series: Array  # (ticks,) of the signal that shows it most
@@ -58,7 +62,7 @@ def shown(site: str, data: Data, change: Array) -> SiteTrace:
 
 
 def unexplained(data: Data, fit: Fit) -> SiteTrace:
-    """What a fit leaves, at the site where it most likely arises."""
+    """Trace of what a fit leaves, at the site where it most likely arises."""
     residual = data.residual(fitting.lay(data, fit.z, fit.values)) / data.sigma
     left = [item.ratio for item in gaps(fit, data.group)]
     site = culprit(data, residual, left)
@@ -73,7 +77,7 @@ def unexplained(data: Data, fit: Fit) -> SiteTrace:
 
 
 def culprit(data: Data, residual: Array, left: Sequence[float]) -> str:
-    """The site that residuals (ticks, signals) in σ speak for, by which signals show them and which do not."""
+    """The site from which residuals (ticks, signals) in σ most likely come, judged by which signals show them."""
     part = data.part
     if not isinstance(part, LaboratoryPart):
         return part.lab.site(part.name) if isinstance(part, ColumnAlone) else part.name
@@ -83,7 +87,7 @@ def culprit(data: Data, residual: Array, left: Sequence[float]) -> str:
 
 
 def culprit_of_device(data: Data, _residual: Array, amount: dict[str, float]) -> str:
-    """A laboratory of a user's kind: its device, of which nothing more is known."""
+    """The site in a laboratory of a user's kind: its device, since nothing is known of what each signal shows."""
     part = data.part
     return part.lab.kind.sites[0] if isinstance(part, LaboratoryPart) else next(iter(amount))
 
@@ -104,22 +108,21 @@ def culprit_a(data: Data, residual: Array, amount: dict[str, float]) -> str:
     alone = math.sqrt(
         max(float(np.mean(with_it**2)) - 1.0 - (stiffness * data.sigma[0] / data.sigma[1]) ** 2, 0.0)
     )
-    if force < SEEN and level > 2.0:
+    if force < SEEN and level > CLEAR:
         return "sensor.column_displacement"
     return "actuator" if alone < max(force, displacement) else "column"
 
 
-SEEN = 0.3  # systematic residual over noise that counts as seen
-
-
 def culprit_b(data: Data, residual: Array, amount: dict[str, float]) -> str:
-    """A damper on a table: the table moves everything, the damper its stroke and force; one alone is a sensor's."""
+    """A damper on a table: the table moves all readings, the damper stroke and force; a single one is a sensor's."""
     seen = {name for name, value in amount.items() if value > SEEN}
     if "table_displacement" in seen:
         return "table"
     if seen == {"table_acceleration"}:
         return "table" if hidden_in_displacement(data, residual) else "sensor.table_acceleration"
-    if seen == {"damper_force"}:  # a true force would have moved the mass, which is seen far more sharply
+    if seen == {
+        "damper_force"
+    }:  # a true force would have moved the mass, which the stroke shows far more clearly
         return "sensor.damper_force" if data.part.present[:, 2].any() else "damper"
     table = amount.get("table_acceleration", 0.0)
     damper = max(amount.get("damper_stroke", 0.0), amount.get("damper_force", 0.0))
@@ -127,24 +130,24 @@ def culprit_b(data: Data, residual: Array, amount: dict[str, float]) -> str:
 
 
 def hidden_in_displacement(data: Data, residual: Array) -> bool:
-    """Whether the motion behind an acceleration's residual would be too small for the displacement sensor."""
+    """Whether the motion behind an acceleration's residual is too small for the displacement sensor to show."""
     interval = data.system.plan.test.interval
     series = residual[:, 1] * data.sigma[1]
     spectrum = np.fft.rfft(series)
     omega = 2.0 * np.pi * np.fft.rfftfreq(series.size, interval)
-    slow = omega > 2.0 * np.pi * 0.5
+    fast = omega > 2.0 * np.pi * OWN_MOTION
     motion = np.zeros_like(spectrum)
-    motion[slow] = spectrum[slow] / omega[slow] ** 2
+    motion[fast] = spectrum[fast] / omega[fast] ** 2
     implied = np.fft.irfft(motion, series.size)
-    return float(np.sqrt(np.mean(implied**2))) < data.sigma[0] * 0.5
+    return float(np.sqrt(np.mean(implied**2))) < UNSEEN * data.sigma[0]
 
 
 def shapley(
     players: Sequence[str], value: Callable[[frozenset[str]], float]
 ) -> dict[str, tuple[float, float, float]]:
-    """Shares of `value(all) − value(none)` per player: exact Shapley value, first in, last out.
+    """Per player: exact Shapley share of `value(all) − value(none)`, its gain as the first and as the last one added.
 
-    Over all subsets (Shapley 1953); for at most a few players.
+    Source: Shapley, A value for n-person games (1953). `value` is asked for all 2ⁿ subsets.
     """
     known = {
         frozenset(subset): value(frozenset(subset))
@@ -169,8 +172,8 @@ def shapley(
 def when(trace: SiteTrace, record: Record, threshold: float = 1.0) -> tuple[tuple[float, float], ...]:
     """Windows of time in which a site's trace stands out of the noise."""
     parts = windows.windows(trace.series, 1.0, record.plan.test.interval)
-    level = max(threshold, 0.25 * float(np.max(parts.ratio, initial=0.0)))
-    spans = windows.intervals(parts, min(level, 0.9 * float(np.max(parts.ratio, initial=0.0))))
+    peak = float(np.max(parts.ratio, initial=0.0))
+    spans = windows.intervals(parts, min(max(threshold, PART_OF_PEAK * peak), BELOW_PEAK * peak))
     return tuple((begin, end) for begin, end in spans)
 
 

@@ -1,4 +1,4 @@
-"""The candidates of a report: the verdict and what else might be, with parameters and probabilities."""
+"""The candidates of a report: the verdict and its alternatives, with parameters and probabilities."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from diagnosis.report.records import Candidate
 from diagnosis.report.values import Parameters, Value
 from laboratories.effects.effect import Effect
 
-MOST_OTHERS = 5  # alternatives listed
+MOST_OTHERS = 5  # alternatives listed, the most probable ones: as many as a reader compares with the verdict
 
 
 class Named(NamedTuple):
@@ -27,7 +27,7 @@ class Named(NamedTuple):
 
 
 def which(found: Diagnosis) -> Named:
-    """The candidates, and what is to be said of the verdict's parameters."""
+    """The candidates, and warnings on the verdict's parameters."""
     named = [verdict for verdict in found.verdicts if verdict.effects]
     effects = [name for verdict in named for name in verdict.effects]
     effects += [reading.effect for reading in found.readings] + [item.effect for item in found.link]
@@ -63,14 +63,14 @@ def at_the_end(effect: Effect, values: Mapping[str, Interval]) -> list[str]:
     """A sentence for each parameter of an effect, shapes aside, that a fit left at the end of its range."""
     shapes = {item.name for item in effect.parameters if item.shape}
     return [
-        f"{key} of {effect.name} lies at the end of its range."
+        f"The parameter {key} of {effect.name} lies at the end of its range."
         for key, item in values.items()
         if item.on_bound and key not in shapes
     ]
 
 
 def seen(found: Diagnosis) -> dict[str, dict[str, Value]]:
-    """Parameters of effects that were read off samples and message numbers."""
+    """Parameters of the effects that were found in samples and in message numbers."""
     result = {}
     catalogue = found.record.catalogue
     for reading in found.readings:
@@ -121,7 +121,10 @@ def unit_of(effect: Effect, parameter: str) -> str:
 
 
 def nothing(found: Diagnosis) -> float:
-    """How sure it is that nothing is there: the nearer to what would be named, the less."""
+    """Probability that there is no effect: one, down to 0.7 where a search nearly named one.
+
+    By the fourth power only what comes close to a limit of the search lowers it: half of a limit costs 2 %.
+    """
     worst = 0.0
     for verdict in found.verdicts:
         fit = verdict.search.chosen

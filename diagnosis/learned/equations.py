@@ -1,6 +1,6 @@
-"""What a machine does beyond its model, as a series over its own motion: the force or the way that a model leaves out.
+"""What a machine does beyond its model, as a series over its own motion: a force or a displacement.
 
-Each is read off the recorded signals at the machine, so that what another machine does wrong does not enter.
+Each series comes from the recorded signals at the machine itself, so that errors of other machines do not enter.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from loop import replay
 from models.registry import Array
 from models.system import System
 
-STILL = 1e-3  # m/s, below which the sign of a measured rate is noise
+STILL = 1e-3  # m/s, below which the sign of a measured rate is noise: 2 µm of stroke noise over one interval of 2 ms
 
 
 @dataclass(frozen=True)
@@ -35,13 +35,13 @@ class Equation:
     rate: Array  # (ticks,) m/s
     left: Array  # (ticks,) in `unit`
     there: Mask
-    over: Literal["way of the piston", "deformation", "velocity"]  # what it is drawn over
-    quantity: str  # what is left, in words
+    over: Literal["piston displacement", "deformation", "velocity"]  # abscissa of its curve
+    quantity: str  # what `left` is, in words
     unit: str
 
 
 def equations(fit: Fit) -> list[Equation]:
-    """Those of the part of a fit, each with the effects of the fit in its model."""
+    """The equations of the machines in a fit's part; their models have the effects of the fit."""
     part, system = fit.data.part, fitting.lay(fit.data, fit.z, fit.values)
     if isinstance(part, ColumnAlone):
         site = part.lab.site("column")
@@ -52,7 +52,7 @@ def equations(fit: Fit) -> list[Equation]:
 
 
 def of_column(fit: Fit, part: LaboratoryPart, system: System) -> list[Equation]:
-    """The piston's way over the way that its model predicts, and the specimen's force over its deformation."""
+    """The piston's displacement over the one that its model predicts, and the specimen's force over its deformation."""
     predicted = part.predict(system)
     place, force = part.measured.T
     placed, felt = part.present.T
@@ -69,7 +69,7 @@ def of_column(fit: Fit, part: LaboratoryPart, system: System) -> list[Equation]:
                 rate,
                 left,
                 placed,
-                "way of the piston",
+                "piston displacement",
                 "displacement",
                 "m",
             )

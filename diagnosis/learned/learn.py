@@ -10,7 +10,8 @@ from diagnosis.learned.equations import Equation, equations
 from diagnosis.learned.regression import Regression, regress
 from models.system import System
 
-Of = Literal["law", "interleaved", "weaker"]  # which data a law is of, as `Regression` names them
+# The data from which a law was learned, as `Regression` names them.
+Of = Literal["law", "interleaved", "weaker"]
 
 
 @dataclass(frozen=True)
@@ -18,7 +19,7 @@ class LearnedLaw:
     """What no effect explains at one machine, as a law of its motion."""
 
     site: str
-    role: str  # of whom the laboratory is
+    role: str  # of the process that drives the laboratory
     equation: Equation
     regression: Regression
 
@@ -28,7 +29,7 @@ class LearnedLaw:
 
 
 def learn(fit: Fit) -> list[LearnedLaw]:
-    """The laws of what a fit leaves in its part: one for each machine where one predicts time that it has not seen."""
+    """The laws of what a fit leaves in its part, of the machines whose law predicts time that it was not fitted on."""
     result = []
     for equation in equations(fit):
         found = regress(

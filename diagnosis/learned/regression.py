@@ -1,7 +1,7 @@
-"""A law of `models.preisach` found in a series by ridge regression, with its error on data that it has not seen.
+"""A law of `models.preisach` found in a series by ridge regression, with its error on data not used for it.
 
-Beside the law of all data there are two others for judging: of the seconds that fits of effects see, and of all but the
-stretch in which the motion goes farthest, which shows whether a law does more than interpolate.
+Beside the law of all data two others serve to judge it: one from the seconds that fits of effects use, and one from all
+but the stretch of the largest motion, which shows whether a law does more than interpolate.
 """
 
 from __future__ import annotations

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from common.roles import MASTER
-from diagnosis.recorded.parts import Nuisance, of_sites
+from diagnosis.recorded.nuisances import Nuisance
+from diagnosis.recorded.parts import of_sites
 from diagnosis.recorded.record import Record
 from loop import substructure
 from models.registry import Array
@@ -13,7 +14,7 @@ from models.system import System
 
 
 class Ground:
-    """The recorded ground acceleration against the plan's record."""
+    """The recorded ground acceleration, predicted from the ground motion of the plan."""
 
     name = "ground"
     role = MASTER
@@ -40,7 +41,7 @@ class Ground:
         return self
 
     def shift(self) -> float:
-        """By how much later (s) the recorded motion came, by cross-correlation."""
+        """Delay (s) of the recorded motion against the plan's, by cross-correlation."""
         size = 2 * self.measured.size
         came = np.fft.rfft(self.measured[:, 0], size)
         product = np.fft.irfft(came * np.conj(np.fft.rfft(self._believed[0], size)), size)

@@ -26,12 +26,12 @@ class RecordedLaboratory:
     role: str
     kind: Kind
     plan: Plan  # as the role sees it
-    before: str = ""  # what its sites and effects begin with in the record
-    ahead: str = ""  # what its signals begin with
+    before: str = ""  # prefix of its sites and effects in the record
+    ahead: str = ""  # prefix of its signals
 
     @property
     def title(self) -> str:
-        """What it is called: laboratory A is the master's, laboratory B a slave's."""
+        """Its name in texts: laboratory A is the master's, laboratory B a slave's."""
         return "laboratory A" if self.role == MASTER else "laboratory B"
 
     def signal(self, name: str) -> str:
@@ -44,7 +44,7 @@ class RecordedLaboratory:
 
     @property
     def rows(self) -> tuple[Signal, ...]:
-        """What is written and measured in it, with units, under the names of the record."""
+        """The signals written and measured in it, with units, under the names of the record."""
         channels = self.kind.channels
         rows = (channels.target, channels.command, *([channels.effort] if channels.effort else []))
         return tuple(row._replace(name=self.signal(row.name)) for row in (*rows, *channels.measured))
@@ -56,7 +56,7 @@ class RecordedLaboratory:
 
     @property
     def commands(self) -> dict[str, str]:
-        """The signals that drive it, each with its machine in words."""
+        """The signals that drive it, each with the name of its machine in texts."""
         command, *effort = self.kind.channels.drives
         words = {command: command.removesuffix("_command").replace("_", " ")}
         words |= {name: f"{name.removesuffix('_command').replace('_', ' ')}'s motor" for name in effort}
@@ -80,7 +80,7 @@ class RecordedLaboratory:
         return {effect.name: effect for effect in found}
 
     def scoped(self, effect: Effect) -> Effect:
-        """An effect of the catalogue with the names of the record."""
+        """An effect of the catalogue, with site, signals and name as in the record."""
         if not self.before:
             return effect
         stop = effect.contact
@@ -102,7 +102,7 @@ class RecordedLaboratory:
 
 
 def recorded(plan: Plan, plans: Mapping[str, Plan]) -> tuple[RecordedLaboratory, ...]:
-    """The laboratories of a record of a plan's test, of the master and of one slave at most; `plans` as each sees it.
+    """The laboratories that a record shows, the master's and at most one slave's; `plans` are those of their roles.
 
     Raises:
         InputError: a kind of the plan cannot be loaded.

@@ -1,4 +1,4 @@
-"""The closed loop simulated again with what was found, and the gap that it leaves to the recording."""
+"""The closed loop of a recorded test, simulated with the effects found, and its gap to the recording."""
 
 from __future__ import annotations
 
@@ -18,8 +18,9 @@ from loop.closed_loop import MessagesUsed
 from models.registry import Array
 from models.system import System
 
-NOISY = 2  # noisy simulations by which the floor is found
-DIVERGED = 10.0  # gap of a simulation that diverges
+# Noisy simulations from which the noise floor is found: each costs as much as all other simulations of a site.
+NOISY = 2
+DIVERGED = 10.0  # gap given to a simulation that diverges: far above that of any wrong model that is stable
 
 Signals = dict[str, Array]
 Systems = Mapping[str, System]  # master and slave by role
@@ -30,8 +31,8 @@ class RecordedLoop:
     """The data that all re-simulations of one recording share."""
 
     record: Record
-    ground: Array  # as believed
-    exchange: MessagesUsed | None  # as it was, where the link was not as planned
+    ground: Array  # rows of the ground motion in the plan
+    exchange: MessagesUsed | None  # which message each tick used, where the link was not as planned
     names: tuple[str, ...]  # response signals that were recorded
 
     def simulate(self, systems: Systems, *, linked: bool = True, seed: int | None = None) -> Signals | None:
@@ -86,8 +87,8 @@ def simulated(
 ) -> Signals | None:
     """Signals of the closed loop of a record's test by name, None where it diverges.
 
-    Of a test with several slaves those of the master and of the slave that the record shows; the other slaves are what
-    they were found to be, or what the plan says.
+    In a test with several slaves these are the signals of the master and of the slave that the record shows; the other
+    slaves have the effects that were found in them, or are as the plan says.
     """
     plan = systems[MASTER].plan.with_ticks(record.ticks)
     role = next((one for one in systems if one != MASTER), "")
@@ -114,7 +115,7 @@ def simulated(
 
 
 def noised(record: Record, systems: Systems, levels: Mapping[str, float]) -> dict[str, System]:
-    """The systems with sensors as noisy as they were found to be."""
+    """The systems with the noise that was found in their sensors, by role."""
     result = dict(systems)
     for lab in record.labs:
         names = zip(lab.kind.channels.names, lab.measured, strict=True)

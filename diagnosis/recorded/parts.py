@@ -1,22 +1,29 @@
-"""The pieces that a recording can be judged by, one after the other, each from its own recorded inputs.
+"""The parts of a test, each of which is replayed from its own recorded inputs and judged by itself.
 
-A piece is driven by commands that are known exactly, so what it predicts differs from what was read by
-the sensors' noise alone as long as its model is right. A gap in one piece does not spill into another.
+A part is driven by commands that are known exactly. As long as its model is right, its prediction differs from its
+readings by the sensors' noise alone, and a gap in one part does not enter another one.
 """
 
 from __future__ import annotations
 
 import copy
 from collections.abc import Collection
-from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
 
 from common.plan.plan import Plan
-from common.recording.imported import NOTHING_STATED, ImportedChannel
 from common.roles import MASTER
 from diagnosis.recorded.laboratory import RecordedLaboratory
+from diagnosis.recorded.nuisances import (
+    LoggedForce,
+    LoggedReadings,
+    Nuisance,
+    calibrations,
+    channels,
+    nuisances,
+    of_building,
+)
 from diagnosis.recorded.record import Record
 from diagnosis.signals.mask import Mask
 from laboratories.effects.effect import Effect
@@ -25,102 +32,29 @@ from loop import replay
 from models.registry import Array
 from models.system import System
 
-EXACT = 1e-4  # share of a computed signal's rms below which a difference is rounding, not gap
-UNREST = 0.05  # share of its largest value from which on a first value is no rest
-PIECE, REACH = 1.0, 10  # s between beginnings of a free damper, ticks to each side that they are read from
-LATE = 4e-3  # s, by which a logger's filters usually make a force late
-ALIKE = 5e-4  # s, by which a logger's channels may differ: a quarter of an interval,
-UNLIKE = 0.5  # and this share of a delay, so that a channel on time is no more than two tolerances off
-CALIBRATED = 0.01  # by which a logger's calibration usually differs
-MODEL_ERROR = 1e-3  # share of a measured signal's rms that two good solutions of one model may differ by
-
-
-@dataclass(frozen=True)
-class Nuisance:
-    """A nominal parameter that may move within its tolerance, of the building or of a laboratory."""
-
-    parameter: str  # table.name of the plan
-    tolerance: float
-    lab: RecordedLaboratory | None = None
-    storey: int = field(default=0, kw_only=True)  # whose value alone moves, from 1; 0: all
-    of_record = False  # whether it says something of the recording alone, and nothing of the test
-
-    @property
-    def name(self) -> str:
-        """The name in reports: part.parameter, and of one storey alone which."""
-        if self.storey:
-            return f"{self.parameter} of storey {self.storey}"
-        return self.lab.site(self.parameter) if self.lab else self.parameter
-
-    def moved(self, system: System, z: float) -> System:
-        """The system with the parameter moved by `z` tolerances."""
-        if z == 0.0:
-            return system
-        factor = 1.0 + z * self.tolerance
-        if self.lab:
-            return self.lab.kind.scaled(system, self.parameter, factor)
-        table, _, key = self.parameter.partition(".")
-        if not self.storey:
-            return system.scaled(table, key, factor)
-        values = getattr(getattr(system.plan, table), key)
-        place = self.storey - 1
-        return system.moved(table, **{key: (*values[:place], factor * values[place], *values[self.storey :])})
-
-
-@dataclass(frozen=True)
-class ChannelGain(Nuisance):
-    """The calibration of one channel of a logger, within the tolerance stated for it."""
-
-    of_record = True
-    signal: str = ""  # of the reading in its laboratory
-
-    @property
-    def name(self) -> str:
-        """The name in reports."""
-        site = f"sensor.{self.signal}"
-        return f"{self.lab.site(site) if self.lab else site}.calibration"
-
-    def moved(self, system: System, z: float) -> System:
-        """The system whose reading has that gain."""
-        return system if z == 0.0 else system.sensed(self.signal, gain=1.0 + z * self.tolerance)
-
-
-@dataclass(frozen=True)
-class LoggedForce(Nuisance):
-    """How late a logger recorded a force that the master used, in seconds, or by what factor."""
-
-    of_record = True
-    signal: str = ""  # of the force's reading
-
-    def moved(self, system: System, z: float) -> System:
-        """The system whose reading of that force says what the logger did to it."""
-        value = z * self.tolerance
-        return system.sensed(
-            self.signal, **({"delay": value} if self.parameter == "delay" else {"gain": 1.0 + value})
-        )
-
-
-@dataclass(frozen=True)
-class LoggedReadings(Nuisance):
-    """How late a logger recorded all readings of a laboratory, in seconds, about what it made of another one."""
-
-    of_record = True
-    signals: tuple[str, ...] = ()  # of the readings in their laboratory
-    about: float = 0.0  # s
-
-    def moved(self, system: System, z: float) -> System:
-        """The system whose readings all come that late; none comes early."""
-        delay = max(0.0, self.about + z * self.tolerance)
-        for name in self.signals if delay > 0.0 else ():
-            system = system.sensed(name, delay=delay)
-        return system
+# Share of a computed signal's rms below which a difference is rounding of the recording: four digits of a text file.
+EXACT = 1e-4
+UNREST = 0.05  # first value over the largest one from which on a record does not begin at rest
+# A damper without a spring is replayed anew every PIECE seconds, since an error of force grows into a drift; a cubic
+# over REACH ticks to each side (20 ms) gives its place and rate there.
+PIECE, REACH = 1.0, 10
+# Difference of two good solutions of one model over a measured signal's rms; nothing below is a gap.
+MODEL_ERROR = 1e-3
+# Standard deviations within which a logger's channels are expected. LATE: a filter of 40 Hz, usual before sampling at
+# 100 Hz to 200 Hz, delays by 4 ms. ALIKE and UNLIKE: channels of one logger differ by a quarter of an interval or by
+# half of their delay, so that a channel without delay is two tolerances off. CALIBRATED: load cells and displacement
+# transducers are calibrated to a percent.
+LATE = 4e-3  # s
+ALIKE = 5e-4  # s
+UNLIKE = 0.5
+CALIBRATED = 0.01
 
 
 class Part(Protocol):
-    """A piece of the test with its recorded inputs and outputs."""
+    """A part of the test with its recorded inputs and outputs."""
 
     name: str
-    role: str  # of whom it is
+    role: str  # of the process that it belongs to
     signals: tuple[str, ...]
     nuisances: tuple[Nuisance, ...]
     candidates: tuple[Effect, ...]
@@ -129,45 +63,10 @@ class Part(Protocol):
     exact: bool  # computed, not measured: free of noise
 
     def predict(self, system: System) -> Array:
-        """What the piece would have given, without noise; (ticks, signals)."""
+        """Outputs of the part without noise, (ticks, signals)."""
 
     def first(self, ticks: int) -> Part:
-        """The piece over the first ticks only."""
-
-
-def nuisances(lab: RecordedLaboratory, names: tuple[str, ...]) -> tuple[Nuisance, ...]:
-    """Those of a laboratory's parameters that can move: finite and not zero."""
-    found = ((name, lab.kind.planned(lab.plan, name), lab.kind.tolerance(lab.plan, name)) for name in names)
-    return tuple(
-        Nuisance(name, tolerance, lab) for name, value, tolerance in found if movable(value, tolerance)
-    )
-
-
-def of_building(plan: Plan) -> tuple[Nuisance, ...]:
-    """Those of the building's parameters that can move; each storey's by itself, as far as it has one of its own."""
-    known, result = plan.tolerances, []
-    for key in ("mass", "stiffness", "damping", "damping_ratio"):
-        name, values = f"structure.{key}", getattr(plan.structure, key)
-        tolerance = known.parameters.get(name, known.default)
-        if movable(values, tolerance):
-            storeys = range(1, len(values) + 1) if apart(plan, values) else (0,)
-            result += [Nuisance(name, tolerance, storey=storey) for storey in storeys]
-    return tuple(result)
-
-
-def apart(plan: Plan, values: Any) -> bool:
-    """Whether a parameter of the building has values of several storeys that may be wrong one by one.
-
-    Those of a matrix are not: it stays symmetric. What `[structure.experimental]` takes over belongs to all of them.
-    """
-    several = isinstance(values, tuple) and len(values) > 1 and not isinstance(values[0], tuple)
-    return several and plan.structure.experimental is None
-
-
-def movable(value: Any, tolerance: float) -> bool:
-    """Whether a parameter's values are finite and not zero, and uncertain at all."""
-    values = np.asarray(value)
-    return tolerance > 0.0 and bool(np.all(np.isfinite(values)) and np.all(values != 0.0))
+        """The part over the first ticks only."""
 
 
 def cut(part: Any, ticks: int, inputs: Any) -> Any:
@@ -186,7 +85,7 @@ def with_fields(part: Any, fields: dict[str, Any]) -> Any:
 
 
 def outputs(record: Record, names: tuple[str, ...]) -> tuple[Array, Mask]:
-    """Recorded signals and where they are there; one that is absent is nowhere there."""
+    """Recorded signals (ticks, names) and where they are present; a signal that was not recorded is present nowhere."""
     none = np.zeros(record.ticks)
     values = [record.signals.get(name, none) for name in names]
     there = [record.present.get(name, none.astype(bool)) for name in names]
@@ -194,36 +93,16 @@ def outputs(record: Record, names: tuple[str, ...]) -> tuple[Array, Mask]:
 
 
 def of_sites(record: Record, sites: Collection[str], plan: Plan) -> tuple[Effect, ...]:
-    """The effects on these sites that change a waveform and that the plan's models can have.
+    """The effects at these sites that change a waveform and that the plan's models can have.
 
-    Noise and rounding are seen directly.
+    Noise and rounding are left out, since they are found in the samples directly.
     """
     found = [effect for effect in record.catalogue.values() if effect.site in sites and effect.fits(plan)]
     return tuple(effect for effect in found if not effect.in_samples)
 
 
-def channels(record: Record, lab: RecordedLaboratory) -> tuple[ImportedChannel, ...]:
-    """What is stated of the logger's channels of a laboratory's readings, nothing where rths recorded them."""
-    stated = record.stated
-    if stated is None:
-        return (NOTHING_STATED,) * len(lab.measured)
-    return tuple(stated.channel(lab.role, name) for name in lab.kind.channels.names)
-
-
-def calibrations(
-    record: Record, lab: RecordedLaboratory, stated: tuple[ImportedChannel, ...]
-) -> tuple[ChannelGain, ...]:
-    """Gains of the channels that were recorded, within the tolerances stated."""
-    rows = zip(lab.kind.channels.names, lab.measured, stated, strict=True)
-    return tuple(
-        ChannelGain("gain", channel.calibration, lab, name)
-        for name, given, channel in rows
-        if channel.calibration > 0.0 and record.has(given)
-    )
-
-
 class LaboratoryPart:
-    """A laboratory from its recorded commands."""
+    """A laboratory replayed from its recorded commands."""
 
     exact = False
 
@@ -253,7 +132,7 @@ class LaboratoryPart:
         self._start = float(first) if abs(first) > UNREST * most else 0.0
 
     def targets(self, record: Record) -> dict[str, Array]:
-        """What commands were to bring about, by command: free of the sensors' noise that a controller feeds back."""
+        """Targets by command: unlike commands, these are free of the sensors' noise that a controller feeds back."""
         channels = self.lab.kind.channels
         command, target = self.lab.signal(channels.command.name), self.lab.signal(channels.target.name)
         return {command: record.signals[target]} if command in self.inputs and record.has(target) else {}
@@ -279,10 +158,10 @@ class LaboratoryPart:
         return found
 
     def beginnings(self, record: Record) -> Array | None:
-        """Ticks, places and rates from which a motion that nothing brings back is replayed anew.
+        """Ticks, displacements and rates from which a motion without a restoring force is replayed anew.
 
-        Without a spring every error of force adds up to a drift for ever, so it is replayed piece by piece, each from
-        the measured motion. The same where a record does not begin at rest.
+        Without a spring every error of force grows into a drift, so the motion is replayed piece by piece, each from
+        the measured state. A record that does not begin at rest has one such beginning.
         """
         name = self.lab.signal(self.lab.kind.free)
         if not name or not record.has(name):
@@ -309,9 +188,9 @@ class LaboratoryPart:
         return result
 
     def logged(self, delay: float) -> LaboratoryPart:
-        """The same laboratory, whose readings came through a logger that made the forces used late by `delay` s.
+        """The same laboratory with readings from a logger that delayed the forces in use by `delay` s.
 
-        What a logger does to one channel it mostly does to all; nothing of what is stated of it is changed.
+        A logger mostly delays all its channels alike. Where a delay or filter is stated for a channel, nothing changes.
         """
         if any(channel.filter is not None or channel.delay != 0.0 for channel in self.channels):
             return self
@@ -326,7 +205,7 @@ class LaboratoryPart:
 
 
 class ColumnAlone:
-    """The column from its measured deformation, where no actuator command was recorded."""
+    """The column replayed from its measured deformation, where no actuator command was recorded."""
 
     name = "column"
     exact = False
@@ -355,8 +234,7 @@ class ColumnAlone:
 class Building:
     """The numerical substructure from the ground motion and the forces that the master used.
 
-    It is exact where the forces recorded are those that the master used to the last bit, else they came through a
-    logger of their own.
+    It is exact where the recorded forces are the very numbers that the master used; otherwise a logger recorded them.
     """
 
     name = "structure"
@@ -413,7 +291,7 @@ class Building:
         return position, np.interp(ticks + logger.delay / self._interval, ticks, force) / logger.gain, used
 
     def logged(self) -> Building:
-        """The same building, of which the forces that the master used are known up to a logger's noise only."""
+        """The same building, whose recorded forces have the delay, gain and noise of a logger."""
         logger = tuple(
             LoggedForce(name, tolerance, None, self._force)
             for name, tolerance in (("delay", LATE), ("gain", CALIBRATED))
@@ -423,7 +301,7 @@ class Building:
         return result
 
     def late(self, z: Array) -> float:
-        """By how much a logger recorded the force too late, s, at places (nuisances,) of a fit."""
+        """Delay (s) of the logger that recorded the force, at values z (nuisances,) of a fit."""
         rows = zip(self.nuisances, z, strict=True)
         return sum(
             float(x) * one.tolerance
@@ -432,5 +310,5 @@ class Building:
         )
 
     def first(self, ticks: int) -> Building:
-        """The whole of it, because it is computed and cheap."""
+        """The whole part, since computing it takes little time."""
         return self

@@ -17,7 +17,7 @@ from models.registry import Array
 
 
 def paths(record: Record, nominal: dict[str, Array] | None) -> Paths:
-    """What the three paths of the loop cost, as recorded and in the nominal simulation.
+    """Delay, amplitude and damping of the three paths of the loop, as recorded and in the nominal simulation.
 
     The command path runs from the building's drift to the specimen's deformation, the force path from the deformation
     to the force that the master used, the exchange from the damper's force in its laboratory to its use.
@@ -29,7 +29,7 @@ def paths(record: Record, nominal: dict[str, Array] | None) -> Paths:
         channels = own.kind.channels
         damped = (
             own.kind.coupling(own.plan).stiffness > 0.0
-        )  # what it adds to the damping follows from the stiffness
+        )  # the damping that a delay adds is that of a stiffness
         command = path(record, nominal, channels.target.name, channels.position, damped=damped)
         if own.kind.name == COLUMN:
             force = path(record, nominal, channels.position, channels.force)
@@ -42,7 +42,7 @@ def paths(record: Record, nominal: dict[str, Array] | None) -> Paths:
 def path(
     record: Record, nominal: dict[str, Array] | None, start: str, end: str, *, damped: bool = True
 ) -> LoopPath | None:
-    """One path, None where it was not recorded; what it does to the damping only where it is `damped`."""
+    """One path, None where it was not recorded; with its effect on the damping only where it is `damped`."""
     here = measured(record, record.signals, start, end)
     if here is None:
         return None
@@ -57,12 +57,12 @@ def path(
 
 
 def points(record: Record, path: FrequencyEvaluation) -> float:
-    """What a path adds to the first mode's damping, in points of a percent."""
+    """Damping ratio that a path adds to the first mode, in percentage points."""
     return -100.0 * damping_lost(record.plans[MASTER], path)
 
 
 def measured(record: Record, signals: dict[str, Array], start: str, end: str) -> FrequencyEvaluation | None:
-    """Amplitude and delay from one signal to another, None where they are not there; forces per stiffness."""
+    """Amplitude and delay from one signal to another, None where one is missing; forces over the stiffness."""
     if start not in signals or end not in signals or not record.has(start, end):
         return None
     target, reached = signals[start], signals[end]

@@ -28,8 +28,7 @@ from models.registry import Array
 from models.system import System
 
 MASTER_FIRST = ("master", "slave")
-SLAVE_FIRST = ("slave", "master")
-LEAST_TICKS = 50
+LEAST_TICKS = 50  # without which nothing is judged: 0.1 s at 2 ms, and fewer ticks than a correlation needs
 
 
 @dataclass(frozen=True)
@@ -39,7 +38,9 @@ class WholeTest:
     plan: Plan
     role: str  # of the slave that the record shows
     used: Array  # (ticks, slaves) forces that the master used, N
-    others: dict[str, System] = field(default_factory=dict)  # what the other slaves were found to be, by role
+    others: dict[str, System] = field(
+        default_factory=dict
+    )  # systems of the other slaves as diagnosed, by role
 
 
 @dataclass(frozen=True)
@@ -54,15 +55,15 @@ class Record:
     ticks: int
     signals: dict[str, Array]
     present: dict[str, Mask]
-    ground: Array | None  # (2, ticks + 1) as the plan believes it, None where it is not known
-    other_plan: bool = False  # whether the building or its control were other than this plan's
+    ground: Array | None  # (2, ticks + 1) the ground motion of the plan, None where it is not known
+    other_plan: bool = False  # whether the test had another building or control than this plan
     whole: WholeTest | None = None  # the test around it, where that has several slaves
     plans: dict[str, Plan] = field(default_factory=dict)  # by role, as each sees it
     labs: tuple[RecordedLaboratory, ...] = ()  # the laboratories that it shows, the master's first
 
     @cached_property
     def stated(self) -> ImportedData | None:
-        """What is stated of the logger's channels, None where rths recorded the test itself."""
+        """The stated properties of the logger's channels, None where rths recorded the test itself."""
         return imported(self.run)
 
     @cached_property
@@ -86,7 +87,7 @@ class Record:
 
     @property
     def systems(self) -> dict[str, System]:
-        """What the plan says that master and slave are, by role."""
+        """Systems of master and slave as the plan says, by role."""
         return {role: System(plan) for role, plan in self.plans.items()}
 
     @property
@@ -106,7 +107,7 @@ class Record:
 
     @property
     def targets(self) -> tuple[str, ...]:
-        """What the laboratories were to follow."""
+        """The target signals of the laboratories."""
         return tuple(lab.signal(lab.kind.channels.target.name) for lab in self.labs)
 
     def unit(self, name: str) -> str:
@@ -127,9 +128,9 @@ class Record:
 def build(run: Run, plan: Plan | None = None, *, against_ideal: bool = False, role: str = SLAVE) -> Record:
     """The record of a recording under a plan, its own where none is given.
 
-    It shows the master and the slave whose `role` is given, or with the role of the master that one alone.
-    With `against_ideal` it is compared with the pure simulation of that plan: transfer systems that do what
-    the building wants. Their command is then the target, and their compensation a part of them.
+    It shows the master and the slave whose `role` is given, or the master alone where that is the master's role. With
+    `against_ideal` the recording is compared with the pure simulation of the plan, whose transfer systems reach every
+    target exactly: their command is then the target, and their compensation counts as a part of them.
 
     Raises:
         InputError: there is no plan, it names other slaves, or there is no signal to look at.
@@ -145,7 +146,9 @@ def build(run: Run, plan: Plan | None = None, *, against_ideal: bool = False, ro
         own = own.of(role) if own is not None and own.slaves else own
     topics = [topic for topic in MASTER_FIRST if run.has(topic)]
     if not topics:
-        raise InputError(f"{run.path} holds no signals of a master or a slave to diagnose.")
+        raise InputError(
+            f"{run.path} holds no signals of a master or a slave, so that nothing can be diagnosed."
+        )
     ticks = 1 + max(int(run.sequences[topic].max()) for topic in topics)
     tables = ("structure", "compensator", "control", "column")
     other = own is not None and any(getattr(own, name) != getattr(chosen, name) for name in tables)
@@ -178,9 +181,9 @@ def used_forces(run: Run, plan: Plan, ticks: int) -> Array:
 def on_ticks(
     run: Run, topics: list[str], ticks: int, labs: tuple[RecordedLaboratory, ...]
 ) -> tuple[dict[str, Array], dict[str, Mask]]:
-    """The topics' numbers on their ticks, and where they are there.
+    """The topics' numeric signals on their ticks, and where they are present.
 
-    What two topics hold is the master's, but what a slave wrote and measured is its own.
+    Of a signal that two topics hold the master's is taken, except for signals that the slave wrote and measured itself.
     """
     signals: dict[str, Array] = {}
     present: dict[str, Mask] = {}
@@ -223,9 +226,9 @@ def check_slaves(run: Run, plan: Plan) -> None:
 
 
 def wanted(values: Array, there: Mask, *, at_end: bool) -> tuple[Array, Mask]:
-    """A target as the command of an ideal transfer system: what is wanted for the interval's end.
+    """A target as the command of an ideal transfer system, which is the target at the end of the interval.
 
-    The recorded target of the master's own laboratory is that of the tick, one that is sent that of the interval's end.
+    A target that is sent to a slave is already that of the interval's end; the master's own is recorded for the tick.
     """
     if at_end:
         return values, there
@@ -233,7 +236,7 @@ def wanted(values: Array, there: Mask, *, at_end: bool) -> tuple[Array, Mask]:
 
 
 def laid_out(values: Array, places: NDArray[np.int64], ticks: int) -> tuple[Array, Mask]:
-    """Values on their ticks, held over holes, and where they are finite and there."""
+    """Values on their ticks, the last one held where a tick is missing, and where they are present and finite."""
     result = np.zeros((ticks, *values.shape[1:]))
     there = np.zeros(ticks, dtype=bool)
     finite = np.isfinite(values.reshape(values.shape[0], -1)).all(axis=1)
@@ -245,7 +248,7 @@ def laid_out(values: Array, places: NDArray[np.int64], ticks: int) -> tuple[Arra
 
 
 def believed_ground(run: Run, plan: Plan, ticks: int, known: bool) -> Array | None:
-    """Ground rows that the plan believes in: those of the recording, or of the plan's record."""
+    """Rows of the plan's ground motion: those attached to the recording where the plan is the same, else computed."""
     if known and GROUND in run.attachments:
         rows = np.frombuffer(run.attachments[GROUND], dtype="<f8").reshape(2, -1).copy()
     else:

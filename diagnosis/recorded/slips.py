@@ -1,8 +1,8 @@
-"""Slips of units and signs: a reading that is hundreds of times what its command lets expect, or runs against it.
+"""Slips of units and signs: a reading that is about a hundred times its prediction or more, or has the opposite sign.
 
-A nominal model that is merely wrong is no slip: nobody plans a laboratory a hundred times too stiff, but everybody
-forgets that a column was in millimetres. So only factors count that no laboratory has, and signs of readings that
-otherwise resemble what is predicted.
+A nominal model that is merely wrong is no slip: nobody plans a laboratory a hundred times too stiff, but it is easily
+forgotten that a data column is in millimetres. So only factors count that no wrong model has, and signs of readings
+whose shape is that of the prediction.
 """
 
 from __future__ import annotations
@@ -20,11 +20,12 @@ from diagnosis.recorded.parts import ColumnAlone, LaboratoryPart
 from diagnosis.recorded.record import Record
 from models.registry import Array
 
-FAR = 90.0  # factor from which on it is a slip, as cm for m is; g for m/s² may be a wrong model
-ALIKE = 0.5  # correlation from which on two signals have one shape
-OPPOSED = 0.8  # of a reading that runs against its prediction; less may be a wrong phase
-LONGEST_LAG = 0.1  # s, by which a reading may be late and have the same shape
-ABOVE_NOISE = 10.0  # times the sensor's noise: below, a shape says nothing
+FAR = 90.0  # factor from which on it is a slip: cm for m makes 100, while 9.81 for g may be a wrong model
+ALIKE = 0.5  # correlation from which on two signals have the same shape: that of sines 60° apart
+# correlation, negative, from which on a sign is wrong: sines 143° apart; less may be a wrong phase.
+OPPOSED = 0.8
+LONGEST_LAG = 0.1  # s, delay within which shapes are compared: several times that of actuators and filters
+ABOVE_NOISE = 10.0  # rms over the sensor's noise without which the shape of a reading is not compared
 USUAL = {1e3: "a factor of 1000", 1e2: "a factor of 100", 1e6: "a factor of a million"}
 NEAR = 2.0  # factor within which a power of ten is named
 
@@ -43,8 +44,8 @@ class ReadingSlip:
         names = " and ".join(self.commands)
         if self.factor < 0.0 and not self.far:
             return (
-                f"'{self.signal}' runs against what the plan predicts of {names}: "
-                f"look at the sign of its column, and of {names}"
+                f"'{self.signal}' has the opposite sign of what the plan predicts from {names}: "
+                f"check the sign of its column and of {names}"
             )
         times = (
             f"{abs(self.factor):.3g} times"
@@ -52,8 +53,8 @@ class ReadingSlip:
             else f"1/{1.0 / abs(self.factor):.3g} of"
         )
         return (
-            f"'{self.signal}' is {times} what the plan predicts of {names}{self._guess}: "
-            f"look at the units of its column, and of {names}"
+            f"'{self.signal}' is {times} what the plan predicts from {names}{self._guess}: "
+            f"check the units of its column and of {names}"
         )
 
     @property
@@ -103,9 +104,9 @@ def of_laboratory(record: Record, lab: RecordedLaboratory) -> Iterator[ReadingSl
 
 
 def compared(measured: Array, predicted: Array, noise: float, most: int) -> float | None:
-    """The factor between two signals of one shape, at most so many ticks apart; None where they have not.
+    """The factor between two signals of the same shape, at most `most` ticks apart; None where the shapes differ.
 
-    It is negative where the shape is the opposite, which is only said of signals that are much alike.
+    It is negative where the signs are opposite, which needs a larger correlation.
     """
     read, wanted = (values - np.mean(values) for values in (measured, predicted))
     sizes = np.sqrt(np.mean(read**2)), np.sqrt(np.mean(wanted**2))

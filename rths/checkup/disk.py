@@ -1,6 +1,6 @@
 """The folder of recordings: whether it can be written, how fast, how long a sync takes, how much space is free.
 
-The data go into a file without a name, so that nothing is left however the check ends.
+The data go into a file without a name, which the system removes however the check ends.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from typing import Any
 
 from common.errors import InputError
 
-PIECE = 100_000  # bytes, what a recorder writes at most in one flush: 1 MB/s
-PACE = 0.1  # s, from flush to flush
+PACE = 0.1  # s, from flush to flush, as the recorder does it
+PIECE = 100_000  # bytes per flush: 1 MB/s, more than a recorder of several slaves writes
 
 
 def nearest(folder: Path) -> Path:
@@ -37,9 +37,9 @@ def there(place: Path) -> bool:
 
 
 def measure(folder: Path, until: float) -> dict[str, Any]:
-    """Write like a recorder that has every flush on the disk, until a time of the monotonic clock; times in s.
+    """Write and sync pieces at a recorder's pace until a time of the monotonic clock; times in s.
 
-    `error` says why it could not be done.
+    `error` says why nothing could be written.
     """
     found: dict[str, Any] = {"folder": str(folder)}
     try:
@@ -57,8 +57,8 @@ def measure(folder: Path, until: float) -> dict[str, Any]:
 
 
 def write(descriptor: int, until: float) -> tuple[list[float], float]:
-    """Write a piece per pace, once at least; how long each took to be on the disk, and all together, s."""
-    piece = os.urandom(PIECE)  # a disk that compresses gains nothing
+    """Write a piece every `PACE`, at least once; the time that each took to reach the disk and their sum, s."""
+    piece = os.urandom(PIECE)  # random, so that a file system cannot compress it
     times: list[float] = []
     while not times or time.monotonic() < until:
         began = time.monotonic()

@@ -1,8 +1,9 @@
 """Frames there and back over the link between two processes of this machine, paced as in a test.
 
-`python -m rths.checkup.exchange master|slave ENDPOINT …`: the master sends a command per interval, the slave
-answers each at once. Both end where their standard input does, so that neither outlives who started them.
-The master says two lines of JSON: what it was granted, and at the end what it found; times in s.
+`python -m rths.checkup.exchange master|slave ENDPOINT …`: the master sends a command per interval, and the slave
+answers each at once. Both end when their standard input is closed, so that neither outlives the process that started
+them. The master prints two lines of JSON: the real-time settings that it was granted, and at the end what it measured,
+in s.
 """
 
 from __future__ import annotations
@@ -25,10 +26,11 @@ from common.protocol.messages import Command, Feedback
 from common.terminal import cli
 
 TEST = "doctor"
-PATIENCE = 5.0  # s, for the other process to be there
-WARM = 100  # exchanges before those that count: caches, and the link's own first steps
+# s, for the other process to answer: both start at once, and imports take many seconds under load.
+PATIENCE = 30.0
+WARM = 100  # exchanges before those that count: they fill caches, and zenoh sets up its routes
 REPEAT = 0.02  # s, between attempts to be heard for the first time
-IDLE = 0.05  # s, how often a process without messages looks whether it is still wanted
+IDLE = 0.05  # s, after which a process without messages looks whether the doctor has ended: a user does not notice it
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -36,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("role", choices=("master", "slave"))
     parser.add_argument("endpoint")
     parser.add_argument("--interval-ns", type=int, default=2_000_000)
-    parser.add_argument("--until-ns", type=int, default=0, help="end of the measurement, monotonic clock")
+    parser.add_argument("--length", type=float, default=1.0, help="length of the measurement, s")
     parser.add_argument("--rt", choices=realtime.MODES, default="auto")
     parser.add_argument("--processor", type=int)
 
@@ -54,14 +56,14 @@ def run(args: argparse.Namespace) -> int:
         if args.role == "slave":
             answer(endpoint)
             return 0
-        say(Master(endpoint, args.interval_ns).measure(args.until_ns))
+        say(Master(endpoint, args.interval_ns).measure(round(args.length * 1e9)))
     finally:
         link.close()
     return 0
 
 
 def say(found: dict[str, Any]) -> None:
-    """One line of JSON to who started this process."""
+    """Print one line of JSON for the process that started this one."""
     sys.stdout.write(json.dumps(found) + "\n")
     sys.stdout.flush()
 
@@ -106,8 +108,8 @@ class Master:
         self._ticks = 0
         self._on_time = 0
 
-    def measure(self, until_ns: int) -> dict[str, Any]:
-        """Exchange until a time of the monotonic clock; percentiles.
+    def measure(self, length_ns: int) -> dict[str, Any]:
+        """Exchange for a length of time, once the slave answers; counts and percentiles.
 
         Raises:
             LostError: the slave never answered.
@@ -116,7 +118,7 @@ class Master:
         realtime.freeze()
         self._pace(time.monotonic_ns() + WARM * self._interval_ns)
         self._forget()
-        self._pace(until_ns)
+        self._pace(time.monotonic_ns() + length_ns)
         self._hear(time.monotonic_ns() + self._interval_ns, lambda: not self._waiting)
         return {
             "exchanges": self._ticks,
@@ -131,7 +133,7 @@ class Master:
         while not self._round_trip and not unwanted():
             if time.monotonic_ns() > deadline:
                 raise LostError(
-                    f"The answering process was not heard within {PATIENCE:g} s: see whether this machine "
+                    f"The answering process was not heard within {PATIENCE:g} s: check that this machine "
                     "lets programs talk over 127.0.0.1."
                 )
             self._send(time.monotonic_ns())
@@ -144,7 +146,7 @@ class Master:
         self._ticks = self._on_time = 0
 
     def _pace(self, until_ns: int) -> None:
-        """A command at every interval; those whose interval has passed are skipped and count as late."""
+        """Send a command at every interval; commands whose interval has passed are skipped and count as late."""
         due = time.monotonic_ns() + self._interval_ns
         while due < until_ns and not unwanted():
             self._hear(due, lambda: False)
@@ -163,7 +165,7 @@ class Master:
         self._endpoint.send(COMMAND._replace(seq=self._seq, sent_ns=sent))
 
     def _hear(self, deadline_ns: int, enough: Callable[[], bool]) -> None:
-        """Take answers until a time, and those that are there by then."""
+        """Take answers until a time, including those that have arrived by then."""
         while not enough():
             left = deadline_ns - time.monotonic_ns()
             received = self._endpoint.receive(max(left, 0) * 1e-9)

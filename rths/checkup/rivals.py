@@ -1,4 +1,4 @@
-"""Other programs of this machine at a real-time priority: one that never sleeps keeps a laboratory waiting."""
+"""Other programs of this machine at a real-time priority: one that never sleeps delays a laboratory's loop."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ RT_PRIORITY = 37  # place in /proc/PID/stat behind the name
 def rivals() -> list[str]:
     """'fifo 49 python spin.py (process 1234)' for each process whose main thread has a real-time priority.
 
-    The kernel's own threads are left out: they have no command line, and they are meant to come first.
+    The kernel's own threads are left out: they have no command line, and their priority is intended.
     """
     from common.host.machine import scheduler_name
 

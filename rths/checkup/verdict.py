@@ -1,4 +1,4 @@
-"""What the findings of `rths doctor` mean: a check passes or fails, and all together become one sentence."""
+"""Judgement of what `rths doctor` measured: each check passes or fails, and one sentence sums them up."""
 
 from __future__ import annotations
 
@@ -8,24 +8,26 @@ from typing import Any, NamedTuple
 # One tick in a thousand that uses a force one interval (2 ms) too old is 2 µs of delay on average, which costs
 # a structure like the default one 0.0003 points of damping.
 LATE_SHARE = 1e-3
-ROOM = 1.0  # of the interval, for waking up and the round trip, each at its 99.9th percentile
-CLOCK_STEP = 0.01  # of the interval: finer than this nothing is judged
+ROOM = 1.0  # of the interval, for waking up and the round trip together, each at its 99.9th percentile
+CLOCK_STEP = 0.01  # of the interval, a tenth of what the other checks of latency resolve
 WORST_SYNC = 1.0  # s; a recording that is cut off may lose its last second, no more
-RATE = 1e6  # bytes/s, above what a recorder writes
-FREE = 1_000_000_000  # bytes, a quarter of an hour of recording
-STOLEN_SHARE = 0.01  # of the processors' time; above it the check measures the host, not this machine
+RATE = 1e6  # bytes/s, more than a recorder writes
+FREE = 1_000_000_000  # bytes, a quarter of an hour of recording at that rate
+# Share of the processors' time that a host may take: ten times the share of late ticks that is judged, so that beyond
+# it late ticks may be the host's.
+STOLEN_SHARE = 0.01
 
 TIMING = ("wake-up", "wake-up + round trip", "late exchanges", "clock")
 
 
 class PlanCheck(NamedTuple):
-    """One thing that a test needs."""
+    """One requirement of a test, and whether this machine meets it."""
 
     name: str
     found: str
     needed: str
     passed: bool
-    advice: str  # a sentence, for where it failed
+    advice: str  # a sentence that says what to do where it failed
 
 
 class CheckVerdict(NamedTuple):
@@ -37,7 +39,7 @@ class CheckVerdict(NamedTuple):
 
 
 def checks(report: dict[str, Any]) -> list[PlanCheck]:
-    """Every check whose part could be measured, or failed to be."""
+    """Every check of what was measured; a measurement that failed is a check that failed."""
     parts: tuple[Callable[[dict[str, Any]], Iterator[PlanCheck]], ...] = (
         of_realtime,
         of_wake_up,
@@ -64,12 +66,12 @@ def judged(report: dict[str, Any]) -> tuple[str, dict[str, float]]:
 
 
 def remedy(report: dict[str, Any]) -> str:
-    """What to do where the timing does not suffice, the same for every check that says so."""
+    """What to do where the timing does not suffice, the same sentence for every check of it."""
     steps = ["end other programs", "give this machine more processors", "or lengthen the interval"]
     if report["rt"] == "off":
         steps.insert(0, "try it with --rt auto")
     elif report["realtime"].get("missing"):
-        steps.insert(0, "get what real time lacks")
+        steps.insert(0, "grant the real-time settings that are missing")
     text = f"The interval is not kept: {', '.join(steps)}."
     if "hypervisor" in report["facts"]:
         text += " A host that pauses this machine can cause this without any other sign."
@@ -81,7 +83,7 @@ def of_wake_up(report: dict[str, Any]) -> Iterator[PlanCheck]:
     name, found = judged(report)
     if not found:
         yield PlanCheck(
-            "wake-up", "none", "a loop", False, "The bare timing loop failed: see whether python runs."
+            "wake-up", "none", "a loop", False, "The bare timing loop did not run: check that python starts."
         )
         return
     share = found["late"] / max(found["ticks"] + found["late"], 1)
@@ -124,7 +126,7 @@ def of_round_trip(report: dict[str, Any]) -> Iterator[PlanCheck]:
 
 
 def of_clock(report: dict[str, Any]) -> Iterator[PlanCheck]:
-    """Whether the clock can tell the times that matter."""
+    """Whether the clock resolves a hundredth of the interval."""
     step = max(report["clock"]["resolution"], report["clock"]["read_time"])
     source = report["facts"].get("clocksource", "unknown")
     yield PlanCheck(
@@ -137,7 +139,7 @@ def of_clock(report: dict[str, Any]) -> Iterator[PlanCheck]:
 
 
 def of_disk(report: dict[str, Any]) -> Iterator[PlanCheck]:
-    """Whether a recording can be kept where it is to go."""
+    """Whether a recording can be written to its folder."""
     found = report["disk"]
     folder = found["folder"]
     if "error" in found:
@@ -155,7 +157,7 @@ def of_disk(report: dict[str, Any]) -> Iterator[PlanCheck]:
 
 
 def of_host(report: dict[str, Any]) -> Iterator[PlanCheck]:
-    """Whether the processors were this machine's own while the check ran."""
+    """Whether the host left the processors to this machine while the check ran."""
     share = report["machine"].get("stolen_share")
     if share is not None:
         yield PlanCheck(
@@ -168,7 +170,7 @@ def of_host(report: dict[str, Any]) -> Iterator[PlanCheck]:
 
 
 def notes(report: dict[str, Any]) -> list[str]:
-    """Notes on what is worth knowing although no check fails for it."""
+    """Notes on what does not fail a check but should be known."""
     found = list(report["realtime"].get("missing", [])) if report["rt"] == "auto" else []
     found += [
         f"Another program runs at a real-time priority: {rival}; end it, or give it a processor of its own."
@@ -210,7 +212,7 @@ def verdict(report: dict[str, Any], found: list[PlanCheck]) -> CheckVerdict:
 
 
 def outlook(report: dict[str, Any]) -> tuple[str, str]:
-    """Where the timing suffices: how surely, and why."""
+    """State and reason of a machine whose timing suffices: it holds, or mostly holds."""
     found = report["round_trip"]
     together = judged(report)[1]["p99.9"] + found["round_trip"]["p99.9"]
     fits = f"waking up and the round trip take {together * 1e3:.2f} ms in all but one interval of a thousand"

@@ -34,6 +34,6 @@ def run(args: argparse.Namespace) -> int:
     try:
         sys.stdout.write(written)
         sys.stdout.flush()
-    except BrokenPipeError:  # the verdict comes first, for readers who read no further
+    except BrokenPipeError:  # the reader, such as `head`, has what it wants
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return report.exit_code

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `compare`."""
-    parser.add_argument("a", metavar="A", help="a recording, or a plan whose simulation is meant")
-    parser.add_argument("b", metavar="B", help="the other one")
+    parser.add_argument("a", metavar="A", help="a recording, or a plan, which is then simulated")
+    parser.add_argument("b", metavar="B", help="the other recording or plan")
     parser.add_argument(
         "--tolerance", type=float, metavar="X", help="exit with 1 where an NRMSE exceeds this"
     )

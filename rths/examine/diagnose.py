@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--ideal",
         action="store_true",
-        help="hold the test against the pure simulation: transfer systems that follow their targets at once",
+        help="compare the test with the pure simulation, whose transfer systems follow their targets at once",
     )
     parser.add_argument(
         "--name", metavar="NAME", help="the slave that is diagnosed, of several (default: each)"
@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--require",
         type=float,
         metavar="GAP",
-        help="the gap that may be left in each part, such as 0.02: the report says of each whether it is good enough",
+        help="the gap that may be left in each part, such as 0.02; the report says which parts meet it",
     )
     parser.add_argument(
         "--validate",
@@ -116,20 +116,20 @@ def check(args: argparse.Namespace) -> None:
     if len(set(used)) < len(used):
         raise InputError(f"A recording is given twice beside {args.file}: name each file once.")
     if args.require is not None and not 0.0 < args.require < math.inf:
-        raise InputError(f"--require {args.require:g} is no gap: give a share above 0, such as 0.02.")
+        raise InputError(f"--require {args.require:g} cannot be used: give a gap above 0, such as 0.02.")
     if len({outputs.target(path) for path in files}) < len(files):
         raise InputError(f"--html and --json both name {args.html}: give each a file of its own.")
 
 
 def chosen(recording: Run, args: argparse.Namespace) -> list[str]:
-    """Names of the slaves that are asked for, of which a file holds one; empty for the one without a name."""
+    """Names of the slaves to diagnose; an empty name for a slave without one. A JSON or HTML file holds only one."""
     names = [name_of(role) for role in recording.roles or (MASTER,)]
     if args.name and args.name not in names:
         hint = nearest(args.name, names) if any(names) else "leave out --name."
         raise InputError(f"{args.file} has no slave '{args.name}': {hint}")
     if len(names) > 1 and not args.name and (args.json or args.html):
         raise InputError(
-            f"--json and --html hold one laboratory: say which one with --name ({', '.join(names)})."
+            f"--json and --html hold the report on one laboratory: choose it with --name ({', '.join(names)})."
         )
     return [args.name] if args.name else names
 
@@ -162,10 +162,10 @@ def diagnose_slaves(
     tell: Tell = untold,
     require: float | None = None,
 ) -> dict[str, Report]:
-    """The reports on a recording by the name of the slave, empty where there is one without or none.
+    """The reports on a recording by the name of the slave; the name is empty where the slave has none or there is none.
 
-    Each is of the master and that slave, and its verdict begins with the laboratory's name where there are several. The
-    laboratories are searched in the recordings `more` of them as well.
+    Each covers the master and that slave, and its verdict begins with the laboratory's name where slaves have names.
+    Effects must also explain the recordings `more` of the same laboratories, if given.
 
     Raises:
         InputError: a file cannot be read, or holds nothing to diagnose.

@@ -21,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--events",
         action="store_true",
-        help="the events too, in a table of their own: OUT-events.csv (a .mat has them anyway, as `events`)",
+        help="export the events too, as a second table OUT-events.csv (a .mat always holds them, as `events`)",
     )
     cli.force_argument(parser)
     cli.json_argument(parser, "say what was written as JSON on standard output")
@@ -67,7 +67,7 @@ def beside(args: argparse.Namespace) -> bool:
 
 
 def events(recording: Run) -> dict[str, Any]:
-    """The events, one column per field; the numbers that belong to one are JSON text."""
+    """The events, one column per field; the values of an event are JSON text."""
     import numpy as np
 
     named = {name: [event[name] for event in recording.events] for name in ("lab", "level", "code", "text")}
@@ -77,7 +77,7 @@ def events(recording: Run) -> dict[str, Any]:
 
 
 def structs(columns: dict[str, Any]) -> Any:
-    """Columns as an array of structs, which is what MATLAB has for a table with text."""
+    """Columns as an array of structs, as which MATLAB holds a table with text."""
     import numpy as np
 
     rows = zip(*columns.values(), strict=True)
@@ -87,8 +87,8 @@ def structs(columns: dict[str, Any]) -> Any:
 def flat(recording: Run) -> dict[str, Any]:
     """One column per signal, named `<topic>_<signal>`, with `_<number>` of storey or slave where there are several.
 
-    One row per tick; the topic of a named slave is `slave_<name>`. A tick that a topic does not have is NaN there,
-    or 0 in a column of whole numbers.
+    One row per tick; the topic of a named slave is `slave_<name>`. Where a topic lacks a tick, its columns hold NaN, or
+    0 in columns of whole numbers.
     """
     import numpy as np
 
@@ -121,7 +121,7 @@ def flat_units(recording: Run) -> dict[str, str]:
 
 
 def column_name(topic: str, name: str) -> str:
-    """What a topic's signal is called in a table."""
+    """The name of a topic's signal in a table."""
     return f"{topic.replace('.', '_')}_{name}"
 
 

@@ -1,4 +1,4 @@
-"""`rths import`: a recording made of someone's own measurements, whole or of one part."""
+"""`rths import`: a recording made from measurements of another data logger, of a whole test or of one part."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rths.examine.import_map import ImportMap, Known
     from rths.examine.onto_ticks import OnTicks
 
-UNJUDGED = "the link cannot be judged, because the data hold no numbers and no stamps of messages"
+UNJUDGED = "the link cannot be judged, because the data hold no numbers and no time stamps of messages"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -29,11 +29,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "data", type=Path, metavar="DATA", help="measurements: .csv, .txt, .tsv, .parquet, .mat or .npz"
     )
     parser.add_argument(
-        "--map", type=Path, required=True, metavar="MAP", help="TOML file that says what is what"
+        "--map",
+        type=Path,
+        required=True,
+        metavar="MAP",
+        help="TOML file that says which column is which signal",
     )
     cli.output_argument(parser, "FILE", "the recording to write", required=True)
     parser.add_argument(
-        "--as-is", action="store_true", help="import a signal too whose unit or sign looks wrong"
+        "--as-is", action="store_true", help="import signals even where their unit or sign looks wrong"
     )
     cli.force_argument(parser)
     cli.json_argument(parser, "say what was written as JSON on standard output")
@@ -99,7 +103,7 @@ def exchange(mapping: ImportMap) -> bool:
 
 
 def write(path: Path, mapping: ImportMap, found: OnTicks, data: str, *, as_is: bool = False) -> None:
-    """The recording: the topics and fields that there are signals for, with the plan and what is stated of them."""
+    """Write the recording: topics and fields for the signals at hand, the plan, and what is stated of the channels."""
     from common.recording.imported import IMPORT, ImportedData
     from common.recording.writer import Recording
     from rths.examine.import_map import lab_signals
@@ -126,7 +130,7 @@ def write(path: Path, mapping: ImportMap, found: OnTicks, data: str, *, as_is: b
 
 
 def columns_of(topic: str, names: list[str], found: OnTicks, known: Known) -> dict[Signal, list[Any]]:
-    """The fields of a topic with their values; of the stamps, which belong together, those not given are NaN."""
+    """The fields of a topic with their values; time stamps belong together, so that missing ones hold NaN."""
     from rths.examine.import_map import STAMPS
 
     columns: dict[Signal, list[Any]] = {signals.SEQ: list(range(found.t.size))}
@@ -152,6 +156,6 @@ def check_slips(path: Path, data: Path) -> None:
     for role in run.roles or (MASTER,):
         try:
             built = record.build(run, role=role)
-        except InputError:  # too little for any comparison
+        except InputError:  # too few signals for any comparison
             continue
         refuse_slips(built, data)

@@ -1,4 +1,4 @@
-"""The map of an import: which column is which of our signals, and what the data logger did to it."""
+"""The map of an import: which column is which signal, and the properties of the data logger's channels."""
 
 from __future__ import annotations
 
@@ -20,18 +20,14 @@ from common.signals import FieldType, Signal
 
 Known = dict[str, tuple[str, Signal]]  # by our name of a signal its topic and its row there
 GIVEN = (FieldType.NUMBER, FieldType.STOREYS, FieldType.INDEX)
-STAMPS = (
-    "command_one_way",
-    "feedback_one_way",
-    "round_trip",
-)  # of a message, s: these three tell of the link
+STAMPS = ("command_one_way", "feedback_one_way", "round_trip")  # s, the times of a message that show the link
 
 
 def lab_signals(plan: Plan) -> Known:
-    """What can be given: our signals, those of a named slave as `NAME.signal`; numbers and stamps of messages too.
+    """The signals that a map can name, with topic and row: those of a named slave are `NAME.signal`.
 
-    Where both ends know a signal, the slave's is meant. Of a slave without a name whose laboratory is of the master's
-    kind the signals are `slave.signal`.
+    They include the numbers and times of messages. A signal that master and slave share is the slave's. Where a slave
+    without a name has a laboratory of the master's kind, its signals are `slave.signal`.
     """
     from laboratories import kinds
 
@@ -51,7 +47,7 @@ def lab_signals(plan: Plan) -> Known:
 
 
 def prefix(topic: str) -> str:
-    """What stands before a signal's name in the topic of a named slave."""
+    """Prefix of the signals of a topic: the name of its slave, if it has one."""
     return f"{name_of(topic)}." if name_of(topic) else ""
 
 
@@ -82,20 +78,20 @@ class SignalSource:
     )
 
 
-APART = ("value", "filter", "resolution")  # keys that are read by themselves
-OUR_OWN = ("scaled",)  # fields that are no keys
+APART = ("value", "filter", "resolution")  # keys that need their own check
+OUR_OWN = ("scaled",)  # fields that are set here and cannot be given as keys
 
 
 @dataclass(frozen=True)
 class ImportTable:
-    """What a map says of the whole file."""
+    """The keys of a map that hold for the whole file."""
 
     plan: str = key("file of the nominal models", default="")
     time: str = key("column of the time, s", default="")
     rate: float = key("samples per second, instead of a column of time", default=0.0, above=0.0, unit="Hz")
     start: float = key("time in the data from which on it is read", default=0.0, unit="s")
     stop: float = key("time in the data up to which it is read", default=0.0, unit="s")
-    static: bool = key("times without meaning: each row is a tick", default=False)
+    static: bool = key("each row is one tick, whatever its time", default=False)
     separator: str = key("character between columns", default="")
     decimal: str = key("decimal sign", default=".", choices=(".", ","))
     skip_rows: int = key("rows before that of the names", default=0, least=0)
@@ -124,7 +120,7 @@ class ImportMap:
 
     @property
     def static(self) -> bool:
-        """Whether times have no meaning."""
+        """Whether each row is one tick, whatever its time."""
         return self.table.static
 
 
@@ -157,7 +153,7 @@ def load_map(path: Path) -> ImportMap:
 
 
 def check(path: Path, table: ImportTable, start: float | None, stop: float | None) -> None:
-    """Raise InputError for keys that do not go together."""
+    """Raise InputError for keys that contradict each other."""
     if (start is not None or stop is not None) and not (table.time or table.rate):
         raise InputError(f'{path}: start and stop are times: give time = "name of the time column" too.')
     if start is not None and stop is not None and not stop > start:
@@ -169,12 +165,14 @@ def check(path: Path, table: ImportTable, start: float | None, stop: float | Non
 
 
 def check_single(path: Path, plan: Plan, name: str, known: Known) -> None:
-    """Raise InputError for a signal that has several values here."""
+    """Raise InputError for a signal with one value per storey or slave in this plan."""
     _, row = known[name]
     per = "storey" if plan.storeys > 1 and row.kind is FieldType.STOREYS else ""
     per = "slave" if len(plan.roles) > 1 and row.slaves else per
     if per:
-        raise InputError(f"{path}: '{name}' has one value per {per} here and cannot be given as one column.")
+        raise InputError(
+            f"{path}: '{name}' has one value per {per} in this plan, so one column cannot give it."
+        )
 
 
 def source(path: Path, name: str, entry: Any, known: Known) -> SignalSource:

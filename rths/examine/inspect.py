@@ -1,4 +1,4 @@
-"""`rths inspect`: what is in a recording."""
+"""`rths inspect`: a summary of a recording."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def write_report(summary: dict[str, Any]) -> None:
 
 
 def write_head(summary: dict[str, Any]) -> None:
-    """What a reader must know first: warnings, under what circumstances, by which motion."""
+    """The first lines: warnings, the circumstances of the test, and the ground motion."""
     say = sys.stdout.write
     for text in summary["warnings"]:
         say(f"WARNING: {text}\n")
@@ -84,7 +84,7 @@ def write_head(summary: dict[str, Any]) -> None:
 
 
 def ending(summary: dict[str, Any]) -> str:
-    """Whether a recording is whole, and what to do where it is not."""
+    """The state of a recording that is damaged or cut off, with the command that saves it; empty where it is whole."""
     if summary["damage"]:
         return f", damaged {summary['damage']}; rths recover {summary['file']} saves what is whole behind it"
     if not summary["finished"]:
@@ -93,12 +93,12 @@ def ending(summary: dict[str, Any]) -> str:
 
 
 def stopped(summary: dict[str, Any]) -> str:
-    """At which tick a test ended early, empty where it did not; of a recording that was cut off, where that ends."""
+    """The tick at which a test ended early or its recording was cut off; empty where neither happened."""
     expected, planned = summary["ticks_expected"], summary["ticks_planned"]
     if not planned or expected >= planned:
         return ""
     if outcome(summary["recorder"]) == CUT_OFF:
-        return f"recorded until tick {expected} of {planned}; what came after it is not known"
+        return f"recorded until tick {expected} of {planned}; the rest of the test is not in the file"
     return f"stopped at tick {expected} of {planned}"
 
 

@@ -21,15 +21,17 @@ if TYPE_CHECKING:
     from report.facts.laboratories import LaboratoryFacts
 
 EVENT = "event"
-SCRIPT_TOPICS = "/studio_script/rths_"  # the viewers give scripts topics of this beginning only
+SCRIPT_TOPICS = "/studio_script/rths_"  # the viewers allow scripts only topics that begin like this
+# Bins of the histogram: a hundredth of the interval each, up to two intervals, beyond which a force is two ticks old.
 BINS_PER_INTERVAL, BINNED_INTERVALS = 100, 2
 
 TIMES = ("Plot!histogram", "Plot!round_trip")
 BESIDE = ("StateTransitions!states", "RawMessages!events")
-SHARE_OF_ROWS = 70  # % of the width
+SHARE_OF_ROWS = 70  # % of the width for the plots; states and events need only lines of text
 
-# what the viewers have no panel for
-SCRIPT = Path(__file__).with_name("layouts") / "histogram.ts"
+SCRIPT = (
+    Path(__file__).with_name("layouts") / "histogram.ts"
+)  # counts the histogram, for which viewers have no panel
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -59,10 +61,9 @@ def run(args: argparse.Namespace) -> int:
 
 @dataclass(frozen=True)
 class Subject:
-    """What a layout is made for: a test's name, its slaves' roles, its interval in s, its last tick.
+    """The test that a layout shows: its name, its slaves' roles, its interval in s, its last tick.
 
-    `fields` are the names of what its topics hold, `labs` its laboratories, those that are
-    alike together.
+    `fields` are the names of the signals of its topics, `labs` its laboratories, those of one kind together.
     """
 
     test: str
@@ -98,7 +99,7 @@ def of_default_test() -> Subject:
 
 
 def of_recording(path: Path) -> Subject:
-    """What a recording holds; raises InputError where it cannot be read."""
+    """The test in a recording; raises InputError where it cannot be read."""
     from common.plan.plan import Plan
     from common.recording.reader import read
     from report.facts.laboratories import alike, laboratories, plan_of
@@ -121,7 +122,7 @@ def layout(subject: Subject) -> dict[str, Any]:
     """The layout as the viewers read it.
 
     Raises:
-        InputError: there is nothing of which it has a panel.
+        InputError: the test has no signal for any panel.
     """
     above, below = motions(subject), forces(subject)
     panels = {
@@ -134,7 +135,7 @@ def layout(subject: Subject) -> dict[str, Any]:
     }
     shown = {name: panel for name, panel in panels.items() if panel}
     if not shown:
-        raise InputError(f"The recording of '{subject.test}' holds nothing of which a layout has a panel.")
+        raise InputError(f"The recording of '{subject.test}' holds no signal for any panel of a layout.")
     rows = [stacked("row", [name for name in row if name in shown]) for row in (above, below, TIMES)]
     parts = [
         stacked("column", [row for row in rows if row]),
@@ -150,10 +151,7 @@ def layout(subject: Subject) -> dict[str, Any]:
 
 
 def stacked(direction: str, parts: Sequence[Any], share: float | None = None) -> Any:
-    """Parts beside or below each other, as nested pairs; None where there are none.
-
-    They are of equal size, or the first has a share in %.
-    """
+    """Parts beside or below each other as nested pairs, None without parts; `share` (%) is the first one's size."""
     if len(parts) < 2:
         return parts[0] if parts else None
     return {
@@ -194,17 +192,17 @@ def plot(title: str, drawn: Sequence[dict[str, Any]], **axis: Any) -> dict[str, 
 
 
 def against(path: str) -> dict[str, Any]:
-    """The horizontal axis of a plot that is not one over time."""
+    """The horizontal axis of a plot over another signal than time."""
     return {"xAxisVal": "custom", "xAxisPath": {"value": path, "enabled": True}}
 
 
 def label(topic: str, field: str) -> str:
-    """What the legend says: the slave where the test names them, and the signal."""
+    """The entry in the legend: the slave's name, if it has one, and the signal."""
     return f"{name_of(topic)} {field}".strip()
 
 
 def motions(subject: Subject) -> dict[str, dict[str, Any]]:
-    """The motion that each laboratory imposes beside its target, by panel; of slaves that are alike in one."""
+    """Plots of each laboratory's motion and target, by panel; slaves of one kind share a panel."""
     return {
         f"Plot!{labs[0].name}": over_time(
             subject,
@@ -217,7 +215,7 @@ def motions(subject: Subject) -> dict[str, dict[str, Any]]:
 
 
 def forces(subject: Subject) -> dict[str, dict[str, Any]]:
-    """What each laboratory tests: force over the motion that is imposed, or its own motion and force over time."""
+    """Plots of what each laboratory tests: force over imposed motion, or the device's motion and force over time."""
     found: dict[str, dict[str, Any]] = {}
     for labs in subject.labs:
         channels = labs[0].channels
@@ -280,17 +278,17 @@ def hysteresis(subject: Subject, title: str, lab: LaboratoryFacts, loop: Hystere
 
 
 def timed(subject: Subject) -> list[str]:
-    """The topics of which there is a histogram."""
+    """The topics with a histogram."""
     return [topic for topic in subject.topics(LATENCY) if "round_trip" in subject.fields[topic]]
 
 
 def script_topic(topic: str) -> str:
-    """Where the histogram of a latency topic is to be found."""
+    """The topic on which the script publishes the histogram of a latency topic."""
     return SCRIPT_TOPICS + topic.replace(".", "_")
 
 
 def histogram(subject: Subject) -> dict[str, Any]:
-    """How many ticks took how long."""
+    """Number of ticks over the round trip."""
     topics = [(topic, script_topic(topic)) for topic in timed(subject)]
     if not topics:
         return {}

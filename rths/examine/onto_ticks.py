@@ -1,4 +1,4 @@
-"""Columns of a data file as our signals on the ticks of a plan."""
+"""Columns of a data file as signals on the ticks of a plan."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from models.registry import Array
 from report.text.tabular import DataTable
 from rths.examine.import_map import ImportMap, SignalSource, in_unit, lab_signals
 
-ON_TICKS = 1e-3  # of an interval: rows closer than this stand on the ticks
+ON_TICKS = 1e-3  # of an interval, within which a row is on its tick: times in a text file are rounded to a microsecond
 
 
 @dataclass(frozen=True)
 class OnTicks:
-    """Our signals on the ticks, each with what is stated of it."""
+    """The signals on the ticks, each with the stated properties of its channel."""
 
     t: Array  # s, from 0
     values: dict[str, Array]  # by our name of the signal
@@ -30,15 +30,15 @@ class OnTicks:
 
     @property
     def interpolated(self) -> list[str]:
-        """The signals whose rows did not stand on the ticks."""
+        """The signals whose rows were not on the ticks."""
         return [name for name, row in self.stated.items() if row.interpolated]
 
 
 def on_ticks(mapping: ImportMap, table: DataTable, data: Path) -> OnTicks:
-    """Our signals at the plan's interval, by linear interpolation; numbers of messages are held.
+    """The signals at the plan's interval, by linear interpolation; numbers of messages are held.
 
     Raises:
-        InputError: a column is not there or has a gap, its unit is of another quantity, or time does not increase.
+        InputError: a column is missing or has a gap, its unit is of another quantity, or time does not increase.
     """
     theirs, rows = time_base(mapping, table, data)
     interval = mapping.plan.test.interval
@@ -63,7 +63,7 @@ def on_ticks(mapping: ImportMap, table: DataTable, data: Path) -> OnTicks:
         if bad.size:
             place = int(np.arange(rows.size)[rows][bad[0]]) + 1
             raise InputError(
-                f"{data}: column '{source.column}' has no number in row {place}: fill or cut the gap."
+                f"{data}: column '{source.column}' has no number in row {place}: fill the gap or cut it out."
             )
         scale, unit = scale_of(name, source, row, table, data)
         if unit:
@@ -83,14 +83,14 @@ def stands_on(theirs: Array, t: Array, interval: float) -> bool:
 
 
 def moved(theirs: Array, values: Array, t: Array, row: Signal) -> Array:
-    """Values at the ticks: linear between rows, the last row's for the number of a message."""
+    """Values at the ticks: interpolated between rows, or the last row's for the number of a message."""
     if row.kind is FieldType.INDEX:
         return values[np.clip(np.searchsorted(theirs, t + 1e-9, side="right") - 1, 0, None)]
     return np.asarray(np.interp(t, theirs, values))
 
 
 def scale_of(name: str, source: SignalSource, row: Signal, table: DataTable, data: Path) -> tuple[float, str]:
-    """The factor to our unit; where the map gives none, by the unit that stands below the column's name."""
+    """The factor to the signal's unit; where the map gives none, from the unit in the row below the column's name."""
     unit = table.units.get(source.column, "")
     if source.scaled or not unit or row.kind is FieldType.INDEX:
         return source.scale, ""
@@ -101,7 +101,7 @@ def scale_of(name: str, source: SignalSource, row: Signal, table: DataTable, dat
 
 
 def channel(source: SignalSource, row: Signal, rate: float, *, between: bool) -> ImportedChannel:
-    """What is stated of a measured signal."""
+    """The stated properties of the channel of a measured signal."""
     counted = row.kind is FieldType.INDEX
     return ImportedChannel(
         source.filter,
@@ -138,7 +138,7 @@ def length(mapping: ImportMap, table: DataTable, data: Path) -> int:
     names = [*([mapping.time] if mapping.time else []), *(row.column for row in mapping.signals.values())]
     sizes = {name: pick(table, name, data).size for name in names if name}
     if len(set(sizes.values())) > 1:
-        said = ", ".join(f"'{name}' {size}" for name, size in sizes.items())
+        said = ", ".join(f"'{name}' has {size}" for name, size in sizes.items())
         raise InputError(f"{data}: the columns of the map have different numbers of rows: {said}.")
     return next(iter(sizes.values()), 0)
 

@@ -24,7 +24,7 @@ WIDTHS = ("single", "double")
 
 
 class PictureTarget(NamedTuple):
-    """Where pictures go: each under its name into a folder, or the only one into a file."""
+    """The files of the pictures: each under its name in a folder, or a single one in a file."""
 
     folder: Path
     format: str
@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     cli.output_argument(
         parser,
         "PLACE",
-        "a folder (default: beside the recording), or for one picture a file: its ending says the format",
+        "a folder (default: beside the recording), or for a single picture a file, whose ending gives the format",
     )
     cli.force_argument(parser)
     parser.add_argument("--format", choices=FORMATS, help="format of the pictures (default: png)")
@@ -87,7 +87,7 @@ def run(args: argparse.Namespace) -> int:
 def draw_all(
     recording: Run, chosen: list[Picture], place: PictureTarget, width: str
 ) -> tuple[list[str], dict[str, str]]:
-    """Files of the pictures that were drawn, and what the others lack."""
+    """Files of the pictures that were drawn, and the signals that the others lack."""
     from report.facts.laboratories import views
     from report.pictures import needs
     from report.text.progress import Progress
@@ -124,7 +124,7 @@ def choose(names: list[str]) -> list[Picture]:
 
 
 def complain(args: argparse.Namespace, made: list[str], left_out: dict[str, str]) -> None:
-    """Raise InputError where nothing was drawn, or a picture was named that cannot be."""
+    """Raise InputError where nothing was drawn, or a picture that was named could not be."""
     if args.names and left_out:
         missing = "; ".join(f"'{name}' needs {needs}" for name, needs in left_out.items())
         raise InputError(f"{args.file} lacks signals: {missing} (see rths inspect {args.file}).")
@@ -133,10 +133,10 @@ def complain(args: argparse.Namespace, made: list[str], left_out: dict[str, str]
 
 
 def place_of(args: argparse.Namespace) -> PictureTarget:
-    """Where the command line wants its pictures.
+    """The target that the command line names.
 
     Raises:
-        InputError: a file for several pictures, in another format than asked for or an unknown one, or no folder.
+        InputError: several pictures for one file, an unknown format, or another format than --format.
     """
     path: Path = args.output or args.file.with_suffix("")
     ending = path.suffix.lower()
@@ -146,16 +146,16 @@ def place_of(args: argparse.Namespace) -> PictureTarget:
             raise InputError(f"Cannot write {path}: give a file that ends in .{', .'.join(FORMATS)}.")
         return PictureTarget(path, args.format or FORMATS[0], force=args.force)
     if len(set(args.names)) != 1:
-        raise InputError(f"{path} is one file: name the one picture that shall be in it, or give a folder.")
+        raise InputError(f"{path} is one file: name the one picture to draw in it, or give a folder.")
     if args.format not in (None, ending[1:]):
         raise InputError(
-            f"{path} is no {args.format} file: leave --format away or end the file's name in it."
+            f"{path} is no {args.format} file: leave out --format, or let the file's name end in .{args.format}."
         )
     return PictureTarget(path.parent, ending[1:], path.stem, args.force)
 
 
 def is_folder(path: Path) -> bool:
-    """Whether there is a folder; none has a name that no file can have."""
+    """Whether a path is a folder; a name that no file can have is none."""
     try:
         return path.is_dir()
     except OSError:
@@ -168,7 +168,7 @@ def labelled(name: str, role: str) -> str:
 
 
 def draw(recording: Run, role: str, picture: Picture, width: str = "single") -> Any | None:
-    """The figure of what concerns a slave, with its caption; None where the recording lacks its signals."""
+    """The figure with the signals of a slave and its caption; None where the recording lacks its signals."""
     from report.facts.laboratories import views
     from report.pictures import figure, layout
 
@@ -194,7 +194,7 @@ def save(
 
 
 def caption(recording: Run, role: str) -> str:
-    """What was tested, which slave is shown where it has a name; under it, under which motion."""
+    """The test, and the slave where it has a name; on a second line the ground motion and its scale."""
     motion = recording.metadata.get("ground_motion", {})
     test = shown(f"{recording.test}, {title(role)}" if name_of(role) else recording.test)
     record, scale = motion.get("record"), motion.get("scale")

@@ -1,4 +1,4 @@
-"""`rths recover`: a finished recording of all that is whole in a damaged or cut-off one."""
+"""`rths recover`: a finished recording with everything that is intact in a damaged or cut-off one."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from report.text.terminal import table
 if TYPE_CHECKING:
     from common.recording.account import Missing, Recovery, Topic
 
-SHOWN = 10  # ranges of a topic, and holes of the file; JSON has all
+SHOWN = 10  # ranges of a topic and holes of the file on the terminal, which fit a screen; JSON has all
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -73,7 +73,7 @@ def cells(topic: Topic, origin_ns: int) -> list[str]:
 
 
 def span(hole: Missing, origin_ns: int) -> str:
-    """A range of sequence numbers, and between which times it lies."""
+    """A range of sequence numbers with the times of the messages before and after it."""
     times = "…".join("" if at is None else seconds(at, origin_ns) for at in (hole.after_ns, hole.before_ns))
     return f"{hole.first}–{hole.last} ({times} s)"
 
@@ -86,7 +86,7 @@ def seconds(at_ns: int, origin_ns: int) -> str:
 def verdict(found: Recovery) -> str:
     """The account in a sentence."""
     if found.complete:
-        return "Nothing of what was in the file is lost."
+        return "Everything that was in the file is recovered."
     if found.finished or not found.lossy or found.lossy[-1].end < found.size:
         return "What is lost is listed above."
-    return "The file is cut off at its end: it holds nothing of what followed the last messages above."
+    return "The file is cut off at its end: it holds no messages after the last ones above."

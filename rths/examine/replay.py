@@ -21,12 +21,12 @@ if TYPE_CHECKING:
     from common.recording.run import Run
     from master.step import Outputs
 
-NOWHERE = (0.0, 0.0)  # position and force of a laboratory that is not there
+NOWHERE = (0.0, 0.0)  # position and force where the master has no laboratory
 
 
 @dataclass
 class Match:
-    """How well one signal was met: ticks compared, and where it differs first."""
+    """How one computed signal compares with the recorded one: ticks compared, and where they first differ."""
 
     compared: int = 0
     differing: int = 0
@@ -50,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--plan",
         metavar="PLAN",
-        help="a plan file beside which the classes of its own kinds of laboratory are (default: beside FILE)",
+        help="a plan file in whose folder the files of your own kinds of laboratory are (default: the folder of FILE)",
     )
     cli.json_argument(parser, "write the result as JSON on standard output")
 
@@ -78,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def planned(recording: Run, place: str | None = None) -> Plan:
-    """The whole plan in a recording; the files of its own kinds stand beside the recording, or the plan at `place`.
+    """The whole plan in a recording; files of users' kinds are beside the recording, or beside the plan at `place`.
 
     Raises:
         InputError: the recording holds no plan, or one that cannot be read.
@@ -87,12 +87,12 @@ def planned(recording: Run, place: str | None = None) -> Plan:
 
     plan = whole_plan(recording)
     if plan is None or not recording.has(MASTER):
-        raise InputError(f"{recording.path} holds no plan and master's signals to replay.")
+        raise InputError(f"{recording.path} cannot be replayed: it lacks the plan or the master's signals.")
     return plan if place is None else replace(plan, base=cli.plan_path(place).parent)
 
 
 def replay_master(recording: Run, plan: Plan, tell: Tell = untold) -> dict[str, Match]:
-    """The building and what all laboratories are told, from the first tick to the first hole."""
+    """The building and the commands to all laboratories, from the first tick to the first that is missing."""
     from laboratories import kinds
     from master.step import MasterStep
 
@@ -119,7 +119,7 @@ def replay_master(recording: Run, plan: Plan, tell: Tell = untold) -> dict[str, 
 
 
 class ComputedSignals:
-    """What the master computes, by the signals of its topic; those of `held` stay where a tick moves nothing."""
+    """The master's computed signals by the names of its topic; those in `held` stay where a tick moves nothing."""
 
     def __init__(self, plan: Plan) -> None:
         from laboratories import kinds
@@ -132,7 +132,7 @@ class ComputedSignals:
         self.held = (*written, *(name for _, names in self._groups for name in names))
 
     def of(self, outputs: Outputs) -> dict[str, Any]:
-        """One tick's; of several slaves of a kind, and of several storeys, a value of each."""
+        """The signals of one tick; several slaves of a kind, or several storeys, give a list each."""
         found: dict[str, Any] = {"ground_acceleration": outputs.ground_acceleration}
         if self._own:
             found |= {self._own.target.name: outputs.target, self._own.command.name: outputs.command}
@@ -147,7 +147,7 @@ class ComputedSignals:
 
 
 def told(sent: tuple[float, ...], names: Sequence[str]) -> tuple[float, ...]:
-    """What a slave was sent, without the motor's force where its kind has none."""
+    """The values that a slave was sent, without the motor's force where its kind has none."""
     return sent if len(names) == len(sent) else (sent[0], *sent[2:])
 
 
@@ -173,9 +173,9 @@ def forces_used(plan: Plan, columns: dict[str, Any]) -> list[Any]:
 
 
 def held_ticks(recording: Run, commands: Sequence[float]) -> set[int]:
-    """Ticks in which the master moved nothing, because it came too late or stopped; then no slave was sent anything.
+    """Ticks in which the master moved nothing, because it was late or had stopped, and sent no slave anything.
 
-    A test without slaves records no latency: there it is where the command for the master's own rig is the last one.
+    A test without slaves records no latency; there these are the ticks that repeat the command to the master's own rig.
     """
     if not recording.roles:
         return {tick for tick in range(1, len(commands)) if commands[tick] == commands[tick - 1]}
@@ -195,18 +195,18 @@ def ground_of(recording: Run) -> Any:
     from common.recording.run import GROUND
 
     if GROUND not in recording.attachments:
-        raise InputError(f"{recording.path} carries no ground motion: it cannot be replayed.")
+        raise InputError(f"{recording.path} cannot be replayed: it carries no ground motion.")
     return np.frombuffer(recording.attachments[GROUND], dtype="<f8").reshape(2, -1).copy()
 
 
 def replay_slaves(recording: Run, plan: Plan, tell: Tell = untold) -> dict[str, Match]:
-    """What each slave did with the commands it had, and the master with the feedbacks it had."""
+    """The commands as each slave used them, its compensator's output, and the feedbacks as the master used them."""
     from laboratories.kinds import kind_of
 
     matches: dict[str, Match] = {}
     for role in recording.roles:
         if recording.has(role):
-            tell(f"what the {title(role)} did", 0, 0)
+            tell(f"the {title(role)}'s ticks", 0, 0)
             used, suffix = f"{kind_of(plan, role).channels.force}_used", role.removeprefix(SLAVE)
             for name, match in replay_exchange(recording, plan, role).items():
                 matches[f"{MASTER}/{name}{suffix}" if name == used else f"{role}/{name}"] = match
@@ -239,7 +239,7 @@ def replay_exchange(whole: Run, plan: Plan, role: str) -> dict[str, Match]:
 
 
 def replay_command(plan: Plan, role: str, slave: dict[str, Any], match: Match, ramped: set[int]) -> None:
-    """The slave's compensator again, from the first tick to the first hole; not where it was `ramped` to rest."""
+    """The slave's compensator, from the first tick to the first that is missing, without ticks `ramped` to rest."""
     from common.protocol.messages import Command
     from laboratories.kinds import kind_of
     from slave.step import SlaveStep
@@ -250,9 +250,8 @@ def replay_command(plan: Plan, role: str, slave: dict[str, Any], match: Match, r
         if seq != place:
             break
         target, *rates = (slave[name][place] for name in (channels.target.name, *channels.rates))
-        command = Command(
-            0, seq, 0, 0, -1, target, 0.0, *rates
-        )  # a motor's force does not pass the compensator
+        # The force of the motor, 0.0 here, does not enter the compensator.
+        command = Command(0, seq, 0, 0, -1, target, 0.0, *rates)
         computed = step(command, tuple(slave[name][place] for name in channels.names))
         if seq not in ramped:
             match.take(t, computed, slave[channels.command.name][place])

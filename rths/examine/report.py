@@ -11,8 +11,8 @@ from common.terminal.printable import shown
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `report`."""
-    cli.recording_argument(parser, ", damaged or cut off too")
-    cli.output_argument(parser, "OUT.html", "the page (default: beside the recording, with .html)")
+    cli.recording_argument(parser, ", which may be damaged or cut off")
+    cli.output_argument(parser, "OUT.html", "the page (default: FILE with the ending .html)")
     cli.force_argument(parser)
     cli.json_argument(parser, "name the page, its sentences and its pictures as JSON on standard output")
 

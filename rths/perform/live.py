@@ -14,28 +14,36 @@ from common.errors import InputError
 from common.lab import process
 from common.terminal import cli
 
-RATE, RATES = 10.0, (1.0, 30.0)  # Hz
-WINDOW = 10.0  # s
-LOWEST = 19  # priority
+RATE, RATES = 10.0, (1.0, 30.0)  # Hz; ten updates a second look continuous, and a page draws no more than 30
+WINDOW = 10.0  # s; about twenty cycles of a building of 2 Hz
+LOWEST = 19  # nice value: the view never takes time from a test
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `live`."""
     cli.recording_argument(parser, ", finished or being written")
-    parser.add_argument("--port", type=int, default=0, metavar="N", help="of the page (default: a free one)")
-    parser.add_argument("--no-browser", action="store_true", help="print the page's address, open nothing")
     parser.add_argument(
-        "--rate", type=float, default=RATE, metavar="HZ", help=f"of the page's updates (default: {RATE:g})"
+        "--port", type=int, default=0, metavar="N", help="port of the page (default: a free one)"
+    )
+    parser.add_argument(
+        "--no-browser", action="store_true", help="print the page's address without opening it"
+    )
+    parser.add_argument(
+        "--rate",
+        type=float,
+        default=RATE,
+        metavar="HZ",
+        help=f"rate of the page's updates (default: {RATE:g})",
     )
     parser.add_argument(
         "--window",
         type=float,
         metavar="S",
-        help=f"that plots reach back (default: {WINDOW:g}, of a finished recording all of it)",
+        help=f"time that plots reach back (default: {WINDOW:g}; the whole of a finished recording)",
     )
-    parser.add_argument("--wait", action="store_true", help="for a file that is written from now on")
-    parser.add_argument("--leave", action="store_true", help="when the test has ended (default: at Ctrl-C)")
-    cli.json_argument(parser, "say the page's address as JSON on standard output")
+    parser.add_argument("--wait", action="store_true", help="wait for a file that is yet to be written")
+    parser.add_argument("--leave", action="store_true", help="end with the test (default: at Ctrl-C)")
+    cli.json_argument(parser, "print the page's address as JSON on standard output")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -43,13 +51,13 @@ def run(args: argparse.Namespace) -> int:
     since_ns = time.time_ns() if args.wait else 0
     check(args)
     with contextlib.suppress(OSError):
-        os.nice(LOWEST)  # before anything costs time: a test may run on this machine
+        os.nice(LOWEST)  # first of all, since a test may run on this machine
     serve(args, since_ns)
     return 0
 
 
 def check(args: argparse.Namespace) -> None:
-    """Raise InputError for options that cannot be."""
+    """Raise InputError for options out of range."""
     if not RATES[0] <= args.rate <= RATES[1]:
         raise InputError(f"--rate {args.rate:g} must be from {RATES[0]:g} to {RATES[1]:g} Hz.")
     if args.window is not None and not 1.0 <= args.window <= 3600.0:
@@ -57,7 +65,7 @@ def check(args: argparse.Namespace) -> None:
     if not 0 <= args.port <= 65535:
         raise InputError(f"--port {args.port} must be from 1 to 65535, or 0 for a free one.")
     if not args.wait and not args.file.is_file():
-        raise InputError(f"There is no recording {args.file}: give its path, or --wait for it to come.")
+        raise InputError(f"There is no recording {args.file}: give its path, or --wait to wait for it.")
 
 
 def serve(args: argparse.Namespace, since_ns: int) -> None:
@@ -86,7 +94,7 @@ def serve(args: argparse.Namespace, since_ns: int) -> None:
 
 
 def shown_somewhere() -> bool:
-    """Whether somebody sits in front of a screen on which a browser can open."""
+    """Whether there is a screen and a terminal, so that opening a browser makes sense."""
     screen = sys.platform == "darwin" or "DISPLAY" in os.environ or "WAYLAND_DISPLAY" in os.environ
     return sys.stdout.isatty() and screen
 

@@ -1,4 +1,4 @@
-"""The live view beside a test: a process of its own, which can neither end the test nor hold it up."""
+"""The live view beside a test: a process of its own, which can neither end the test nor delay it."""
 
 from __future__ import annotations
 
@@ -14,12 +14,13 @@ from queue import Empty, SimpleQueue
 
 from rths.perform.processes import ROOT, Leash
 
-LEAVE_S = 4.0  # for the view to show the test's end and leave
-READY = "live view: "  # how it says where its page is
+# s, for the view to send the end of the test to the page, which it updates ten times a second, and to end.
+LEAVE_S = 4.0
+READY = "live view: "  # beginning of the line with the address of its page
 
 
 class View:
-    """A view of the recording of a test that begins."""
+    """A live view of the recording of a test that is about to start."""
 
     def __init__(self, recording: Path, port: int) -> None:
         self._recording = recording
@@ -60,7 +61,7 @@ class View:
                     self._last.append(line.strip())
 
     def news(self) -> str:
-        """A line for the user, empty while there is none: where the page is, or that it is no more."""
+        """A line for the user: the address of the page, or that the view has ended; empty where there is no news."""
         with contextlib.suppress(Empty):
             return self._said.get_nowait()
         code = self._process.poll() if self._process else 1
@@ -68,11 +69,11 @@ class View:
             return ""
         self._over = True
         why = self._last[0].removeprefix("rths: ") if self._last else f"exit code {code}"
-        return f"live view: it has ended ({why}); the test goes on, and {self.again} shows it."
+        return f"live view: it has ended ({why}); the test goes on, and {self.again} shows it again."
 
     @property
     def again(self) -> str:
-        """How to look at the recording again."""
+        """The command that shows the recording again."""
         return f"rths live {self._recording}"
 
     @staticmethod
@@ -84,7 +85,7 @@ class View:
                 return
 
     def close(self) -> None:
-        """Let it show the end for a moment, then end it."""
+        """Let the view show the end of the test for a moment, then end it."""
         if self._process is not None:
             if not (self._recording.is_file() and self._recording.stat().st_size):  # there is no end to show
                 self._process.terminate()

@@ -1,4 +1,4 @@
-"""What `rths stop` and `rths reset` have in common: an operator's wish, and every laboratory's answer."""
+"""The common part of `rths stop` and `rths reset`: an operator's order, and every laboratory's answer."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from common.roles import MASTER, OPERATOR, title
 from common.terminal import cli
 from common.terminal.printable import shown
 
-REPEAT_S = 0.1  # between two sendings of a wish, whose answer takes a tick
-PATIENCE_S = 3.0  # s for all answers: a laboratory looks at its messages every tick, unless it is held up
+REPEAT_S = 0.1  # s, after which an order is sent again: an answer takes a tick, a few milliseconds
+PATIENCE_S = 3.0  # s for all answers: a laboratory reads its messages every tick, also while it ramps to rest
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The test that is meant."""
+    """Options that name the test."""
     cli.plan_arguments(parser, optional=True)
     parser.add_argument(
         "--connect",
@@ -33,7 +33,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="ENDPOINT",
         help="where the master listens (default: the test that runs on this machine)",
     )
-    parser.add_argument("--reason", default="", metavar="TEXT", help="recorded as the operator's reason")
+    parser.add_argument(
+        "--reason", default="", metavar="TEXT", help="the operator's reason, which is recorded"
+    )
     cli.json_argument(parser, "write the answers as JSON on standard output")
 
 
@@ -41,7 +43,7 @@ def carry_out(args: argparse.Namespace, word: str) -> int:
     """Ask all laboratories of a test; 0 where all did it, 1 where one did not.
 
     Raises:
-        LostError: one gave no answer.
+        LostError: a laboratory gave no answer.
     """
     plan, endpoint = chosen(args)
     answers = asked(plan, endpoint, word, args.reason)
@@ -62,7 +64,7 @@ def chosen(args: argparse.Namespace) -> tuple[Plan, str]:
 
 
 def asked(plan: Plan, connect: str, word: str, reason: str) -> dict[str, Answer]:
-    """The answers by role; the wish is said again until all have answered or patience is over."""
+    """The answers by role; the order is repeated until all have answered or `PATIENCE_S` is over."""
     from common.lab.process import join
     from common.link.endpoint import FrameEndpoint
 
@@ -75,7 +77,7 @@ def asked(plan: Plan, connect: str, word: str, reason: str) -> dict[str, Answer]
 
 
 def gathered(endpoint: Endpoint, plan: Plan, word: str, reason: str) -> dict[str, Answer]:
-    """One press: said until every laboratory has answered it."""
+    """The answers by role to one order, which is repeated until every laboratory has answered."""
     wish = Operator(0, plan.digest(), word, secrets.randbelow(2**62) + 1, reason)
     answers: dict[str, Answer] = {}
     deadline, again = time.monotonic() + PATIENCE_S, 0.0
@@ -90,7 +92,7 @@ def gathered(endpoint: Endpoint, plan: Plan, word: str, reason: str) -> dict[str
 
 
 def show(answers: dict[str, Answer], *, as_json: bool) -> None:
-    """Write what each laboratory said."""
+    """Write the answer of each laboratory."""
     if as_json:
         plain = {role: {"accepted": bool(one.accepted), "text": one.text} for role, one in answers.items()}
         sys.stdout.write(json.dumps(plain) + "\n")

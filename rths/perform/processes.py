@@ -1,4 +1,4 @@
-"""The processes of a test on one machine: how they are started, heard, asked to stop and killed."""
+"""The processes of a test on one machine: starting them, reading their reports, asking them to stop, killing them."""
 
 from __future__ import annotations
 
@@ -19,10 +19,11 @@ from common.roles import MASTER, kind_of, name_of
 
 ROOT = Path(__file__).resolve().parents[2]
 
-LAST_WORDS_S = 1.0  # for what is left in a pipe that a rig's own child may hold open for ever
-TEXT = "text"  # a line that is no report
-BEGIN = '{"kind": '  # a rig may have printed without an end of line before it
-REPORTS = {  # what a process of ours says, and what belongs to it
+# s, for the rest of a pipe to be read after its process has ended: a child process of a rig may hold it open for ever.
+LAST_WORDS_S = 1.0
+TEXT = "text"  # kind of a line that is not a report
+BEGIN = '{"kind": '  # beginning of a report; a rig may have printed text before it on the same line
+REPORTS = {  # reports of master, slaves and recorder by kind, and the keys that each must have
     "event": {"lab", "level", "code", "text"},
     "state": {"lab", "state"},
     "mode": {"lab", "mode"},
@@ -41,7 +42,7 @@ class Said(NamedTuple):
 
 
 def understood(line: str) -> list[dict[str, Any]]:
-    """What a line on a process's standard output says; of kind 'text' what is no report: a user's rig may print."""
+    """The reports in a line of a process's standard output; text that a user's rig printed is of the kind 'text'."""
     printed, begin, rest = line.partition(BEGIN)
     data = report(begin + rest)
     if data is None:
@@ -67,10 +68,10 @@ def text(line: str) -> dict[str, Any]:
 
 
 class Leash:
-    """Interrupts processes when the last holder of the other end is gone, however it ended.
+    """Interrupts processes when the process that holds the other end has ended, in whatever way.
 
-    A pipe that nobody writes to; the kernel signals its readers when its last writer is closed. Linux alone has the
-    signal to choose and the way to open a pipe anew: elsewhere nothing is held.
+    It is a pipe that nobody writes to: the kernel signals its readers when its last writer is closed. Only Linux lets a
+    program choose the signal and open a pipe anew; on other systems a leash does nothing.
     """
 
     def __init__(self) -> None:
@@ -82,7 +83,7 @@ class Leash:
         if sys.platform != "linux":
             yield []
             return
-        # opened anew, because an owner belongs to an open file and not to a descriptor
+        # The end is opened anew, because the process that gets the signal is set per open file, not per descriptor.
         fresh = os.open(f"/proc/self/fd/{self._reader}", os.O_RDONLY | os.O_NONBLOCK)
         try:
             yield [fresh]
@@ -107,17 +108,17 @@ class Leash:
 
 
 class Processes:
-    """Master, slaves and recorder by role; what they say in one queue, their errors and complaints kept.
+    """Master, slaves and recorder by role; their reports in one queue, with their errors and complaints.
 
-    If this process is killed, the master is interrupted, and when the master has ended, all others are: the master
-    ends a test in order, and without a test nothing else would end the others.
+    If this process is killed, the master is interrupted and ends the test in order. When the master has ended, all
+    others are interrupted, which without a test nobody else would end.
     """
 
     def __init__(self) -> None:
         self._running: dict[str, subprocess.Popen[str]] = {}
         self._queue: Queue[Said] = Queue()  # not SimpleQueue, for the reason in common/link/inbox.py
         self._threads: list[threading.Thread] = []
-        self._home, self._lead = Leash(), Leash()  # held by this process; by this one and the master
+        self._home, self._lead = Leash(), Leash()  # held by this process, and by this one and the master
         self._read_until = 0.0
         self._complaints: dict[str, list[str]] = {}
         self.errors: dict[str, str] = {}  # code of the first error that each reported
@@ -125,7 +126,7 @@ class Processes:
         self.killed: set[str] = set()
 
     def start(self, name: str, arguments: Sequence[str]) -> None:
-        """Start `python -m name arguments --json`, out of reach of the terminal's Ctrl-C; a slave with its name."""
+        """Start `python -m name arguments --json`, where the terminal's Ctrl-C does not reach it."""
         own = ["--name", name_of(name)] if name_of(name) else []
         leash, held = (self._home, [self._lead.writer]) if name == MASTER else (self._lead, [])
         with leash.end() as ends:
@@ -179,7 +180,7 @@ class Processes:
         return {name: code for name, process in self._running.items() if (code := process.poll()) is not None}
 
     def all_ended(self) -> bool:
-        """Whether all processes have ended and all they said was read, as far as it could be had."""
+        """Whether all processes have ended and their reports were read, as far as their pipes could be read out."""
         if len(self.ended()) < len(self._running):
             return False
         self._read_out()

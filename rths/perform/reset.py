@@ -1,4 +1,4 @@
-"""`rths reset`: let laboratories leave their latched safe state, once what brought them there is gone."""
+"""`rths reset`: let laboratories leave their latched safe state once its cause is gone."""
 
 from __future__ import annotations
 

@@ -30,16 +30,10 @@ if TYPE_CHECKING:
     from rths.perform.live_child import View
     from rths.perform.processes import Processes, Said
 
-POLL_S = 0.1  # s between two looks at the processes: a user does not notice it
-AGREED = State.SCHEDULED.value  # with which the master reports that all know the start
-UNSAID = (
-    "patience",
-    "machine",
-    "bare_loop",
-    "mode",
-    "exchange",
-    PASSED,
-)  # for the recording; what was passed, and what a machine lacks, is said before, patience in the summary
+POLL_S = 0.1  # s between two looks at the processes: a user does not notice the delay
+AGREED = State.SCHEDULED.value  # state in which the master reports that all processes know the start
+# Codes of events that go into the recording only: the terminal shows them before the start or in the summary.
+UNSAID = ("patience", "machine", "bare_loop", "mode", "exchange", PASSED)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -49,15 +43,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     cli.rt_arguments(parser)
     cli.accept_argument(parser)
     clock = parser.add_mutually_exclusive_group()
-    clock.add_argument("--real-time", action="store_true", help="a process each, wall clock (default)")
     clock.add_argument(
-        "--virtual", action="store_true", help="one process, virtual clock, as fast as it goes"
+        "--real-time", action="store_true", help="a process for each role, on the wall clock (default)"
+    )
+    clock.add_argument(
+        "--virtual", action="store_true", help="one process on a virtual clock, as fast as it can"
     )
     cli.output_argument(parser, "FILE", "the recording (default: runs/<test>-<time>.mcap)")
     cli.force_argument(parser)
-    parser.add_argument("--live", action="store_true", help="show it in a browser page while it runs")
+    parser.add_argument("--live", action="store_true", help="show the test in a browser page while it runs")
     parser.add_argument(
-        "--live-port", type=int, default=0, metavar="N", help="of that page (default: a free one)"
+        "--live-port", type=int, default=0, metavar="N", help="port of that page (default: a free one)"
     )
     parser.add_argument(
         "--beside", action="store_true", help="run although another test runs on this machine"
@@ -95,7 +91,7 @@ def run(args: argparse.Namespace) -> int:
 def in_virtual_time(
     plan: Plan, reality: Reality, output: Path, stopping: Stopper, gate: Gate
 ) -> RthsError | None:
-    """The test in this process; the error that ended it."""
+    """Run the test in this process on the virtual clock; the error that ended it."""
     from simulation import virtual
 
     said = before_the_start(plan, output, gate)
@@ -112,11 +108,11 @@ def in_virtual_time(
 
 
 def before_the_start(plan: Plan, output: Path, gate: Gate) -> list[str]:
-    """Judge what can be judged before anything starts: what was passed and what is overruled, a line each.
+    """Make the pre-flight checks that need no laboratory; a line on each that passed or whose risk is accepted.
 
     Raises:
-        RefusedError: a risk that the gate does not accept.
-        InputError: a model or parameter of the plan cannot be.
+        RefusedError: a check failed whose risk is not accepted.
+        InputError: a model or parameter of the plan cannot be used.
     """
     made = checks(plan, output)
     gate.judge(made)
@@ -125,7 +121,7 @@ def before_the_start(plan: Plan, output: Path, gate: Gate) -> list[str]:
 
 
 def checks(plan: Plan, output: Path) -> list[PreflightCheck]:
-    """What is judged before anything starts."""
+    """The pre-flight checks that need no laboratory: of the plan, and of the disk."""
     from loop.nominal import preflight
     from recorder import space
 
@@ -133,8 +129,8 @@ def checks(plan: Plan, output: Path) -> list[PreflightCheck]:
 
 
 def virtual_report(working: Working, kind: str, data: Any) -> None:
-    """Events of a test in virtual time, on standard error."""
-    if kind == "event" and data["code"] not in UNSAID and data["level"] != "error":  # errors come last
+    """Write an event of a test in virtual time on standard error; an error is this command's last sentence."""
+    if kind == "event" and data["code"] not in UNSAID and data["level"] != "error":
         working.leave(wipe=True)
         cli.text_report(kind, data)
 
@@ -142,7 +138,7 @@ def virtual_report(working: Working, kind: str, data: Any) -> None:
 def in_real_time(
     args: argparse.Namespace, plan: Plan, reality: Reality, output: Path, stopping: Stopper, gate: Gate
 ) -> RthsError | None:
-    """The test in a process each; the error that ended it."""
+    """Run the test with a process for each role; the error that ended it."""
     from common.link.zenoh_link import listenable
     from rths.perform.ending import Ending, verdict
     from rths.perform.processes import Processes
@@ -176,7 +172,7 @@ def in_real_time(
 
 
 def shown(output: Path, port: int) -> View:
-    """A live view of the recording that begins."""
+    """A live view of the recording of a test that is about to start."""
     from rths.perform.live_child import View
 
     return View(output, port)
@@ -191,7 +187,7 @@ def crew(plan: Plan) -> str:
 
 
 def check(reality: Reality) -> None:
-    """Raise InputError where a laboratory could not be built or not show who it is, before any process starts."""
+    """Raise InputError where a laboratory cannot be built or lacks its certificate, before any process starts."""
     import master.assembly
     import slave.assembly
     from loop.links import link_model
@@ -234,7 +230,7 @@ def start_all(
     processes.start("master", [*words, *secret, *places[0], "--listen", endpoint])
     for role, place in zip(roles, places[1:], strict=True):
         processes.start(role, [*words, *secret, *place, "--connect", endpoint])
-    # the file is this command's already: it stands there empty, or the user wants it replaced
+    # --force: this command has reserved the file, which is empty or may be replaced
     processes.start("recorder", [*words, "--connect", endpoint, "-o", str(output), "--force"])
 
 
@@ -251,9 +247,9 @@ def follow(
     stopping: Stopping,
     view: View | None = None,
 ) -> None:
-    """Show what the processes say, and stop them where it is time, until all have ended.
+    """Show the reports of the processes, and stop those whose time has come, until all have ended.
 
-    A second wish to stop changes nothing; the answer says what the processes are doing.
+    A second Ctrl-C changes nothing; the answer to it says what the processes are doing.
     """
     from rths.perform.ending import killed
 
@@ -274,7 +270,7 @@ def follow(
 
 
 def note(said: Said, ending: Ending, doing: dict[str, str]) -> None:
-    """Take note of what a report says about the end of a test; `doing` are laboratories that arm or come to rest."""
+    """Take note of a report that concerns the end of a test; `doing` says which laboratories arm or come to rest."""
     match said.data:
         case {"kind": "state", "state": state} if said.process == MASTER and state == AGREED:
             ending.agreed = True
@@ -297,12 +293,15 @@ def note(said: Said, ending: Ending, doing: dict[str, str]) -> None:
 
 
 def answer(processes: Processes, doing: Mapping[str, str]) -> str:
-    """The answer to a second wish to stop: what the processes are doing, which is not cut short."""
+    """The answer to a second Ctrl-C: what the processes are doing, which is not cut short."""
     there = [name for name in processes.names if name not in processes.ended()]
     if resting := [f"{title(name)}: {text}" for name, text in doing.items() if name in there]:
-        return f"already stopping, no laboratory is killed on its ramp to rest or as it arms ({'; '.join(resting)})"
+        return (
+            "already stopping; no laboratory is killed while it arms or is on its ramp to rest "
+            f"({'; '.join(resting)})"
+        )
     return (
-        f"already stopping, and waiting for {' and '.join(map(title, there)) or 'nobody'} to leave in order"
+        f"already stopping; waiting for {' and '.join(map(title, there)) or 'no process'} to leave in order"
     )
 
 
@@ -316,16 +315,16 @@ def end_all(processes: Processes, ending: Ending) -> None:
 
 
 def tell(said: Said, progress: RunProgress) -> None:
-    """Show one report, where it is for the user."""
+    """Show one report if it is meant for the user."""
     match said.data:
         case {"kind": "progress"} if said.process == MASTER:
             progress.show(said.data)
         case {"kind": "mode", "lab": lab, "mode": mode}:
             progress.mode(lab, mode)
         case {"kind": "event", "code": "real_time", "missing": missing} if missing:
-            pass  # with a rig it was reported before; an emulation does not need it
+            pass  # pre-flight reported it if there is a rig; an emulation does not need it
         case {"kind": "event", "level": "error", "code": code, "lab": lab}:
-            progress.say(f"{lab}: ends the test ({code})")  # the sentence is this command's last word
+            progress.say(f"{lab}: ends the test ({code})")  # the full sentence is this command's last line
         case {"kind": "event", "code": code, "lab": lab, "text": text} if code not in UNSAID:
             progress.say(f"{lab}: {text}")
         case {"kind": "text", "text": text}:
@@ -335,7 +334,7 @@ def tell(said: Said, progress: RunProgress) -> None:
 
 
 def stop(processes: Processes, ending: Ending, wish: str) -> list[str]:
-    """Ask and kill those whose time has come; who was killed."""
+    """Ask or kill the processes whose time has come; names of those that were killed."""
     gone = []
     now, ended = time.monotonic(), processes.ended()
     ending.look(now, wish, processes.names, ended)

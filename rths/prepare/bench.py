@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "part",
         choices=PARTS,
         metavar="PART",
-        help=f"{', '.join(PARTS[:-1])}, or target: any laboratory follows steps, sines and a sweep within its limits",
+        help=f"{', '.join(PARTS[:-1])}; or target, which lets any laboratory follow steps, sines and a sweep",
     )
     parser.add_argument(
         "plan", metavar="PLAN", help=f"TOML file of the test; {', '.join(cli.SHIPPED)} for those that ship"
@@ -39,12 +39,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="PIECE",
-        help="only the pieces that begin so (step, sine, random, sweep, static); may be repeated",
+        help="play only pieces whose name begins with this (step, sine, random, sweep, static); may be repeated",
     )
     parser.add_argument(
         "--name",
         metavar="NAME",
-        help="whose laboratory it is where several have the part: a slave's name, master, or slave for one without",
+        help="the laboratory, where several have the part: a slave's name, master, or slave for a slave without a name",
     )
     clock = parser.add_mutually_exclusive_group()
     clock.add_argument("--virtual", action="store_true", help="virtual clock, as fast as it goes (default)")
@@ -60,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
     from common.plan import read as plans
 
     plan = plans.with_test(plans.load(cli.plan_path(args.plan)), seed=args.seed)
-    # in real time nothing may run beside the loop
+    # In real time no thread of a progress bar may run beside the loop.
     with contextlib.nullcontext() if args.real_time else Progress("bench test") as progress:
         from recorder import files
         from simulation import benches
@@ -81,7 +81,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def summary(result: BenchResult) -> dict[str, Any]:
-    """What was done, as plain values."""
+    """The summary of a bench test as plain values."""
     return {
         "file": str(result.path),
         "part": result.part,
@@ -92,7 +92,7 @@ def summary(result: BenchResult) -> dict[str, Any]:
 
 
 def show(result: BenchResult, more: str) -> None:
-    """What was done, as text; `more` options of the next command."""
+    """Write the summary as text, with the command that evaluates the recording; `more` holds further options of it."""
     from report.text.terminal import table
 
     rows = [["piece", "from", "to"]]

@@ -1,7 +1,7 @@
-"""`rths check`: what a plan describes, before anything of it is run.
+"""`rths check`: a description of a plan, without running it.
 
-It imports no class of a rig. What a plan with a kind of the user's own describes depends on that kind's class, which is
-imported, unless only the classes are asked for.
+It imports no class of a rig. A plan with a user's own kind of laboratory cannot be described without that kind's class,
+which is imported unless only the list of classes is asked for.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def listed(plan: Plan, *, as_json: bool) -> int:
 
 
 def printable(value: Any) -> Any:
-    """Plain values with texts that a terminal may be given: a plan's own words may hold escape sequences."""
+    """Plain values whose texts are safe for a terminal: those of a plan may hold escape sequences."""
     if isinstance(value, dict):
         return {name: printable(one) for name, one in value.items()}
     if isinstance(value, list):

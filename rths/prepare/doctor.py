@@ -14,9 +14,10 @@ from common.terminal import cli
 from common.terminal.telling import Tell
 from report.text.progress import Progress
 
-SHORTEST = 3.0  # s; below, the processes are not up before they have to end
+SHORTEST = 3.0  # s; with less, the exchange has too few intervals to show one in a thousand that is late
+LONGEST = 3600.0  # s; an hour shows what happens once in a million intervals
 PARTS = 3
-EXCHANGE, WAKE_UP = 0.45, 0.85  # ends of the parts as shares of the time; the rest is the disk's
+EXCHANGE, WAKE_UP, DISK = 0.45, 0.4, 0.15  # shares of the time; the disk needs fewest samples
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -46,38 +47,33 @@ def run(args: argparse.Namespace) -> int:
 
 
 def check_bounds(args: argparse.Namespace) -> None:
-    """Raises InputError for a time that cannot be used."""
+    """Raise InputError for a time that cannot be used."""
     from common.errors import InputError
 
-    if not SHORTEST <= args.seconds <= 3600.0:
-        raise InputError(f"--seconds {args.seconds:g} cannot be used: give {SHORTEST:g} to 3600.")
+    if not SHORTEST <= args.seconds <= LONGEST:
+        raise InputError(f"--seconds {args.seconds:g} cannot be used: give {SHORTEST:g} to {LONGEST:g}.")
     if not 1e-4 <= args.interval <= 0.1:
         raise InputError(f"--interval {args.interval:g} s cannot be used: give 0.0001 to 0.1.")
 
 
 def examine(args: argparse.Namespace, tell: Tell) -> dict[str, Any]:
-    """Measure part after part, so that none disturbs another, and judge; times in s."""
+    """Measure one part after the other, so that none disturbs another, and judge; times in s."""
     from common.host.machine import Watch, facts
     from rths.checkup import children, disk
     from rths.checkup.clock import ClockWatch
     from rths.checkup.rivals import rivals
     from rths.checkup.verdict import checks, notes, verdict
 
-    began = time.monotonic()
-    folder = disk.nearest(args.output)
+    folder, seconds = disk.nearest(args.output), float(args.seconds)
     watch, clock, others = Watch(), ClockWatch(), rivals()
     interval_ns = round(args.interval * 1e9)
-
-    def until(share: float) -> float:
-        return began + share * float(args.seconds)
-
-    # with 'on' the check goes on with what is available, and its absence is judged
+    # With 'on' the check takes the settings that are available, and judges that some are missing.
     mode = "off" if args.rt == "off" else "auto"
     tell("round trip over zenoh", 1, PARTS)
-    granted, round_trip = children.exchange(interval_ns, round(until(EXCHANGE) * 1e9), mode)
+    granted, round_trip = children.exchange(interval_ns, EXCHANGE * seconds, mode)
     tell("wake-up lateness", 2, PARTS)
     place = granted.get("priority", 0), granted.get("processor", -1)
-    wake_up = children.wake_ups(interval_ns, until(WAKE_UP), *place)
+    wake_up = children.wake_ups(interval_ns, WAKE_UP * seconds, *place)
     tell("disk", 3, PARTS)
     report: dict[str, Any] = {
         "seconds": args.seconds,
@@ -86,7 +82,7 @@ def examine(args: argparse.Namespace, tell: Tell) -> dict[str, Any]:
         "realtime": granted,
         "wake_up": wake_up,
         "round_trip": round_trip,
-        "disk": disk.measure(folder, until(1.0)),
+        "disk": disk.measure(folder, time.monotonic() + DISK * seconds),
         "clock": clock.values(),
         "machine": watch.values(),
         "facts": facts(),
@@ -116,7 +112,7 @@ def write_report(report: dict[str, Any]) -> None:
 
 
 def write_host(report: dict[str, Any]) -> None:
-    """What this machine is and was, in lines."""
+    """Lines on this machine: system, processors, real-time settings and clock."""
     facts, clock = report["facts"], report["clock"]
     words = [facts["system"], *(facts[name] for name in ("preemption", "processor") if name in facts)]
     if "hypervisor" in facts:
@@ -133,7 +129,7 @@ def write_host(report: dict[str, Any]) -> None:
 
 
 def processors(machine: dict[str, float]) -> list[str]:
-    """How many there are, and what they did."""
+    """The number of processors, their load, and the share that the host took."""
     shares = (("busy_share", "busy"), ("stolen_share", "stolen by the host"))
     words = [f"{machine['processors']:.0f}"]
     words += [f"{machine[name] * 100:.1f} % {word}" for name, word in shares if name in machine]
@@ -141,7 +137,7 @@ def processors(machine: dict[str, float]) -> list[str]:
 
 
 def shape(granted: dict[str, Any]) -> list[str]:
-    """What a laboratory's process gets here."""
+    """The real-time settings that a laboratory's process gets on this machine."""
     processor = granted.get("processor", -1)
     return [
         f"scheduler {granted.get('scheduler', 'unknown')}",
@@ -172,7 +168,7 @@ def write_latency(report: dict[str, Any]) -> None:
 
 
 def write_checks(report: dict[str, Any]) -> None:
-    """What was found beside what is needed."""
+    """A table of the checks: what was found, and what is needed."""
     from report.text.terminal import table
 
     rows = [["check", "found", "needed", ""]]

@@ -1,4 +1,4 @@
-"""`rths identify`: a part's parameters from a bench recording, or from any that holds its in- and outputs."""
+"""`rths identify`: a part's parameters from a bench recording, or from any that holds its inputs and outputs."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--part",
         choices=PARTS,
-        help="which part (default: the bench test's; all that are possible in any other recording)",
+        help="the part (default: that of the bench test; in other recordings all that can be identified)",
     )
     parser.add_argument(
         "--fit", metavar="MODEL", help="fit this hysteretic model to the column too (clough, bwbn, …)"
@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--plan",
         metavar="PLAN",
-        help="the plan of the test: the parameters of its own kind of laboratory are fitted, whose class is run",
+        help="fit the parameters of your own kind of laboratory in this plan, whose class is run",
     )
     cli.json_argument(parser, "write the report as JSON on standard output")
 
@@ -70,8 +70,8 @@ def identified(args: argparse.Namespace, tell: Tell) -> list[dict[str, Any]]:
             reports.append(identify(view, part) | named(part, role))
     if not reports:
         raise InputError(
-            f"{args.file} holds no part's in- and outputs: see rths inspect {args.file}, and give --plan PLAN for a "
-            "kind of laboratory of your own."
+            f"{args.file} does not hold inputs and outputs of any part: see rths inspect {args.file}, and give "
+            "--plan PLAN for a kind of laboratory of your own."
         )
     return reports + models
 
@@ -94,7 +94,8 @@ def devices(recording: Any, plan_name: str, tell: Tell) -> list[dict[str, Any]]:
             reports.append(report)
     if not reports:
         raise InputError(
-            f"{recording.path} lacks the in- and outputs of the {', the '.join(k.says for k in own.values())}."
+            f"{recording.path} lacks the inputs and outputs of the {', the '.join(k.says for k in own.values())}: "
+            "record them with rths bench target."
         )
     return reports
 

@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "name",
         type=Path,
         metavar="NAME",
-        help="name of the test, with the folder of its files where it is another",
+        help="name of the test; with a folder before it, the files go there",
     )
     cli.force_argument(parser)
     cli.json_argument(parser, "say which files were written as JSON on standard output")

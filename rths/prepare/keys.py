@@ -23,8 +23,10 @@ if TYPE_CHECKING:
 
 HERE = ("localhost", "127.0.0.1", "::1")
 HOST = re.compile(r"[A-Za-z0-9]([A-Za-z0-9-]*[A-Za-z0-9])?(\.[A-Za-z0-9]([A-Za-z0-9-]*[A-Za-z0-9])?)*")
-EARLIER = timedelta(hours=1)  # by which a laboratory's clock may be behind
-LONGEST = 3650  # days
+EARLIER = timedelta(
+    hours=1
+)  # by which a laboratory's clock may be behind, or an hour off for daylight saving time
+LONGEST = 3650  # days, ten years: longer than any campaign
 NAME_LENGTH = 64  # of a common name (RFC 5280, appendix A)
 AUTHORITY = "authority"
 
@@ -38,11 +40,11 @@ class Owner(NamedTuple):
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `keys`."""
-    parser.add_argument("folder", type=Path, metavar="FOLDER", help="where the files go: new, or empty")
+    parser.add_argument("folder", type=Path, metavar="FOLDER", help="folder for the files, new or empty")
     slaves = parser.add_mutually_exclusive_group()
     slaves.add_argument("--plan", metavar="PLAN", help="plan whose slaves get certificates")
     slaves.add_argument(
-        "--slaves", nargs="+", metavar="NAME", default=[], help="names of the slaves, where they have any"
+        "--slaves", nargs="+", metavar="NAME", default=[], help="names of the slaves, if they have names"
     )
     parser.add_argument("--days", type=int, default=30, metavar="N", help="validity in days (30)")
     parser.add_argument(
@@ -51,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="extend",
         default=[],
         metavar="NAME",
-        help=f"name or address by which the master is dialled, beside {', '.join(HERE)}",
+        help=f"name or address under which slaves connect to the master, beside {', '.join(HERE)}",
     )
     cli.json_argument(parser, "say what was written as JSON on standard output")
 
@@ -81,13 +83,14 @@ def slave_roles(args: argparse.Namespace) -> tuple[str, ...]:
     for name in args.slaves:
         if not plans.SLAVE_NAME.fullmatch(name):
             raise InputError(
-                f"The slave's name '{name}' must begin with a letter and have small letters, digits and _ only."
+                f"The slave's name '{name}' cannot be used: begin with a lower-case letter, go on with lower-case "
+                "letters, digits and _."
             )
         if len(slave_role(name)) > NAME_LENGTH:
             raise InputError(f"The slave's name '{name}' is too long for a certificate: shorten it.")
     if len(set(args.slaves)) < len(args.slaves):
         raise InputError(
-            f"A name in --slaves {' '.join(args.slaves)} is there twice: give each slave one of its own."
+            f"--slaves {' '.join(args.slaves)} has a name twice: give each slave a name of its own."
         )
     return tuple(map(slave_role, args.slaves or [""]))
 
@@ -108,7 +111,7 @@ def certificates(
 
 
 def authorized(begin: datetime, end: datetime) -> Owner:
-    """An authority whose name no other has, so that certificates of another one are told as such."""
+    """An authority with a unique name, so that a certificate of another authority is recognised by its issuer."""
     from cryptography import x509
     from cryptography.hazmat.primitives import hashes
     from cryptography.hazmat.primitives.asymmetric import ec
@@ -220,8 +223,8 @@ PLACES = {
     MASTER: "the master's machine",
     "slave": "the machine of that slave",
     RECORDER: "the recorder's machine",
-    OPERATOR: "who may give a test orders",
-    OBSERVER: "who may watch",
+    OPERATOR: "people who may stop and reset a test",
+    OBSERVER: "people who may watch a test",
 }
 
 
@@ -245,8 +248,8 @@ def told(folder: Path, roles: Sequence[str], end: datetime) -> str:
             f"{folder}: an authority and {len(roles)} certificates, valid until {end:%Y-%m-%d %H:%M} UTC.",
             f"  {f'{AUTHORITY}.pem':<{width}}  everybody",
             *rows,
-            f"{folder / AUTHORITY}.key must not travel to the laboratories: "
-            "with it anybody makes certificates of any role.",
+            f"Keep {folder / AUTHORITY}.key away from the laboratories: "
+            "whoever has it can make certificates of any role.",
             f'In the plan: [link.security] folder = "{folder.name}", relative to the plan\'s own folder.\n',
         )
     )

@@ -1,4 +1,4 @@
-"""`rths simulate`: the closed loop of nominal models, or of those of a reality, computed in one rollout."""
+"""`rths simulate`: the closed loop of nominal models, or of the models of a reality, in one compiled rollout."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `simulate`."""
     cli.plan_arguments(parser)
     parser.add_argument(
-        "--ideal", action="store_true", help="transfer systems that follow at once, no compensation"
+        "--ideal", action="store_true", help="with transfer systems that follow at once, without compensation"
     )
-    parser.add_argument("--uncompensated", action="store_true", help="the actuator without compensation")
-    parser.add_argument("--no-amd", action="store_true", help="the building without the damper")
+    parser.add_argument("--uncompensated", action="store_true", help="without compensation of the actuator")
+    parser.add_argument("--no-amd", action="store_true", help="without the damper")
     cli.reality_argument(parser)
     parser.add_argument("--noise", action="store_true", help="with the sensors' noise, from the plan's seed")
     cli.output_argument(parser, "FILE", "write the simulation as a recording")
@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def rolled_out(plan: Plan, motion: Any, args: argparse.Namespace) -> tuple[dict[str, Any], str]:
-    """Signals of the compiled rollout, written where a file is wanted; the first value beyond the plan's limits."""
+    """Signals of the compiled rollout, which --output also writes, and a sentence on the first value beyond a limit."""
     from loop import substructure
     from loop.closed_loop import by_role, signals, simulate
 
@@ -78,7 +78,7 @@ def really(truth: Reality, *, noise: bool) -> Rollout:
     """The rollout of the laboratories and the network as they really are.
 
     Raises:
-        InputError: a laboratory is a plug-in, of which no model is known, or an effect cannot be laid.
+        InputError: a laboratory's rig is a plug-in, which has no model, or an effect cannot be applied.
     """
     from loop import substructure
     from loop.closed_loop import simulate
@@ -90,7 +90,7 @@ def really(truth: Reality, *, noise: bool) -> Rollout:
     for role, rig in rigs.items():
         if rig.class_:
             raise InputError(
-                f"[{role}.rig] is a plug-in, of which a simulation knows no model: use rths run --virtual."
+                f"[{role}.rig] names a plug-in, which a simulation has no model of: use rths run --virtual."
             )
     system = true_system(truth)
     plan, effects = system.plan, system.effects

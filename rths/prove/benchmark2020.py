@@ -16,7 +16,7 @@ from report.text.progress import Progress
 if TYPE_CHECKING:
     from common.plan.laboratory_tables import CompensatorTable
 
-MOST_PLANTS = 1000
+MOST_PLANTS = 1000  # fifty times the benchmark's own 20: hours of computing
 PROCESSORS = len(os.sched_getaffinity(0))
 USUAL = {"plants": 20, "seed": 2020, "only": None, "jobs": PROCESSORS, "json": False}
 
@@ -28,13 +28,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=int,
         default=USUAL["plants"],
         metavar="N",
-        help="transfer systems drawn beside the nominal (default: 20)",
+        help="number of random transfer systems beside the nominal one (default: 20)",
     )
     parser.add_argument(
         "--seed", type=int, default=USUAL["seed"], metavar="N", help="seed of the plants (default: 2020)"
     )
     parser.add_argument(
-        "--only", type=cli.words, metavar="NAME,…", help="these settings of the compensators only"
+        "--only", type=cli.words, metavar="NAME,…", help="only these settings of the compensators"
     )
     parser.add_argument(
         "--jobs",
@@ -46,16 +46,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     cli.output_argument(
         parser,
         "FOLDER",
-        "where page, pictures and results.json go (default: runs/benchmark2020); with --plan its file",
+        "folder for page, pictures and results.json (default: runs/benchmark2020); with --plan the plan's file",
     )
     parser.add_argument(
         "--plan",
         type=int,
         metavar="CASE",
-        help="write the plan of a case, 1 to 4, instead of running anything",
+        help="write the plan of a case, 1 to 4, and run nothing",
     )
     parser.add_argument(
-        "--compensator", metavar="NAME", help="with --plan: its setting of the compensator (default: sample)"
+        "--compensator", metavar="NAME", help="with --plan: the setting of its compensator (default: sample)"
     )
     cli.force_argument(parser)
     cli.json_argument(parser, "write the results as JSON on standard output")
@@ -88,11 +88,11 @@ def run(args: argparse.Namespace) -> int:
 
 
 def check(args: argparse.Namespace) -> None:
-    """Raise InputError for values and options that do not fit together."""
+    """Raise InputError for values out of range and for options that contradict each other."""
     if args.plan is not None:
         for name, unused in USUAL.items():
             if getattr(args, name) != unused:
-                raise InputError(f"--plan writes a plan and plays nothing: leave out --{name}.")
+                raise InputError(f"--plan writes a plan and runs nothing: leave out --{name}.")
         return
     if args.compensator is not None:
         raise InputError(
@@ -127,7 +127,7 @@ def setting(name: str) -> CompensatorTable:
 
 
 def write_plan(args: argparse.Namespace) -> int:
-    """Write the plan of one case, to be run, recorded and diagnosed as any other."""
+    """Write the plan of one case, which can be run, recorded and diagnosed as any other."""
     from validation.benchmark2020.problem import CASES, EL_CENTRO, planned, with_compensator
 
     cases = {case.number: case for case in CASES}

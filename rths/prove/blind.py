@@ -1,4 +1,4 @@
-"""`rths blind`: the diagnosis on cases whose effect is withheld, scored."""
+"""`rths blind`: the diagnosis scored on cases whose effects it is not told."""
 
 from __future__ import annotations
 
@@ -48,17 +48,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=cli.words,
         default=[],
         metavar="KIND,…",
-        help="catalogue, formula, unknown, pair, clean, many or material",
+        help="only cases of these kinds: catalogue, formula, unknown, pair, clean, many, material",
     )
     which.add_argument(
-        "--effects", type=cli.words, default=[], metavar="NAME,…", help="cases with these effects"
+        "--effects", type=cli.words, default=[], metavar="NAME,…", help="only cases with these effects"
     )
     which.add_argument(
         "--duration", type=float, default=30.0, metavar="S", help="length of each test (default: 30)"
     )
-    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="processes; -1: all processors")
     parser.add_argument(
-        "--dask", default="", metavar="ADDRESS", help="diagnose on a Dask cluster, same file system"
+        "--jobs", type=int, default=1, metavar="N", help="number of processes; -1 for one per processor"
+    )
+    parser.add_argument(
+        "--dask", default="", metavar="ADDRESS", help="diagnose on a Dask cluster with the same file system"
     )
     parser.add_argument(
         "--diagnosis",
@@ -70,16 +72,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     cli.output_argument(
         parser,
         "FOLDER",
-        "where the page and the results go (default: runs/blind)",
+        "folder for the page and the results (default: runs/blind)",
         default=Path("runs/blind"),
     )
-    parser.add_argument("--keep", action="store_true", help="keep recordings, plans and realities there too")
+    parser.add_argument("--keep", action="store_true", help="also keep recordings, plans and realities there")
     cli.force_argument(parser)
     cli.json_argument(parser, "write the results as JSON on standard output")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Draw, record, diagnose, score; 1 where a goal is missed, which a few cases cannot show."""
+    """Draw, record, diagnose and score the cases; 1 where a goal is missed, which takes more than a few cases."""
     from validation.blind.cases.basis import basis
     from validation.blind.draw import draw
     from validation.blind.results.measures import measures
@@ -109,7 +111,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def said_of(args: argparse.Namespace, trial: TrialBasis) -> str:
-    """How the cases are made, in a sentence or two."""
+    """One or two sentences on how the cases are made."""
     from validation.blind.library import own_kernels
 
     plan = f"of the plan '{args.plan}', " if args.plan else ""
@@ -120,8 +122,8 @@ def said_of(args: argparse.Namespace, trial: TrialBasis) -> str:
     own = " and ".join(map(title, own_kernels(trial.plan)))
     if own:
         text += (
-            f" The laboratory of the {own} is of a user's kind, of which there is no second code: it is played by "
-            "its own kernel, with parameters inside their tolerances."
+            f" The laboratory of the {own} is of a user's kind, which has no second implementation: its own kernel "
+            "emulates it, with parameters inside their tolerances."
         )
     return text
 
@@ -175,7 +177,7 @@ def diagnose_cases(folder: Path, total: int, args: argparse.Namespace, tell: Tel
 
 
 def keep(cases: Iterable[Case], recorded: dict[int, RecordedCase], place: Path, folder: Path) -> None:
-    """Recordings, plans and realities of all cases, once every diagnosis is done."""
+    """Copy the recordings, plans and realities of all cases into the folder, after all diagnoses."""
     import shutil
 
     import tomli_w
@@ -200,7 +202,7 @@ def write(folder: Path, outcomes: Sequence[Outcome], about: str) -> dict[str, An
 
 
 def show(table: Sequence[Measure], outcomes: Sequence[Outcome]) -> None:
-    """The measures, then the cases that are not right."""
+    """Write the measures, the table of cases, and a line on each case whose answer is wrong."""
     from report.text import terminal
     from validation.blind.results.page import hidden, number
     from validation.blind.results.rows import HEAD, case_rows

@@ -1,4 +1,4 @@
-"""`rths faults`: whole tests simulated with faults drawn from seeds, and what must hold in all of them."""
+"""`rths faults`: whole tests simulated with random faults, and the invariants that must hold in all of them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from validation.faults.schedule import Schedule
     from validation.faults.trial import TrialResult
 
-MANY = 100
+MANY = 100  # schedules by default: about an hour of virtual time
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -27,22 +27,29 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--seed",
         type=int,
         metavar="N",
-        help="seed of the first schedule; alone: of the only one (default: 1)",
+        help="seed of the first schedule; without --schedules, of a single one (default: 1)",
     )
     parser.add_argument(
-        "--schedules", type=int, metavar="N", help=f"how many, with seeds that follow (default: {MANY})"
+        "--schedules",
+        type=int,
+        metavar="N",
+        help=f"number of schedules, with consecutive seeds (default: {MANY})",
     )
     parser.add_argument(
         "--duration", type=float, metavar="S", help="length of each test (default: drawn, 10 to 60 s)"
     )
-    parser.add_argument("--schedule", metavar="LINE", help="play this one, as it was printed or changed")
-    parser.add_argument("--recorded", action="store_true", help="with a recorder, which has faults too")
-    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="processes; -1: all processors")
+    parser.add_argument(
+        "--schedule", metavar="LINE", help="play this schedule, as printed before, or changed"
+    )
+    parser.add_argument("--recorded", action="store_true", help="with a recorder, which may fail too")
+    parser.add_argument(
+        "--jobs", type=int, default=1, metavar="N", help="number of processes; -1 for one per processor"
+    )
     cli.json_argument(parser, "write the results as JSON on standard output")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Draw, simulate, judge; 1 where something that must hold does not."""
+    """Draw schedules, simulate them and check the invariants; 1 where one is violated."""
     from validation.faults.trial import play
     from validation.spread import spread
 
@@ -63,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def schedules(args: argparse.Namespace) -> list[Schedule]:
-    """What is to be played; raises InputError for options that make no trial."""
+    """The schedules to play; raises InputError for values out of range."""
     from validation.faults.schedule import draw, parse
     from validation.spread import needed
 
@@ -86,7 +93,7 @@ def schedules(args: argparse.Namespace) -> list[Schedule]:
 
 
 def reproduction(args: argparse.Namespace) -> str:
-    """How one schedule of these is played again; its seed or its line comes behind."""
+    """The command that plays one of these schedules again, with a place for its seed."""
     if args.schedule is not None:
         return f"rths faults --schedule '{args.schedule}'"
     length = "" if args.duration is None else f" --duration {args.duration:g}"
@@ -121,7 +128,7 @@ def summary(results: Sequence[TrialResult], spent: float, again: str) -> dict[st
 
 
 def show(found: dict[str, Any], results: Sequence[TrialResult]) -> None:
-    """The counts; of a single schedule its course; then what does not hold and how to see it again."""
+    """Write the counts, the course of a single schedule, and each violation with the command that shows it again."""
     if len(results) == 1:
         sys.stdout.write(f"{results[0].schedule}\n")
         for line in results[0].course:

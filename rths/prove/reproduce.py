@@ -1,4 +1,4 @@
-"""`rths reproduce`: the seed paper's numbers and figures, paper beside computed."""
+"""`rths reproduce`: the seed paper's numbers and figures beside those computed here."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     cli.output_argument(
         parser,
         "FOLDER",
-        "where recordings, figures and the page go (default: runs/reproduce)",
+        "folder for recordings, figures and the page (default: runs/reproduce)",
         default=Path("runs/reproduce"),
     )
     cli.force_argument(parser)

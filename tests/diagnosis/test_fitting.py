@@ -18,7 +18,8 @@ from common.recording.reader import read
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data, Fit
 from diagnosis.recorded import record
-from diagnosis.recorded.parts import MODEL_ERROR, Building, LaboratoryPart, Part, of_building
+from diagnosis.recorded.nuisances import of_building
+from diagnosis.recorded.parts import MODEL_ERROR, Building, LaboratoryPart, Part
 from diagnosis.recorded.record import Record
 from laboratories.effects import CATALOGUE
 from models.registry import Array

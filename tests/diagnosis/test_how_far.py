@@ -11,7 +11,7 @@ import pytest
 from common.recording.reader import read
 from common.roles import MASTER
 from diagnosis.diagnose import examine
-from diagnosis.findings import how_far
+from diagnosis.findings import gaps, how_far
 from diagnosis.recorded import record
 from diagnosis.recorded.loop import closed_share, overall
 from rths.examine.diagnose import diagnose_file
@@ -123,7 +123,7 @@ def test_a_falsified_reading_counts_once_in_the_noise_floor(cases: Cases, effect
 
 
 def test_withheld_time_is_a_good_part_of_the_test(cases: Cases) -> None:
-    mask = how_far.held_out(cases.record())
+    mask = gaps.held_out(cases.record())
     assert 0.15 < np.mean(mask) < 0.6
     assert not mask.all()
 
@@ -137,7 +137,7 @@ def test_what_closed_means() -> None:
 
 def test_a_diverging_simulation_is_a_gap_not_a_crash(cases: Cases) -> None:
     found = examine(cases.record(FOUND["column"]))
-    judge = how_far.Judge(found, found.record, how_far.held_out(found.record))
+    judge = gaps.RecordingGaps(found, found.record, gaps.held_out(found.record))
     assert judge.loop is not None
     systems = found.systems()
     wild_systems = systems | {MASTER: systems[MASTER].moved("actuator", delay=0.2)}

@@ -8,7 +8,7 @@ from common.plan.plan import Plan
 from common.roles import MASTER
 from diagnosis.fits import fitting, laws
 from diagnosis.fits.fitting import Data, Fit
-from diagnosis.recorded.parts import Nuisance
+from diagnosis.recorded.nuisances import Nuisance
 from laboratories.effects import CATALOGUE
 from laboratories.effects.effect import Effect
 from loop import replay

@@ -16,7 +16,8 @@ from common.plan.laboratory_tables import RigTable
 from common.plan.plan import Plan
 from common.recording.reader import read
 from common.recording.run import Run
-from diagnosis.recorded.link import LinkFinding, account, exchange_of, findings
+from diagnosis.recorded.link import LinkFinding, account, exchange_of
+from diagnosis.recorded.link_effects import findings
 from loop.closed_loop import on_time
 from loop.exchange import exchange
 from models.link.impaired import ImpairedLink
@@ -178,9 +179,6 @@ def test_late_ticks_are_counted_apart_and_are_no_effect() -> None:
         used[tick + 1] = used[tick]
     told = account(run, DT)
     assert told.late == 40
-    assert told.notes == (
-        "40 ticks at which a laboratory or the wire was late: scheduling, no effect of the link.",
-    )
     assert findings(told, DT) == []
 
 

@@ -51,6 +51,7 @@ def numbers(value: Any) -> Iterator[float]:
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_report_is_whole(cases: Cases, kind: str) -> None:
     report = report_of(cases, kind)
+    assert report["version"] == 2
     keeps_to_its_schema(report)
     adds_up(report)
     if kind == "two":  # pictures take long, and are those of any report

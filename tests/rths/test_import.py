@@ -140,12 +140,12 @@ SLIPS = {
     "kilonewtons for newtons": (
         LATE,
         1e-3 * FORCE,
-        "about a factor of 1000: look at the units of its column",
+        "about a factor of 1000: check the units of its column",
     ),
     "a wrong sign": (
         -LATE,
         FORCE,
-        "'column_displacement' runs against what the plan predicts of actuator_command",
+        "'column_displacement' has the opposite sign of what the plan predicts from actuator_command",
     ),
 }
 
@@ -166,7 +166,7 @@ def test_a_column_without_a_command_is_held_against_its_deformation(bring: Any, 
     rows = 'column_displacement = { column = "y" }\ncolumn_force = { column = "f", unit = "kN" }\n'
     assert bring(table("t,y,f", TIMES, LATE, FORCE), rows)[0] == 2
     assert (
-        "'column_force' is 1/1e+03 of what the plan predicts of column_displacement"
+        "'column_force' is 1/1e+03 of what the plan predicts from column_displacement"
         in capsys.readouterr().err
     )
 

@@ -32,14 +32,12 @@ class CaseSet:
     loggers: tuple[
         str, ...
     ] = ()  # taken in turn by the number of the case, none for the test's own recording
-    normal: bool = (
-        False  # true parameters are normal about the nominal ones, by tolerances as standard deviations
-    )
+    # True parameters are normal about the nominal ones, by tolerances as standard deviations.
+    normal: bool = False
     own: bool = False  # every laboratory that has one is played by its independent code
     materials: tuple[str, ...] = ()  # OpenSees' materials in the column's place, taken in turn
-    twice: bool = (
-        False  # a second motion is recorded, on which the diagnosis judges what it found on the first
-    )
+    # A second motion is recorded, on which the diagnosis judges what it found on the first.
+    twice: bool = False
 
     def kind(self, lot: Lot) -> str:
         """The kind of a case."""

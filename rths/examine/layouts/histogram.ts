@@ -1,5 +1,5 @@
-// The histogram of the round trip: one message, made at the last tick. A tick that comes again, as ticks do while a viewer
-// loads a file piece by piece, counts once.
+// The histogram of the round trip: one message, published at the last tick. A viewer that loads a file piece by piece
+// delivers some ticks twice; each tick counts once.
 
 type Tick = { message: { seq: number; round_trip: number } };
 type Histogram = { time: number[]; ticks: number[] };
@@ -9,7 +9,7 @@ export const output = $output;
 
 const LAST = $last; // tick at which the histogram is complete
 const WIDTH = $width; // of a bin, s
-const BINS = $bins; // the last one has what is beyond, too
+const BINS = $bins; // the last one also counts longer round trips
 
 const binOf: number[] = [];
 

@@ -1,4 +1,4 @@
-"""Rigs of the test '$name': what stands between rths and the devices of a laboratory.
+"""Rigs of the test '$name': the code between rths and the devices of a laboratory.
 
 A rig is constructed before the test, armed once, then read and written once in every interval, and disarmed at the end.
 All values are in SI units at the laboratory's own scale. `read` and `write` together must take less than an interval.
@@ -16,9 +16,8 @@ from common.rig import ColumnCommand, ColumnMeasurement, TableCommand, TableMeas
 class ColumnRig:
     """Laboratory A: an actuator that deforms a specimen."""
 
-    idle_readings = (
-        False  # True where `read` may be called any number of times before the test, to judge the sensors
-    )
+    # True where `read` may be called any number of times before the test, to judge the sensors.
+    idle_readings = False
 
     def __init__(self, interval: float, seed: int, **options: Any) -> None:
         """Open the device; `interval` in s, `options` as the plan's [master.rig] gives them."""

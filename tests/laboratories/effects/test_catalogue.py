@@ -215,7 +215,9 @@ def test_what_need_not_be_given_is_at_its_default(effect: Effect) -> None:
 def test_bounds_and_null_are_allowed(effect: Effect) -> None:
     for item in effect.parameters:
         for value in (item.least, item.most, item.null):
-            lay(BASE, [(effect.name, strong(effect) | {item.name: value})])
+            given = strong(effect) | {item.name: value}
+            same = lay(BASE, [(effect.name, given)]) == BASE
+            assert not same or item.null in given.values()
 
 
 @EACH

@@ -163,7 +163,8 @@ def test_a_test_that_ended_at_once_does_no_harm(name: str, count: int, tmp_path:
         run.columns[topic] = {signal: values[:count] for signal, values in columns.items()}
         if topic in run.sequences:
             run.sequences[topic] = run.sequences[topic][:count]
-    plot.save(run, SLAVE, PICTURES[name], tmp_path / "short.png")
+    drawn = plot.save(run, SLAVE, PICTURES[name], tmp_path / "short.png")
+    assert (tmp_path / "short.png").exists() == drawn
 
 
 @pytest.mark.parametrize("name", PICTURES)

@@ -10,13 +10,13 @@ from typing import Any
 import pytest
 
 from common.roles import MASTER, SLAVE
-from diagnosis.findings.calibration import clopper_pearson
 from diagnosis.report import read
 from tests.rths.diagnosis_report.reports import bare
 from tests.rths.report.pages import check_alone, check_in_browser
 from validation.blind.cases.case import Case, Laid
 from validation.blind.judge import DiagnosisAnswer
 from validation.blind.record import RecordedCase
+from validation.blind.results.calibration import clopper_pearson
 from validation.blind.results.measures import (
     binned,
     by_size,

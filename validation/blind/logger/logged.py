@@ -22,9 +22,8 @@ MAINS = 50.0  # Hz
 ORDER = 4  # of the anti-alias filter and of the filters that colour noise
 CORRELATION = 0.95  # of neighbouring samples of the noise "ar1"
 FREEDOM = 3  # degrees of freedom of Student's t: the fewest whole number that has a variance
-DEEPEST = (
-    0.1  # Hz, below which pink noise is flat: ten seconds are the longest wave that half a minute shows well
-)
+# Hz, below which pink noise is flat: ten seconds are the longest wave that half a minute shows well.
+DEEPEST = 0.1
 RANGE = (1.5, 5.0)  # range of a converter over the peak of its channel: nobody fits it better, or wastes more
 DECIMALS = {"m": 1e-6, "N": 1.0, "m/s²": 1e-3}  # 3 decimals of mm, of kN, of m/s²
 SETTLING = 4096  # samples before the first, in which coloured noise becomes stationary

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.findings.calibration import clopper_pearson, expected_calibration_error, wilson
-from diagnosis.findings.calibration import reliability as stated_and_observed
 from report.text.formats import percent, quantity
 from validation.blind.cases.names import NAMING
 from validation.blind.library import OWN_KERNEL
+from validation.blind.results.calibration import clopper_pearson, expected_calibration_error, wilson
+from validation.blind.results.calibration import reliability as stated_and_observed
 from validation.blind.results.rows import case_rows
 from validation.blind.results.scoring import JudgedEstimate, Outcome
 from validation.blind.results.stated import brier_score, in_columns, stated_verdicts
@@ -41,9 +41,8 @@ class Measure:
     least: float | None = None
     most: float | None = None
     unit: str = ""
-    passed: bool | None = (
-        None  # whether the goal is met; None without goal or case, and where the cases are too few
-    )
+    # Whether the goal is met; None without goal or case, and where the cases are too few.
+    passed: bool | None = None
 
     @property
     def verdict(self) -> str:

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from diagnosis.findings.calibration import brier
 from models.registry import Array
+from validation.blind.results.calibration import brier
 from validation.blind.results.scoring import Outcome
 
 Stated = tuple[float, bool]  # probability, and whether it was true

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from common.errors import InputError
-from diagnosis.findings import calibration
+from validation.blind.results import calibration
 
 
 @given(st.integers(1, 500), st.floats(0.0, 1.0), st.floats(0.5, 0.999))

@@ -13,8 +13,6 @@ from scipy.special import betaincinv
 from common.errors import InputError
 from models.registry import Array
 
-COOLEST, HOTTEST = 1e-3, 1e6  # temperatures looked between
-
 
 class Reliability(NamedTuple):
     """Stated and observed frequency per bin of the stated probability."""

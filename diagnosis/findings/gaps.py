@@ -1,0 +1,92 @@
+"""Gaps of one recording: without effects, with the effects found in it or in another recording, and of noise alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from diagnosis.findings.found import Diagnosis
+from diagnosis.fits import fitting
+from diagnosis.recorded import link
+from diagnosis.recorded.loop import RecordedLoop
+from diagnosis.recorded.record import Record
+from diagnosis.signals.mask import Mask
+from models.registry import Array
+from models.system import System
+
+QUIET = 0.2  # noise over a signal's rms from which on a gap relative to that rms is mostly noise, and is not judged
+
+
+def held_out(record: Record) -> Mask:
+    """Ticks that no fit has seen."""
+    return fitting.withheld_ticks(record.ticks, record.plan.test.interval)
+
+
+class RecordingGaps:
+    """Gaps of one recording under the hypotheses found in another, or in the same."""
+
+    def __init__(self, found: Diagnosis, record: Record, mask: Mask) -> None:
+        self.found, self.record, self.mask = found, record, mask
+        names = tuple(name for name in record.responses if record.has(name))
+        self.loop: RecordedLoop | None = None
+        if record.ground is not None and record.has("displacement", *record.targets) and names:
+            exchange = link.exchange_of(record.run, record.ticks) if found.link else None
+            self.loop = RecordedLoop(record, record.ground, exchange, names)
+
+    def signals(self, sites: frozenset[str] | None) -> Mapping[str, Array] | None:
+        """Simulated response with the effects of some sites, of all where None."""
+        linked = sites is None or "link" in sites
+        return self.simulated(self.found.systems(sites, self.record.plans), linked=linked)
+
+    def simulated(self, systems: Mapping[str, System], *, linked: bool = True) -> Mapping[str, Array] | None:
+        """Simulated response of systems, with the exchange that was found where `linked`."""
+        if self.loop is not None:
+            return self.loop.simulate(systems, linked=linked and bool(self.found.link))
+        return self.open(systems)
+
+    def open(self, systems: Mapping[str, System]) -> Mapping[str, Array]:
+        """Each part's own prediction, where no loop was recorded."""
+        result: dict[str, Array] = {}
+        for verdict in self.found.verdicts:
+            part = verdict.search.data.part
+            if not part.exact:
+                result |= dict(zip(part.signals, part.predict(systems[part.role]).T, strict=True))
+        return result
+
+    def gap(self, simulated: Mapping[str, Array] | None, mask: Mask | None = None) -> dict[str, float]:
+        """Gap per response signal."""
+        chosen = self.mask if mask is None else mask
+        if self.loop is not None:
+            return self.loop.gap(simulated, chosen)
+        known = simulated or {}
+        names = [
+            name
+            for name in self.record.responses
+            if name in known and self.record.has(name) and self.moves(name)
+        ]
+        result = {}
+        for name in names or [name for name in known if self.record.has(name)]:
+            there = self.record.present[name] & chosen
+            recorded = self.record.signals[name][there]
+            error = recorded - known[name][there]
+            level = float(np.mean(recorded**2))
+            result[name] = float(np.sqrt(np.mean(error**2) / level)) if level > 0.0 else 0.0
+        return result
+
+    def moves(self, name: str) -> bool:
+        """Whether a signal stands well out of its noise."""
+        level = float(np.sqrt(np.mean(self.record.signals[name] ** 2)))
+        return level > 0.0 and self.found.white.get(name, 0.0) < QUIET * level
+
+    def floor(self) -> dict[str, float]:
+        """Gap that noise alone makes."""
+        if self.loop is not None:
+            systems = self.found.systems(plans=self.record.plans, noisy=False)
+            return self.loop.floor(systems, self.found.white, self.mask)
+        result = {}
+        for name, white in self.found.white.items():
+            there = self.record.present[name] & self.mask
+            level = float(np.mean(self.record.signals[name][there] ** 2)) if there.any() else 0.0
+            result[name] = white / float(np.sqrt(level)) if level > 0.0 else 0.0
+        return result

@@ -1,0 +1,150 @@
+"""Unknowns that a fit moves beside the effects: nominal parameters within tolerances, and properties of a logger."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from common.plan.plan import Plan
+from common.recording.imported import NOTHING_STATED, ImportedChannel
+from diagnosis.recorded.laboratory import RecordedLaboratory
+from diagnosis.recorded.record import Record
+from models.system import System
+
+
+@dataclass(frozen=True)
+class Nuisance:
+    """A nominal parameter that may move within its tolerance, of the building or of a laboratory."""
+
+    parameter: str  # table.name of the plan
+    tolerance: float
+    lab: RecordedLaboratory | None = None
+    storey: int = field(default=0, kw_only=True)  # the only storey whose value moves, from 1; 0 for all
+    of_record = False  # whether it belongs to the recording alone and changes nothing of the test
+
+    @property
+    def name(self) -> str:
+        """The name in reports: part.parameter, with the storey where only one storey's value moves."""
+        if self.storey:
+            return f"{self.parameter} of storey {self.storey}"
+        return self.lab.site(self.parameter) if self.lab else self.parameter
+
+    def moved(self, system: System, z: float) -> System:
+        """The system with the parameter moved by `z` tolerances."""
+        if z == 0.0:
+            return system
+        factor = 1.0 + z * self.tolerance
+        if self.lab:
+            return self.lab.kind.scaled(system, self.parameter, factor)
+        table, _, key = self.parameter.partition(".")
+        if not self.storey:
+            return system.scaled(table, key, factor)
+        values = getattr(getattr(system.plan, table), key)
+        place = self.storey - 1
+        return system.moved(table, **{key: (*values[:place], factor * values[place], *values[self.storey :])})
+
+
+@dataclass(frozen=True)
+class ChannelGain(Nuisance):
+    """The calibration of one channel of a logger, within the tolerance stated for it."""
+
+    of_record = True
+    signal: str = ""  # of the reading in its laboratory
+
+    @property
+    def name(self) -> str:
+        """The name in reports."""
+        site = f"sensor.{self.signal}"
+        return f"{self.lab.site(site) if self.lab else site}.calibration"
+
+    def moved(self, system: System, z: float) -> System:
+        """The system whose reading has that gain."""
+        return system if z == 0.0 else system.sensed(self.signal, gain=1.0 + z * self.tolerance)
+
+
+@dataclass(frozen=True)
+class LoggedForce(Nuisance):
+    """Delay (s) or gain with which a logger recorded a force that the master used."""
+
+    of_record = True
+    signal: str = ""  # of the force's reading
+
+    def moved(self, system: System, z: float) -> System:
+        """The system whose reading of that force has the logger's delay or gain."""
+        value = z * self.tolerance
+        return system.sensed(
+            self.signal, **({"delay": value} if self.parameter == "delay" else {"gain": 1.0 + value})
+        )
+
+
+@dataclass(frozen=True)
+class LoggedReadings(Nuisance):
+    """Delay (s) with which a logger recorded all readings of a laboratory, about the one that was found elsewhere."""
+
+    of_record = True
+    signals: tuple[str, ...] = ()  # of the readings in their laboratory
+    about: float = 0.0  # s, the delay at z = 0
+
+    def moved(self, system: System, z: float) -> System:
+        """The system whose readings have that delay, which is never negative."""
+        delay = max(0.0, self.about + z * self.tolerance)
+        for name in self.signals if delay > 0.0 else ():
+            system = system.sensed(name, delay=delay)
+        return system
+
+
+def nuisances(lab: RecordedLaboratory, names: tuple[str, ...]) -> tuple[Nuisance, ...]:
+    """The parameters of a laboratory that can move, of those with these names."""
+    found = ((name, lab.kind.planned(lab.plan, name), lab.kind.tolerance(lab.plan, name)) for name in names)
+    return tuple(
+        Nuisance(name, tolerance, lab) for name, value, tolerance in found if movable(value, tolerance)
+    )
+
+
+def of_building(plan: Plan) -> tuple[Nuisance, ...]:
+    """The parameters of the building that can move; storeys with a value of their own move one by one."""
+    known, result = plan.tolerances, []
+    for key in ("mass", "stiffness", "damping", "damping_ratio"):
+        name, values = f"structure.{key}", getattr(plan.structure, key)
+        tolerance = known.parameters.get(name, known.default)
+        if movable(values, tolerance):
+            storeys = range(1, len(values) + 1) if apart(plan, values) else (0,)
+            result += [Nuisance(name, tolerance, storey=storey) for storey in storeys]
+    return tuple(result)
+
+
+def apart(plan: Plan, values: Any) -> bool:
+    """Whether a parameter of the building has values of several storeys that may be wrong one by one.
+
+    Entries of a matrix move together, so that it stays symmetric; so do all values beside `[structure.experimental]`.
+    """
+    several = isinstance(values, tuple) and len(values) > 1 and not isinstance(values[0], tuple)
+    return several and plan.structure.experimental is None
+
+
+def movable(value: Any, tolerance: float) -> bool:
+    """Whether a parameter's values are finite and not zero, and uncertain at all."""
+    values = np.asarray(value)
+    return tolerance > 0.0 and bool(np.all(np.isfinite(values)) and np.all(values != 0.0))
+
+
+def channels(record: Record, lab: RecordedLaboratory) -> tuple[ImportedChannel, ...]:
+    """The stated properties of the logger's channels of a laboratory; neutral ones where rths recorded the test."""
+    stated = record.stated
+    if stated is None:
+        return (NOTHING_STATED,) * len(lab.measured)
+    return tuple(stated.channel(lab.role, name) for name in lab.kind.channels.names)
+
+
+def calibrations(
+    record: Record, lab: RecordedLaboratory, stated: tuple[ImportedChannel, ...]
+) -> tuple[ChannelGain, ...]:
+    """Gains of the channels that were recorded, within the tolerances stated."""
+    rows = zip(lab.kind.channels.names, lab.measured, stated, strict=True)
+    return tuple(
+        ChannelGain("gain", channel.calibration, lab, name)
+        for name, given, channel in rows
+        if channel.calibration > 0.0 and record.has(given)
+    )
