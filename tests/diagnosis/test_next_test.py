@@ -83,7 +83,7 @@ def test_what_is_explained_and_unambiguous_needs_no_test(cases: Cases) -> None:
 def test_what_no_motion_separates_asks_for_a_look_at_the_sensor(cases: Cases) -> None:
     report = cases.report({"column.stiffness": {"factor": 1.1}})
     assert "check the sensor" in report["next_test"]
-    assert "No motion at hand separates" in report["next_test"]
+    assert "No proposed motion separates" in report["next_test"]
     assert report["details"]["next"][0]["separation"] < next_test.ENOUGH
 
 
@@ -94,7 +94,7 @@ def test_the_advice_in_words() -> None:
     assert next_test.sentence([best, other]) == (
         "Run a sine: it separates column.slip from column.pinching by 12 standard deviations of the noise."
     )
-    assert next_test.sentence([other], str.upper).startswith("No motion at hand separates COLUMN.SLIP")
+    assert next_test.sentence([other], str.upper).startswith("No proposed motion separates COLUMN.SLIP")
 
 
 def test_spikes_of_the_recording_are_not_in_the_next_test(cases: Cases) -> None:

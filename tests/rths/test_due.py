@@ -81,7 +81,7 @@ def test_the_verdict_says_where_a_test_stopped_and_what_is_missing_until_then() 
 def test_of_a_recording_that_was_cut_off_nobody_says_when_the_test_stopped() -> None:
     facts = {"master": {"missing": 0}}
     summary = {"ticks_planned": 7000, "ticks_expected": 330, "topics": facts, "recorder": {}}
-    assert stopped(summary) == "recorded until tick 330 of 7000; what came after it is not known"
+    assert stopped(summary) == "recorded until tick 330 of 7000; the rest of the test is not in the file"
     assert completeness(summary).startswith(
         "The recording ends at tick 330 of 7000; all until then are recorded"
     )

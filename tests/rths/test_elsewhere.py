@@ -376,7 +376,7 @@ def test_what_a_layout_cannot_be_made_of_is_said_in_one_sentence(
     bare.add("master", 0, 0, (0, 0.0))
     bare.close({})
     wrong = {
-        (tmp_path / "bare.mcap", tmp_path / "a.json"): "holds nothing of which a layout has a panel",
+        (tmp_path / "bare.mcap", tmp_path / "a.json"): "holds no signal for any panel of a layout",
         (tmp_path / "none.mcap", tmp_path / "a.json"): "Cannot read the recording",
         (recordings["one slave"], tmp_path): "it is a folder; give the name of a file",
     }

@@ -82,7 +82,8 @@ def test_rows_between_the_ticks_are_marked(bring: Any, capsys: Any) -> None:
     said = capsys.readouterr().out
     assert "interpolated onto the ticks, and marked so: actuator_command, column_displacement" in said
     assert (
-        "link: the link cannot be judged, because the data hold no numbers and no stamps of messages" in said
+        "link: the link cannot be judged, because the data hold no numbers and no time stamps of messages"
+        in said
     )
 
 

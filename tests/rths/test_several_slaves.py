@@ -128,7 +128,7 @@ def test_what_is_exported_can_be_imported_slave_by_slave(
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("table_target", "'table_target' has one value per slave here and cannot be given as one column"),
+        ("table_target", "'table_target' has one value per slave in this plan, so one column cannot give it"),
         ("rof.damper_force", "Unknown signal 'rof.damper_force'"),
         ("damper_force", "Unknown signal 'damper_force'"),
     ],
@@ -251,7 +251,7 @@ def test_a_report_for_a_file_is_of_one_laboratory_of_the_recordings_own_slaves(
     call: Any, capsys: Any, recording: Path, virtual_recording: Path, plan_file: Path, tmp_path: Path
 ) -> None:
     for words, sentence in (
-        ((recording, "--json", tmp_path / "a.json"), "say which one with --name (roof, cellar)"),
+        ((recording, "--json", tmp_path / "a.json"), "choose it with --name (roof, cellar)"),
         ((recording, "--name", "celar"), "has no slave 'celar': did you mean cellar?"),
         ((virtual_recording, "--name", "roof"), "has no slave 'roof': leave out --name."),
         (

@@ -114,7 +114,7 @@ def test_a_second_ctrl_c_leaves_the_specimen_unloaded_the_rig_disarmed_and_the_r
         process.send_signal(signal.SIGINT)
         _, err = process.communicate(timeout=50.0)
     assert process.returncode == 3, err
-    assert "already stopping, no laboratory is killed on its ramp to rest" in err
+    assert "already stopping; no laboratory is killed while it arms or is on its ramp to rest" in err
     assert err.rstrip().endswith("stopped by the user (SIGINT).")
     assert abs(json.loads((tmp_path / "disarmed").read_text())) < 300.0
     run = read(recording)
