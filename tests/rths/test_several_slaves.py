@@ -179,7 +179,7 @@ def test_a_simulated_reality_is_the_test_to_the_last_bit(
     truth.write_text("[slave.roof.rig]\nclass = 'my_lab.py:Lab'\n")
     capsys.readouterr()
     assert call("simulate", plan_file, "--reality", truth) == 2
-    assert "[slave.roof.rig] is a plug-in" in capsys.readouterr().err
+    assert "[slave.roof.rig] names a plug-in" in capsys.readouterr().err
 
 
 def test_a_simulation_beyond_a_limit_is_exit_code_1(call: Any, capsys: Any, plan_file: Path) -> None:
