@@ -28,7 +28,6 @@ from diagnosis.recorded.laboratory import RecordedLaboratory
 from diagnosis.recorded.link import LinkFinding
 from diagnosis.recorded.parts import Building, ColumnAlone, LaboratoryPart, Part
 from diagnosis.recorded.record import LEAST_TICKS, Record
-from diagnosis.report.records import Report
 from models.system import System
 
 # s. A shorter recording is not judged: it holds less than one period of the default building's first mode (2 Hz).
@@ -46,8 +45,8 @@ def diagnose(
     tell: Tell = untold,
     require: float | None = None,
     more: Mapping[str, Sequence[Record]] = MappingProxyType({}),
-) -> dict[str, Report]:
-    """The reports on a test by role of the slave, without their verdicts in words, which the pages add.
+) -> dict[str, report.Judged]:
+    """The reports on a test by role of the slave, without their verdicts in words, each with what was found.
 
     Each report covers the master and one slave; its closed loop holds the other slaves as they were diagnosed. A test
     without slaves has one report, under the master's role. `require` is the gap that may be left in each part. Effects

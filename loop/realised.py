@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from common.errors import InputError
+from common.plan.found import LearnedEntry
 from common.plan.plan import Plan
 from common.plan.reality import Reality
 from common.plan.schema import nearest
@@ -31,7 +32,21 @@ def true_system(reality: Reality) -> System:
         check(name, only, whole.plan, known)
     for part in (one,) if reality.whole else map(whole.of, (MASTER, *whole.plan.roles)):
         check_rig(part)
-    return lay(System(one.plan), [entry for entry in one.effects if entry[0] in own], own)
+    system = lay(System(one.plan), [entry for entry in one.effects if entry[0] in own], own)
+    for law in one.learned:
+        system = with_learned(system, law)
+    return system
+
+
+def with_learned(system: System, given: LearnedEntry) -> System:
+    """The system whose machine follows a learned law beside its model; raises InputError for a machine that cannot."""
+    machine = getattr(system.effects, given.machine, None)
+    if not hasattr(machine, "learned"):
+        raise InputError(
+            f"machine of [[learned]] is '{given.machine}', which follows no learned law: "
+            "give actuator, column or damper."
+        )
+    return system.laid(given.machine, learned=given.law)
 
 
 def check(name: str, only: str, whole: Plan, known: dict[str, Effect]) -> None:

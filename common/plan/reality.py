@@ -12,6 +12,7 @@ from typing import Any
 
 from common.errors import PlanError
 from common.plan.building import OF_FOPDT
+from common.plan.found import LearnedEntry, check_found, learned
 from common.plan.kinds import TABLES_OF_KIND, known_kind
 from common.plan.laboratory_tables import RigTable
 from common.plan.plan import Plan
@@ -32,7 +33,7 @@ MERGED = (
     "parameters",
     "noise",
 )  # inner tables that keep the keys that a reality does not give
-KNOWN = ("seed", "master", "slave", "link", "effect", *TRUE_TABLES)
+KNOWN = ("seed", "master", "slave", "link", "effect", "found", "learned", *TRUE_TABLES)
 
 
 @dataclass(frozen=True)
@@ -54,6 +55,7 @@ class Reality:
     only: tuple[
         str, ...
     ] = ()  # for each effect the one role to whose laboratory it is applied, empty for all
+    learned: tuple[LearnedEntry, ...] = ()  # laws that a diagnosis learned of what no effect explains
     slaves: dict[str, RigTable] = field(default_factory=dict)  # by role, where the plan names them
     role: str = SLAVE
     place: int = 0
@@ -71,6 +73,7 @@ class Reality:
             slaves=self.slaves if role == MASTER else {},
             effects=tuple(entry for entry, _ in kept),
             only=tuple(alone for _, alone in kept),
+            learned=tuple(entry for entry in self.learned if entry.role == role),
             role=role,
             place=list(self.slaves).index(role) if role in self.slaves else 0,
             whole=self.whole or self,
@@ -101,6 +104,7 @@ def from_reality(tables: dict[str, Any], plan: Plan, base: Path) -> Reality:
     for name in tables:
         if name not in KNOWN:
             raise PlanError(f"Unknown entry '{name}': {nearest(name, KNOWN)}")
+    check_found(tables, plan)
     seed = tables.get("seed", plan.test.seed)
     if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
         raise PlanError(f"seed is {seed!r}, but must be a whole number of at least 0.")
@@ -118,6 +122,7 @@ def from_reality(tables: dict[str, Any], plan: Plan, base: Path) -> Reality:
         hidden=frozenset(role for role, lab in labs.items() if "rig" in lab),
         effects=entries(effects),
         only=tuple(alone(entry, plan) for entry in effects),
+        learned=learned(tables, plan, base),
         slaves=rigs if plan.slaves else {},
     )
 

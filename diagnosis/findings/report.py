@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,9 +19,16 @@ from diagnosis.report.records import Place, Report, Status, Tolerance
 STILL = 5.0  # rms of a signal over its noise below which nothing is judged: its noise alone is a gap of 20 %
 
 
+class Judged(NamedTuple):
+    """A report without its verdict in words, and its diagnosis with the learned laws that hold."""
+
+    report: Report
+    found: Diagnosis
+
+
 def build(
     found: Diagnosis, validation: Sequence[Record], tell: Tell = untold, require: float | None = None
-) -> Report:
+) -> Judged:
     """The whole report without its verdict in words; `require` is the gap that may be left in each part."""
     tell("how far the gap closes", 0, 0)
     far = how_far.judge(found, validation)
@@ -28,7 +36,7 @@ def build(
     named = which(found)
     tell("the next test", 0, 0)
     tests = next_test.choices(found)
-    return Report(
+    whole = Report(
         version=2,
         status=status_of(found),
         tolerances=tolerances(found),
@@ -43,6 +51,7 @@ def build(
         parts=parts_table.parts(found, require),
         details=details.details(found, far, named.candidates, tests),
     )
+    return Judged(whole, found)
 
 
 def status_of(found: Diagnosis) -> Status:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from common.plan.found import LearnedEntry
 from diagnosis.fits.fitting import Fit
 from diagnosis.learned.equations import Equation, equations
 from diagnosis.learned.regression import Regression, regress
@@ -22,6 +23,11 @@ class LearnedLaw:
     role: str  # of the process that drives the laboratory
     equation: Equation
     regression: Regression
+
+    @property
+    def entry(self) -> LearnedEntry:
+        """The law as a reality says it."""
+        return LearnedEntry(self.role, self.equation.machine, tuple(self.regression.law.tolist()))
 
     def laid(self, system: System, of: Of = "law") -> System:
         """The system with the law added to what the machine does."""

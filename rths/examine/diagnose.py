@@ -7,9 +7,10 @@ import dataclasses
 import json
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from common.errors import InputError
 from common.plan.schema import nearest
@@ -21,7 +22,10 @@ from report.text.progress import Progress
 
 if TYPE_CHECKING:
     from common.recording.run import Run
+    from diagnosis.findings.as_reality import FoundReality
     from diagnosis.report.records import Report
+
+LAWS = ".npz"  # ending of the file with the laws that were learned, beside the reality
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -47,6 +51,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--json", type=Path, metavar="OUT", help="write the report as JSON; - for standard output"
+    )
+    parser.add_argument(
+        "--found",
+        type=Path,
+        metavar="OUT",
+        help="write what was found as a reality for rths run --virtual and rths simulate: out.toml, and beside it "
+        "out.npz where something was learned",
     )
     parser.add_argument("--html", type=Path, metavar="OUT", help="write the report as one HTML page")
     cli.force_argument(parser)
@@ -74,7 +85,7 @@ def run(args: argparse.Namespace) -> int:
 
         recording = read(args.file)
         names = chosen(recording, args)
-        found = diagnose_slaves(
+        found, reality = diagnosed(
             recording,
             more=args.more,
             plan=args.plan,
@@ -83,6 +94,9 @@ def run(args: argparse.Namespace) -> int:
             tell=progress.tell,
             require=args.require,
         )
+        if args.found:
+            write_found(args.found, reality(), args.force)
+            found = {name: dataclasses.replace(one, found=str(args.found)) for name, one in found.items()}
         reports = [found[name] for name in names]
         report = reports[0]
         if args.html:
@@ -103,9 +117,29 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
+def write_found(path: Path, found: FoundReality, force: bool) -> None:
+    """Write what was found as a reality, with the laws that were learned in a file beside it."""
+    import numpy as np
+    import tomli_w
+
+    beside = path.with_suffix(LAWS)
+    if found.learned:
+        with outputs.writing(beside, force) as place, place.open("wb") as file:
+            np.savez(file, **{f"{law.role}.{law.machine}": np.array(law.law) for law in found.learned})  # type: ignore[arg-type]
+    rows = [{"laboratory": law.role, "machine": law.machine, "file": beside.name} for law in found.learned]
+    tables = found.tables | ({"learned": rows} if rows else {})
+    outputs.write_text(path, tomli_w.dumps(tables), force)
+
+
 def check(args: argparse.Namespace) -> None:
     """Raise InputError where the report cannot be written, before any work is done."""
-    files = [path for path in (args.html, args.json) if path and str(path) != "-"]
+    files = [path for path in (args.html, args.json, args.found) if path and str(path) != "-"]
+    if args.found:
+        if args.ideal:
+            raise InputError("--found writes what the laboratories of the plan are: leave out --ideal.")
+        if args.found.suffix != ".toml":
+            raise InputError(f"--found names {args.found}, but writes TOML: give a name that ends in .toml.")
+        files.append(args.found.with_suffix(LAWS))
     inputs = [args.file, *args.more, *args.validate, *([cli.plan_path(args.plan)] if args.plan else [])]
     for path in files:
         outputs.checked(path, args.force, inputs)
@@ -118,7 +152,7 @@ def check(args: argparse.Namespace) -> None:
     if args.require is not None and not 0.0 < args.require < math.inf:
         raise InputError(f"--require {args.require:g} cannot be used: give a gap above 0, such as 0.02.")
     if len({outputs.target(path) for path in files}) < len(files):
-        raise InputError(f"--html and --json both name {args.html}: give each a file of its own.")
+        raise InputError("--html, --json and --found name one file twice: give each a file of its own.")
 
 
 def chosen(recording: Run, args: argparse.Namespace) -> list[str]:
@@ -152,7 +186,12 @@ def diagnose_recording(path: Path, validate: Sequence[Path] = ()) -> dict[str, R
     return diagnose_slaves(read(path), validate=validate)
 
 
-def diagnose_slaves(
+def diagnose_slaves(recording: Run, **options: Any) -> dict[str, Report]:
+    """The reports on a recording by the name of the slave, as `diagnosed` with the same options."""
+    return diagnosed(recording, **options)[0]
+
+
+def diagnosed(
     recording: Run,
     *,
     more: Sequence[Path] = (),
@@ -161,11 +200,12 @@ def diagnose_slaves(
     against_ideal: bool = False,
     tell: Tell = untold,
     require: float | None = None,
-) -> dict[str, Report]:
-    """The reports on a recording by the name of the slave; the name is empty where the slave has none or there is none.
+) -> tuple[dict[str, Report], Callable[[], FoundReality]]:
+    """The reports on a recording by the name of the slave, and a function that makes the reality that was found.
 
-    Each covers the master and that slave, and its verdict begins with the laboratory's name where slaves have names.
-    Effects must also explain the recordings `more` of the same laboratories, if given.
+    The name is empty where the slave has none or there is none. Each report covers the master and that slave, and its
+    verdict begins with the laboratory's name where slaves have names. Effects must also explain the recordings `more`
+    of the same laboratories, if given. The function raises InputError where a reality file cannot say what was found.
 
     Raises:
         InputError: a file cannot be read, or holds nothing to diagnose.
@@ -173,6 +213,7 @@ def diagnose_slaves(
     from common.plan import read as plans
     from common.recording.reader import read
     from diagnosis.diagnose import diagnose
+    from diagnosis.findings.as_reality import as_reality
     from diagnosis.recorded import record
     from diagnosis.recorded.slips import refuse_slips
     from report.gap import wording
@@ -192,8 +233,9 @@ def diagnose_slaves(
         for some in (others[: len(more)], others[len(more) :])
     )
     result = {}
-    for role, report in diagnose(own, held, tell, require, searched).items():
+    judged = diagnose(own, held, tell, require, searched)
+    for role, (report, _) in judged.items():
         name, words = name_of(role), wording.verdict(report)
         verdict = f"Laboratory {name}: {words}" if name else words
         result[name] = dataclasses.replace(report, verdict=verdict)
-    return result
+    return result, partial(as_reality, {role: item.found for role, item in judged.items()})

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -46,20 +47,27 @@ def sentence(capsys: Any, message: str) -> None:
 def test_report_page_and_summary(call: Any, capsys: Any, cases: Cases, tmp_path: Path) -> None:
     out, html = tmp_path / "gap.json", tmp_path / "gap.html"
     path = cases.file(FRICTION, duration=8.0)
-    assert call("diagnose", path, "--json", out, "--html", html) == 0
+    reality = tmp_path / "found.toml"
+    assert call("diagnose", path, "--json", out, "--html", html, "--found", reality) == 0
     text, error = capsys.readouterr()
     assert all(line.startswith("diagnosing: ") for line in error.splitlines())
     assert "damper friction" in text
     report = checked(out)
     assert report["which"][0]["effects"] == ["damper.friction"]
     assert report["details"]["test"]["file"] == path.name
+    assert report["found"] == str(reality)
+    assert tomllib.loads(reality.read_text(encoding="utf-8"))["found"]["recording"] == path.name
+    assert call("simulate", "default", "--duration", 1, "--reality", reality) == 0
+    capsys.readouterr()
+    assert call("simulate", "rc_column", "--duration", 1, "--reality", reality) == 2
+    sentence(capsys, "it was found with other nominal models than this plan's")
     assert "damper" in report["verdict"]
     page = html.read_text(encoding="utf-8")
     assert page.startswith("<!doctype html>")
     assert not re.findall(r"(?:src|href)=[\"'](?!#|data:)", page)  # nothing is loaded from elsewhere
     assert str(path.parent) not in page
     assert call("diagnose", path, "--json", "-") == 0
-    assert json.loads(capsys.readouterr().out) == report
+    assert json.loads(capsys.readouterr().out) == report | {"found": None}
 
 
 @pytest.mark.slow

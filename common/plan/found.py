@@ -1,0 +1,89 @@
+"""What a diagnosis found, as a reality says it: the plan that it is of, and laws that were learned from a recording."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+from zipfile import BadZipFile
+
+import numpy as np
+
+from common.errors import PlanError
+from common.plan.plan import Plan
+from common.roles import MASTER
+
+# the tables of a plan that say what the laboratories and the building are: what was found is of these nominal models
+OF_MODELS = ("structure", "column", "actuator", "table", "damper", "device", "master", "slave", "slaves")
+
+
+class LearnedEntry(NamedTuple):
+    """A law of `models.preisach` that a machine of one laboratory follows beside its model."""
+
+    role: str
+    machine: (
+        str  # `column`, `actuator` or `damper`: a part of `models.system.Effects` with the field `learned`
+    )
+    law: tuple[float, ...]
+
+
+def models_of(plan: Plan) -> str:
+    """Sixteen hex digits that agree where two plans have the same nominal models; motion and control are free."""
+    tables = plan.tables()
+    text = json.dumps({name: tables.get(name) for name in OF_MODELS}, sort_keys=True)
+    return hashlib.blake2b(text.encode(), digest_size=8).hexdigest()
+
+
+def check_found(tables: Mapping[str, Any], plan: Plan) -> None:
+    """Raise PlanError where a reality was found with other nominal models than the plan's."""
+    given = tables.get("found", {})
+    if not isinstance(given, dict):
+        raise PlanError(f"[found] must be a table, not {given!r}.")
+    models = given.get("models", "")
+    if models and models != models_of(plan):
+        raise PlanError(
+            f"it was found with other nominal models than this plan's ({models}, not {models_of(plan)}): diagnose a "
+            "recording of this plan's laboratories, or give the plan that it was found with."
+        )
+
+
+def learned(tables: Mapping[str, Any], plan: Plan, base: Path) -> tuple[LearnedEntry, ...]:
+    """The laws of `[[learned]]` tables, each read from the file that it names, relative to `base`.
+
+    Raises:
+        PlanError: an entry lacks a key, names a laboratory that the plan does not have, or its file holds no such law.
+    """
+    given = tables.get("learned", [])
+    if not isinstance(given, list) or not all(isinstance(entry, dict) for entry in given):
+        raise PlanError("laws that were learned are given as [[learned]] tables.")
+    return tuple(entry_of(entry, plan, base) for entry in given)
+
+
+def entry_of(entry: Mapping[str, Any], plan: Plan, base: Path) -> LearnedEntry:
+    """One law; raises PlanError as `learned`."""
+    keys = ("laboratory", "machine", "file")
+    for key in keys:
+        if not isinstance(entry.get(key), str):
+            raise PlanError(f"{key} of [[learned]] is {entry.get(key)!r}, but must be text.")
+    role, machine, path = (str(entry[key]) for key in keys)
+    if role not in (MASTER, *plan.roles):
+        raise PlanError(f"laboratory of [[learned]] is '{role}', which the plan does not have.")
+    return LearnedEntry(role, machine, law_in(base / path, f"{role}.{machine}"))
+
+
+def law_in(path: Path, name: str) -> tuple[float, ...]:
+    """A law in an .npz file; raises PlanError where it cannot be read or is no series of finite numbers."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            law = np.asarray(file[name], dtype=np.float64)
+    except (OSError, ValueError, KeyError, BadZipFile):
+        raise PlanError(
+            f"Cannot read the law '{name}' in {path}: keep the file that `rths diagnose --found` wrote beside it."
+        ) from None
+    if law.ndim != 1 or law.size == 0 or not np.all(np.isfinite(law)):
+        raise PlanError(
+            f"The law '{name}' in {path} is no series of finite numbers: diagnose the recording anew."
+        )
+    return tuple(law.tolist())
