@@ -17,6 +17,7 @@ from benchmarks import (
     recorder,
     scale,
     start,
+    udp_rig,
     virtual_time,
 )
 from benchmarks.result import BenchmarkFigure
@@ -38,6 +39,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "scale": scale.run,
     "recorder": recorder.run,
     "codec": codec.run,
+    "udp_rig": udp_rig.run,
     "start": start.run,
     "false_trips": false_trips.run,
 }

@@ -17,6 +17,8 @@ from common import blame
 from common.errors import EmergencyStopError, RigError
 from common.rig_time import RigTime
 from common.signals import Channels
+from common.udp.account import Account
+from common.udp.rig import UdpRig
 
 ANYTHING = (
     Exception,
@@ -122,6 +124,9 @@ class AtRest(Protocol):
     ) -> None:
         """Read channels of these names several times, an interval apart where `paced`; raise RigError where unsound."""
 
+    def reach(self, rig: UdpRig, *, hidden: bool) -> None:
+        """Judge the exchanges with a rig in another process; raise RigError where they are too slow."""
+
     def skip(self, kind: str, *, hidden: bool) -> None:
         """Take note of a rig of the class `kind` that cannot be read at rest."""
 
@@ -163,6 +168,21 @@ class GuardedRig:
         """The rig's name in errors."""
         return self._name
 
+    def follow(self, mode: Callable[[], int]) -> None:
+        """Tell a rig in another process the number that `mode` gives of its laboratory's safety mode."""
+        if isinstance(self._rig, UdpRig):
+            self._rig.follow(mode)
+
+    @property
+    def missed(self) -> int:
+        """Intervals in a row in which a rig in another process has not answered in time; 0 of any other rig."""
+        return self._rig.missed if isinstance(self._rig, UdpRig) else 0
+
+    @property
+    def exchanged(self) -> Account | None:
+        """The account of the packets with a rig in another process; None of any other rig, and of a hidden one."""
+        return self._rig.account if isinstance(self._rig, UdpRig) and not self._hidden else None
+
     def arm(self) -> None:
         """Arm the rig; raises RigError with the rig's own reason, or where a sensor at rest is unsound."""
         try:
@@ -173,6 +193,8 @@ class GuardedRig:
             self._judge(self._at_rest)
 
     def _judge(self, at_rest: AtRest) -> None:
+        if isinstance(self._rig, UdpRig):
+            at_rest.reach(self._rig, hidden=self._hidden)
         fields: tuple[str, ...] = self._measurement._fields  # type: ignore[attr-defined]
         if self._twin is not None:
             twin = GuardedRig(self._twin(), self._name, self._measurement, hidden=self._hidden)

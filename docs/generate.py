@@ -14,8 +14,9 @@ from common.plan.plan import Plan
 from common.plan.read import parse
 from common.plan.tables import Limits, Preflight, SafetyTable
 from common.rig import ColumnMeasurement, TableCommand, TableMeasurement
-from common.safety.modes import MEANING, TURNS, mermaid
+from common.safety.modes import MEANING, TURNS, Mode, mermaid
 from common.signals import OF_STOREYS, SENT, TOPICS
+from common.udp import packets
 from diagnosis.report import schema
 from docs import reference_tables
 from docs.markdown import quantity, table
@@ -55,6 +56,13 @@ def parts() -> dict[str, dict[str, str]]:
         },
         "decisions.md": {"decisions": decisions()},
         "reference/plan.md": {"keys": reference_tables.plan()},
+        "reference/udp-rig.md": {
+            "request": reference_tables.packet(packets.REQUEST),
+            "modes of a laboratory": reference_tables.numbered(mode.value for mode in Mode),
+            "answer": reference_tables.packet(packets.ANSWER),
+            "states of a rig": reference_tables.numbered(packets.STATES.values()),
+            "channels of kinds": reference_tables.channels(),
+        },
         "reference/signals.md": {"topics": topics()},
         "reference/commands.md": {"commands": reference_tables.commands()},
         "reference/effects.md": {"effects": reference_tables.effects()},

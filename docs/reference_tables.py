@@ -7,7 +7,7 @@ import ast
 import dataclasses
 import inspect
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, get_type_hints
 
@@ -15,12 +15,15 @@ from common import errors
 from common.plan.patience import FIGURES
 from common.plan.plan import TABLES, Plan
 from common.plan.schema import Rule, required, table_fields
+from common.udp import packets
+from common.udp.packets import Field
 from diagnosis.report import schema
 from docs.markdown import quantity, table
 from laboratories.effects import of_site
 from laboratories.effects.effect import Effect, Parameter
 from laboratories.effects.reading import SIGNALS
 from laboratories.effects.sites import SITES
+from laboratories.kinds import KINDS
 from models.compensators import COMPENSATORS
 from models.ground_motion import MOTIONS
 from models.integrators import INTEGRATORS
@@ -230,6 +233,34 @@ def motions() -> str:
     """The records that ship."""
     rows = ((f"`{name}`", motion.name, motion.version) for name, motion in MOTIONS.items())
     return table(("record", "earthquake", "version"), rows)
+
+
+def packet(fields: Sequence[Field]) -> str:
+    """The bytes of a packet."""
+    rows, place = [], 0
+    for field in fields:
+        size = packets.layout([field]).size
+        rows.append((str(place), str(size), f"`{field.name}`", field.kind, field.text))
+        place += size
+    return table(("from byte", "bytes", "field", "type", "says"), rows)
+
+
+def numbered(texts: Iterable[str]) -> str:
+    """Words by their numbers, from 0."""
+    return table(("number", "says"), ((str(number), text) for number, text in enumerate(texts)))
+
+
+def channels() -> str:
+    """Commands and measurements of the kinds that ship, with the number of their channels."""
+    rows = []
+    for name, kind in KINDS.items():
+        driving = [kind.channels.command, *([kind.channels.effort] if kind.channels.effort else [])]
+        told, read = (
+            ", ".join(f"`{row.name}` {row.unit}" for row in part)
+            for part in (driving, kind.channels.measured)
+        )
+        rows.append((f"`{name}`", told, read, f"`{packets.number(kind.channels):#010x}`"))
+    return table(("kind", "commands", "measured", "`channels`"), rows)
 
 
 def exits() -> str:

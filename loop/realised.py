@@ -69,7 +69,7 @@ def check(name: str, only: str, whole: Plan, known: dict[str, Effect]) -> None:
 def check_rig(one: Reality) -> None:
     """Raise InputError where an effect is in the laboratory of a role whose rig is a plug-in."""
     rig, plan = one.master if one.role == MASTER else one.slave, (one.whole or one).plan
-    if not rig.class_ or one.role not in plan.kinds:
+    if not rig.own or one.role not in plan.kinds:
         return
     places = sites.of_kind(kind_of(plan, one.role))
     for name, _ in one.effects:

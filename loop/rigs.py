@@ -7,11 +7,15 @@ from typing import Any
 
 from common.lab.laboratory import Setting
 from common.lab.preflight import Gate, SensorsAtRest
-from common.plan.patience import strict
+from common.plan import patience
+from common.plan.plan import Plan
 from common.plan.plugins import construct, find
-from common.plan.reality import Reality
+from common.plan.reality import Reality, as_planned
 from common.rig import METHODS, AtRest, GuardedRig, NoRig, NothingMeasurement, measurement_of
 from common.roles import MASTER, name_of, title
+from common.udp import packets
+from common.udp.probe import Probed, probe
+from common.udp.rig import Terms, UdpRig
 from laboratories import kinds
 from laboratories.emulated import EmulatedLab
 from laboratories.kind import Kind
@@ -20,6 +24,8 @@ from laboratories.sensors import noise, readings
 from loop.realised import true_system
 from models.compiled import plain
 
+FREE_SILENCE = 10.0  # s without a packet in virtual time: a computation that is held up for longer is dead
+
 
 def hosted(reality: Reality, role: str) -> Kind | None:
     """The kind of laboratory of a role, None for a master without one; raises InputError as `kinds.kind_of`."""
@@ -27,8 +33,10 @@ def hosted(reality: Reality, role: str) -> Kind | None:
     return kinds.own(plan) if role == MASTER else kinds.kind_of(plan, role)
 
 
-def build(reality: Reality, role: str, at_rest: AtRest | None = None) -> GuardedRig:
+def build(reality: Reality, role: str, at_rest: AtRest | None = None, *, paced: bool = False) -> GuardedRig:
     """A role's laboratory, of a slave from that slave's reality, judged `at_rest` as it is armed.
+
+    A rig in another process is waited for no longer than the plan says where the test is `paced`, in real time.
 
     Raises:
         InputError: it cannot be constructed.
@@ -41,6 +49,10 @@ def build(reality: Reality, role: str, at_rest: AtRest | None = None) -> Guarded
     rig = reality.master if role == MASTER else reality.slave
     place = noise.LAB_A if role == MASTER else noise.LAB_B + reality.place
     seed = noise.lab_seed(reality.seed, place)
+    if rig.address:
+        terms = exchange(reality, role, seed, paced=paced)
+        shown = name if hidden else f"{name} ({rig.address})"
+        return GuardedRig(UdpRig(kind.channels, terms), shown, measurement, hidden=hidden, at_rest=at_rest)
     if not rig.class_:
         twin = partial(EmulatedLab, kind, true_system(reality), seed)
         return GuardedRig(twin(), name, measurement, at_rest=at_rest, twin=twin)
@@ -49,6 +61,41 @@ def build(reality: Reality, role: str, at_rest: AtRest | None = None) -> Guarded
     built = construct(found, arguments | rig.options, where, METHODS)
     shown = name if hidden else f"{name} ({found.__name__})"
     return GuardedRig(built, shown, measurement, hidden=hidden, at_rest=at_rest)
+
+
+def exchange(reality: Reality, role: str, seed: int, *, paced: bool) -> Terms:
+    """The terms of the exchange with a role's rig in another process.
+
+    It may be left without packets as long as this laboratory's loop may be late before it trips by itself, and twice
+    as long as it may miss answers, so that a laboratory that lives brings it to rest. In virtual time a tick may take
+    any time.
+    """
+    plan = patience.strict(reality.plan)
+    rig = reality.master if role == MASTER else reality.slave
+    interval, safety = plan.test.interval, plan.safety
+    return Terms(
+        rig.address,
+        f"[{role}.rig]",
+        interval,
+        seed,
+        rig.answer_share * interval,
+        rig.arm_timeout,
+        max(safety.overrun, 2 * safety.ramp_after) * interval if paced else FREE_SILENCE,
+        safety.ramp_after,
+        paced,
+    )
+
+
+def probed(plan: Plan) -> list[Probed]:
+    """Every rig of a plan that stands in another process, asked whether it is there; nothing moves."""
+    reality, found = as_planned(plan), []
+    for role, kind in kinds.kinds_of(plan).items():
+        own = reality.of(role)
+        rig = own.master if role == MASTER else own.slave
+        if rig.address:
+            terms = exchange(own, role, 0, paced=True)
+            found.append(probe(terms, packets.number(kind.channels)))
+    return found
 
 
 def called(role: str) -> str:
@@ -73,7 +120,7 @@ def at_rest(gate: Gate | None, setting: Setting, role: str) -> AtRest | None:
     if gate is None or role not in setting.plan.kinds:
         return None
     kind = kinds.kind_of(setting.plan, role)
-    plan = strict(setting.plan.of(role))  # what is off zero is so beside an emulation too
+    plan = patience.strict(setting.plan.of(role))  # what is off zero is so beside an emulation too
     levels = dict(zip(kind.channels.names, kind.noise(plan).tolist(), strict=True))
     return SensorsAtRest(gate, setting, kind.limits(plan), levels)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import secrets
 
-from common.host.clock import unix_ns
+from common.host.clock import real, unix_ns
 from common.lab.laboratory import Setting
 from common.lab.preflight import Gate, PreflightCheck
 from common.plan.plan import Plan
@@ -28,9 +28,9 @@ def preflight(plan: Plan) -> list[PreflightCheck]:
     return nominal.checks(plan)
 
 
-def build_rig(reality: Reality, at_rest: AtRest | None = None) -> GuardedRig:
+def build_rig(reality: Reality, at_rest: AtRest | None = None, *, paced: bool = False) -> GuardedRig:
     """The master's own laboratory, judged `at_rest` as it is armed; raises InputError where it cannot be."""
-    return rigs.build(reality, MASTER, at_rest)
+    return rigs.build(reality, MASTER, at_rest, paced=paced)
 
 
 def check(reality: Reality) -> None:
@@ -65,7 +65,7 @@ def build_loop(
     warm_up(reality)
     return MasterLoop(
         setting,
-        build_rig(reality, rigs.at_rest(gate, setting, MASTER)),
+        build_rig(reality, rigs.at_rest(gate, setting, MASTER), paced=real(setting.clock)),
         master_step(reality),
         {role: link_model(reality.of(role)) for role in setting.plan.roles},
         session=session if session is not None else secrets.randbelow(2**62) + 1,

@@ -192,7 +192,7 @@ class Bench:
         programme = chosen(plan, kind, order)
         self.segments = programme.segments
         self.plan = plan.with_ticks(programme.motion.shape[1] - 1)
-        self.rig = rigs.build(reality, role)
+        self.rig = rigs.build(reality, role, paced=order.real_time)
         channels = kind.channels
         self._position = channels.names.index(channels.position)
         names = (*channels.names, channels.target.name, *channels.drives)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import secrets
 
+from common.host.clock import real
 from common.lab.laboratory import Setting
 from common.lab.preflight import Gate, PreflightCheck
 from common.plan.plan import Plan
@@ -20,13 +21,13 @@ def preflight(_plan: Plan) -> list[PreflightCheck]:
     return []
 
 
-def build_rig(reality: Reality, at_rest: AtRest | None = None) -> GuardedRig:
+def build_rig(reality: Reality, at_rest: AtRest | None = None, *, paced: bool = False) -> GuardedRig:
     """The laboratory of the slave whose reality is given, judged `at_rest` as it is armed.
 
     Raises:
         InputError: it cannot be constructed.
     """
-    return rigs.build(reality, reality.role, at_rest)
+    return rigs.build(reality, reality.role, at_rest, paced=paced)
 
 
 def build_step(reality: Reality) -> SlaveStep:
@@ -53,7 +54,7 @@ def build_loop(
     warm_up(reality)
     return SlaveLoop(
         setting,
-        build_rig(reality, rigs.at_rest(gate, setting, reality.role)),
+        build_rig(reality, rigs.at_rest(gate, setting, reality.role), paced=real(setting.clock)),
         link_model(reality),
         role=reality.role,
         instance=instance if instance is not None else secrets.randbelow(2**62) + 1,

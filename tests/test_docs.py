@@ -36,6 +36,7 @@ BY_CONSTANT = {
     preflight.PASSED,
     preflight.SENSORS,
     preflight.LINK,
+    preflight.RIG,
     preflight.ACCEPTED,
 }
 

@@ -62,6 +62,11 @@ class VirtualClock:
         """Do nothing: no process waits on this clock."""
 
 
+def real(clock: Clock) -> bool:
+    """Whether a clock is the machine's, so that what happens outside of this process keeps its time."""
+    return isinstance(clock, MonotonicClock)
+
+
 def unix_ns() -> int:
     """The machine's wall clock, ns since 1970."""
     return time.time_ns()

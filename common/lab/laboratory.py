@@ -231,9 +231,10 @@ class Laboratory:
         return True
 
     def watch(self, rig: GuardedRig) -> None:
-        """Measure how long a rig's calls take."""
+        """Measure how long a rig's calls take, and tell a rig in another process this laboratory's mode."""
         self._rig_name = rig.name
         rig.measure(self.clock.now, self.rig_time)
+        rig.follow(lambda: MODES[self.safety.mode])
 
     def slow_rig(self, tick: int) -> None:
         """End the test because the calls of this laboratory's own rig took too long."""

@@ -13,9 +13,12 @@ from common.errors import RigError
 from common.lab.laboratory import Laboratory, Setting
 from common.plan.plan import Plan
 from common.safety.risks import Risk, known
+from common.udp import probe
+from common.udp.rig import UdpRig
 
 # codes of the recording's events
 PASSED, SENSORS, LINK, ACCEPTED = "preflight", "sensors", "link", "accepted_risk"
+RIG = "rig_exchange"
 
 NOISE_FACTOR = 10.0  # noise over the plan's rms: more of it points to a wrong range or a loose cable
 OFFSET_SHARE = 0.1  # share of the limit that a rig at rest may read: a zeroed sensor stays far below it
@@ -224,10 +227,24 @@ class SensorsAtRest:
         risk = sensor_risk(readings, names, self._limits, self._noise, hidden=hidden, lab=lab)
         self._gate.judge([PreflightCheck(SENSORS_PASSED, risk)], SENSORS)
 
+    def reach(self, rig: UdpRig, *, hidden: bool) -> None:
+        """Judge the exchanges with a rig in another process; of a hidden one nothing is said where it serves."""
+        terms, found = rig.terms, rig.echoes
+        risk = probe.slow(terms, found.round_trips_s, found.lost, self._plan)
+        if risk and hidden:
+            risk = risk._replace(sentence="a rig does not answer as it must")
+        if risk or not hidden:
+            self._gate.judge([PreflightCheck(probe.text(terms, found.round_trips_s), risk)], RIG)
+
     def skip(self, kind: str, *, hidden: bool) -> None:
         """Take note of a rig of the class `kind` that cannot be read at rest.
 
         A hidden rig, one of a reality, is reported like one whose check passed, so that the recording does not show it.
         """
-        skipped = f"Sensor check skipped: class {kind} does not set idle_readings = True"
+        why = (
+            "the rig gives no readings in its answers to echoes"
+            if kind == UdpRig.__name__
+            else f"class {kind} does not set idle_readings = True"
+        )
+        skipped = f"Sensor check skipped: {why}"
         self._gate.judge([PreflightCheck(SENSORS_PASSED if hidden else skipped)], SENSORS)

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from common.errors import EmergencyStopError, RigError
+from common.lab import preflight
 from common.lab.descent import Descent, Resting
 from common.lab.laboratory import REPEAT_NS, Laboratory
 from common.protocol.exchange import Event
@@ -58,6 +59,8 @@ class RigLoop:
 
         After a shorter silence the laboratory holds. `late_ns` is the lateness of the tick, `late` whether it counts as
         late.
+
+        A rig in another process that does not answer in time makes it hold too; such a rig trips by the error of `read`.
         """
         lab = self.lab
         if lab.overrun(late_ns, tick):
@@ -68,7 +71,7 @@ class RigLoop:
         if finding is WatchdogFinding.RAMP:
             lab.silent(who, tick)
             return True
-        if finding is WatchdogFinding.HOLD:
+        if finding is WatchdogFinding.HOLD or self._rig.missed >= lab.plan.safety.hold_after:
             lab.safety.follow(Turn.HOLD)
         elif lab.safety.mode is Mode.HOLDING:
             lab.safety.take(Turn.RESUME)
@@ -101,6 +104,10 @@ class RigLoop:
             if failure := self._rig.disarm():
                 self.lab.note("disarm", str(failure), level="warning", tick=self.ticks)
                 self.lab.explain(failure, tick=self.ticks)
+            account = self._rig.exchanged
+            if account is not None and (values := account.values()):
+                text = f"{self._rig.name}: {account.sentence()}."
+                self.lab.note(preflight.RIG, text, tick=self.ticks, values=values)
 
     def end(self, reason: str) -> None:
         """Bring the test to an end in order: after its last tick, or earlier because somebody wants it so."""

@@ -137,7 +137,7 @@ class Control:
 
 @dataclass(frozen=True)
 class RigTable:
-    """The laboratory behind the rig interface.
+    """The laboratory behind the rig interface: emulated, a class of the user's, or a rig in another process.
 
     A class is code that runs with your rights: only run plans that you trust.
     """
@@ -147,6 +147,23 @@ class RigTable:
         default="",
     )
     options: dict[str, Any] = key("keyword arguments of the class", default={})
+    address: str = key(
+        "udp/HOST:PORT of a rig in another process, or udp/PORT on this machine; empty for none", default=""
+    )
+    answer_share: float = key(
+        "share of the interval that a tick waits for the answer of a rig at an address",
+        default=0.25,
+        above=0.0,
+        most=0.9,
+    )
+    arm_timeout: float = key(
+        "time in which a rig at an address gets ready", default=10.0, unit="s", above=0.0, most=3600.0
+    )
+
+    @property
+    def own(self) -> bool:
+        """Whether it is a rig of the user's, no emulated one."""
+        return bool(self.class_ or self.address)
 
 
 @dataclass(frozen=True)

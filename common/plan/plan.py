@@ -81,7 +81,7 @@ class Plan:
     def emulated(self) -> bool:
         """Whether no laboratory of the plan has a rig of the user's."""
         rigs = [self.master.rig, self.slave.rig, *(lab.rig for lab in self.slaves.values())]
-        return not any(rig.class_ for rig in rigs)
+        return not any(rig.own for rig in rigs)
 
     @property
     def makes_good(self) -> bool:

@@ -1,4 +1,4 @@
-"""Classes that a plan or a reality names: 'file.py:Class' or 'package.module:Class'."""
+"""Rigs that a plan or a reality names: by a class, 'file.py:Class' or 'package.module:Class', or by an address."""
 
 from __future__ import annotations
 
@@ -13,9 +13,22 @@ from types import MappingProxyType, ModuleType
 from typing import Any
 
 from common import blame
-from common.errors import InputError
+from common.errors import InputError, PlanError
+from common.plan.laboratory_tables import RigTable
+from common.udp.peer import place
 
 NO_METHODS: Mapping[str, Sequence[str]] = MappingProxyType({})
+
+
+def checked(rig: RigTable, where: str) -> RigTable:
+    """The rig of a plan's table `where`; raises PlanError where its keys do not fit together."""
+    if rig.class_ and rig.address:
+        raise PlanError(f"[{where}] gives a class and an address, but a rig is one of both: leave one out.")
+    if rig.options and rig.address:
+        raise PlanError(f"options in [{where}] are for a class: leave them out beside an address.")
+    if rig.address:
+        place(rig.address, f"[{where}]")
+    return rig
 
 
 def find(reference: str, base: Path, where: str) -> type[Any]:

@@ -12,6 +12,7 @@ from common.plan import building, patience
 from common.plan.kinds import TABLES_OF_KIND, check_kind, known_kind, planned
 from common.plan.laboratory_tables import RigTable, SlaveLaboratory
 from common.plan.plan import INTERFACE, TABLES, Plan
+from common.plan.plugins import checked
 from common.plan.schema import fill, nearest, plain
 from common.plan.toml_file import tables_in, text_of
 from common.roles import MASTER, slave_role
@@ -87,9 +88,10 @@ def with_test(
 
 
 def check_laboratories(plan: Plan) -> None:
-    """Raise PlanError where a kind is unknown, or no process would have a laboratory."""
+    """Raise PlanError where a kind is unknown, a rig's keys do not fit, or no process would have a laboratory."""
     for role in (MASTER, "slave"):
         check_kind(getattr(plan, role).kind, role)
+        checked(getattr(plan, role).rig, f"{role}.rig")
     if not plan.kinds:
         raise PlanError(
             "Neither [master] nor [slave] has a laboratory: give one of them a kind other than 'none'."
@@ -143,7 +145,8 @@ def slave_laboratory(plan: Plan, name: str, given: dict[str, Any]) -> SlaveLabor
         own, common = given.get(part, {}), getattr(plan, part)
         merged = plain(common) | own if isinstance(own, dict) else own
         parts[part] = fill(type(common), merged, f"{where}.{part}")
-    return SlaveLaboratory(rig=fill(RigTable, given.get("rig", {}), f"{where}.rig"), kind=kind, **parts)
+    rig = checked(fill(RigTable, given.get("rig", {}), f"{where}.rig"), f"{where}.rig")
+    return SlaveLaboratory(rig=rig, kind=kind, **parts)
 
 
 def check_tolerances(plan: Plan) -> None:

@@ -16,6 +16,7 @@ from common.plan.found import LearnedEntry, check_found, learned
 from common.plan.kinds import TABLES_OF_KIND, known_kind
 from common.plan.laboratory_tables import RigTable
 from common.plan.plan import Plan
+from common.plan.plugins import checked
 from common.plan.read import from_tables
 from common.plan.schema import fill, nearest
 from common.plan.toml_file import load_tables
@@ -282,7 +283,7 @@ def rig(entry: dict[str, Any], lab: str, planned: RigTable, plan_base: Path, bas
     """The rig of a laboratory from a reality, or else as planned, with an absolute path of its class."""
     chosen, start = (planned, plan_base)
     if "rig" in entry:
-        chosen, start = fill(RigTable, entry["rig"], f"{lab}.rig"), base
+        chosen, start = checked(fill(RigTable, entry["rig"], f"{lab}.rig"), f"{lab}.rig"), base
     if ".py:" in chosen.class_:
         return RigTable(class_=str(start.resolve() / chosen.class_), options=chosen.options)
     return chosen

@@ -79,6 +79,7 @@ def rigs(plan: Plan) -> str:
 
 
 def classes(plan: Plan) -> Iterator[tuple[str, str]]:
-    """Every laboratory and the class that the plan names for its rig, empty for the emulated one."""
+    """Every laboratory and the class or address that the plan names for its rig, empty for the emulated one."""
     for role in plan.kinds:
-        yield role, (plan.master if role == MASTER else plan.of(role).slave).rig.class_
+        rig = (plan.master if role == MASTER else plan.of(role).slave).rig
+        yield role, rig.class_ or rig.address

@@ -10,11 +10,15 @@ from common.lab.preflight import PreflightCheck
 from common.plan.kinds import COLUMN, TABLE
 from common.plan.plan import Plan
 from common.roles import MASTER
+from common.udp import probe
+from common.udp.account import quantile
+from common.udp.probe import Probed
 from laboratories.kinds import kind_of
 from loop import substructure
 from loop.nominal import limited
 from loop.nominal.partition import felt, matrices, taken_over
 from loop.nominal.preflight import Findings, expected_delay, findings
+from loop.rigs import probed
 from models.ground_motion import GroundMotion
 from models.structures import shear_building
 from recorder import space
@@ -25,6 +29,8 @@ def facts(plan: Plan, file: Path) -> dict[str, Any]:
     """What a plan describes; raises InputError where it cannot be used."""
     motion = substructure.motion(plan)
     found = findings(plan)
+    rigs_there = [rig(one, plan) for one in probed(plan)]
+    refusing = [one["risk"] for one in rigs_there if one["risk"]]
     made = [*found.checks, space.check(plan, existing(Path(plan.recording.folder)))]
     return {
         "plan": str(file),
@@ -40,9 +46,27 @@ def facts(plan: Plan, file: Path) -> dict[str, Any]:
         "peaks": peaks(plan, found),
         "recording": {"bytes": round(space.need(plan)), "folder": plan.recording.folder},
         "classes": [one._asdict() for one in classes.named(plan)],
+        "rigs": rigs_there,
         "slips": [one._asdict() for one in slips.slips(plan, motion, found)],
-        "refused": [risk(one) for one in made if one.risk],
-        "ready": not any(one.risk for one in made),
+        "refused": [*(risk(one) for one in made if one.risk), *refusing],
+        "ready": not refusing and not any(one.risk for one in made),
+    }
+
+
+def rig(probed: Probed, plan: Plan) -> dict[str, Any]:
+    """A rig in another process: whether it is there, and how fast it answers."""
+    found, refused = probed.found, probe.risk(probed, plan)
+    ranked = sorted(found.round_trips_s)
+    return {
+        "where": probed.terms.where.strip("[]"),
+        "address": probed.terms.address,
+        "channels": f"{probed.channels:#010x}",
+        "there": found.answer is not None,
+        "exchanges": len(ranked) + found.lost,
+        "lost": found.lost,
+        "round_trip_p50": quantile(ranked, 0.5),
+        "round_trip_p99": quantile(ranked, 0.99),
+        "risk": refused._asdict() if refused else {},
     }
 
 

@@ -44,6 +44,8 @@ def described(facts: Mapping[str, Any]) -> Iterator[str]:
         )
     for role, system in facts["transfer_systems"].items():
         yield f"{role:<17} {system_text(role, system)}"
+    for rig in facts["rigs"]:
+        yield f"{rig['where']:<17} {rig_text(rig)}"
     yield f"delay             {delay_text(facts['delay'])}"
     yield f"recording         about {facts['recording']['bytes'] / 1e6:.1f} MB in {facts['recording']['folder']}"
 
@@ -84,6 +86,17 @@ def table_text(system: Mapping[str, Any]) -> str:
     )
 
 
+def rig_text(rig: Mapping[str, Any]) -> str:
+    """A rig in another process."""
+    text = f"{rig['address']}, channels {rig['channels']}"
+    if not rig["there"]:
+        return f"{text}: nothing answers"
+    return (
+        f"{text}: {rig['exchanges'] - rig['lost']} of {rig['exchanges']} exchanges, round trip p50 "
+        f"{rig['round_trip_p50'] * 1e3:.3f} ms, p99 {rig['round_trip_p99'] * 1e3:.3f} ms"
+    )
+
+
 def delay_text(delay: Mapping[str, Any]) -> str:
     """The column's path."""
     critical = (
@@ -108,8 +121,8 @@ def peak_row(name: str, peak: Mapping[str, Any]) -> list[str]:
     return [name, quantity(peak["peak"], unit), limit, f"{share:.0%}", bar]
 
 
-def code(classes: Sequence[Mapping[str, str]]) -> Iterator[str]:
-    """The classes that a plan names, each in a sentence."""
+def code(classes: Sequence[Mapping[str, str]], *, emulated: bool = True) -> Iterator[str]:
+    """The classes that a plan names, each in a sentence; `emulated` where it has no rig of the user's."""
     for one in classes:
         place = one["file"] or "a file that is not there"
         yield (
@@ -117,12 +130,13 @@ def code(classes: Sequence[Mapping[str, str]]) -> Iterator[str]:
             "you trust."
         )
     if not classes:
-        yield "The plan names no class of its own: all laboratories are emulated."
+        others = "all laboratories are emulated" if emulated else "its rigs are in other processes"
+        yield f"The plan names no class of its own: {others}."
 
 
 def concerns(facts: Mapping[str, Any]) -> Iterator[str]:
     """What to look at before the test: classes, slips, refusals."""
-    yield from code(facts["classes"])
+    yield from code(facts["classes"], emulated=not facts["rigs"])
     for slip in facts["slips"]:
         yield f"a slip of units? {slip['where']}: {slip['text']}"
     for risk in facts["refused"]:

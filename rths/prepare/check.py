@@ -51,7 +51,8 @@ def listed(plan: Plan, *, as_json: bool) -> int:
     from report.plan.text import code
 
     found = printable([one._asdict() for one in named(plan)])
-    sys.stdout.write(json.dumps({"classes": found}) + "\n" if as_json else "\n".join(code(found)) + "\n")
+    lines = code(found, emulated=plan.emulated)
+    sys.stdout.write(json.dumps({"classes": found}) + "\n" if as_json else "\n".join(lines) + "\n")
     return 0
 
 

@@ -88,7 +88,7 @@ def really(truth: Reality, *, noise: bool) -> Rollout:
 
     rigs = {MASTER: truth.master} | {role: truth.of(role).slave for role in truth.plan.roles}
     for role, rig in rigs.items():
-        if rig.class_:
+        if rig.own:
             raise InputError(
                 f"[{role}.rig] names a plug-in, which a simulation has no model of: use rths run --virtual."
             )

@@ -1,0 +1,1 @@
+"""Rigs in other processes: one UDP packet each way per tick, its layout, and what is measured of the exchange."""
