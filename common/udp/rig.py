@@ -176,6 +176,9 @@ class UdpRig:
     def disarm(self) -> None:
         """Let the rig come to a safe stop; raises RigError where it does not confirm it."""
         packet = self._packet(Asked.DISARM)
+        if self.echoes.answer is None:  # it was never reached
+            self._peer.send(packet)
+            return
         for _ in range(TRIES):
             self._peer.send(packet)
             if answer_to(self._peer, self._session, self._seq, time.monotonic_ns() + AGAIN_NS // 2):

@@ -57,9 +57,10 @@ def apart(plan: Plan) -> Iterator[Plan]:
             lab = plan.slaves.get(role.partition(".")[2])
             if lab is not None:
                 plan = replace(plan, slaves=plan.slaves | {role.partition(".")[2]: replace(lab, rig=rig)})
+            elif role == MASTER:
+                plan = replace(plan, master=LaboratoryTable(rig, plan.master.kind))
             else:
-                name = "master" if role == MASTER else "slave"
-                plan = replace(plan, **{name: LaboratoryTable(rig, getattr(plan, name).kind)})
+                plan = replace(plan, slave=LaboratoryTable(rig, plan.slave.kind))
         yield plan
 
 

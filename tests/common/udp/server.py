@@ -6,6 +6,7 @@ import contextlib
 import importlib.util
 import socket
 import threading
+import zlib
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -90,5 +91,5 @@ def changed(answer: bytes, **fields: Any) -> bytes:
     values += [0.0] * (8 - len(values))
     by_name |= fields
     ordered = [by_name[name] for name in names]
-    body = example.ANSWER.pack(*ordered[:8], *values, *ordered[8:])[: packets.CHECKED]
-    return bytes(body) + packets.zlib.crc32(body).to_bytes(4, "little")
+    body: bytes = example.ANSWER.pack(*ordered[:8], *values, *ordered[8:])[: packets.CHECKED]
+    return body + zlib.crc32(body).to_bytes(4, "little")
