@@ -60,7 +60,7 @@ class RigLoop:
         After a shorter silence the laboratory holds. `late_ns` is the lateness of the tick, `late` whether it counts as
         late.
 
-        A rig in another process that does not answer in time makes it hold too; such a rig trips by the error of `read`.
+        A rig in another process that does not answer in time makes it hold too, and trips by the error of `read`.
         """
         lab = self.lab
         if lab.overrun(late_ns, tick):

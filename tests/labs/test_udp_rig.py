@@ -18,7 +18,8 @@ from common.plan.laboratory_tables import LaboratoryTable, RigTable
 from common.plan.plan import Plan
 from common.plan.read import load
 from common.plan.reality import as_planned, from_reality
-from common.recording.reader import Run, read
+from common.recording.reader import read
+from common.recording.run import Run
 from common.roles import MASTER
 from common.safety.modes import Mode
 from common.udp import rig as udp
