@@ -1,7 +1,7 @@
 """One check per limit of a budget.
 
-A check is `ok`, `over`, in `doubt` (over, but the bare loop was late in as many ticks) or `short` (too few values lie
-beyond the percentile to tell it from the maximum).
+A check is `ok`, `over`, in `doubt` (over, but the bare loop was late in as many ticks) or `short` (so few values lie
+beyond the percentile that it is next to the maximum).
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from report.budget.limits import PERCENTILES, WAITS, Budget, LateLimits, Machine
 
 OK, OVER, DOUBT, SHORT = "ok", "over", "doubt", "short"
 WAKE, SUM = "wake_lateness", "round_trip"
-# values that must lie beyond a percentile: with fewer it is next to a maximum, which a single pause makes
+# Values that must lie beyond a percentile: with fewer it is close to the maximum, which a single pause determines.
 LEAST_BEYOND = 5
-EPSILON = 1e-9  # s or values: rounding is no excess
+EPSILON = 1e-9  # s, or values: rounding of computed percentiles and counts
 
 
 @dataclass(frozen=True)
 class BudgetCheck:
-    """One limit and what was found: s, a share or ticks; `bare` is the bare loop's own, None where none ran.
+    """One limit and the value found, in s, as a share or in ticks; `bare` is the bare loop's value, None without one.
 
-    `calm` says that, over its limit, it was judged without the ticks in which the master stood still.
+    `calm` says that a value over its limit was judged without the ticks in which the master did not run.
     """
 
     name: str
@@ -89,11 +89,11 @@ def percentile_check(
 def explained(
     item: ExchangeTicks, segment: str, limit: float, allowed: float, admitted: float, bare: Bare
 ) -> bool:
-    """Whether the machine may have taken so many ticks beyond what is allowed that the rest are no more than admitted.
+    """Whether the machine may have caused so many of the ticks beyond the allowed value that the rest are admitted.
 
-    A wait does so where it is longer than what is left between the segment's usual need and what is allowed; over
-    the round trip two of half of that. Shares of independent causes add up, as percentiles do not. While a process
-    stands still the messages to it wait too: in both loops ticks that passed meanwhile are left to [late].
+    A wait of the machine causes one where it is longer than the room between the segment's usual time and the allowed
+    one; in the round trip two waits of half that room do so. Shares of independent causes add up, while percentiles do
+    not. Messages to a process that does not run wait as well: ticks that passed meanwhile are judged by [late] only.
     """
     values, waits = item.segments[segment], WAITS[segment]
     need = max(float(np.nanmedian(values)) - waits * bare.percentiles["p50"], 0.0)

@@ -1,4 +1,4 @@
-"""What a recording says about latency: the segments of every exchange, late ticks, and the machine they ran on."""
+"""The latency in a recording: the segments of every exchange, late ticks, and the state of the machines."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from report.facts.circumstances import NO_LATENCY, VIRTUAL, clock_of
 Numbers = NDArray[np.float64]
 RECORD = "real_time"
 BARE = "bare_loop"
-FLUSH_NS = 1_000_000_000  # what a recording that is cut off may lack at its end
-LEAST = 1e-9  # s: percentiles of zero have no logarithm
+FLUSH_NS = 1_000_000_000  # ns that a cut-off recording may lack at its end: the recorder's longest time between flushes
+LEAST = 1e-9  # s, the resolution of the clocks, in place of percentiles of zero, which have no logarithm
 
 
 @dataclass(frozen=True)
 class Bare:
-    """Lateness of the bare timing loop (s); `late` ticks passed before it woke and are none of its `ticks`."""
+    """Lateness of the bare timing loop (s); `late` ticks passed before it woke and are not counted in `ticks`."""
 
     ticks: int
     late: int
@@ -76,15 +76,14 @@ class Bare:
 class ExchangeTicks:
     """The ticks of the master with one slave; `name` is empty where there is only one.
 
-    A tick without a row of latency counts as late, for nothing shows that it had an answer.
+    A tick without a row of latency counts as late, since nothing shows that it was answered.
     """
 
     name: str
     ticks: int
     unrecorded: int  # of these, ticks without a row
-    segments: dict[
-        str, Numbers
-    ]  # s, per tick in order, NaN where it was not measured; only those measured at all
+    # s, per tick in order, NaN where it was not measured; segments that were never measured are left out
+    segments: dict[str, Numbers]
     late: NDArray[np.bool_] | None  # per tick, in order
     missed: NDArray[np.bool_] | None  # per row, in order
 
@@ -107,7 +106,7 @@ class ExchangeTicks:
 
 @dataclass(frozen=True)
 class Figures:
-    """All of a recording that a budget is about; `stolen` and `schedulers` by laboratory."""
+    """Everything in a recording that a budget judges; `stolen` and `schedulers` by laboratory."""
 
     recording: str
     exchanges: list[ExchangeTicks]
@@ -131,7 +130,7 @@ def figures(run: Run) -> Figures:
         )
     if not any(run.has(topic) for topic in topics):
         raise InputError(
-            f"{run.path} holds no latency of any tick: give one of a whole test, as rths run makes it."
+            f"{run.path} holds no latency of any tick: give the recording of a whole test, as rths run makes it."
         )
     ticks = np.unique(np.concatenate([numbers(run, topic) for topic in (MASTER, *topics)]))
     exchanges = [exchange(run, topic, expected(run, topic, ticks)) for topic in topics]
@@ -149,7 +148,7 @@ def figures(run: Run) -> Figures:
 
 
 def from_events(run: Run) -> dict[str, str]:
-    """The same numbers as the metadata record's, from the events by which the laboratories told the recorder."""
+    """The numbers of the metadata record, from the events in which the laboratories reported them to the recorder."""
     found: dict[str, str] = {}
     for event in run.events:
         if event["code"] == BARE:
@@ -173,9 +172,9 @@ def numbers(run: Run, topic: str) -> Values:
 
 
 def expected(run: Run, topic: str, ticks: Values) -> Values:
-    """The ticks of which a topic of latency should have a row: all, less what a cut-off recording had not written yet.
+    """The ticks for which a topic of latency should have a row: all but those that a cut-off recording had not written.
 
-    That is the end of it without a row, as far as it lies within the last second of the master's ticks.
+    These are the last ticks without a row, within the last second of the master's ticks.
     """
     if run.finished or not (run.has(MASTER) and run.has(topic)):
         return ticks
@@ -236,15 +235,17 @@ def bare_loop(record: Mapping[str, str]) -> Bare | None:
 
 
 def warnings(run: Run, ticks: Values, exchanges: list[ExchangeTicks]) -> list[str]:
-    """Why the figures are not those of the whole test, a sentence each; `ticks` have a row of the master's."""
-    found = [] if run.finished else ["The recording was cut off before its end: judged as far as it goes."]
+    """Sentences on why the figures are not those of the whole test; `ticks` are those with a row of the master."""
+    found = (
+        [] if run.finished else ["The recording was cut off before its end; its ticks until then are judged."]
+    )
     if clock_of(run) == VIRTUAL:
         found.append(f"{NO_LATENCY}: the times above come from the interval and the link's model alone.")
     planned = number(run.metadata.get("summary", {}), "ticks_expected")
     end = int(ticks[-1]) + 1
     if run.finished and planned is not None and end < planned:
         found.append(
-            f"The recording ends after {end} of {planned:.0f} planned ticks: judged as far as it goes."
+            f"The recording ends after {end} of {planned:.0f} planned ticks; its ticks until then are judged."
         )
     if holes := end - ticks.size:
         found.append(f"{holes} ticks are missing from the recording and are not judged.")
@@ -252,10 +253,10 @@ def warnings(run: Run, ticks: Values, exchanges: list[ExchangeTicks]) -> list[st
         where = f" with {item.name}" if item.name else ""
         if item.silent:
             found.append(
-                f"The recording has no latency of any of the {item.ticks} ticks{where}: over any budget."
+                f"The recording has no latency of any of the {item.ticks} ticks{where}, which is over any budget."
             )
         elif item.unrecorded:
             found.append(
-                f"{item.unrecorded} of {item.ticks} ticks{where} have no row of latency: they count as late."
+                f"{item.unrecorded} of {item.ticks} ticks{where} have no row of latency and count as late."
             )
     return found

@@ -1,8 +1,8 @@
 """Figures judged against a budget: its checks, and one status.
 
-A check that is over makes the recording `over`; else one in doubt leaves it `not_judged`; else it is `within`. On an
-unfit machine what it may have caused is in doubt. A slave without a row of latency is over any budget on any machine:
-its gap is the whole test, and no noise loses every row.
+A check that is over makes the recording `over`; otherwise a check in doubt makes it `not_judged`; otherwise it is
+`within`. On an unfit machine every check that the machine may have failed is in doubt. A slave without any row of
+latency is over any budget on any machine, since no disturbance of a machine loses every row.
 """
 
 from __future__ import annotations
@@ -23,14 +23,15 @@ def judge(found: Figures, budget: Budget) -> BudgetReport:
     """Judge figures against a budget.
 
     Raises:
-        InputError: the recording has nothing of what the budget limits.
+        InputError: the recording has no value of anything that the budget limits.
     """
     unfit = unfitness(found, budget.machine)
     doubts = unfit or unsteadiness(found, budget.machine)
     checks = [check for item in found.exchanges for check in checks_of(item, budget, found.bare)]
     if not checks:
         raise InputError(
-            f"{found.recording} has no value of what the budget {budget.name} limits: {', '.join(limited(budget))}."
+            f"{found.recording} has no value of anything that the budget {budget.name} limits: "
+            f"{', '.join(limited(budget))}."
         )
     if doubts:
         checks = [excused(check, unfit=bool(unfit)) for check in checks]
@@ -44,7 +45,7 @@ def judge(found: Figures, budget: Budget) -> BudgetReport:
 
 
 def excused(check: BudgetCheck, *, unfit: bool) -> BudgetCheck:
-    """The check on an unsteady machine, where those of messages alone stand, or on an unfit one, where none does."""
+    """The check on an unsteady machine, where only those of messages hold, or on an unfit one, where none does."""
     stands = check.verdict != OVER or (check.calm and not unfit)
     return check if stands else replace(check, verdict=DOUBT)
 
@@ -56,7 +57,7 @@ def silence(item: ExchangeTicks) -> BudgetCheck:
 
 
 def limited(budget: Budget) -> list[str]:
-    """Names of what the budget limits."""
+    """Names of the segments and shares that the budget limits."""
     return [*budget.segments, *budget.plain()["late"]]
 
 
@@ -77,7 +78,7 @@ def unfitness(found: Figures, machine: MachineLimits) -> list[str]:
 
 
 def unsteadiness(found: Figures, machine: MachineLimits) -> list[str]:
-    """A sentence if the bare loop was held up too often to judge the master's wake-ups, else none."""
+    """A sentence if the bare loop was late too often for the master's wake-ups to be judged, else none."""
     if late_share(found) <= machine.standstill_share:
         return []
     return [
@@ -99,7 +100,7 @@ def remarks(found: Figures, budget: Budget, checks: list[BudgetCheck]) -> list[s
     if short := [check.name for check in checks if check.verdict == SHORT]:
         said.append(f"Too few ticks for {', '.join(short)}: fewer than {LEAST_BEYOND} values lie beyond.")
     if found.bare is None and any(check.verdict == OVER for check in checks):
-        said.append("No bare loop was recorded: a slow machine cannot be told from a slow test here.")
+        said.append("No bare loop was recorded, so a slow machine cannot be distinguished from a slow test.")
     return said
 
 

@@ -14,7 +14,7 @@ from common.plan.toml_file import load_tables
 
 DEFAULT = Path(__file__).with_name("default.toml")
 PERCENTILES = {"p50": 50.0, "p90": 90.0, "p99": 99.0, "p99.9": 99.9}
-WAITS = {  # segments, in the order of a tick, and for how many threads each waits to wake; see the default budget
+WAITS = {  # segments in the order of a tick, with the number of threads that must wake in each; see the default budget
     "wake_lateness": 1,
     "compute_time": 1,
     "encode_time": 1,
@@ -50,13 +50,33 @@ class LateLimits:
 class MachineLimits:
     """Limits beyond which lateness is attributed to the machine and not to the test."""
 
-    lateness: float = key("most that the bare loop adds to a limit", default=0.3e-3, unit="s", least=0.0)
-    share: float = key("most that its own share adds to a share", default=0.005, least=0.0, most=1.0)
-    standstill_share: float = key(
-        "late ticks of it beyond which those of the test are not judged", default=0.005, least=0.0, most=1.0
+    lateness: float = key(
+        "largest lateness of the bare loop that is added to a limit", default=0.3e-3, unit="s", least=0.0
     )
-    unfit_share: float = key("beyond which nothing over is judged", default=0.02, least=0.0, most=1.0)
-    stolen_share: float = key("time taken by the host beyond which", default=0.05, least=0.0, most=1.0)
+    share: float = key(
+        "largest share of late ticks of the bare loop that is added to a limit",
+        default=0.005,
+        least=0.0,
+        most=1.0,
+    )
+    standstill_share: float = key(
+        "share of late ticks of the bare loop beyond which late ticks and wake-ups over their limits are not judged",
+        default=0.005,
+        least=0.0,
+        most=1.0,
+    )
+    unfit_share: float = key(
+        "share of late ticks of the bare loop beyond which nothing over its limit is judged",
+        default=0.02,
+        least=0.0,
+        most=1.0,
+    )
+    stolen_share: float = key(
+        "share of the processors' time taken by the host beyond which nothing over its limit is judged",
+        default=0.05,
+        least=0.0,
+        most=1.0,
+    )
 
 
 @dataclass(frozen=True)
@@ -83,7 +103,7 @@ def load(path: Path | None) -> Budget:
     """The budget in a TOML file, the one that ships for None.
 
     Raises:
-        PlanError: the file cannot be read, is no TOML, or holds what no budget can.
+        PlanError: the file cannot be read, is no TOML, or holds keys or values that a budget cannot have.
     """
     if path is None:
         return load(DEFAULT)

@@ -15,12 +15,12 @@ from report.text.terminal import table
 ENDS = {
     WITHIN: "within the budget",
     OVER: "over the budget",
-    NOT_JUDGED: "not judged, for the machine may have caused it",
+    NOT_JUDGED: "not judged, because the machine may have caused it",
 }
 
 
 def text(report: BudgetReport) -> str:
-    """Figures, checks, remarks and the verdict, for a terminal; a sentence where nothing was measured and all fits."""
+    """Figures, checks, remarks and verdict for a terminal; one sentence for a test in virtual time that is within."""
     if report.figures.virtual and report.status == WITHIN:
         return shown(unmeasured(report)) + "\n"
     stream = io.StringIO()
@@ -46,7 +46,7 @@ def text(report: BudgetReport) -> str:
 
 
 def unmeasured(report: BudgetReport) -> str:
-    """What a recording in virtual time says of its budget."""
+    """The sentence on a recording in virtual time, whose latency was not measured."""
     return (
         f"{NO_LATENCY}; by the interval and the link's model alone {report.figures.recording} "
         f"({ticks(report)}) is {ENDS[WITHIN]} {report.budget.name}."
@@ -93,7 +93,7 @@ def check_rows(checks: list[BudgetCheck]) -> list[list[str]]:
 
 
 def amount(value: float, unit: str) -> str:
-    """A value in the unit that is read: µs, %, ticks."""
+    """A value in the unit of the table: µs, %, ticks."""
     if unit == "s":
         return f"{value * 1e6:.0f} µs"
     if unit == "share":

@@ -18,7 +18,7 @@ from report.facts.laboratories import laboratories
 
 
 class MessageAccount(NamedTuple):
-    """Messages of one direction: those of the sender by their fate, and at least how many others came."""
+    """Messages of one direction: those of the sender by their fate, and the least number of foreign ones."""
 
     sent: int
     used: int
@@ -30,9 +30,9 @@ class MessageAccount(NamedTuple):
 def account(sent: int, used: int, rejected: int, beyond: int, extra: int) -> MessageAccount:
     """The account of what a sender has sent and a receiver reports as used and rejected.
 
-    `beyond` of the numbers used were higher than any sent, and `extra` frames came under a number that was known
-    already or that could not be yet. More messages than were sent cannot come from the sender; up to that count they
-    are taken for its own.
+    `beyond` of the numbers used were higher than any number sent, and `extra` frames had a number that had come before
+    or was too far ahead. Messages beyond the number sent cannot come from the sender; up to it they are taken for its
+    own.
     """
     own = min(max(used - beyond, 0), sent)
     late = min(rejected, sent - own)
@@ -42,11 +42,10 @@ def account(sent: int, used: int, rejected: int, beyond: int, extra: int) -> Mes
 def accounts(run: Run) -> dict[str, dict[str, int]]:
     """The accounts by `<slave's role>/<direction>`.
 
-    Each end counts what it sent, and what became of what it received.
-    A direction of which an end has not told its count,
-    because it was killed or cut off, is absent.
+    Each end counts what it sent, and the fate of what it received. A direction is left out where one of its ends has
+    not reported its counts, because it was killed or cut off.
     """
-    told: dict[str, dict[str, float]] = {}  # by laboratory; the master tells of each slave apart
+    told: dict[str, dict[str, float]] = {}  # by laboratory; the master reports each slave separately
     for event in run.events:
         if event["code"] == "exchange":
             told.setdefault(event["lab"], {}).update(event["values"])
@@ -70,7 +69,7 @@ def accounts(run: Run) -> dict[str, dict[str, int]]:
 
 
 def extra(told: Mapping[str, float], prefix: str) -> int:
-    """Frames that a receiver turned away because the sender cannot have sent them."""
+    """Frames that a receiver rejected because the sender cannot have sent them."""
     return sum(int(told.get(f"{prefix}.turned_away.{reason}", 0)) for reason in (AHEAD, REPEATED))
 
 

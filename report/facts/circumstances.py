@@ -1,7 +1,7 @@
 """The circumstances of a recording: its clock, and its rigs as far as the plan describes them.
 
-What a laboratory really was stands in no recording, because a hidden reality may have put another rig in place of the
-plan's. So only the plan is asked, and the sentence says so.
+A recording does not show what a laboratory really was, because a reality may replace the plan's rig. So the sentence is
+about the plan's rigs, and says so.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from common.roles import LATENCY, MASTER, kind_of, title
 
 VIRTUAL, REAL, SIMULATION, IMPORT, UNKNOWN = "virtual", "real", "simulation", "import", ""
 SENTENCES = {
-    VIRTUAL: "Virtual time in one process, where nothing takes time and no latency is measured",
+    VIRTUAL: "Virtual time in one process, in which computing takes no time and no latency is measured",
     REAL: "Real time, each laboratory in a process of its own on the network",
     SIMULATION: "A simulation of the closed loop, in which no laboratory took part",
     IMPORT: "Imported data, which no test of rths recorded",
@@ -25,7 +25,7 @@ NO_LATENCY = "The test ran in virtual time, where no latency is measured"
 
 
 def clock_of(run: Run) -> str:
-    """What kept the time of a recording; of one that does not say it, what its latencies show, else UNKNOWN.
+    """The clock of a recording; where the recording does not name it, the one that its latencies show, else UNKNOWN.
 
     In real time some tick takes longer than nothing to compute; in virtual time none does, whatever the link delays.
     """

@@ -1,4 +1,4 @@
-"""How many ticks were due: all of the plan where a test was completed, else those until it ended."""
+"""The number of ticks that a recording should hold: all of the plan, or those until the end of a test that stopped."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ WHOLE = ("completed", "imported")
 def due(run: Run, plan: Plan | None) -> dict[str, int]:
     """Ticks due by topic.
 
-    Of a test that ended early a laboratory's ticks were due until it left them for its ramp to rest, which its event
-    says and no row may be later than; where it said nothing, as one that was killed, until the last laboratory did.
+    In a test that ended early a laboratory's ticks were due until it began its ramp to rest, as its event says. A
+    laboratory without that event, such as one that was killed, owes the ticks until the last laboratory began its ramp.
     """
     topics = [topic for topic in run.columns if kind_of(topic) in signals.TICK_TOPICS]
     begun = {topic: int(run.sequences[topic].max(initial=-1)) + 1 for topic in topics}

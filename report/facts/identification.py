@@ -27,11 +27,12 @@ NEEDED = {
 }
 NEEDED_TOPICS = ("master", "slave")
 EQUIVALENT_LAG = "equivalent first-order lag of a servo-hydraulic actuator"
-TAIL = 0.4  # s behind a step that the tangent looks at
+# S behind a step over which the tangent is fitted: about ten time constants of the default actuator.
+TAIL = 0.4
 
 
 def part_of(run: Run) -> str:
-    """The part that a bench recording is of, empty for any other recording."""
+    """The part that a bench test tested, empty for any other recording."""
     return run.metadata.get("bench", {}).get("part", "")
 
 
@@ -42,19 +43,19 @@ def segments(run: Run) -> list[ProgrammeSegment]:
 
 
 def possible(run: Run) -> list[str]:
-    """Parts whose in- and outputs a recording holds."""
+    """Parts whose inputs and outputs a recording holds."""
     return [part for part in NEEDED if topic_of(run, part)]
 
 
 def topic_of(run: Run, part: str) -> str:
-    """The topic that holds a part's in- and outputs, that of the default plan first; empty where none does."""
+    """The topic that holds a part's inputs and outputs, the default plan's first; empty where none does."""
     usual, names = NEEDED[part]
     topics = (usual, *(topic for topic in NEEDED_TOPICS if topic != usual))
     return next((topic for topic in topics if set(names) <= run.columns.get(topic, {}).keys()), "")
 
 
 def identify(run: Run, part: str = "") -> dict[str, Any]:
-    """What can be said of a part, as plain values: parameters with 95 % intervals, and what else the test shows.
+    """The identification of a part as plain values: parameters with 95 % intervals, and what else the test shows.
 
     Raises:
         InputError: the recording lacks the part's signals, or they cannot carry an identification.
@@ -151,9 +152,8 @@ def of_damper(run: Run, interval: float) -> dict[str, Any]:
     plan = plan_of(run)
     still = part_of(run) == "damper"
     force = columns.get("damper_force")
-    free = [
-        name for name in damper.NAMES if name != "gain" or force is not None
-    ]  # without a force the motor's is taken
+    # The motor's gain cannot be separated from the mass without a measured force.
+    free = [name for name in damper.NAMES if name != "gain" or force is not None]
     if plan and plan.damper.stiffness == 0.0:
         free.remove("stiffness")
     fit = damper.least_squares(

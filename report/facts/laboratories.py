@@ -1,7 +1,8 @@
 """The laboratories of a recording: the roles that host them, and the names of their signals.
 
-The plan inside a recording says the kinds. Of a kind of the user's the recording itself says the signals. A recording
-is data: nothing here runs a class that its plan names, and it opens where that class is not at hand.
+The plan inside a recording names the kinds. The signals of a user's kind are read from the recording itself. A
+recording is data: nothing here runs a class that its plan names, so that it opens on machines that do not have that
+class.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ class LaboratoryFacts(NamedTuple):
 
     @property
     def late(self) -> int:
-        """Ticks by which a target stands before the measurement that it belongs to."""
+        """Ticks from the recorded target to the measurement at which it should be reached."""
         return 0 if self.topic == MASTER else 1
 
     @property
@@ -75,7 +76,7 @@ def plan_of(run: Run) -> Plan | None:
 
 
 def views(run: Run) -> dict[str, Run]:
-    """The recording as pictures show it: of each slave with the master, by its role; the master's of a test without."""
+    """The recording as pictures show it: each slave with the master, by role; the master alone without slaves."""
     return {role: run.of(role) for role in run.roles} or {MASTER: run}
 
 
@@ -93,7 +94,7 @@ def laboratories(run: Run) -> list[LaboratoryFacts]:
 
 
 def lettered(labs: list[LaboratoryFacts]) -> list[LaboratoryFacts]:
-    """The laboratories with a letter where the master's and a slave's would have one name."""
+    """The laboratories with a letter where the master's and a slave's would otherwise have the same name."""
     names = {lab.pictured.name for lab in labs if lab.topic == MASTER}
     alike = names & {lab.pictured.name for lab in labs if lab.topic != MASTER}
     return [
@@ -103,7 +104,7 @@ def lettered(labs: list[LaboratoryFacts]) -> list[LaboratoryFacts]:
 
 
 def alike(labs: Iterable[LaboratoryFacts]) -> list[list[LaboratoryFacts]]:
-    """The laboratories, those of slaves with the same signals together."""
+    """The laboratories, grouped so that slaves with the same signals are together."""
     found: dict[Any, list[LaboratoryFacts]] = {}
     for lab in labs:
         found.setdefault((lab.topic == MASTER, lab.channels, lab.letter), []).append(lab)
@@ -111,7 +112,7 @@ def alike(labs: Iterable[LaboratoryFacts]) -> list[list[LaboratoryFacts]]:
 
 
 def laboratory(role: str, topic: str, plan: Plan | None, units: Mapping[str, str]) -> LaboratoryFacts | None:
-    """The laboratory of a role whose topic holds signals of these units; None where it has none or none is told."""
+    """The laboratory of a role whose topic holds signals of these units; None where it has none or it is not known."""
     kind = planned(kind_of(role), "") if plan is None else plan.kinds.get(role, "")
     part = plan.of(role) if plan is not None and kind else None
     if kind in SHIPPED:
@@ -123,10 +124,10 @@ def laboratory(role: str, topic: str, plan: Plan | None, units: Mapping[str, str
 
 
 def told(topic: str, units: Mapping[str, str]) -> Channels | None:
-    """The channels of a kind that does not ship, by the order in which its topic has them; None where it lacks some.
+    """The channels of a user's kind, by the order of its topic's fields; None where some are missing.
 
-    These are its target, a motor's force where it has one, the command, and what is measured. The first measured one in
-    the target's unit is its position, the first in newtons its force.
+    The order is: target, force of a motor if there is one, command, measured signals. The first measured signal in the
+    target's unit is the position, the first in newtons the force.
     """
     names = [*units]
     after = names.index(BEFORE[kind_of(topic)]) + 1 if BEFORE[kind_of(topic)] in names else len(names)

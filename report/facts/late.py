@@ -12,9 +12,9 @@ from common.roles import LATENCY, kind_of
 
 
 def late_ticks(run: Run) -> dict[str, Any] | None:
-    """Ticks late in the exchange with any slave, of how many, and the most in any window; None where unknown.
+    """Late ticks in the exchange with any slave, all ticks, and the most late ones in a window; None where unknown.
 
-    None on a virtual clock as well, where an effect may delay messages but the machine cannot be late.
+    The result is None on a virtual clock too, on which an effect may delay messages but the machine cannot be late.
     """
     tables = [columns for topic, columns in run.columns.items() if kind_of(topic) == LATENCY]
     if not any(columns["seq"].size for columns in tables):
@@ -37,5 +37,5 @@ def warning(found: dict[str, Any] | None) -> str:
     return (
         f"The test did not keep real time: {found['late']} of {found['ticks']} ticks "
         f"({found['late'] / found['ticks']:.0%}) were late, up to {found['worst']} of {WINDOW} in a row, "
-        f"where pre-flight lets {MOST} pass; the recording contains delays of this machine (`rths doctor`)."
+        f"while pre-flight allows {MOST}; the recording contains delays of this machine (see `rths doctor`)."
     )

@@ -19,11 +19,11 @@ UNITS = {"drift": "m", "displacement": "m", "absolute_acceleration": "m/s²", "s
 
 
 def storeys(run: Run, plan: Plan, labs: list[LaboratoryFacts]) -> list[dict[str, Any]]:
-    """Peaks of every storey from the lowest up, each with its time; of quantities without signals nothing.
+    """Peaks of every storey from the lowest up, each with its time; quantities without signals are left out.
 
-    The drift is that between a storey's two floors, displacement and absolute acceleration are of the floor above it.
-    The shear is the restoring force of the storey's columns: of the numerical ones, and in a specimen's storey what was
-    measured times the columns that the specimen stands for; of a slave's specimen what the building had of it.
+    The drift is that between a storey's two floors; displacement and absolute acceleration are those of the floor above
+    the storey. The shear is the restoring force of the storey's columns: of the numerical columns, plus the specimen's
+    force times the number of columns that it represents; a slave's specimen enters with the force that the master used.
     """
     columns = run.columns.get(MASTER, {})
     t = columns.get("t", np.array([]))

@@ -23,7 +23,8 @@ from report.facts.laboratories import LaboratoryFacts, laboratories, plan_of
 
 Result = TypeVar("Result")
 PERCENTILES = (50, 90, 99, 99.9)
-LEAST_TICKS = 500  # a second at 2 ms: less holds too few cycles of a building for a delay
+# A second at 2 ms: two cycles of a building of 2 Hz, without which a delay is not determined.
+LEAST_TICKS = 500
 SEGMENTS = (
     "wake_lateness",
     "compute_time",
@@ -77,7 +78,7 @@ def summarize(run: Run) -> dict[str, Any]:
 
 
 def completeness(run: Run, topic: str, expected: int) -> dict[str, Any]:
-    """How many messages of a topic there are, how many of the ticks that were due are missing, and the first holes."""
+    """The messages of a topic that are recorded, the ticks due that are missing, and the first ten holes."""
     sequence = run.sequences[topic]
     missing = np.setdiff1d(np.arange(expected), sequence)
     breaks = np.flatnonzero(np.diff(missing) > 1) + 1
@@ -113,10 +114,11 @@ def units_of(run: Run, topic: str) -> dict[str, str]:
 
 
 def tracking(run: Run, labs: list[LaboratoryFacts]) -> dict[str, dict[str, Any]]:
-    """How the transfer systems followed their targets: delay (s) two ways, amplitude, NRMSE, peak error.
+    """How the transfer systems followed their targets: delay (s) by two methods, amplitude, NRMSE, peak error.
 
-    By system; that of a named slave is `table.NAME`, that of a slave without a name whose master has a system of the
-    same name `actuator.slave`. Where the delay is not determined it is None and `undetermined` says why.
+    The result is by system. The system of a named slave is `table.NAME`; that of a slave without a name, if the master
+    has a system of the same name, `actuator.slave`. A delay that is not determined is None, and `undetermined` says
+    why.
     """
     result: dict[str, dict[str, Any]] = {}
     for lab in labs:
@@ -138,7 +140,7 @@ def tracking(run: Run, labs: list[LaboratoryFacts]) -> dict[str, dict[str, Any]]
 
 
 def system(lab: LaboratoryFacts, labs: list[LaboratoryFacts]) -> str:
-    """What tables call a laboratory's transfer system: no two have one name."""
+    """The name of a laboratory's transfer system in tables, which no other system has."""
     name = name_of(lab.topic)
     first = next(other for other in labs if other.pictured.system == lab.pictured.system)
     return (
@@ -147,7 +149,7 @@ def system(lab: LaboratoryFacts, labs: list[LaboratoryFacts]) -> str:
 
 
 def whereabouts(lab: LaboratoryFacts) -> str:
-    """A laboratory by what stands in it, in a sentence: `the column`, or `column A` of two."""
+    """A laboratory's device in a sentence: `the column`, or `column A` where there are two."""
     return lab.name if lab.letter else f"the {lab.name}"
 
 
@@ -158,7 +160,7 @@ def force_paths(run: Run, labs: list[LaboratoryFacts]) -> dict[str, dict[str, An
 
 
 def force_path(run: Run, lab: LaboratoryFacts) -> dict[str, Any] | None:
-    """That of one laboratory; None where it is unknown."""
+    """Delay, its interval, and gain of one column's force; None where they are unknown."""
     columns, position, force = run.columns[lab.topic], lab.channels.position, lab.channels.force
     if lab.plan is None or not {position, force} <= columns.keys():
         return None
@@ -212,7 +214,7 @@ def following(wanted: Values, got: Values, interval: float) -> dict[str, Any]:
 
 
 def known(indicator: Callable[..., Result], *signals: Any) -> Result | None:
-    """What an indicator says, None where it refuses."""
+    """The value of an indicator, None where it raises an InputError."""
     try:
         return indicator(*signals)
     except InputError:
@@ -225,7 +227,7 @@ def late_ticks(run: Run) -> int | None:
 
 
 def patience(run: Run) -> str:
-    """Which figures of the plan were larger because all laboratories were emulated, and why; empty where none was."""
+    """The sentence on figures of the plan that were larger because all laboratories are emulated; empty without any."""
     return next((event["text"] for event in run.events if event["code"] == "patience"), "")
 
 
@@ -235,7 +237,7 @@ def missed_ticks(run: Run) -> int | None:
 
 
 def rejected(run: Run) -> dict[str, dict[str, int]]:
-    """Frames that were rejected, by laboratory and reason: each event counts from the test's beginning."""
+    """Frames that were rejected, by laboratory and reason; each event holds the counts since the start of the test."""
     found = {}
     for event in run.events:
         if event["code"] == "rejected":

@@ -1,1 +1,1 @@
-"""A diagnosis report for people: a look on the terminal, one page."""
+"""A diagnosis report for people: a summary on the terminal, and one page."""

@@ -1,4 +1,4 @@
-"""What the page's template takes: tables, pictures with captions, and cells that are more than text."""
+"""Values for the template of the page: tables, pictures with captions, and cells that are more than text."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Drawing(NamedTuple):
 
 
 def drawings(*found: tuple[str, str] | tuple[str, str, str]) -> list[Drawing]:
-    """Pictures with captions and notes, those that are there."""
+    """Pictures with captions and notes; those without a picture are left out."""
     return [Drawing(Markup(item[0]), *item[1:]) for item in found if item[0]]  # noqa: S704 - made by pictures
 
 

@@ -8,13 +8,13 @@ from report.gap import pictures, wording
 from report.gap.blocks import Drawing, Rows, bar, code, drawings, strong
 from report.text.formats import MISSING, percent, quantity, signed, times
 
-MOST_HISTORIES = 4
+MOST_HISTORIES = 4  # pictures: one for each of the usual response signals
 OUTCOMES = {
-    "none": "noise",
+    "none": "noise only",
     "tolerances": "within tolerances",
     "explained": "explained",
-    "partly": "stands in",
-    "unknown": "unknown",
+    "partly": "partly explained",
+    "unknown": "unknown cause",
 }
 
 
@@ -34,7 +34,7 @@ def steps(report: Report) -> list[Drawing]:
 
 
 def numbers(report: Report) -> Rows:
-    """Before, after, closed, floor; no row where that was not determined."""
+    """The gaps before and after, the share closed and the noise floor; no row where they were not determined."""
     far, nominal = report.how_far, wording.nominal_gap(report)
     head = ("", "overall gap")
     if far.before is None or far.after is None:
@@ -68,8 +68,8 @@ def remaining(report: Report) -> str:
 
 
 def made_of(report: Report) -> Rows:
-    """Every part's gap as tolerances, named effects, what was learnt and what is left; the noise beside it."""
-    head = ("part", "gap", "tolerances", "named", "learnt", "left", "noise", "says", "good enough")
+    """Every part's gap as the sum of tolerances, named effects, learned laws and the rest; the noise beside it."""
+    head = ("part", "gap", "tolerances", "named", "learned", "left", "noise", "finding", "good enough")
     rows = [
         [
             wording.plain(part.part),
@@ -83,7 +83,7 @@ def made_of(report: Report) -> Rows:
 
 
 def noises(report: Report) -> Rows:
-    """The noise of every sensor: how large, of which colour, what it picks up, and where that was found."""
+    """The noise of every sensor: its rms and colour, lines that it picks up, resolution, and where it was found."""
     head = ("signal", "rms", "colour", "lines", "resolution", "found in")
     rows = [
         [
@@ -92,9 +92,7 @@ def noises(report: Report) -> Rows:
             "white" if noise.kind == "white" else f"coloured, order {noise.order}",
             ", ".join(f"{line:g} Hz" for line in noise.lines) or MISSING,
             quantity(noise.resolution, unit(report, name)),
-            {"at rest": "readings at rest", "quiet part": "its quiet part"}.get(
-                noise.from_, "the whole residual"
-            ),
+            {"at rest": "samples at rest", "quiet part": "quiet seconds"}.get(noise.from_, "whole residual"),
         ]
         for part in report.parts
         for name, noise in part.noise_model.items()
@@ -120,7 +118,7 @@ def paths(report: Report) -> Rows:
 
 
 def costs(item: LoopPath) -> list[str]:
-    """What a path costs, cell by cell."""
+    """The cells of a path: delay, gain and damping."""
     return [
         quantity(item.delay, "s"),
         quantity(item.nominal_delay, "s"),

@@ -20,7 +20,7 @@ GLOSSARY = (
         "recorded output of a part minus its model's prediction from the recorded input",
     ),
     ("share", "part of the gap that a site causes; shares sum to 100 % over sites with a gap"),
-    ("effect", "something real that the nominal models leave out"),
+    ("effect", "a physical cause of a gap that the nominal models leave out"),
     (
         "probability",
         "how likely a candidate is among those tried; causes that were not tried are not counted",
@@ -28,13 +28,13 @@ GLOSSARY = (
     ("nats", "logarithm of a ratio of likelihoods; 3 nats worse is about 20 times less likely"),
     ("closed", "(before − after) / (before − noise floor), on data that the fit has not seen"),
     ("tolerance", "how well a nominal parameter is known beforehand"),
-    ("not exercised", "an effect that could be there, but that this motion would not have shown"),
+    ("not exercised", "an effect that may be present, but that this motion could not have shown"),
     ("interval", "the range in which the value plausibly lies, given this recording"),
 )
 
 
 def equivalents(report: Report) -> list[str]:
-    """Effects that cannot be told apart, in sentences."""
+    """Sentences on effects that these signals cannot separate."""
     return [wording.equivalent(names) for names in wording.sets(report)]
 
 
@@ -45,7 +45,7 @@ def not_exercised(report: Report) -> list[tuple[str, str, str]]:
 
 
 def tests(report: Report) -> Rows:
-    """Tests that could be run next, and the candidates that they would tell apart."""
+    """Tests that could be run next, and the candidates that they would separate."""
     rows = [
         [
             strong(item.test),
@@ -55,4 +55,4 @@ def tests(report: Report) -> Rows:
         ]
         for item in report.details.next
     ]
-    return Rows(("test", "tells", "separation", "why"), rows)
+    return Rows(("test", "separates", "separation", "why"), rows)

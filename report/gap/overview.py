@@ -22,7 +22,7 @@ def tiles(report: Report) -> list[tuple[str, str, str]]:
 
 
 def place(report: Report) -> tuple[str, str]:
-    """The foremost site."""
+    """The site with the largest share of the gap."""
     if not report.where:
         return MISSING, "no site" if report.status in wording.QUIET else "not determined"
     first = report.where[0]
@@ -30,7 +30,7 @@ def place(report: Report) -> tuple[str, str]:
 
 
 def cause(report: Report) -> tuple[str, str]:
-    """The foremost candidate."""
+    """The first candidate."""
     if not report.which:
         return MISSING, "nothing named"
     first = report.which[0]

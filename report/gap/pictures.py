@@ -20,18 +20,19 @@ from report.text.formats import axis_unit, bare_percent, known, scale
 
 Values = NDArray[np.float64]
 
-WIDTH = 3.6  # inches: one column of the page, or the width of a phone, where text is read at its size
+WIDTH = 3.6  # inches: one column of the page, or a phone's screen, so that text keeps its size
 BLUE, ORANGE, GREEN = COLOURS[:3]
 INK = "black"  # becomes the page's own text colour
 GREY = "#808080"
 RECORDED, BEFORE, AFTER = INK, ORANGE, BLUE
 MOST_PARTS = len(COLOURS)
-LEVEL = "noise"  # a step of the waterfall that is a level of its own
-ZOOM = 4.0  # s around the worst seconds: some periods of a building
+LEVEL = "noise"  # beginning of the label of a step that is a level, not a change
+# S around the largest error: eight periods of a building of 2 Hz, in which single cycles can be seen.
+ZOOM = 4.0
 
 
 def svg(canvas: Any) -> str:
-    """A figure as SVG to stand inside a page: black and blue follow the page's colours, no background."""
+    """A figure as SVG for a page: black and blue follow the page's colours, and there is no background."""
     fit_labels(canvas)
     stream = io.StringIO()
     canvas.savefig(stream, format="svg", transparent=True, metadata=STAMPS[".svg"])
@@ -61,7 +62,7 @@ def pair(first: Sequence[object], second: Sequence[object]) -> tuple[Values, Val
 
 
 def literal(text: str) -> str:
-    """Text that the drawing library takes as it stands."""
+    """Text without characters that the drawing library would interpret."""
     return text.replace("$", r"\$")
 
 
@@ -128,7 +129,7 @@ def residual_amplitude(parts: Sequence[PartSeen]) -> str:
 
 
 def ratios(curves: Sequence[tuple[str, Values, Values]], across: str) -> str:
-    """Residual over noise of sites over something; empty where none has any."""
+    """Residual over noise of sites over the quantity named `across`; empty where no site has values."""
     drawn = [curve for curve in curves if curve[1].size][:MOST_PARTS]
     if not drawn:
         return ""
@@ -189,7 +190,7 @@ def worst(t: Values, error: Values) -> slice:
 
 
 def prediction(item: Reading) -> str:
-    """A part's reading against what its model predicts, without and with the effect, and what is left over."""
+    """A part's reading beside its model's prediction without and with the effect, and the errors of both."""
     models = (
         (item.nominal, BEFORE, "without the effect"),
         (item.corrected, AFTER, "with the effect"),

@@ -15,10 +15,10 @@ from diagnosis.report.records import Report
 from report.gap import wording
 from report.text.formats import percent
 
-STRONGEST = 0.7  # opacity of a site that holds the whole gap; text stays readable on it
-FAINTEST = 0.08  # share of the gap below which a colour could not be told from the page
-MOST_SITES = 2  # of a laboratory: there is room for two boxes, as all kinds have at most
-WIDE, LOW = 352, 196  # height of the picture with a slave's laboratory and without
+STRONGEST = 0.7  # opacity of a site with the whole gap, on which black text can still be read
+FAINTEST = 0.08  # share of the gap below which a colour could not be distinguished from the page
+MOST_SITES = 2  # of a laboratory: the picture has room for two boxes, and no kind has more sites
+WIDE, LOW = 352, 196  # height of the picture with a slave's laboratory and without one
 
 GROUND, STRUCTURE, LINK = (58, 44), (210, 44), (210, 204)
 OWN = ((424, 44), (424, 158))  # boxes of the master's laboratory
@@ -64,7 +64,7 @@ class Circle(NamedTuple):
 
 
 def rig(report: Report) -> dict[str, Any] | None:
-    """What the template of the diagram takes; None for a report that does not say what its laboratories consist of."""
+    """Values for the template of the diagram; None for a report that does not list the sites of its laboratories."""
     labs = report.details.laboratories
     if not labs or any(len(lab.sites) > MOST_SITES for lab in labs):
         return None

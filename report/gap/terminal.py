@@ -9,11 +9,11 @@ from diagnosis.report.records import Report
 from report.gap import wording
 from report.text.formats import as_float, blocks, percent, percent_interval, probability, span, times
 
-WIDTH = 100
-LABEL = 12
-NAME = 22  # of a signal or a site, at least
-BAR = 16
-MOST = 25  # lines of the whole
+WIDTH = 100  # columns of the summary, which a usual terminal window has
+LABEL = 12  # columns of the labels on the left
+NAME = 22  # least columns of the name of a signal or a site
+BAR = 16  # columns of a bar
+MOST = 25  # lines of the summary: one screen
 UNBROKEN = "\u00a0%"
 
 
@@ -156,7 +156,7 @@ def tolerances(report: Report) -> list[str]:
 
 
 def equivalents(report: Report) -> list[str]:
-    """What these signals cannot tell apart, in words."""
+    """Sentences on effects that these signals cannot separate."""
     found = wording.sets(report)
     return row("equivalent", " ".join(map(wording.equivalent, found)), 2)
 
@@ -164,7 +164,7 @@ def equivalents(report: Report) -> list[str]:
 def not_exercised(report: Report) -> list[str]:
     """Effects that the recording could not have shown."""
     names = list(dict.fromkeys(map(wording.effect, report.not_exercised)))
-    return row("not shown", f"could not have appeared here: {', '.join(names)}" if names else "", 2)
+    return row("not shown", f"this motion could not have shown: {', '.join(names)}" if names else "", 2)
 
 
 def warnings(report: Report) -> list[str]:

@@ -8,8 +8,8 @@ from report.gap import pictures, wording
 from report.gap.blocks import Drawing, Rows, bar, drawings, lines, strong
 from report.text.formats import MISSING, percent, percent_interval, span, times
 
-MOST_PARTS = 4
-MOST_WINDOWS = 4
+MOST_PARTS = 4  # pictures of residuals over frequency: two rows of the page
+MOST_WINDOWS = 4  # windows of time in a cell of the table
 
 
 def sites(report: Report) -> Rows:
@@ -28,12 +28,12 @@ def sites(report: Report) -> Rows:
 
 
 def unplaced(report: Report) -> str:
-    """Why no site is listed."""
+    """The sentence on why no site is listed."""
     if report.status in wording.QUIET:
-        return "No part leaves a residual above its noise: there is nothing to place."
+        return "No part leaves a residual above its noise, so that there is no gap to locate."
     return (
-        "The gap could not be placed, because the recording holds input and output together of no part that "
-        "has a gap."
+        "The gap could not be located, because the recording does not hold both input and output of any part with "
+        "a gap."
     )
 
 
@@ -83,7 +83,7 @@ def loop_shares(report: Report) -> Rows:
 
 
 def ceiling(report: Report) -> Rows:
-    """How much of the residual the catalogue explains beside a model that may be anything."""
+    """The share of the residual that a flexible model explains, beside that of the catalogue's best effects."""
     rows = [
         [wording.site(item.site), bar(item.flexible), bar(item.catalogue)] for item in report.details.ceiling
     ]

@@ -1,4 +1,4 @@
-"""Which effect makes the gap: physics and measurement apart, evidence for and against, pictures."""
+"""Which effect causes the gap: physics and measurement separately, evidence for and against, pictures."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from report.gap import pictures, wording
 from report.gap.blocks import Drawing, Rows, bar, drawings
 from report.text.formats import as_float, known, nats, percent, probability, quantity
 
-MOST_PICTURES = 6
+MOST_PICTURES = 6  # of readings with the largest residuals: three rows of the page
 KINDS = (
     ("physics", "Physics effects", "The rig does something that its model leaves out."),
     ("measurement", "Measurement artefacts", "The rig behaves as modelled, but a reading is wrong."),
@@ -58,11 +58,11 @@ def kinds(report: Report) -> list[tuple[str, str, list[Card]]]:
 
 
 def nothing(report: Report) -> str:
-    """Why no effect is named."""
+    """The sentence on why no effect is named."""
     reasons = {
         "within_tolerances": "Parameters within their tolerances explain the gap: no effect is needed.",
         "no_gap": "There is no gap to explain: no effect was searched for.",
-        "not_enough_data": "No effect is named: the recording does not hold enough to tell one from another.",
+        "not_enough_data": "No effect is named: the recording holds too few data to separate one from another.",
         "unknown_effect": "No effect of the catalogue explains the gap.",
     }
     return reasons.get(report.status, "No effect is named.")
@@ -125,7 +125,7 @@ def warnings(item: Candidate | Evidence, report: Report) -> list[str]:
     own = set(item.effects)
     twins = {other for group in report.equivalent if set(group) & own for other in set(group) - own}
     if twins:
-        texts.append(f"Cannot be told apart from {wording.joined(sorted(map(wording.effect, twins)), 'or')}.")
+        texts.append(f"Cannot be separated from {wording.joined(sorted(map(wording.effect, twins)), 'or')}.")
     return texts
 
 
@@ -164,8 +164,8 @@ def learned(report: Report) -> list[Drawing]:
                 pictures.curve(item.curve, names),
                 f"{wording.site(item.site).capitalize()}: the {item.quantity} that no effect explains, over the "
                 "motion there.",
-                f"{quantity(item.before, item.unit)} rms, of which {quantity(item.after, item.unit)} are left on time "
-                "that the law has not seen.",
+                f"{quantity(item.before, item.unit)} rms, of which {quantity(item.after, item.unit)} remain on data "
+                "not used for the law.",
             )
             for item in report.details.learned
         )

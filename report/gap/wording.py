@@ -34,11 +34,12 @@ JUDGED = {
     "recordings given": "On the recordings given for validation",
 }
 LEARNED_ON = {
-    "other recordings": "the recordings given, which it has not seen",
-    "strongest part": "the strongest part of this recording, which it has not seen",
-    "interleaved (interpolation)": "time that it has not seen, but of the same strength: that is interpolation",
+    "other recordings": "the recordings given for validation",
+    "strongest part": "the strongest part of this recording, which was not used for it",
+    "interleaved (interpolation)": "seconds between those used for it (interpolation)",
 }
-DOMINANT = 0.5  # share of the gap from which one site is named as the place
+# Share of the gap from which a site is named in the verdict: it causes more than all others together.
+DOMINANT = 0.5
 NOTABLE = 1.0  # standard deviations of its tolerance that make a parameter's move worth a word
 
 
@@ -90,7 +91,7 @@ def effects(names: Sequence[str]) -> str:
 
 
 def says(name: str) -> str:
-    """What the catalogue says of an effect; nothing of one it does not list."""
+    """The catalogue's sentence on an effect; empty for an effect that it does not list."""
     entry = CATALOGUE.get(placed(name, 2)[0])
     return entry.says if entry else ""
 
@@ -141,7 +142,7 @@ def called(effect: str, parameter: str) -> str:
 def equivalent(names: Sequence[str]) -> str:
     """A set of effects that cannot be told apart, as a sentence."""
     first, *others = map(effect, names)
-    return f"These signals cannot tell {first} from {joined(others, 'or')}: naming one of them is naming all."
+    return f"These signals cannot separate {first} from {joined(others, 'or')}: the cause may be any of them."
 
 
 def notable(report: Report) -> list[tuple[str, Tolerance]]:
@@ -166,12 +167,12 @@ def verdict(report: Report) -> str:
         return report.verdict
     size = f"{percent(report.gap.overall)} (noise floor {percent(report.gap.overall_noise_floor)})"
     sentences = {
-        "no_gap": f"No gap beyond noise and tolerances: {size}.",
-        "within_tolerances": f"No gap beyond tolerances: {size}; {within(report)}.",
+        "no_gap": f"There is no gap beyond noise and tolerances: {size}.",
+        "within_tolerances": f"There is no gap beyond tolerances: {size}; {within(report)}.",
         "partly_explained": f"The gap of {size}{place(report)}: {by_part(report) or cause(report)}.",
-        "not_enough_data": "This recording holds too little to place or name a gap.",
-        "unknown_effect": f"The gap of {size}{place(report)} is made by something that the catalogue lacks.",
-        "ambiguous": f"The gap of {size}{place(report)} has several causes that fit alike: {rivals(report)}.",
+        "not_enough_data": "This recording holds too few data to locate a gap or to name its cause.",
+        "unknown_effect": f"The gap of {size}{place(report)} has a cause that is not in the catalogue.",
+        "ambiguous": f"Several causes explain the gap of {size}{place(report)} equally well: {rivals(report)}.",
     }
     fallback = f"The gap of {size}{place(report)}: {cause(report)}."
     return sentences.get(report.status, fallback)
@@ -181,7 +182,9 @@ def within(report: Report) -> str:
     """The parameters within their tolerances that explain a gap, the farthest moved by name."""
     moved = [f"{name} ×{item.factor:.4g}" for name, item in by_move(report)[:2] if item.factor is not None]
     return (
-        f"parameters moved within them explain it, farthest {joined(moved)}" if moved else "nothing is left"
+        f"parameters moved within them explain it, most of all {joined(moved)}"
+        if moved
+        else "nothing is left"
     )
 
 
@@ -191,17 +194,19 @@ def by_part(report: Report) -> str:
     named = {name for entry in left for name in entry.effects}
     texts = [f"in {entry.part} {of_part(entry)}" for entry in left]
     further = [name for item in report.which[:1] for name in item.effects if name not in named]
-    texts += [f"{effects(further)} besides"] if further and texts else []
+    texts += [f"in addition {effects(further)}"] if further and texts else []
     return "; ".join(texts)
 
 
 def of_part(entry: PartOfGap) -> str:
     """The sentence on one part."""
     if entry.outcome == "unknown":
-        return "it is made by something that the catalogue lacks"
+        return "its cause is not in the catalogue"
     if entry.outcome == "explained":
         return f"{effects(entry.effects)} explains it"
-    return f"{effects(entry.effects)} stands in for what leaves {percent(entry.left)} of {percent(entry.gap)}"
+    return (
+        f"{effects(entry.effects)} explains a part and leaves {percent(entry.left)} of {percent(entry.gap)}"
+    )
 
 
 def place(report: Report) -> str:
@@ -231,7 +236,7 @@ def cause(report: Report) -> str:
 def closed(report: Report) -> str:
     """The closed share with its interval; empty where it is unknown or there was no gap to close.
 
-    What is left may by chance be below the noise floor: no more than all of the gap is said to be closed.
+    By chance the rest may be below the noise floor; a share above 100 % is shown as 100 %.
     """
     share = report.how_far.closed
     if share is None or report.status in QUIET:

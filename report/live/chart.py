@@ -11,8 +11,9 @@ from bokeh.plotting import figure
 
 from report.live.stream import Stream
 
-PLAIN_POWER = 7  # forces of a user's device stand in N: up to 10 MN they are written without an exponent
-HEIGHT = 230  # px
+# Powers of ten without an exponent on an axis: forces of a user's device are in N, up to 10 MN.
+PLAIN_POWER = 7
+HEIGHT = 230  # px of a plot: three rows of plots fit a screen
 TOOLS = "pan,box_zoom,reset,save"
 Scale = Literal["linear", "log"]
 

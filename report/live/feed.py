@@ -1,4 +1,4 @@
-"""The content of a growing recording for the views: traces, exchanges, modes and events, updated look by look."""
+"""The content of a growing recording for the views: traces, exchanges, modes and events, updated at every look."""
 
 from __future__ import annotations
 
@@ -26,10 +26,11 @@ from report.live.standing import Standing
 from report.live.trace import Trace, extremes, largest
 from report.pictures.curves import labs_of
 
-POINTS = 1000  # of a line: as many as a wide screen has columns for it
-POINTS_WHOLE = 5000  # of a line of a finished recording, which is sent once
-SILENT_NS = 2_000_000_000  # without anything new; the recorder writes twenty times a second
-EVENTS = 100
+POINTS = 1000  # of a line: a wide screen has about as many pixel columns for a plot
+POINTS_WHOLE = 5000  # of a line of a finished recording, which is sent once and may be zoomed
+# Ns without new data that count as silence: the recorder writes twenty times a second.
+SILENT_NS = 2_000_000_000
+EVENTS = 100  # kept for new pages; a test in order has about thirty
 EDGES = np.geomspace(50.0, 50_000.0, 61)  # µs, of the histogram's classes
 TIMED = ("t", "round_trip", "wake_lateness")  # of the latency
 DEFAULT = laboratories(Run(Path(), columns={MASTER: {}, SLAVE: {}}))
@@ -58,7 +59,7 @@ class Timing:
         self.counts = np.zeros(EDGES.size - 1, dtype=np.int64)
         self.newest = self.longest = (
             math.nan
-        )  # s, round trip: median of the newest look, and of all the longest
+        )  # s, median round trip of the newest look, and the longest of all
 
     def add(self, columns: Mapping[str, Values]) -> None:
         """Take in some ticks."""
@@ -195,9 +196,8 @@ class Feed:
             ticks = self.window / (self.interval or Plan().test.interval)
             kind, room = kind_of(topic), POINTS_WHOLE if self.whole else POINTS
             thin = largest if kind == LATENCY else extremes if self.whole else None
-            most = (
-                2 * len(names_of(self.laboratories, kind)[1:]) if thin is extremes else 1
-            )  # points of a group
+            points = 2 * len(names_of(self.laboratories, kind)[1:])  # of a group, of which extremes are kept
+            most = points if thin is extremes else 1
             step = max(math.ceil((ticks + 1 if self.whole else ticks) * most / room), 1)
             self._traces[topic] = Trace(step, room, thin)
         return self._traces[topic]
@@ -228,7 +228,7 @@ class Feed:
 
     @property
     def silent(self) -> float:
-        """Seconds for which the file has not grown, 0 while they are so few that it may be about to."""
+        """Seconds for which the file has not grown, 0 up to `SILENT_NS`."""
         silent = self._clock.now() - self._grown_ns
         return silent * 1e-9 if silent > SILENT_NS and not self.ended else 0.0
 
@@ -244,7 +244,7 @@ class Feed:
 
     @property
     def state(self) -> str:
-        """How the test stands, in words."""
+        """The state of the test in words."""
         if self.failure:
             return self.failure
         if self._tail.damage:
@@ -254,7 +254,7 @@ class Feed:
         return self._progress()
 
     def _progress(self) -> str:
-        """How far a recording is that has not come to its end."""
+        """The progress of a recording that has not ended."""
         if not self.changes:
             return "waiting for the recording to begin"
         if self.behind:

@@ -13,8 +13,8 @@ from report.live.feed import EDGES, Feed, Timing
 from report.live.stream import Streams
 from report.pictures.figure import COLOURS
 
-NONE = 0.5  # ticks: where the bars of a logarithmic scale begin
-EVERY = 250  # ticks after which the histogram is drawn anew
+NONE = 0.5  # ticks at which bars begin: on a logarithmic scale half a tick stands for none
+EVERY = 250  # ticks after which the histogram is drawn anew: twice a second at 2 ms
 LABEL = "round trip, µs"
 
 

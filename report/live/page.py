@@ -111,14 +111,14 @@ class Page:
 
     def _update(self, feed: Feed) -> None:
         self._head(feed)
-        self.status.tiles.tags = [feed.beat]  # lets the page say for how long it has heard nothing
+        self.status.tiles.tags = [feed.beat]  # lets the page show for how long it has received nothing
         if len(feed.roles) > 1 and not self.slave.visible:
             options: Any = [(role, name_of(role)) for role in feed.roles]
             self.slave.update(options=options, value=feed.roles[0], visible=True)
         if self._labs != looks(feed.laboratories):
             self._heading.tags = [
                 "anew"
-            ]  # the browser loads the page again, with the plots of these laboratories
+            ]  # lets the browser load the page again, with the plots of these laboratories
         chosen = str(self.slave.value) if self.slave.visible else "".join(feed.roles[:1])
         self._choose(chosen)
         self.streams.follow(feed, chosen)

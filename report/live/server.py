@@ -23,7 +23,7 @@ from report.live.feed import Feed
 from report.live.page import Page
 
 HOST = "127.0.0.1"
-LINGER_S = 1.5  # for the pages to get the end of the test
+LINGER_S = 1.5  # s after the end of a test, for the pages to receive it: fifteen updates
 
 
 class Server:
@@ -31,13 +31,17 @@ class Server:
 
     def __init__(self, feed: Feed, port: int, rate: float) -> None:
         self._feed = feed
-        logging.getLogger("bokeh").setLevel(logging.ERROR)  # a reader who leaves is no reason for a warning
+        logging.getLogger("bokeh").setLevel(
+            logging.ERROR
+        )  # bokeh would warn of every reader who closes the page
         self._period = 1e3 / rate
         try:
             sockets, self._port = bind_sockets(HOST, port)
         except OSError as error:
-            reason = "it is taken" if error.errno == errno.EADDRINUSE else os.strerror(error.errno or 0)
-            raise InputError(f"Cannot serve the live view on port {port}: {reason}; give another.") from None
+            reason = "it is in use" if error.errno == errno.EADDRINUSE else os.strerror(error.errno or 0)
+            raise InputError(
+                f"Cannot serve the live view on port {port}: {reason}; give another port."
+            ) from None
         origins = [f"{HOST}:{self._port}", f"localhost:{self._port}"]  # no other site's page may read along
         pages = {"/": Application(FunctionHandler(self._page))}
         self._loop = IOLoop.current()
@@ -48,7 +52,7 @@ class Server:
 
     @property
     def url(self) -> str:
-        """Where the page is."""
+        """The address of the page."""
         return f"http://{HOST}:{self._port}/"
 
     def _page(self, document: Document) -> None:

@@ -12,7 +12,7 @@ from common.safety.modes import LATCHED, Mode
 from recorder.loop import CONSEQUENCE
 
 MODES = [mode.value for mode in Mode]
-GRAVEST = (  # the first of these modes that a laboratory is in says how the test stands
+GRAVEST = (  # the first of these modes that any laboratory is in is the state of the test
     Mode.EMERGENCY_STOP,
     Mode.SAFE,
     Mode.RAMPING,
@@ -36,16 +36,15 @@ class StopCause(NamedTuple):
 class Standing:
     """Modes, ages and causes of the laboratories, from their rows and events.
 
-    A row's age is the time since it was measured. The test's clock and this process's differ by a constant that nobody
-    knows; the smallest difference ever seen between a row's time and its arrival stands for it, so that an age counts
-    what a row waited anywhere beyond the shortest wait.
+    A row's age is the time since it was measured. The clock of the test and that of this process differ by an unknown
+    constant. The smallest difference seen between a row's time and its arrival is taken for it, so that an age is what
+    a row waited beyond the shortest wait of all.
     """
 
     def __init__(self, clock: Clock) -> None:
         self.modes: dict[str, str] = {}
-        self.stops: list[
-            StopCause
-        ] = []  # causes of their own; where there are none, those that followed another
+        # Causes that arose in a laboratory itself; where there are none, those that followed another laboratory.
+        self.stops: list[StopCause] = []
         self._clock = clock
         self._t: dict[str, float] = {}  # newest time of each laboratory
         self._shift = math.inf  # s

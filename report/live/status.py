@@ -1,4 +1,4 @@
-"""How the test stands: what stopped it, laboratories, time, late ticks, round trip; and what has happened."""
+"""The state of the test: what stopped it, laboratories, time, late ticks, round trip; and the newest events."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from report.page import block_of
 from report.pictures.figure import COLOURS
 from report.text.formats import percent
 
-SHOWN = 40  # events
-STOPS = 4  # causes in the banner: more than a test with a few laboratories has
+SHOWN = 40  # events in the list, which scrolls
+STOPS = 4  # causes in the banner: one for each laboratory of a usual test
 GREY, BLUE, ORANGE, RED = "#595959", COLOURS[0], "#8a5a00", "#b3261e"  # legible on white
 IN_MODE = {
     Mode.ARMED.value: BLUE,

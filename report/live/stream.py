@@ -50,9 +50,8 @@ class Stream:
         if anew:
             self.source.data = points if count else self._nothing
         elif count:
-            few = {
-                name: values.tolist() for name, values in points.items()
-            }  # each array is a message of its own
+            # Lists, since bokeh sends each array as a message of its own.
+            few = {name: values.tolist() for name, values in points.items()}
             self.source.stream(few, rollover=trace.room)
         self._trace, self._total = trace if count or not anew else None, trace.total
 

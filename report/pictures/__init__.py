@@ -12,10 +12,10 @@ from report.pictures.figure import DOUBLE, SINGLE
 
 
 class Picture(NamedTuple):
-    """One picture: `draw` takes a recording as one of one slave, and an empty figure of a size of the two.
+    """One picture: `draw` takes a recording with one slave at most, and an empty figure of one of the two sizes.
 
-    It returns False, and leaves the figure empty, where the recording lacks its signals; where it has a part of them
-    the figure shrinks to these.
+    It returns False and leaves the figure empty where the recording lacks the signals. Where the recording has some of
+    them, the figure shrinks to these.
     """
 
     name: str
@@ -26,7 +26,7 @@ class Picture(NamedTuple):
     draw: Callable[[Run, Any], bool]
 
     def on(self, recording: Run, canvas: Any) -> bool:
-        """Draw; False where the recording lacks the signals, or holds numbers of which no picture can be made."""
+        """Draw; False where the recording lacks the signals, or holds numbers that cannot be drawn."""
         try:
             return self.draw(recording, canvas)
         except (ValueError, ArithmeticError, MemoryError):

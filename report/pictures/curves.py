@@ -1,4 +1,4 @@
-"""What pictures show of a recording: signals over time, and each transfer system beside what was asked of it."""
+"""Signals of a recording for the pictures: signals over time, and each transfer system's motion beside its target."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 Values = NDArray[np.float64]
 
-STRONGEST = 1.5  # s before and behind the largest target: some periods of a building
-LATE = 1  # ticks by which a command stands before the measurement at which it is to be reached
+STRONGEST = 1.5  # s before and after the largest target: six periods of a building of 2 Hz
+LATE = 1  # ticks from a command to the measurement at which it should be reached
 
 
 class Curve(NamedTuple):
@@ -29,10 +29,10 @@ class Curve(NamedTuple):
 
 
 class Pair(NamedTuple):
-    """A transfer system's measurement beside what it was to be at that moment."""
+    """A transfer system's measured motion beside the wanted one at the same moments."""
 
     label: str
-    word: str  # what was asked: the target, or the command where no target is recorded
+    word: str  # which signal is wanted: the target, or the command where no target is recorded
     lab: LaboratoryFacts
     t: Values  # (n,) s, of the measurement
     wanted: Values  # (n,) m
@@ -58,7 +58,7 @@ def curve(recording: Run, topic: str, name: str) -> Curve | None:
 
 
 def moving(recording: Run, topic: str, name: str) -> Curve | None:
-    """A signal that does not stand still all the time."""
+    """A signal that is not constant; None for any other."""
     found = curve(recording, topic, name)
     return found if found is not None and np.nanmax(found.values) > np.nanmin(found.values) else None
 
@@ -77,7 +77,7 @@ def pairs(recording: Run) -> list[Pair]:
 
 
 def matched(recording: Run, lab: LaboratoryFacts, asked: tuple[str, str, int]) -> Pair | None:
-    """A laboratory's position beside what was asked of it so many ticks before; None where one is lacking or still."""
+    """A laboratory's position beside the signal that asked for it; None where one of them is missing or constant."""
     topic, measured = lab.topic, lab.channels.position
     columns, (name, word, late) = recording.columns.get(topic, {}), asked
     if not {"t", name, measured} <= columns.keys():

@@ -1,9 +1,9 @@
-"""The one style of figures: legible in print at one column's width, in colours that everybody can tell apart.
+"""The style of all figures: legible in print at one column's width, in colours that are distinct for every reader.
 
 Widths are those of a journal's page: columns are 84 to 90 mm wide (Elsevier 90 mm, Springer 84 mm, ASCE 89 mm), a page
 174 to 190 mm. Text is drawn at the size at which it is read, 8 pt and 7 pt: Elsevier's artwork sizing asks for 7 pt in
-print, and no superscript below 6 pt. What is saved as SVG has its letters as outlines: a reader without the font would
-get another whose letters have other widths, and labels that run into each other.
+print, and no superscript below 6 pt. In SVG files letters are saved as outlines, because another font on the reader's
+machine would have other widths, and labels would overlap.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ REFERENCE = "0.35"  # grey of lines that are no measurement: bounds, nominal val
 
 SINGLE, DOUBLE = 3.35, 7.0  # inches: 85 mm and 178 mm
 TEXT, SMALL = 8, 7  # pt
-PLAIN = (-9, 9)  # powers of ten within which numbers stand at their ticks, not as a factor above the axis
+PLAIN = (-9, 9)  # powers of ten within which axes show plain numbers and no common factor
 DOTS = 300  # per inch of a saved picture
 STAMPS: dict[str, dict[str, Any]] = {
     ".svg": {"Date": None},

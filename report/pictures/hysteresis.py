@@ -1,4 +1,4 @@
-"""Force against motion of what stands in the laboratories: deformation of the column, stroke of the damper."""
+"""Force over motion of the devices in the laboratories: deformation of the column, stroke of the damper."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from report.facts.laboratories import LaboratoryFacts
 
 
-LEAST = 10  # ticks
+LEAST = 10  # ticks from which on noise is estimated: with fewer its error would exceed a quarter
 
 
 def draw(recording: Run, canvas: Any) -> bool:
@@ -48,7 +48,7 @@ def draw(recording: Run, canvas: Any) -> bool:
 
 
 def work(deformation: Values, force: Values) -> str:
-    """The energy that a loop absorbs, to the place that noise leaves, of at most four."""
+    """The energy that a loop absorbs, with the digits that noise allows, four at most."""
     energy, doubt = absorbed(deformation, force)
     factor, unit = scale(max(abs(energy), doubt), "J")
     energy, doubt = factor * energy, factor * doubt

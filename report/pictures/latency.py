@@ -1,4 +1,4 @@
-"""Where the time of a tick goes: how every segment is spread, and the round trip over the test."""
+"""The time of a tick: the distribution of every segment, and the round trip over the test."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from report.pictures.figure import COLOURS
 from report.pictures.layout import bound, decades, legend_above
 
 MICRO = 1e6
-BINS = 150
-LEAST = 1.0  # µs: what took less is drawn there, for the axis is logarithmic
+BINS = 150  # stretches of the test: two points for each millimetre of a column's width
+LEAST = 1.0  # µs at which shorter times are drawn, because the axis is logarithmic
 MARKS = (
     ("p50", 50.0, "o", COLOURS[0]),
     ("p99", 99.0, "|", COLOURS[1]),

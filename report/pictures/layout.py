@@ -9,8 +9,9 @@ from typing import Any
 
 from report.pictures.figure import DOUBLE, REFERENCE, SINGLE, SMALL, TEXT
 
-MARGIN = 0.45  # inches of a figure's height that axes below one another need once
-FEW, MANY = 60.0, 2e4  # ratios of the ends of a logarithmic axis
+MARGIN = 0.45  # inches of a figure's height for labels that panels below one another have only once
+# Ratios of the ends of a logarithmic axis: below FEW, under two decades, ticks at 1, 2 and 5; above MANY powers of ten.
+FEW, MANY = 60.0, 2e4
 LINE = 1.25 * SMALL / 72.0  # inches, of the caption
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -21,7 +22,7 @@ def wide(canvas: Any) -> bool:
 
 
 def shrink(canvas: Any, count: int, usual: int) -> None:
-    """Take the height of panels below one another that are not there."""
+    """Reduce a figure's height by that of the panels that are missing."""
     height = canvas.get_figheight() - MARGIN
     canvas.set_figheight(MARGIN + height * count / usual)
 
@@ -89,7 +90,7 @@ def power(value: float) -> str:
 
 
 def bound(axis: Any, label: str, *, x: float | None = None, y: float | None = None) -> None:
-    """A line that is no measurement, upright at `x` or level at `y`."""
+    """A reference line, vertical at `x` or horizontal at `y`."""
     options = {"color": REFERENCE, "linewidth": 0.8, "label": label}
     if x is not None:
         axis.axvline(x, linestyle=(0, (1, 1)), **options)
@@ -98,7 +99,7 @@ def bound(axis: Any, label: str, *, x: float | None = None, y: float | None = No
 
 
 def caption(canvas: Any, text: str) -> Any:
-    """Small text over a figure, which grows by it; broken into lines that fit whatever the words are."""
+    """Small text above a figure, whose height grows by it; the text is broken into lines that fit the width."""
     limit = canvas.bbox.width * 0.98
     longest = max(map(len, text.splitlines()), default=1)
     label = canvas.suptitle("", fontsize=SMALL, x=0.01, ha="left", parse_math=False)

@@ -21,11 +21,11 @@ if TYPE_CHECKING:
     from report.facts.laboratories import LaboratoryFacts
 
 SEGMENT = 10.0  # s: lines 0.1 Hz apart, half the width of a peak at 2 Hz with 5 % of damping
-LEAST = 64  # ticks: a spectrum of fewer has too few frequencies to be drawn
-HOLES = 4  # ticks that may be missing for one that is there
-RANGE = 1e6  # of the ordinate: below lies rounding
+LEAST = 64  # ticks without which no spectrum is drawn: fewer give less than two decades of frequency
+HOLES = 4  # longest mean distance of recorded ticks, in intervals: more holes than that make a spectrum meaningless
+RANGE = 1e6  # ratio of the ends of the ordinate: lower densities are rounding errors
 BANDS = 24  # a decade: 10 % wide, as wide as a peak with 5 % of damping
-MODES = 3  # whose frequencies are marked: more lines would hide the curves
+MODES = 3  # natural frequencies that are marked: more lines would hide the curves
 DASHED = (0, (4, 2))
 DOTTED = (0, (1, 1))
 
@@ -79,7 +79,7 @@ def accelerations(recording: Run) -> list[SpectrumLine]:
 
 
 def displacements(recording: Run) -> list[SpectrumLine]:
-    """As measured and, dotted in the same colour, by how much they missed what was wanted."""
+    """Spectra of the measured displacements and, dotted in the same colour, of their tracking errors."""
     lines = []
     for lab in labs_of(recording):
         item = moving(recording, lab.topic, lab.channels.position)
@@ -145,8 +145,8 @@ def amplitude_density(item: Curve) -> tuple[Values, Values]:
 def averaged(frequency: Values, density: Values) -> tuple[Values, Values]:
     """Mean square densities over bands of equal width on a logarithmic axis, at the mean frequency of each.
 
-    Lines stand ever closer together there: each alone scatters by as much as its value, and all of them are a solid
-    area. Where a band holds one line only, it stays as it is.
+    On a logarithmic axis spectral lines lie closer and closer together; single lines scatter by as much as their value,
+    so that many of them look like a solid area. A band with one line keeps it unchanged.
     """
     band = np.floor(BANDS * np.log10(frequency)).astype(int)
     starts = np.flatnonzero(np.diff(band, prepend=band[0] - 1))
@@ -156,7 +156,7 @@ def averaged(frequency: Values, density: Values) -> tuple[Values, Values]:
 
 
 def natural_frequencies(recording: Run) -> list[float]:
-    """The first undamped ones of the planned building (Hz); none where the recording is not of one that shook."""
+    """The first natural frequencies (Hz) of the planned building without damping; none without a ground motion."""
     from loop.nominal.partition import matrices
     from models.structures import shear_building
 

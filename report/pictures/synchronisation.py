@@ -1,4 +1,4 @@
-"""The synchronisation subspace: what each transfer system measured against what it was to be.
+"""The synchronisation subspace: each transfer system's measured motion over its target.
 
 A delay opens the straight line to a loop, an error of amplitude tilts it. Source: Wallace, Sieber, Neild, Wagg and
 Krauskopf, Stability analysis of real-time dynamic substructuring using delay differential equation models, Earthq. Eng.
@@ -17,7 +17,7 @@ from report.pictures.figure import COLOURS, REFERENCE
 from report.pictures.layout import legend_above, note, panels
 from report.text.formats import axis_scale
 
-ROOM = 0.05  # at the ends of an axis, of the range
+ROOM = 0.05  # of the range, free at both ends of an axis, so that no curve touches the frame
 
 
 def draw(recording: Run, canvas: Any) -> bool:

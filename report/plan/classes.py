@@ -1,7 +1,7 @@
 """The classes that a plan would run, and where their code lies; none of it is imported here.
 
-A plan that names a class, for a rig or for a kind of laboratory, runs that class's code with the rights of whoever
-starts the test. That of a kind runs as well where the plan is checked or simulated.
+A plan that names a class, for a rig or for a kind of laboratory, runs that class's code with the rights of the user who
+starts the test. The class of a kind also runs when the plan is checked or simulated.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What looks like a slip of units: values that are possible, but that no building or laboratory has."""
+"""Likely slips of units: values that are possible, but that no building or laboratory has."""
 
 from __future__ import annotations
 
@@ -17,18 +17,21 @@ SHORTEST, LONGEST = (
     0.05,
     12.0,
 )  # s, of a first period: a stiff test frame has 20 Hz, the tallest towers 8 to 10 s
-USUAL = (0.1, 5.0)  # s, to which a slip is traced back: from low stiff houses to tall or isolated ones
+USUAL = (
+    0.1,
+    5.0,
+)  # s, periods by which a slip is recognised: from low stiff houses to tall or isolated buildings
 LARGEST_DAMPING = 0.5  # a building with many dampers has 0.3
 LEAST_DAMPING = 1e-4  # bare welded steel has 2e-3; a dashpot in kN·s/m is a thousandth
 OFF = 10.0  # specimen over the stiffness that it stands for: cracking makes 3, the least slip of units 1000
 LARGEST_STROKE = 2.0  # m; the largest shaking tables and dynamic actuators have 1 m
 TICKS_PER_PERIOD = 20.0  # least, with which a second-order integration keeps a period to half a percent
-WEAKEST = 1.0  # m/s², peak of a record: hardly anybody tests with less than a tenth of g, unscaled
-STRONGEST = 25.0  # m/s², which hardly any record was ever beyond
-LEAST_PEAK = 0.01  # m/s² after scaling, a millig: people begin to feel it there
-LARGEST_DRIFT = 0.5  # m: no storey stands at a sixth of its height
-SLOWEST = 0.5  # s, dead time and lag of a transfer system: a hand would be quicker
-FORCE_OFF = 100.0  # peak over limit: a limit in kN is a thousandth of one that leaves room
+WEAKEST = 1.0  # m/s², peak of an unscaled record: records for tests have a tenth of g and more
+STRONGEST = 25.0  # m/s², peak of a record: only a few records of all earthquakes are stronger
+LEAST_PEAK = 0.01  # m/s², peak after scaling: a thousandth of g, about the threshold of perception
+LARGEST_DRIFT = 0.5  # m: a sixth of a storey's height, at which every building collapses
+SLOWEST = 0.5  # s, dead time and lag of a transfer system: ten times that of slow ones
+FORCE_OFF = 100.0  # peak over limit: a limit in kN is a thousandth of the right one
 NOISE_SHARE = 0.1  # rms of a sensor's noise over its limit: good ones have a thousandth of their range
 MASS, STIFFNESS = "mass in [structure]", "stiffness in [structure]"
 FACTORS = (  # of the period where a value is by that much too small, and what was written instead
@@ -74,7 +77,7 @@ def interval_slip(plan: Plan, period: float) -> list[PlanSlip]:
 
 
 def motion_slips(plan: Plan, motion: GroundMotion) -> list[PlanSlip]:
-    """A record whose numbers are not m/s², and a scale that makes too little or too much of it."""
+    """A record whose numbers are not in m/s², and a scale that makes the motion far too weak or too strong."""
     chosen, where, peak = plan.ground_motion, "record in [ground_motion]", motion.peak
     share = f"{peak:.3g} m/s² ({peak / STANDARD_GRAVITY:.3g} g)"
     if chosen.record not in MOTIONS and peak < WEAKEST:
@@ -108,9 +111,9 @@ def period_slips(period: float) -> list[PlanSlip]:
         for factor, name, slip in FACTORS
         if USUAL[0] <= period * factor <= USUAL[1]
     ]
-    where = "; or at ".join(causes) or f"{MASS} (kg) and {STIFFNESS} (N/m)"
+    where = "; or ".join(causes) or f"{MASS} (kg) and {STIFFNESS} (N/m)"
     text = (
-        f"The first period is {period:.3g} s, where buildings and frames have {SHORTEST:g} to {LONGEST:g} s: look at "
+        f"The first period is {period:.3g} s, while buildings and frames have {SHORTEST:g} to {LONGEST:g} s: check "
         f"{where}."
     )
     return [PlanSlip("[structure]", text)]
@@ -121,7 +124,7 @@ def damping_slips(ratio: float) -> list[PlanSlip]:
     if LEAST_DAMPING <= ratio <= LARGEST_DAMPING or ratio == 0.0 or math.isnan(ratio):
         return []
     text = (
-        f"The first mode's damping ratio is {ratio * 100.0:.3g} %, where buildings have 0.5 to 20 %: damping must be "
+        f"The first mode's damping ratio is {ratio * 100.0:.3g} %, while buildings have 0.5 to 20 %: damping must be "
         "in N·s/m (200e3 for 200 kN·s/m), damping_ratio a share (0.05 for 5 %)."
     )
     return [PlanSlip("damping in [structure]", text)]
@@ -164,7 +167,7 @@ def transfer_slips(plan: Plan) -> list[PlanSlip]:
 
 
 def sensor_slips(plan: Plan) -> list[PlanSlip]:
-    """Noise that would drown what is measured."""
+    """Noise that is large beside the limit of its signal."""
     result = []
     for name, rms in vars(plan.sensors).items():
         limit, unit = getattr(plan.limits, name), LIMITS[name].unit
@@ -193,6 +196,8 @@ def limit_slips(plan: Plan, found: Findings) -> list[PlanSlip]:
             )
             result.append(PlanSlip(f"{name} in [limits]", text))
     if peaks.get("displacement", 0.0) > LARGEST_DRIFT:
-        text = f"A storey moves by {peaks['displacement']:.3g} m: look at the units of mass, stiffness and record."
+        text = (
+            f"A storey moves by {peaks['displacement']:.3g} m: check the units of mass, stiffness and record."
+        )
         result.append(PlanSlip("[structure]", text))
     return result

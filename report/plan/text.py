@@ -22,7 +22,7 @@ def show(facts: Mapping[str, Any]) -> None:
         table([[row[0], *row[1:4], row[4].ljust(BAR)] for row in rows])
         write("\n")
     else:
-        write("The simulated loop is unstable: its peaks mean nothing.\n\n")
+        write("The simulated loop is unstable, so that it has no peaks to compare with limits.\n\n")
     for line in concerns(facts):
         write(f"{line}\n")
 

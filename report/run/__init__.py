@@ -1,1 +1,1 @@
-"""The report of a run: what its page says, section by section."""
+"""The report of a run: the contents of its page, section by section."""

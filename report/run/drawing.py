@@ -1,4 +1,4 @@
-"""The pictures of a recording as they stand inside its page."""
+"""The pictures of a recording in the form in which its page holds them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from report.page import data_uri
 from report.pictures import PICTURES, Picture, figure, needs
 
 INCH = 96  # CSS pixels
-WIDE = ("histories",)  # their time is the whole test's, which two columns show better where there is room
+WIDE = ("histories",)  # pictures over the whole test, which get two columns where there is room
 
 
 class DrawnPicture(NamedTuple):
@@ -61,7 +61,7 @@ def draw(part: Run, role: str, picture: Picture) -> DrawnPicture | None:
 
 
 def png(part: Run, picture: Picture, size: tuple[float, float]) -> tuple[bytes, tuple[int, int]] | None:
-    """A picture's file and its CSS pixels; a grid of dots, because it stays small however long the test was."""
+    """A picture as PNG and its CSS pixels; unlike SVG, PNG stays small however long the test was."""
     canvas = figure.figure(*size)
     if not picture.on(part, canvas):
         return None

@@ -1,4 +1,4 @@
-"""The figures of `rths inspect` as tables of the page, and what the recording says about itself."""
+"""The figures of `rths inspect` as tables of the page, and the facts that the recording holds about itself."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from report.run.verdict import Margin, Summary, amount
 from report.text.formats import MISSING, milliseconds, reading, storey_rows, tracked
 from report.text.terminal import TitledTable
 
-EVENTS = 400  # rows of the page; JSON of rths inspect has all
-SHOWN = ("plan", CLOCK, GROUND, MACHINES)  # metadata that have a place of their own
+EVENTS = 400  # rows on the page, which stays below a megabyte; JSON of rths inspect has all
+SHOWN = ("plan", CLOCK, GROUND, MACHINES)  # metadata that have a section of their own
 
 
 def facts(run: Run, summary: Summary) -> list[tuple[str, str]]:
@@ -73,7 +73,7 @@ def holes(found: Mapping[str, Any]) -> str:
 
 
 def exchange(summary: Summary) -> TitledTable:
-    """The account of every message: sent = used + rejected + lost, and what came beside them where anything did."""
+    """The account of all messages: sent = used + rejected + lost, and foreign messages where there were any."""
     columns = {"sent": "sent", "used": "= used", "rejected": "+ rejected", "lost": "+ lost"}
     if any(counts["foreign"] for counts in summary["exchange"].values()):
         columns["foreign"] = "not sent by it, at least"
@@ -200,7 +200,7 @@ def events(run: Run, *codes: str) -> TitledTable:
 
 
 def provenance(run: Run, summary: Summary) -> list[tuple[str, str]]:
-    """Where the numbers come from, and whether they can be relied on."""
+    """The origin of the numbers: versions, state of the file, digest of the plan."""
     versions = run.metadata.get("versions", {})
     ground = run.attachments.get(GROUND, b"")
     whole = summary["finished"] and not summary["damage"]

@@ -1,4 +1,4 @@
-"""The verdict on a run in sentences with figures, and what of its recording is lost."""
+"""The verdict on a run in sentences with figures, and a sentence on what its recording lacks."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ NO_END = "The recording does not say how the test ended."
 
 
 class Margin(NamedTuple):
-    """How near a recorded signal came to its limit in the plan."""
+    """The peak of a recorded signal and its limit in the plan."""
 
     signal: str
     peak: float
@@ -47,13 +47,13 @@ def lost(summary: Summary) -> str:
     file = Path(summary["file"]).name
     if summary["damage"]:
         return (
-            f"This recording is damaged {summary['damage']}, so the page shows what was read before; "
-            f"rths recover {file} saves what is whole behind it. {amount(summary)}"
+            f"This recording is damaged {summary['damage']}, so the page shows the part before; "
+            f"rths recover {file} saves the intact data behind it. {amount(summary)}"
         )
     if not summary["finished"]:
         return (
-            "This recording was cut off before its end, so the page shows what had reached the file; "
-            f"rths recover {file} makes a finished one of it. {amount(summary)}"
+            "This recording was cut off before its end, so the page shows what had been written; "
+            f"rths recover {file} makes a finished recording of it. {amount(summary)}"
         )
     return ""
 
@@ -68,7 +68,7 @@ def amount(summary: Summary) -> str:
 
 
 def sentences(run: Run, summary: Summary) -> list[str]:
-    """The verdict, one sentence for each thing that a test is judged by, of those that the recording knows."""
+    """The verdict: one sentence for each criterion of a test that the recording has data for."""
     found = [
         outcome(summary),
         *summary["warnings"],
@@ -104,7 +104,7 @@ def completeness(summary: Summary) -> str:
     names = ", ".join(topics)
     if not gaps:
         if expected < planned:
-            return f"{begin} at tick {expected} of {planned}; all until then are recorded ({names})."
+            return f"{begin} at tick {expected} of {planned}; all ticks until then are recorded ({names})."
         return f"All {expected} ticks are recorded ({names})."
     counts = " and ".join(f"the {topic} lacks {count}" for topic, count in gaps.items())
     if expected < planned:
@@ -176,7 +176,7 @@ def force_paths(summary: Summary) -> list[str]:
 
 
 def energy(summary: Summary) -> str:
-    """What the errors of the column's transfer system did to the energy."""
+    """The energy that errors of the column's transfer system put in or took out."""
     share = summary["error_energy"]
     if share is None:
         return ""

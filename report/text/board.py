@@ -1,4 +1,4 @@
-"""What stands on a terminal while a test runs: how far it is, sparklines of its signals, the laboratories' states."""
+"""The lines on a terminal while a test runs: its progress, sparklines of its signals, the laboratories' states."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from common.safety.modes import Mode
 from common.terminal.printable import shown
 
 BLOCKS = "▁▂▃▄▅▆▇█"
-BAR = 24  # columns
-KEPT = 200  # reports: more than a sparkline has columns
+BAR = 24  # columns of the progress bar
+KEPT = 200  # reports kept: more than a sparkline has columns
 BLUE, YELLOW, RED = "34", "33", "31"
 IN_MODE = {
     Mode.RUNNING.value: BLUE,
@@ -56,7 +56,7 @@ LABEL = len("column force")  # columns at least
 
 
 def row_of(name: str) -> BoardRow:
-    """The row of a signal: what is not known is the force of a laboratory of a user's."""
+    """The row of a signal; a signal that is not known is the force of a user's kind of laboratory."""
     return KNOWN.get(name, BoardRow(name, name.replace("_", " "), 1.0, "N", "+9.1f"))
 
 

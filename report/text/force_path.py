@@ -1,4 +1,4 @@
-"""How late the measured column force is beside that of the plan's specimen, as a sentence for every report."""
+"""The delay of the measured column force behind that of the plan's specimen, as a sentence for every report."""
 
 from __future__ import annotations
 

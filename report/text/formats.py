@@ -8,7 +8,7 @@ from typing import Any
 
 MISSING = "–"
 PREFIXES = ((1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
-# how far up and down the prefixes of a unit go; other units take none
+# smallest and largest prefix of a unit; other units take none
 RANGES = {
     "m": (1e-9, 1.0),
     "s": (1e-9, 1.0),
@@ -20,8 +20,9 @@ RANGES = {
     "m/N": (1e-9, 1.0),
     "J": (1e-9, 1.0),
 }
-LEAST_ON_AXIS = 0.01  # ends below which the numbers of an axis would need four decimals
-NOTHING = 1e-3  # of the smallest prefix: what is below it is rounding
+LEAST_ON_AXIS = 0.01  # largest value of an axis below which its numbers would need four decimals
+# In the smallest prefix, such as a thousandth of a nanometre: smaller values are rounding errors.
+NOTHING = 1e-3
 NO_UNIT = ("", "-", "–", "1")
 
 
@@ -236,5 +237,5 @@ def modes(found: Sequence[Mapping[str, float | None]], most: int = 6) -> str:
 
 
 def apart(counts: dict[str, int]) -> str:
-    """How many messages came that the other laboratory did not send, in words; empty where there were none."""
-    return f"; at least {counts['foreign']} more came that it did not send" if counts["foreign"] else ""
+    """The least number of messages that arrived but were not sent by the other laboratory; empty without any."""
+    return f"; at least {counts['foreign']} more arrived that it did not send" if counts["foreign"] else ""

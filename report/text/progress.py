@@ -13,17 +13,17 @@ from typing import Self, TextIO
 from common.terminal.printable import behind, shown
 from report.text.formats import blocks
 
-BAR = 24
-UNSAID = 2.0  # s that go by without a word
-REDRAW = 0.25  # s between two lines on a terminal,
-EVERY = 5.0  # at least between two elsewhere
+BAR = 24  # columns of the bar
+UNSAID = 2.0  # s before the first line: shorter waits need no explanation
+REDRAW = 0.25  # s between two lines on a terminal, which look continuous at that rate
+EVERY = 5.0  # s between two lines in a file, at least, so that a log stays short
 
 
 class Progress:
-    """The progress of a command, shown while the context lasts; nothing of one that ends within `UNSAID` seconds.
+    """The progress of a command, shown as long as the context lasts, from `UNSAID` seconds on.
 
-    A thread writes the lines, so that `tell` costs nothing in a loop and time goes on while a kernel computes. On a
-    terminal the line is wiped when the work ends, and stays where an error or Ctrl-C ends it.
+    A thread writes the lines, so that `tell` costs nothing in a loop and the seconds are counted while a kernel
+    computes. On a terminal the line is wiped when the work ends, and stays if an error or Ctrl-C ends it.
     """
 
     def __init__(self, doing: str, stream: TextIO | None = None, began: float | None = None) -> None:
@@ -51,7 +51,7 @@ class Progress:
             self.leave(wipe=kind is None)
 
     def tell(self, what: str, done: int = 0, total: int = 0) -> None:
-        """What is being done now: `done` of `total` of it, where a total is known."""
+        """Set the present step: `what`, of which `done` of `total` are done where a total is known."""
         self._now = (what, done, total)
 
     def look(self, now: float) -> None:
@@ -78,13 +78,13 @@ class Progress:
         return f"{bar}{self._doing}: {parts}"
 
     def leave(self, *, wipe: bool) -> None:
-        """Go from the terminal's line, which is empty then or stays."""
+        """Leave the terminal's line, which is wiped or stays."""
         if self._width:
             self._stream.write(f"\r{' ' * self._width}\r" if wipe else "\n")
             self._stream.flush()
             self._width = 0
 
     def _write(self) -> None:
-        with contextlib.suppress(OSError, ValueError):  # the reader has gone: the work goes on
+        with contextlib.suppress(OSError, ValueError):  # the work goes on although nobody reads its progress
             while not self._ended.wait(REDRAW):
                 self.look(time.monotonic())

@@ -21,23 +21,23 @@ MAT_NAME = 63  # characters that MATLAB allows
 
 
 class TextForm(NamedTuple):
-    """How a text file writes its table."""
+    """The form of a table in a text file."""
 
     separator: str = ""  # empty: a comma, a semicolon where that is the decimal sign, a tab in .tsv
     decimal: str = "."
     skip_rows: int = 0  # before that of the names
 
     def between(self, path: Path) -> str:
-        """What stands between columns."""
+        """The character between columns."""
         usual = "\t" if path.suffix.lower() == ".tsv" else ";" if self.decimal == "," else ","
         return self.separator or usual
 
 
 class DataTable(NamedTuple):
-    """What a file holds."""
+    """The columns of a file."""
 
     columns: Columns
-    units: dict[str, str]  # of the columns whose unit stands in a row below the names
+    units: dict[str, str]  # of the columns that have a unit in a row below the names
 
 
 AS_WRITTEN = TextForm()
@@ -52,17 +52,17 @@ def read_table(path: Path, form: TextForm = AS_WRITTEN) -> DataTable:
     """Numeric columns by name, with units where a text file has a row of them below the names.
 
     Raises:
-        InputError: the file cannot be read, holds no numbers, or is no text though `form` says how one is written.
+        InputError: the file cannot be read, holds no numbers, or is no text file although `form` is that of one.
     """
     readers = {".parquet": _read_parquet, ".mat": _read_mat, ".npz": _read_npz}
     suffix = path.suffix.lower()
     if suffix not in READABLE:
-        raise InputError(f"Cannot tell the format of {path}: give a file that ends in {', '.join(READABLE)}.")
+        raise InputError(f"The format of {path} is unknown: give a file that ends in {', '.join(READABLE)}.")
     if not path.is_file():
         raise InputError(f"There is no file {path}.")
     if suffix in readers and form != AS_WRITTEN:
         raise InputError(f"{path} is no text: leave out separator, decimal and skip_rows.")
-    hint = "" if suffix in readers else "; a map says what separator, decimal sign and rows to skip it has"
+    hint = "" if suffix in readers else "; a map can give its separator, decimal sign and rows to skip"
     try:
         found = DataTable(readers[suffix](path), {}) if suffix in readers else _read_text(path, form)
     except Exception as error:  # each library has its own exceptions for a damaged file
@@ -199,7 +199,7 @@ def _write_mat(path: Path, columns: dict[str, NDArray[Any]], more: dict[str, Any
 
 
 def _write_csv(path: Path, columns: dict[str, NDArray[Any]]) -> None:
-    # pyarrow would write 4.0 as 4, of which others make a whole number
+    # Not by pyarrow, which writes 4.0 as 4, so that other programs read an integer.
     with path.open("w", encoding="utf-8", newline="") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(columns)

@@ -75,7 +75,7 @@ def test_commands_that_somebody_injected_are_counted_apart(tmp_path: Path) -> No
     recording.close({})
     counts = accounts(read(path))["slave/commands"]
     assert counts == {"sent": 531, "used": 503, "rejected": 28, "lost": 0, "foreign": 3 + 83 + 3}
-    assert apart(counts) == "; at least 89 more came that it did not send"
+    assert apart(counts) == "; at least 89 more arrived that it did not send"
     assert apart(counts | {"foreign": 0}) == ""
 
 

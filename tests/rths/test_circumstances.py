@@ -31,7 +31,7 @@ def test_a_virtual_run_says_so_and_shows_no_latency(call: Any, capsys: Any, virt
     assert call("inspect", virtual_recording) == 0
     out = capsys.readouterr().out.splitlines()
     assert out[2] == (
-        "Virtual time in one process, where nothing takes time and no latency is measured; by the plan both "
+        "Virtual time in one process, in which computing takes no time and no latency is measured; by the plan both "
         "laboratories are emulated."
     )
     assert not [line for line in out if line.startswith(("latency, µs", "late ticks", "round_trip"))]

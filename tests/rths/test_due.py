@@ -83,7 +83,7 @@ def test_of_a_recording_that_was_cut_off_nobody_says_when_the_test_stopped() -> 
     summary = {"ticks_planned": 7000, "ticks_expected": 330, "topics": facts, "recorder": {}}
     assert stopped(summary) == "recorded until tick 330 of 7000; the rest of the test is not in the file"
     assert completeness(summary).startswith(
-        "The recording ends at tick 330 of 7000; all until then are recorded"
+        "The recording ends at tick 330 of 7000; all ticks until then are recorded"
     )
 
 

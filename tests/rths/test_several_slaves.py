@@ -242,7 +242,7 @@ def test_a_diagnosis_says_in_which_laboratory_the_gap_lies(
     assert virtual.run(virtual.assemble(two, truth, path), str) is None
     assert call("diagnose", path) == 0
     roof, cellar = capsys.readouterr().out.split("\n\n")
-    assert "Laboratory roof: No gap beyond noise and tolerances" in roof
+    assert "Laboratory roof: There is no gap beyond noise and tolerances" in roof
     assert "Laboratory cellar: The gap of" in cellar
     assert "damper friction: force 3." in cellar or "damper friction: force 2.9" in cellar
 

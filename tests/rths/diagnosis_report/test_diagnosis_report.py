@@ -160,7 +160,7 @@ def test_the_page_shows_every_picture_of_a_whole_report() -> None:
     assert html.index("Measurement artefacts") < html.index("sensor.damper_force.gain")
     for words in (
         "On the bound of its range: factor.",
-        "Cannot be told apart from table friction.",
+        "Cannot be separated from table friction.",
         "8.3 nats worse",
     ):
         assert words in html
@@ -171,7 +171,7 @@ def test_pages_say_what_is_absent() -> None:
     poor = text_of(page_of("not_enough_data"))
     for words in (
         "The gap could not be placed",
-        "No effect is named: the recording does not hold enough",
+        "No effect is named: the recording holds too few data",
         "How far the gap closes was not determined.",
         "its prediction is not in this report",
         "The paths' delays are not in this report.",
@@ -325,7 +325,7 @@ def test_names_become_words() -> None:
     assert wording.kind(Candidate(effects=names[:1], **given)) == "measurement"
     assert wording.kind(Candidate(effects=names, **given)) == "physics"
     assert wording.equivalent(["a.x", "b.y", "c.z"]).startswith(
-        "These signals cannot tell a x from b y or c z:"
+        "These signals cannot separate a x from b y or c z:"
     )
 
 

@@ -127,7 +127,7 @@ def test_every_slave_is_an_exchange_of_its_own() -> None:
 def test_a_recording_without_latency_is_refused() -> None:
     run = Run(Path("bench.mcap"))
     with pytest.raises(
-        InputError, match=r"bench.mcap holds no latency of any tick: give one of a whole test"
+        InputError, match=r"bench.mcap holds no latency of any tick: give the recording of a whole test"
     ):
         figures(run)
     run.columns["latency"], run.sequences["latency"] = {"round_trip": np.array([])}, np.array([])
@@ -142,7 +142,7 @@ def test_holes_and_a_cut_are_said() -> None:
     assert figures(run).warnings == []
     run.sequences["latency"], run.finished = np.array([1, 2, 4]), False
     assert figures(run).warnings == [
-        "The recording was cut off before its end: judged as far as it goes.",
+        "The recording was cut off before its end; its ticks until then are judged.",
         "2 ticks are missing from the recording and are not judged.",
     ]
 
@@ -152,7 +152,7 @@ def test_an_end_before_the_planned_one_is_said() -> None:
     assert figures(run).warnings == []
     run.metadata["summary"]["ticks_expected"] = "1166"
     assert figures(run).warnings == [
-        "The recording ends after 300 of 1166 planned ticks: judged as far as it goes."
+        "The recording ends after 300 of 1166 planned ticks; its ticks until then are judged."
     ]
 
 
@@ -207,5 +207,5 @@ def test_a_file_that_was_cut_off_is_read_as_far_as_it_goes(tmp_path: Path) -> No
     recording = old_recording(tmp_path / "cut.mcap", 100, close=False)
     found = figures(read(tmp_path / "cut.mcap"))
     assert found.exchanges[0].ticks == 100
-    assert found.warnings == ["The recording was cut off before its end: judged as far as it goes."]
+    assert found.warnings == ["The recording was cut off before its end; its ticks until then are judged."]
     recording.abandon()

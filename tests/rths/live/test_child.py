@@ -53,7 +53,7 @@ def test_where_it_cannot_serve_the_user_is_told_once(tmp_path: Path) -> None:
         view = View(tmp_path / "a.mcap", port)
         news = told(view)
     assert news == (
-        f"live view: it has ended (Cannot serve the live view on port {port}: it is taken; give another.); "
+        f"live view: it has ended (Cannot serve the live view on port {port}: it is in use; give another port.); "
         f"the test goes on, and rths live {tmp_path / 'a.mcap'} shows it."
     )
     assert view.news() == ""
