@@ -108,7 +108,7 @@ def test_the_terminal_says_what_matters() -> None:
         "force 3.10 N (2.90 … 3.30)",
         "the gap falls from 3.4 % to 0.71 % (noise 0.61 %); closed 96 % (94 … 98 %)",
         "actuator.delay ×1.034 (z +1.7)",
-        "cannot tell damper friction from table friction",
+        "cannot separate damper friction from table friction",
         "damper stroke stop",
         "3 of 20000 ticks",
     ):
@@ -170,7 +170,7 @@ def test_pages_say_what_is_absent() -> None:
     assert "No part leaves a residual above its noise" in page_of("no_gap")
     poor = text_of(page_of("not_enough_data"))
     for words in (
-        "The gap could not be placed",
+        "The gap could not be located",
         "No effect is named: the recording holds too few data",
         "How far the gap closes was not determined.",
         "its prediction is not in this report",
@@ -257,7 +257,8 @@ def test_series_may_hold_gaps_and_differ_in_length() -> None:
     part["signals"][0]["nominal"] = part["signals"][0]["nominal"][:50]
     part["signals"][0]["measured"] = [None] * len(part["signals"][0]["t"])
     report["details"]["parts"][1]["amplitudes"]["ratio"] = [None] * 5
-    text_of(page(read(report)))
+    drawn, whole = (page(read(one)).count("<figure") for one in (report, fresh("explained")))
+    assert drawn == whole - 1  # the picture of the reading whose samples are all unknown
 
 
 def test_a_report_in_which_nothing_was_determined_has_a_page() -> None:

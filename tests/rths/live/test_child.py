@@ -54,7 +54,7 @@ def test_where_it_cannot_serve_the_user_is_told_once(tmp_path: Path) -> None:
         news = told(view)
     assert news == (
         f"live view: it has ended (Cannot serve the live view on port {port}: it is in use; give another port.); "
-        f"the test goes on, and rths live {tmp_path / 'a.mcap'} shows it."
+        f"the test goes on, and rths live {tmp_path / 'a.mcap'} shows it again."
     )
     assert view.news() == ""
     view.close()
