@@ -1,9 +1,14 @@
-"""Control steps per second of the compiled closed loop, beside plain Python and beside OpenSeesPy."""
+"""Control steps per second of the compiled closed loop, beside plain Python and beside OpenSeesPy.
+
+All rates are of processor time, because the machine is shared. A step's share of building the loop and of naming its
+signals is counted with it.
+"""
 
 from __future__ import annotations
 
 import statistics
 from dataclasses import replace
+from time import process_time
 
 import numpy as np
 
@@ -18,7 +23,8 @@ from loop.closed_loop import signals, simulate
 from models.registry import Array
 
 TARGET = 5e6
-REPEATS = 7
+REPEATS = 7  # of what takes a second
+COMPILED_REPEATS = 100  # of what takes some ms, in which a shared core may be anybody's
 QUICK_S = 2.0  # of the test
 SAME = 1e-3  # of the peak: what another method may differ by
 
@@ -87,12 +93,13 @@ def opensees(answer: PeerAnswer | str, x: Array, compiled: float, objects: float
 def run(*, quick: bool = False) -> list[BenchmarkFigure]:
     """The default test without and with noise; the ideal test beside plain Python and OpenSeesPy."""
     plan, repeats = (with_test(Plan(), duration=QUICK_S), 1) if quick else (Plan(), REPEATS)
+    often = 1 if quick else COMPILED_REPEATS
     alone = bare(plan)
     ground = substructure.ground_rows(plan, substructure.motion(plan))
-    peer = statistics.median(rates(lambda: len(plain_python(plan, ground)), repeats))
-    compiled = rates(lambda: simulate(plan, ground).ticks, repeats)
-    noisy = rates(lambda: simulate(plan, ground, seed=1).ticks, repeats)
-    objects = [pace.wall for pace in virtual_time.unrecorded(plan, repeats)]
+    peer = statistics.median(rates(lambda: len(plain_python(plan, ground)), repeats, process_time))
+    compiled = rates(lambda: simulate(plan, ground).ticks, often, process_time)
+    noisy = rates(lambda: simulate(plan, ground, seed=1).ticks, often, process_time)
+    objects = [pace.processor for pace in virtual_time.unrecorded(plan, repeats)]
     x = signals(alone, simulate(alone, ground))["displacement"]
     words = "central difference of the building alone in plain Python"
     return [

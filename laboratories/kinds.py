@@ -108,12 +108,24 @@ def kind_of(plan: Plan, role: str) -> Kind:
 
 def kinds_of(plan: Plan) -> dict[str, Kind]:
     """The kind of every role that has a laboratory, the master's first; raises InputError as `kind_of`."""
-    return {role: kind_of(plan, role) for role in plan.kinds}
+    return dict(_hosted(tuple(plan.kinds.items()), plan.base))
 
 
 def topics(plan: Plan) -> dict[str, tuple[Signal, ...]]:
     """What a recording of the plan's test holds; raises InputError as `kind_of`, or as `common.signals.topics`."""
-    return signals.topics({role: kind.channels for role, kind in kinds_of(plan).items()})
+    return dict(_topics(tuple(plan.kinds.items()), plan.base))
+
+
+@cache
+def _hosted(names: tuple[tuple[str, str], ...], base: Path) -> dict[str, Kind]:
+    """The kind of every role by the names that a plan gives them; one of the user's is loaded once."""
+    return {role: named(name, base, f"[{role}] kind") for role, name in names}
+
+
+@cache
+def _topics(names: tuple[tuple[str, str], ...], base: Path) -> dict[str, tuple[Signal, ...]]:
+    """What is recorded of laboratories of these names by role."""
+    return signals.topics({role: kind.channels for role, kind in _hosted(names, base).items()})
 
 
 def own(plan: Plan) -> Kind | None:

@@ -203,9 +203,9 @@ def numerical_columns(plan: Plan) -> NumericalColumns:
 
 def integration(plan: Plan) -> integrators.Method:
     """The plan's method for the numerical part; raises InputError where it is unknown or would diverge."""
-    structure, numerical = plan.structure, partition.numerical(plan)
+    structure, (whole, numerical) = plan.structure, partition.parts(plan)
     chosen = integrators.INTEGRATORS.get(structure.integrator)
-    K = numerical.K if chosen and chosen.of_numerical else partition.matrices(plan).K
+    K = numerical.K if chosen and chosen.of_numerical else whole.K
     return integrators.build(
         structure.integrator, numerical.M, numerical.C, K, plan.test.interval, structure.rho_infinity
     )
@@ -269,19 +269,21 @@ def tell(building: Substructure, lab: int, tick: int, told: Array, first: int) -
         delay.remember(past, ratio * shear_building.storey_drift(state[ACCELERATION], place))
         told[first + SENT_TARGET] = ratio * shear_building.storey_drift(state[NEXT_DISPLACEMENT], place)
         told[first + SENT_VELOCITY] = ratio * rate
-        told[first + SENT_ACCELERATION] = trend.ahead(past)
-        told[first + SENT_JERK] = trend.slope(past, interval)
+        steep = trend.steepness(past)
+        told[first + SENT_ACCELERATION] = trend.ahead(past, steep)
+        told[first + SENT_JERK] = steep / interval
     else:
         rate = state[NEXT_VELOCITY, place]
         here, ahead = ground[1, tick], ground[1, tick + 1]
         delay.remember(past, state[ACCELERATION, place])
+        steep = trend.steepness(past)
         told[first + SENT_TARGET] = ratio * (state[NEXT_DISPLACEMENT, place] + ahead)
         told[first + SENT_VELOCITY] = ratio * (
             rate + (ahead - here) / interval + 0.5 * interval * ground[0, tick + 1]
         )
-        told[first + SENT_ACCELERATION] = ratio * (trend.ahead(past) + ground[0, tick + 1])
+        told[first + SENT_ACCELERATION] = ratio * (trend.ahead(past, steep) + ground[0, tick + 1])
         told[first + SENT_JERK] = ratio * (
-            trend.slope(past, interval) + (ground[0, tick + 1] - ground[0, tick]) / interval
+            steep / interval + (ground[0, tick + 1] - ground[0, tick]) / interval
         )
     told[first + SENT_EFFORT] = labs[MOTOR_GAIN, lab] * rate
 

@@ -17,25 +17,19 @@ RECENT = 6
 
 @jit
 def steepness(recent: Array) -> float:
-    """Slope of the line per tick, towards the newest value."""
-    middle = 0.5 * (recent.size - 1)
+    """Slope of the line through the last RECENT values per tick, towards the newest."""
+    middle = 0.5 * (RECENT - 1)
     above, below = 0.0, 0.0
-    for i in range(recent.size):
+    for i in range(RECENT):
         above += (middle - i) * recent[i]
         below += (middle - i) ** 2
     return above / below
 
 
 @jit
-def slope(recent: Array, interval: float) -> float:
-    """Rate of the values per second."""
-    return steepness(recent) / interval
-
-
-@jit
-def ahead(recent: Array) -> float:
-    """The line's value one tick after the newest."""
+def ahead(recent: Array, steep: float) -> float:
+    """The line's value one tick after the newest, from its slope `steep` per tick."""
     mean = 0.0
-    for i in range(recent.size):
-        mean += recent[i] / recent.size
-    return mean + steepness(recent) * (0.5 * (recent.size - 1) + 1.0)
+    for i in range(RECENT):
+        mean += recent[i] / RECENT
+    return mean + steep * (0.5 * (RECENT - 1) + 1.0)

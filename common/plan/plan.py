@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -107,15 +109,15 @@ class Plan:
         """The number of intervals by which a fresh message may be late or ahead."""
         return max(round(self.safety.message_age / self.test.interval), 1)
 
-    @property
+    @cached_property
     def roles(self) -> tuple[str, ...]:
         """The role of every slave, in the order of the file."""
         if not self.slaves and self.slave.kind == NONE:
             return ()
         return tuple(map(slave_role, self.slaves or [""]))
 
-    @property
-    def kinds(self) -> dict[str, str]:
+    @cached_property
+    def kinds(self) -> Mapping[str, str]:
         """The kind of laboratory of each role that has one, the master's first: a name, or a class of the user's."""
         slaves = {slave_role(name): lab.kind for name, lab in self.slaves.items()}
         slaves = slaves or dict.fromkeys(self.roles, self.slave.kind)

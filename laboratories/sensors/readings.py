@@ -33,9 +33,11 @@ def build(interval: float, names: Sequence[str], sensors: Mapping[str, SensorEff
     params = np.zeros((len(names), 9))
     for place, name in enumerate(names):
         more = sensors.get(name, SensorEffects())
+        if more == SensorEffects():
+            continue
         row = first_order.propagators(1.0, more.lag, np.array([interval]))[0]
         steady = (more.gain, more.bias, more.drift, more.quantization)
-        params[place] = (float(more != SensorEffects()), *steady, *row, more.delay / interval)
+        params[place] = (1.0, *steady, *row, more.delay / interval)
     longest = float(np.max(params[:, DELAY], initial=0.0))
     return Readings(params, np.zeros((len(names), KEPT + (int(longest) + 2 if longest > 0.0 else 0))))
 

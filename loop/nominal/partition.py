@@ -68,7 +68,12 @@ def drifts(plan: Plan) -> dict[str, Coupling]:
 
 
 def numerical(plan: Plan) -> Matrices:
-    """The numerical part: the whole building without what the specimens take over.
+    """The numerical part: the whole building without what the specimens take over; raises InputError as `parts`."""
+    return parts(plan)[1]
+
+
+def parts(plan: Plan) -> tuple[Matrices, Matrices]:
+    """The whole building and its numerical part.
 
     Raises:
         InputError: a mass, stiffness or dashpot cannot be, a specimen takes over all of the modal damping, or
@@ -86,7 +91,7 @@ def numerical(plan: Plan) -> Matrices:
         direction = drift_direction(plan, role)
         outer = np.outer(direction, direction)
         C, K = C - left_out.damping * outer, K - left_out.stiffness * outer
-    return Matrices(M, C, K)
+    return whole, Matrices(M, C, K)
 
 
 def check_experimental(plan: Plan, specimens: int) -> None:

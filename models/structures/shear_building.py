@@ -36,9 +36,9 @@ def matrices(mass: Array, stiffness: Array, damping: Array) -> tuple[Array, Arra
     for name, row in rows.items():
         if row.ndim != 1 or row.size != mass.size or row.size == 0:
             raise InputError(f"{name} has the shape {row.shape}: give one value per storey, as for mass.")
-        if not np.all(np.isfinite(row)) or np.any(row < 0.0):
+        if not np.isfinite(row).all() or (row < 0.0).any():
             raise InputError(f"{name} is {row.tolist()}, but must be finite and not negative.")
-    if np.any(mass == 0.0):
+    if (mass == 0.0).any():
         raise InputError(f"mass is {mass.tolist()}, but must be above 0 kg on every floor.")
     return np.diag(mass).astype(np.float64), tridiagonal(damping), tridiagonal(stiffness)
 

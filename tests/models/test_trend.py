@@ -18,8 +18,9 @@ def test_a_straight_line_is_continued_exactly(level: float, slope: float) -> Non
     recent = np.zeros(trend.RECENT)
     for k in range(trend.RECENT):
         delay.remember(recent, level + slope * 0.002 * k)
-    assert trend.slope(recent, 0.002) == pytest.approx(slope, abs=1e-6)
-    assert trend.ahead(recent) == pytest.approx(level + slope * 0.002 * trend.RECENT, abs=1e-8)
+    steep = trend.steepness(recent)
+    assert steep / 0.002 == pytest.approx(slope, abs=1e-6)
+    assert trend.ahead(recent, steep) == pytest.approx(level + slope * 0.002 * trend.RECENT, abs=1e-8)
 
 
 def test_a_sine_is_read_ahead_within_a_hundredth() -> None:
@@ -27,5 +28,5 @@ def test_a_sine_is_read_ahead_within_a_hundredth() -> None:
     for k in range(500):
         delay.remember(recent, np.sin(omega * 0.002 * k))
         if k > trend.RECENT:
-            errors.append(trend.ahead(recent) - np.sin(omega * 0.002 * (k + 1)))
+            errors.append(trend.ahead(recent, trend.steepness(recent)) - np.sin(omega * 0.002 * (k + 1)))
     assert np.max(np.abs(errors)) < 0.01
