@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -12,26 +11,27 @@ from diagnosis.findings.gaps import QUIET
 from diagnosis.findings.verdict import PartVerdict, heard
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data
-from diagnosis.learned.learn import LearnedLaw
 from diagnosis.recorded.parts import ColumnAlone, LaboratoryPart
+from diagnosis.recorded.record import Record
 from diagnosis.report.records import NoiseEntry, PartOfGap
+from diagnosis.signals.noise_model import NoiseModel
 from models.registry import Array
 from models.system import System
 
 
 def parts(found: Diagnosis, require: float | None = None) -> tuple[PartOfGap, ...]:
     """The parts in the order of the test; `require` is the gap that may be left in each."""
-    return tuple(part(verdict, found.learned, require) for verdict in found.verdicts)
+    return tuple(part(verdict, found, require) for verdict in found.verdicts)
 
 
-def part(verdict: PartVerdict, learned: Sequence[LearnedLaw], require: float | None) -> PartOfGap:
+def part(verdict: PartVerdict, found: Diagnosis, require: float | None) -> PartOfGap:
     """One part: what each correction in turn takes away from its gap above noise."""
     search = verdict.search
     data, bare, fit = search.data, search.commissioned, search.chosen
     noise = rms(heard(search) / levels(data), data)
     systems = [data.system, fitting.lay(data, bare.z, {}), fitting.lay(data, fit.z, fit.values)]
     systems.append(systems[-1])
-    for law in learned:
+    for law in found.learned:
         if law.site in sites_of(data):
             systems[-1] = law.laid(systems[-1])
     steps = [above(data, system, noise) for system in systems]
@@ -47,7 +47,7 @@ def part(verdict: PartVerdict, learned: Sequence[LearnedLaw], require: float | N
         left=left,
         noise=noise,
         adequate=None if require is None else left <= require,
-        noise_model=noises(data),
+        noise_model=noises(data, found.record),
     )
 
 
@@ -84,8 +84,8 @@ def rms(shares: Array, data: Data) -> float:
     return float(np.sqrt(np.mean(shares[counted] ** 2))) if counted.any() else 0.0
 
 
-def noises(data: Data) -> dict[str, NoiseEntry]:
-    """The noise of a part's sensors by signal; none of what is computed."""
+def noises(data: Data, record: Record) -> dict[str, NoiseEntry]:
+    """The noise of a part's sensors by signal; none for a part that is computed."""
     if data.part.exact:
         return {}
     models = data.noise or (None,) * len(data.part.signals)
@@ -95,15 +95,14 @@ def noises(data: Data) -> dict[str, NoiseEntry]:
     ):
         if not there.any():
             continue
-        if model is None:
-            result[name] = NoiseEntry(kind="white", order=0, rms=float(white), from_="residual")
-            continue
+        known = model or NoiseModel(float(white))
         result[name] = NoiseEntry(
-            kind=model.kind,
-            order=model.order,
-            rms=model.rms,
-            from_=model.source,
-            lines=model.lines,
-            resolution=model.resolution or None,
+            kind=known.kind,
+            order=known.order,
+            rms=known.rms,
+            unit=record.unit(name),
+            from_=known.source,
+            lines=known.lines,
+            resolution=known.resolution or None,
         )
     return result

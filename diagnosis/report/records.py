@@ -78,6 +78,7 @@ class NoiseEntry(Entry):
     kind: Literal["white", "ar"] = noted("White, or coloured: an autoregression")
     order: int = noted("Order of the autoregression, 0 of white noise")
     rms: Number = noted("Rms in the signal's unit, lines aside")
+    unit: str = noted("Unit of rms and resolution", default="")
     from_: Literal["at rest", "quiet part", "residual"] = noted(
         "Where it was found: readings at rest, the part's quiet time, or all that no model could explain"
     )

@@ -16,6 +16,7 @@ OUTCOMES = {
     "partly": "partly explained",
     "unknown": "unknown cause",
 }
+ADEQUATE = {None: MISSING, True: "yes", False: "no"}
 
 
 def steps(report: Report) -> list[Drawing]:
@@ -69,17 +70,18 @@ def remaining(report: Report) -> str:
 
 def made_of(report: Report) -> Rows:
     """Every part's gap as the sum of tolerances, named effects, learned laws and the rest; the noise beside it."""
-    head = ("part", "gap", "tolerances", "named", "learned", "left", "noise", "finding", "good enough")
+    judged = any(part.adequate is not None for part in report.parts)
+    head = ("part", "gap", "tolerances", "named", "learned", "left", "noise", "finding")
     rows = [
         [
             wording.plain(part.part),
             *map(percent, (part.gap, part.tolerances, part.named, part.learned, part.left, part.noise)),
             OUTCOMES[part.outcome] + (f": {wording.effects(part.effects)}" if part.effects else ""),
-            MISSING if part.adequate is None else "yes" if part.adequate else "no",
+            *([ADEQUATE[part.adequate]] if judged else []),
         ]
         for part in report.parts
     ]
-    return Rows(head, rows)
+    return Rows((*head, "good enough") if judged else head, rows)
 
 
 def noises(report: Report) -> Rows:
@@ -88,21 +90,16 @@ def noises(report: Report) -> Rows:
     rows = [
         [
             wording.plain(name),
-            quantity(noise.rms, unit(report, name)),
+            quantity(noise.rms, noise.unit),
             "white" if noise.kind == "white" else f"coloured, order {noise.order}",
             ", ".join(f"{line:g} Hz" for line in noise.lines) or MISSING,
-            quantity(noise.resolution, unit(report, name)),
+            quantity(noise.resolution, noise.unit),
             {"at rest": "samples at rest", "quiet part": "quiet seconds"}.get(noise.from_, "whole residual"),
         ]
         for part in report.parts
         for name, noise in part.noise_model.items()
     ]
     return Rows(head, rows)
-
-
-def unit(report: Report, name: str) -> str:
-    """A signal's unit as far as the report says it."""
-    return report.gap.signals[name].unit if name in report.gap.signals else ""
 
 
 def paths(report: Report) -> Rows:

@@ -52,6 +52,7 @@ def numbers(value: Any) -> Iterator[float]:
 def test_a_report_is_whole(cases: Cases, kind: str) -> None:
     report = report_of(cases, kind)
     assert report["version"] == 2
+    assert all(noise["unit"] for part in report["parts"] for noise in part["noise_model"].values())
     keeps_to_its_schema(report)
     adds_up(report)
     if kind == "two":  # pictures take long, and are those of any report
