@@ -1,4 +1,4 @@
-"""What comes from the code: `python -m docs.generate` writes parts of the documents, and the schema of reports.
+"""The generated parts of the documents: `python -m docs.generate` writes them, and the schema of reports.
 
 A part stands between `<!-- name -->` and `<!-- end of name -->`; tests/test_docs.py holds that it is up to date.
 """
@@ -25,7 +25,7 @@ EVERY_KIND = '[slave.a]\nkind = "table"\n[slave.b]\nkind = "column"\n'  # at sla
 
 FOLDER = Path(__file__).resolve().parent
 
-# limits on what is no field of a command or a measurement
+# Limits on quantities that are not fields of a command or a measurement.
 MASTER_DERIVED = (
     "actuator_velocity",
     "actuator_acceleration",

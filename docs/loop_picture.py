@@ -1,4 +1,4 @@
-"""The picture of the closed loop: who sends what to whom in one interval of the default test."""
+"""The picture of the closed loop: the messages and signals of one interval of the default test."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ TITLE, TEXT = 10, 8.5  # pt
 
 
 class Box(NamedTuple):
-    """A part of the test: where its centre is, its width and height, its name and what it does."""
+    """A part of the test: its centre, width and height, its name and its task."""
 
     x: float
     y: float
@@ -23,7 +23,7 @@ class Box(NamedTuple):
 
 
 class Arrow(NamedTuple):
-    """What goes from one part to another: both ends, its label and the label's place, solid or dashed."""
+    """A connection of two parts: both ends, its label and the label's place, solid or dashed."""
 
     start: tuple[float, float]
     end: tuple[float, float]

@@ -1,4 +1,4 @@
-"""The pictures of the documents: `python -m docs.pictures` makes them again, with names only those.
+"""The pictures of the documents: `python -m docs.pictures` makes all of them again, or those that are named.
 
 The tutorial's and the benchmark's pictures are drawn by the commands that their pages show; `gap.png` is the top of the
 tutorial's gap page in a headless Chromium. The picture of the safety machine comes from its table of states, that
@@ -42,7 +42,7 @@ BOX = {"boxstyle": "round,pad=0.5", "fc": "#e8f1f8", "ec": "#1d4f73"}
 
 
 def tutorial() -> list[str]:
-    """Run the tutorial and keep the pictures that it draws; where the page and its commands differ."""
+    """Run the tutorial and keep the pictures that it draws; sentences on where the page and its commands differ."""
     with tempfile.TemporaryDirectory() as folder:
         complaints = console.play(FOLDER / "tutorial.md", Path(folder))
         for name in TUTORIAL:
@@ -53,7 +53,7 @@ def tutorial() -> list[str]:
 
 
 def benchmark2020() -> list[str]:
-    """Play the whole benchmark and keep two of its pictures; what it misses of its goals."""
+    """Run the whole benchmark and keep two of its pictures; a sentence where it misses a goal."""
     from rths.__main__ import command
 
     with tempfile.TemporaryDirectory() as folder:
