@@ -146,7 +146,9 @@ class RigTable:
         "'file.py:Class' or 'package.module:Class', whose code the test then runs; empty for the emulated laboratory",
         default="",
     )
-    options: dict[str, Any] = key("keyword arguments of the class", default={})
+    options: dict[str, Any] = key(
+        "keyword arguments of the class; one called file is a path from the plan's folder", default={}
+    )
     address: str = key(
         "udp/HOST:PORT of a rig in another process, or udp/PORT on this machine; empty for none", default=""
     )

@@ -83,8 +83,9 @@ class Reality:
 
 def as_planned(plan: Plan) -> Reality:
     """The reality in which all laboratories are as planned."""
-    slaves = {slave_role(name): lab.rig for name, lab in plan.slaves.items()}
-    return Reality(plan, plan.test.seed, plan.master.rig, plan.slave.rig, base=plan.base, slaves=slaves)
+    slaves = {slave_role(name): placed(lab.rig, plan.base) for name, lab in plan.slaves.items()}
+    master, slave = (placed(lab.rig, plan.base) for lab in (plan.master, plan.slave))
+    return Reality(plan, plan.test.seed, master, slave, base=plan.base, slaves=slaves)
 
 
 def load(path: Path, plan: Plan) -> Reality:
@@ -280,10 +281,17 @@ def table_of(tables: Mapping[str, Any], name: str, where: str) -> dict[str, Any]
 
 
 def rig(entry: dict[str, Any], lab: str, planned: RigTable, plan_base: Path, base: Path) -> RigTable:
-    """The rig of a laboratory from a reality, or else as planned, with an absolute path of its class."""
+    """The rig of a laboratory from a reality, or else as planned, with absolute paths of class and option `file`."""
     chosen, start = (planned, plan_base)
     if "rig" in entry:
         chosen, start = checked(fill(RigTable, entry["rig"], f"{lab}.rig"), f"{lab}.rig"), base
-    if ".py:" in chosen.class_:
-        return RigTable(class_=str(start.resolve() / chosen.class_), options=chosen.options)
-    return chosen
+    found = placed(chosen, start)
+    return replace(found, class_=str(start.resolve() / chosen.class_)) if ".py:" in chosen.class_ else found
+
+
+def placed(rig: RigTable, start: Path) -> RigTable:
+    """A rig whose option `file`, where it has one, is a path from the folder `start`."""
+    file = rig.options.get("file")
+    if not isinstance(file, str):
+        return rig
+    return replace(rig, options=rig.options | {"file": str(start.resolve() / file)})

@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-import subprocess
-import sys
 from dataclasses import replace
 from functools import cache
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +15,7 @@ import pytest
 from common.plan import read as plans
 from common.plan import reality as realities
 from diagnosis.report import read as read_report
+from tests import opensees
 from tests.rths.diagnosis_report.reports import bare
 from tests.rths.trial.test_scoring import CABLE, RUB, SOFT, case, judged, said
 from validation.blind import oracle
@@ -26,6 +24,7 @@ from validation.blind.cases.basis import TrialBasis, basis
 from validation.blind.cases.case import Case, Laid
 from validation.blind.draw import begin, draw
 from validation.blind.labs import materials
+from validation.blind.labs.material_lab import material
 from validation.blind.logger.loggers import LOGGERS, Logger
 from validation.blind.results.rows import case_rows
 from validation.blind.sets import MILD, SETS
@@ -92,29 +91,22 @@ def test_materials_take_turns_and_stand_in_the_columns_place() -> None:
     assert reality["master"]["rig"]["options"]["effects"][0]["name"] == "opensees.Steel01"
     for name, item in materials.MATERIALS.items():
         values = {key: math.sqrt(low * high) for key, (low, high) in item.ranges.items()}
-        assert json.loads(materials.calls(name, 12.5e6, {"d": 1e-3, **values}))
+        assert json.loads(json.dumps(materials.calls(name, 12.5e6, {"d": 1e-3, **values})))
 
 
 def served(name: str, way: Any) -> list[float]:
     ranges = materials.MATERIALS[name].ranges
     values = {key: math.sqrt(low * high) for key, (low, high) in ranges.items()}
-    from validation.blind.labs.material_lab import MaterialProcess
-
-    process = MaterialProcess(name, {"d": 1e-3, **values}, 12.5e6)
+    process = material(name, {"d": 1e-3, **values}, 12.5e6)
     try:
         return [process.force([place]) for place in way]
     finally:
         process.close()
 
 
-@pytest.mark.skipif(find_spec("openseespy") is None, reason="OpenSeesPy is not installed: make opensees")
+@pytest.mark.skipif(bool(opensees.lacking()), reason=opensees.lacking())
 @pytest.mark.parametrize("name", materials.MATERIALS)
 def test_every_material_answers(name: str) -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", "import openseespy.opensees"], capture_output=True, check=False
-    )
-    if done.returncode:
-        pytest.skip(f"OpenSeesPy does not load here: {done.stderr.decode().splitlines()[-1]}")
     forces = served(name, 3e-3 * np.sin(np.linspace(0.0, 2.0 * math.pi, 401)[1:]))
     assert all(map(math.isfinite, forces))
     assert forces[99] > 0.0 > forces[299]

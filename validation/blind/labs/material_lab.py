@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
-import struct
-import subprocess
-import sys
-import weakref
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from common.errors import InputError
+from common.opensees.process import SpecimenProcess
 from common.plan import schema
 from common.plan.laboratory_tables import Column
 from common.plan.tables import SensorsTable as Levels
 from common.rig import ColumnCommand, ColumnMeasurement
-from validation.blind.labs import material_server, materials
+from validation.blind.labs import materials
 from validation.blind.labs.column_lab import SIGNALS, TrueColumnLab
 from validation.blind.labs.sensors import TrueSensors, true_values
 
 SUBSTEPS = 4  # deformations that a material is led through in an interval
-HOME = Path(__file__).resolve().parents[3]
 
 
 class MaterialLab:
@@ -44,7 +39,7 @@ class MaterialLab:
         self._servo = TrueColumnLab(interval, seed, actuator, column, dict.fromkeys(levels, 0.0))
         self._sensors = TrueSensors(SIGNALS, true_values(SIGNALS, levels), interval, seed)
         self._stiffness = schema.fill(Column, column or {}, "column").stiffness
-        self._material = MaterialProcess(*chosen(effects), self._stiffness) if effects else None
+        self._material = material(*chosen(effects), self._stiffness) if effects else None
         self._true = (0.0, 0.0)
 
     def arm(self) -> None:
@@ -78,39 +73,6 @@ def chosen(effects: Sequence[Mapping[str, Any]]) -> tuple[str, Mapping[str, floa
     return name, effects[0]["parameters"]
 
 
-class MaterialProcess:
-    """The process that holds a material."""
-
-    def __init__(self, name: str, values: Mapping[str, float], stiffness: float) -> None:
-        words = [sys.executable, "-m", material_server.__name__, materials.calls(name, stiffness, values)]
-        self._process = subprocess.Popen(
-            words, cwd=HOME, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE
-        )
-        self.close = weakref.finalize(self, _end, self._process)
-        if len(self._answer()) < material_server.VALUE.size:
-            _, complaints = self._process.communicate()
-            said = complaints.decode(errors="replace").strip().splitlines() or ["it said nothing"]
-            raise InputError(
-                f"OpenSees cannot be the column '{name}' ({said[-1]}): make opensees installs it."
-            )
-
-    def force(self, way: Any) -> float:
-        """The force (N) at the end of a way (m)."""
-        assert self._process.stdin is not None  # noqa: S101 - it is a pipe
-        self._process.stdin.write(material_server.COUNT.pack(len(way)) + struct.pack(f"<{len(way)}d", *way))
-        self._process.stdin.flush()
-        (found,) = material_server.VALUE.unpack(self._answer())
-        return float(found)
-
-    def _answer(self) -> bytes:
-        assert self._process.stdout is not None  # noqa: S101 - it is a pipe
-        return self._process.stdout.read(material_server.VALUE.size)
-
-
-def _end(process: subprocess.Popen[bytes]) -> None:
-    """End the process; what it has to say is of no interest any more."""
-    for stream in (process.stdin, process.stdout, process.stderr):
-        if stream is not None:
-            stream.close()
-    process.kill()
-    process.wait()
+def material(name: str, values: Mapping[str, float], stiffness: float) -> SpecimenProcess:
+    """A material of the trial for a stiffness (N/m), in a process of its own."""
+    return SpecimenProcess(f"'{name}'", {"materials": materials.calls(name, stiffness, values)})

@@ -6,7 +6,6 @@ the plan's stiffness k and of a deformation d at which it bends, so that the def
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
@@ -211,6 +210,6 @@ def concrete(v: Values) -> Rows:
     ]
 
 
-def calls(name: str, stiffness: float, values: Values) -> str:
-    """The calls that make a material for a stiffness (N/m), as JSON."""
-    return json.dumps(MATERIALS[name].rows({"k": stiffness, **values}))
+def calls(name: str, stiffness: float, values: Values) -> Rows:
+    """The calls that make a material for a stiffness (N/m)."""
+    return MATERIALS[name].rows({"k": stiffness, **values})

@@ -1,0 +1,110 @@
+"""A process that holds one OpenSees specimen: `python server.py TASK`, started by `common.opensees.process`.
+
+OpenSees has one domain per process, so each specimen has a process of its own; it may be another interpreter's, and
+imports nothing of this project. It reads deformations (m, eight bytes each, a count before them) from standard input
+and answers with the force (N) at the last, NaN where OpenSees finds no equilibrium. What OpenSees itself writes to
+standard output goes to standard error.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import math
+import os
+import runpy
+import struct
+import sys
+from collections.abc import Iterable
+from typing import Any
+
+COUNT, VALUE = struct.Struct("<i"), struct.Struct("<d")
+OWN = 1_000_000  # tag of the pattern and time series beside those of a model
+HALVINGS = 8  # of a way that finds no equilibrium: 1/256 of it is far below what a tick moves
+ALGORITHMS = (("Newton",), ("KrylovNewton",), ("NewtonLineSearch",), ("ModifiedNewton", "-initial"))
+TOLERANCE, ITERATIONS = 1e-11, 60  # m, of the last iteration's step: a thousandth of a sensor's resolution
+
+
+class Material:
+    """A uniaxial material: deformation as strain, force as stress; `rows` are calls of `uniaxialMaterial`."""
+
+    def __init__(self, ops: Any, rows: list[list[Any]]) -> None:
+        self._ops = ops
+        for row in rows:
+            ops.uniaxialMaterial(*row)
+        ops.testUniaxialMaterial(int(rows[-1][1]))
+
+    def force(self, way: Iterable[float]) -> float:
+        """The force (N) at the end of a way (m)."""
+        for deformation in way:
+            self._ops.setStrain(deformation)
+        return float(self._ops.getStress())
+
+
+class Model:
+    """A model of a user's file: its `build(ops, **options)` gives the node and the direction that are moved.
+
+    What it computes beforehand, as an axial load, is its own matter; loads of it must be constant by then.
+    """
+
+    def __init__(self, ops: Any, file: str, options: dict[str, Any]) -> None:
+        self._ops, self._at = ops, 0.0
+        self._node, self._dof = runpy.run_path(file)["build"](ops, **options)
+        ops.wipeAnalysis()
+        ops.timeSeries("Linear", OWN)
+        ops.pattern("Plain", OWN, OWN)
+        unit = [0.0] * len(ops.nodeDisp(self._node))
+        unit[self._dof - 1] = 1.0
+        ops.load(self._node, *unit)
+        ops.setTime(0.0)  # from now on it is the load factor: the force
+        ops.constraints("Transformation")
+        ops.numberer("RCM")
+        ops.system("BandGeneral")
+        ops.test("NormDispIncr", TOLERANCE, ITERATIONS, 0)
+        ops.algorithm(*ALGORITHMS[0])
+        ops.integrator("DisplacementControl", self._node, self._dof, 0.0)
+        ops.analysis("Static", "-noWarnings")
+        self._zero = float(ops.nodeDisp(self._node, self._dof))
+
+    def force(self, way: Iterable[float]) -> float:
+        """The force (N) at the end of a way (m); NaN where no equilibrium is found."""
+        for deformation in way:
+            if not self._move(deformation, HALVINGS):
+                return math.nan
+        return float(self._ops.getLoadFactor(OWN))
+
+    def _move(self, to: float, halvings: int) -> bool:
+        """Move on to a deformation, in halves where it is too far for one step."""
+        if to == self._at:
+            return True
+        step = self._zero + to - float(self._ops.nodeDisp(self._node, self._dof))
+        self._ops.integrator("DisplacementControl", self._node, self._dof, step)
+        if any(self._found(algorithm) for algorithm in ALGORITHMS):
+            self._at = to
+            return True
+        return halvings > 0 and all(self._move(part, halvings - 1) for part in (0.5 * (self._at + to), to))
+
+    def _found(self, algorithm: tuple[str, ...]) -> bool:
+        self._ops.algorithm(*algorithm)
+        return int(self._ops.analyze(1)) == 0
+
+
+def main() -> int:
+    """Serve until standard input ends."""
+    out = os.dup(1)
+    os.dup2(2, 1)
+    task = json.loads(sys.argv[1])
+    ops: Any = importlib.import_module("openseespy.opensees")
+    own = task.get("model")
+    specimen = Model(ops, own, task["options"]) if own else Material(ops, task["materials"])
+    os.write(out, VALUE.pack(0.0))
+    source = sys.stdin.buffer
+    while head := source.read(COUNT.size):
+        (count,) = COUNT.unpack(head)
+        way = [value for (value,) in VALUE.iter_unpack(source.read(count * VALUE.size))]
+        os.write(out, VALUE.pack(specimen.force(way)))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
