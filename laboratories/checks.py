@@ -1,7 +1,7 @@
-"""The checks of a tick in one compiled call: limits of values and changes, errors that last, frozen sensors.
+"""The checks of a tick in one compiled call: limits of values and of changes, lasting errors, frozen sensors.
 
-NaN is beyond any limit, and nothing else is beyond an infinite one. What changes and repeats is compared with what the
-ticks before have left in the arrays, so that every tick must be checked exactly once.
+NaN is beyond every limit, also beyond an infinite one. Changes and repetitions are found by comparison with values of
+earlier ticks, which the arrays keep, so every tick must be checked exactly once.
 """
 
 from __future__ import annotations
@@ -17,32 +17,37 @@ from models.registry import Array
 Numbers = npt.NDArray[np.int64]
 
 NONE = -1.0  # in place of a limit: the value is not checked
-FINE = -1  # what `look` returns where all is well
+FINE = -1  # returned by `look` where all values are within their limits
 
-# intervals in a row by which an error must be beyond its limit: a message or two that is late makes one for a moment
+
+# Consecutive intervals for which an error must be beyond its limit to count: one or two late messages cause an error of
+# one or two intervals.
 PATIENCE = 3
-# by so many times its nominal noise a command has moved: the reading must then differ beyond any doubt
+# A sensor is judged when the command has moved by so many times its nominal noise (rms): two readings then differ by
+# ten standard deviations.
 TRAVEL = 10.0
 
 COMMANDS, CHANGES, POSITION, COUNT = range(4)  # places in `places`
 VALUE, MOST = range(2)  # rows of `values`
-# places in `scalars`: of every part of the rig from ALONE on whether its sensors are all known, and none repeats itself
+# places in `scalars`; from ALONE on, for each part of the rig, whether all its sensors are judged and none repeats a
+# value
 INTERVAL, LASTED, ALONE = range(3)
-# rows of `commands`: what the rig was given, the newest that was taken note of, and how it differed from the one before
+# rows of `commands`: the command written to the rig, the newest one taken, and its difference from the one before
 WRITTEN, LAST, CHANGE = range(3)
-FRESH = -1  # the last column: whether the command in the row WRITTEN has not been taken note of
-STEP, VELOCITY, ACCELERATION, RATES = range(4)  # how a command's changes stand one after the other
-# columns of `watched`: place of a reading, of the command that moves it, and of the part of the rig
+FRESH = -1  # the last column: whether the command in the row WRITTEN has not been taken yet
+STEP, VELOCITY, ACCELERATION, RATES = range(4)  # places of a command's changes, and their number
+# columns of `watched`: index of a reading, of the command that moves it, and of the part of the rig
 READ, DRIVE, PART = range(3)
 NOISE, REACH, FINEST, READING, SAME, LOW, HIGH, BEFORE = range(8)  # columns of `sensors`
 
 
 class Checks(NamedTuple):
-    """What a tick's values are compared with, in the order in which a violation is reported."""
+    """The values of a tick, their limits, and the memory of the checks."""
 
-    # what the caller fills in every tick, then changes of commands and the error; their limits: (2, n)
+    # (2, n): the values that the caller fills in at every tick, changes of commands and the error; and their limits.
+    # A violation is reported in this order.
     values: Array
-    places: Numbers  # (4,) of commands, of their changes and of the position in `values`; readings too many
+    places: Numbers  # (4,): index in `values` of commands, their changes and the position; readings of a frozen sensor
     scalars: Array  # (2 + parts,) interval (s), intervals in a row with an error beyond its limit, ALONE
     commands: Array  # (3, drives + 1)
     watched: Numbers  # (sensors, 3)
@@ -50,7 +55,7 @@ class Checks(NamedTuple):
 
 
 def sensors(noise: Array, reach: Array) -> Array:
-    """Sensors without a reading yet, with their nominal rms `noise` and how far a command must move to judge each."""
+    """Sensors (n, 8) before their first reading, with nominal `noise` (rms) and the motion `reach` that judges each."""
     found = np.zeros((noise.size, 8))
     found[:, NOISE], found[:, REACH] = noise, reach
     found[:, FINEST] = np.where(noise > 0.0, np.inf, -np.inf)
@@ -66,9 +71,9 @@ def enter(checks: tuple[Any, ...], target: float) -> int:
 
 @jit
 def look(checks: Checks, target: float) -> int:
-    """Where the first value of a tick is that exceeds its limit, or behind all values a frozen sensor; FINE for none.
+    """Index of the first value of a tick that exceeds its limit; FINE where none does.
 
-    `target` (m) is what the measured position should be.
+    An index beyond the values is that of a frozen sensor. `target` (m) is the target of the measured position.
     """
     values, most = checks.values[VALUE], checks.values[MOST]
     take_written(checks)
@@ -83,7 +88,7 @@ def look(checks: Checks, target: float) -> int:
 
 @jit
 def take_written(checks: Checks) -> None:
-    """Take note of the command that was written since the last tick, where one was."""
+    """Take the command that was written since the last tick, if there is one."""
     commands = checks.commands
     if commands[WRITTEN, FRESH] != 0.0:
         for drive in range(commands.shape[1] - 1):
@@ -94,7 +99,10 @@ def take_written(checks: Checks) -> None:
 
 @jit
 def compare_commands(checks: Checks) -> None:
-    """How the commands differ from the last ones that were written; a rig begins at rest in its zero."""
+    """Compute step, velocity and acceleration of each command from the last ones written.
+
+    A rig begins at rest at zero.
+    """
     values, places, commands = checks.values[VALUE], checks.places, checks.commands
     interval = checks.scalars[INTERVAL]
     for drive in range(commands.shape[1] - 1):
@@ -107,7 +115,7 @@ def compare_commands(checks: Checks) -> None:
 
 @jit
 def last(checks: Checks, target: float) -> None:
-    """The error between target and position, the last of the values; none before it has lasted for `PATIENCE`."""
+    """Compute the error between target and position, the last value; it is zero until it has lasted for `PATIENCE`."""
     values, most, scalars = checks.values[VALUE], checks.values[MOST], checks.scalars
     place = values.size - 1
     if most[place] == NONE:
@@ -119,7 +127,7 @@ def last(checks: Checks, target: float) -> None:
 
 @jit
 def still(checks: Checks) -> int:
-    """The first sensor that gives one value again and again while its command moves, FINE for none."""
+    """Index of the first frozen sensor, which repeats a value while its command moves; FINE for none."""
     values, scalars = checks.values[VALUE], checks.scalars
     for part in range(scalars.size - ALONE):
         differ = True
@@ -142,14 +150,16 @@ def still(checks: Checks) -> int:
 
 @jit
 def compare_readings(checks: Checks, part: int) -> None:
-    """Keep the finest step that each sensor of a part has shown, and count its present run of equal readings."""
+    """Update the smallest step that each sensor of a part has shown, and its present run of equal readings."""
     alone = True
     for sensor in range(checks.sensors.shape[0]):
         state, read = checks.sensors[sensor], checks.watched[sensor]
         if read[PART] != part:
             continue
         reading, command = checks.values[VALUE, read[READ]], checks.commands[LAST, read[DRIVE]]
-        if checks.scalars[ALONE + part] != 0.0:  # no command has moved it since
+        if (
+            checks.scalars[ALONE + part] != 0.0
+        ):  # all its readings differed so far, so a run begins with the last one
             begin(state, state[BEFORE], command)
         if reading == state[READING]:
             state[SAME] += 1.0
@@ -166,6 +176,6 @@ def compare_readings(checks: Checks, part: int) -> None:
 
 @jit
 def begin(state: Array, reading: float, command: float) -> None:
-    """A run of equal readings begins."""
+    """Begin a run of equal readings."""
     state[READING], state[SAME] = reading, 1.0
     state[LOW], state[HIGH] = command, command

@@ -1,7 +1,7 @@
 """Checks whether a class of a user's is a complete kind of laboratory, and compiles its kernel.
 
-The kernel is tried on its nominal parameters before a plan may use it: between numbers that it must not touch, since
-compiled code that writes beside its arrays would otherwise end the process or falsify others without a word.
+Before a plan may use it, the kernel is run with its nominal parameters on arrays between guard numbers: compiled code
+that writes beyond its arrays would otherwise crash the process or change other data without any error.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from numba import types
 
 from common import blame
 from common.errors import InputError
+from common.protocol.messages import MOST_CHANNELS
 from common.signals import BUILDING, MODE, NUMERICAL, Channels
 from laboratories.device import Device
 from models.compiled import jit_apart
@@ -28,19 +29,18 @@ VECTOR = types.float64[::1]
 KERNEL = types.void(VECTOR, VECTOR, VECTOR, types.float64, types.float64)
 """Signature of a device's `step`: parameters, state, truth, command (m), effort (N)."""
 
-MOST_CHANNELS = 6  # measured: a message to the master has a layout for each count up to this one
 WORD = re.compile(r"[a-z][a-z0-9_]*")
-# other rows of the topics in which a laboratory's channels are recorded
+# names of other signals in the topics that record a laboratory's channels
 TAKEN = frozenset(signal.name for signal in (*BUILDING, NUMERICAL, MODE)) | {"command_seq"}
-BESIDE = 64  # numbers kept on each side of an array that the kernel is tried on
-# of the trial, in which the command goes once around a sine of 1 mm
-INTERVAL = 2e-3  # s
-TICKS = 250  # of the trial: one period of 0.5 s at the usual interval, as slow as a building moves
-REACH = 1e-3  # m: so little that a device which is sound keeps clear of its stops
+BESIDE = 64  # guard numbers on each side of an array: a wrong index is noticed up to so many places beyond it
+# the trial: one period of a sine of 1 mm
+INTERVAL = 2e-3  # s, the default control interval
+TICKS = 250  # one period of 0.5 s, that of the default building
+REACH = 1e-3  # m: small, so that a correct device does not reach its stops
 
 
 def complete(kind: Device, where: str) -> None:
-    """Compile the kernel of a user's kind; raises InputError with one sentence where the class is no complete kind."""
+    """Compile the kernel of a user's kind; raises InputError where the class is not a complete kind."""
     if wrong := complaint(kind):
         raise InputError(f"{called(kind)} named in {where} {wrong}.")
     kind.move_by(compiled(kind, where))
@@ -67,13 +67,13 @@ def of_names(kind: Device) -> str:
             return f"has the name {name!r}, but a name begins with a letter and has small letters, digits and _ only"
     for place, name in enumerate(signals):
         if name in TAKEN or name in signals[:place] or name in channels.rates:
-            return f"has a signal '{name}', which another signal of the recording is called already: name it otherwise"
+            return f"has a signal '{name}', which is the name of another signal of the recording: rename it"
     both = sorted(kind.nominal.keys() & kind.faults.keys())
-    return f"has '{both[0]}' in nominal and in faults: name one of them otherwise" if both else ""
+    return f"has '{both[0]}' in nominal and in faults: rename one of them" if both else ""
 
 
 def of_channels(kind: Device) -> str:
-    """Complaint about the count of measured channels, or about which are the position and the force."""
+    """Complaint about the number of measured channels, or about the names of the position and the force."""
     names = kind.channels.names
     if not 1 <= len(names) <= MOST_CHANNELS:
         return f"measures {len(names)} channels, but must measure 1 to {MOST_CHANNELS}"
@@ -85,7 +85,7 @@ def of_channels(kind: Device) -> str:
 
 
 def of_tables(kind: Device) -> str:
-    """Complaint about nominal parameters, noise, limits and faults, or about names with which one refers to another."""
+    """Complaint about nominal parameters, noise, limits and faults, or about names in them that are unknown."""
     channels = kind.channels
     limits = (*(name for name in (*kind.limited,) if name), channels.target.name, *channels.drives)
     for table, known in (("rms", channels.names), ("most", (*channels.names, *limits))):
@@ -98,18 +98,18 @@ def of_tables(kind: Device) -> str:
         if not fault.least <= fault.null <= fault.most or not all(
             fault.least <= size <= fault.most and size != fault.null for size in fault.sizes
         ):
-            return f"has a fault '{name}' whose null or sizes are beyond its least and most, or sizes that are its null"
+            return f"has a fault '{name}' whose null or sizes are outside least and most, or a size equal to its null"
         if not fault.sizes:
-            return f"has a fault '{name}' without sizes, from which a search would start"
+            return f"has a fault '{name}' without sizes, from which a search starts"
     return ""
 
 
 def compiled(kind: Device, where: str) -> Any:
-    """The kernel of a kind, compiled and tried; raises InputError with one sentence where it cannot be used."""
+    """The kernel of a kind, compiled and tested; raises InputError where it cannot be used."""
     step = type(kind).step
     try:
         kernel = numba.cfunc(KERNEL, error_model="numpy")(step)
-    except Exception as error:  # Numba raises what its parts raise
+    except Exception as error:  # Numba lets exceptions of all its parts through
         raise InputError(
             f"step of {type(kind).__name__} named in {where} cannot be compiled ({place(step, error)}): "
             f"{reason(error)}."
@@ -120,12 +120,12 @@ def compiled(kind: Device, where: str) -> Any:
 
 
 def called(kind: Device) -> str:
-    """A kind's class with its file."""
+    """A kind's class and its file, for errors."""
     return f"{type(kind).__name__} ({blame.source_of(type(kind)) or 'no file'})"
 
 
 def place(step: Callable[..., Any], error: Exception) -> str:
-    """File, line and text of what cannot be compiled: as Numba says it, or the kernel's beginning."""
+    """File, line and text of the code that cannot be compiled: as Numba reports it, or the kernel's beginning."""
     location = getattr(error, "loc", None)
     code = inspect.unwrap(step).__code__
     file, line = (location.filename, location.line) if location else (code.co_filename, code.co_firstlineno)
@@ -134,14 +134,14 @@ def place(step: Callable[..., Any], error: Exception) -> str:
 
 
 def reason(error: Exception) -> str:
-    """The first line of Numba's text that says something of the code itself."""
+    """The first line of Numba's message that describes the user's code."""
     words = ("Failed in ", "During: ")
     lines = [line.strip() for line in str(error).splitlines() if line.strip() and not line.startswith(words)]
     return lines[0].rstrip(".:") if lines else type(error).__name__
 
 
 def misbehaviour(kind: Device, kernel: Any) -> str:
-    """What a kernel does wrong as it follows a sine from rest, as the end of a sentence; empty where nothing is."""
+    """What a kernel does wrong along a sine from rest, as the end of a sentence; empty where nothing is."""
     row = (
         INTERVAL,
         *(one.value for one in kind.nominal.values()),
@@ -156,7 +156,7 @@ def misbehaviour(kind: Device, kernel: Any) -> str:
         changed = np.flatnonzero(array.view(np.int64) != old.view(np.int64)) - BESIDE
         size = array.size - 2 * BESIDE
         if np.any((changed < 0) | (changed >= size)):
-            return f"writes beside the {size} numbers of {name}"
+            return f"writes beyond the {size} numbers of {name}"
         if name == "parameters" and changed.size:
             return f"changes parameters[{changed[0]}], which it may only read"
     return of_truth(kind, truth)
@@ -164,20 +164,20 @@ def misbehaviour(kind: Device, kernel: Any) -> str:
 
 @jit_apart
 def driven(step: Any, parameters: Array, state: Array, truth: Array, reach: float, ticks: int) -> None:
-    """Drive a kernel along one period of a sine of `reach` m."""
+    """Run a kernel along one period of a sine of `reach` m."""
     for tick in range(ticks):
         step(parameters, state, truth, reach * math.sin(2.0 * math.pi * (tick + 1) / ticks), 0.0)
 
 
 def of_truth(kind: Device, truth: Array) -> str:
-    """Complaint about a channel that a trial has left without a finite number."""
+    """Complaint about a channel to which the trial has written no finite number."""
     for place_, name in enumerate(kind.channels.names):
         if not math.isfinite(truth[place_]):
-            return f"gives {name} (truth[{place_}]) no finite number under a sine of 1 mm with the nominal parameters"
+            return f"sets {name} (truth[{place_}]) to no finite number along a sine of 1 mm with the nominal parameters"
     return ""
 
 
 def padded(values: Iterable[float]) -> Array:
-    """The values between NaN, so that a kernel which reads beside its arrays gives NaN."""
+    """The values between guards of NaN, so that a kernel that reads beyond its arrays gives NaN."""
     beside = [math.nan] * BESIDE
     return np.array([*beside, *values, *beside])

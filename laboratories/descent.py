@@ -7,16 +7,16 @@ from common.safety.ramp import MotionRamp
 
 
 class HoldRamp:
-    """The commands from the last two written on.
+    """The commands of the ramp, from the last two written on.
 
     Args:
-        plan: of the role that hosts the laboratory; it says whether the specimen is unloaded behind the hold.
+        plan: of the role that hosts the laboratory; it states whether the specimen is unloaded after the hold.
         last: the last commands written, the displacement first.
         before: the commands one interval earlier.
-        force: place of the specimen's force among the measured channels.
-        moved: what moves, in a word.
-        tested: what carries the force, in a word.
-        rest: the other commands on the way.
+        force: index of the specimen's force among the measured channels.
+        moved: name of the transfer system, for messages.
+        tested: name of the specimen, for messages.
+        rest: the other commands during the ramp.
     """
 
     def __init__(
@@ -53,6 +53,8 @@ class HoldRamp:
         force = "unknown force" if measured is None else f"{abs(measured[self._force]) * 1e-3:.1f} kN"
         if self._motion.unloading:
             return f"unloading the {self._tested}: {force} left"
+        if self._motion.holding:
+            return f"waiting for the {self._moved} to settle: {force} on the {self._tested}"
         return f"bringing the {self._moved} to a halt: {force} on the {self._tested}"
 
     @property

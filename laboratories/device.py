@@ -1,7 +1,7 @@
-"""A kind of laboratory of the user's own: a class in a file, from which all else follows.
+"""The base class of a user's own kind of laboratory.
 
-The class gives its channels, its nominal parameters, its possible faults and its kernel. A plan chooses it
-by `kind = "file.py:Class"`, and its table `[device]` says where the device stands in the building.
+The class gives its channels, its nominal parameters, its possible faults and its kernel. A plan chooses it by
+`kind = "file.py:Class"`, and its table `[device]` states where the device stands in the building.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from models.system import System
 if TYPE_CHECKING:
     from laboratories.effects.effect import Effect
 
-# a kernel is passed by its address, which Numba calls experimental; tests hold that it works in every loop
+# a kernel is passed by its address, which Numba calls experimental; tests show that it works in every loop
 warnings.filterwarnings("ignore", category=numba.NumbaExperimentalFeatureWarning)
 
 __all__ = ["Channels", "Device", "Fault", "Follows", "Limited", "Nominal", "Signal", "kernel"]
@@ -39,11 +39,14 @@ __all__ = ["Channels", "Device", "Fault", "Follows", "Limited", "Nominal", "Sign
 Function = TypeVar("Function", bound=Callable[..., object])
 
 UNCORRECTED = ForceCorrection()
-SITE = "device"  # where the faults of any device are
+SITE = "device"  # the site of the faults of any device
 
 
 def kernel(function: Function) -> Function:
-    """Compile a function that a device's `step` calls, in each process anew: a file of a user's may import others."""
+    """Compile a function that a device's `step` calls.
+
+    It is compiled in each process and not cached, because a user's file may import others that change.
+    """
     return cast(Function, numba.njit(error_model="numpy", nogil=True)(function))
 
 
@@ -53,9 +56,9 @@ class Nominal(NamedTuple):
     value: float
     unit: str
     says: str
-    tolerance: float = 0.02  # how well it is known, relative
-    least: float = 0.0  # a plan may give no less
-    most: float | None = None  # and no more; None for any
+    tolerance: float = 0.02  # relative; the default is that of a plan's parameters
+    least: float = 0.0  # least value that a plan may give
+    most: float | None = None  # largest value that a plan may give; None for any
 
 
 class Fault(NamedTuple):
@@ -64,18 +67,18 @@ class Fault(NamedTuple):
     The fault `leak` is the effect `device.leak`, which a reality can hide and a diagnosis can name.
     """
 
-    says: str  # what it is, in a few words
-    parameter: str  # what says how strong it is
+    says: str  # its description in a few words
+    parameter: str  # name of its magnitude
     unit: str
-    null: float  # the value at which it is not there
+    null: float  # the magnitude without the fault
     least: float
     most: float
-    sizes: tuple[float, ...]  # from barely visible to strong, where a search starts
+    sizes: tuple[float, ...]  # magnitudes from barely visible to strong, from which a search starts
     reference: str = "the user's own kind"
 
     def effect(self, name: str) -> Effect:
         """The effect of the catalogue that gives a device this fault."""
-        # the catalogue loads the files of the shipped kinds, which need this module's room
+        # imported here, because the catalogue imports the shipped kinds, which import this package
         from laboratories.effects.effect import Effect, Parameter
 
         parameter = Parameter(self.parameter, self.unit, self.null, self.least, self.most, self.sizes)
@@ -84,16 +87,16 @@ class Fault(NamedTuple):
 
 
 def _laid(system: System, *, name: str, parameter: str, **given: float) -> System:
-    """The system whose device has a fault as strong as its one parameter says."""
+    """The system whose device has the fault `name` with the magnitude that its one parameter gives."""
     device = system.effects.device | {name: given[parameter]}
     return dataclasses.replace(system, effects=dataclasses.replace(system.effects, device=device))
 
 
 class DeviceRecord(NamedTuple):
-    """A device at work, which its own kernel moves on."""
+    """A device with its state, which its own kernel updates."""
 
-    step: Any  # compiled, as an address
-    parameters: Array  # interval s, the nominal parameters, then what effects set, in the order of the class
+    step: Any  # address of the compiled kernel
+    parameters: Array  # interval s, the nominal parameters, then the faults, in the order of the class
     state: Array
 
 
@@ -109,13 +112,13 @@ def enter_device(lab: tuple[Any, ...], truth: Array, command: float, effort: flo
 
 
 class Device(Kind):
-    """Base of kinds of users' own, which set `name`, `says`, `channels` and what else they need, and write `step`.
+    """Base of users' own kinds, which set `name`, `says`, `channels` and further attributes, and define `step`.
 
-    `step(parameters, state, truth, command, effort)` is a static method that moves the device on by one interval and is
-    compiled: `parameters` holds the interval (s), the values of `nominal` and then those of `faults`, each in the order
-    of the class; `state` has `states` numbers, all zero at rest; `command` (m) is reached at the interval's end,
-    `effort` (N) is the motor's; what sensors without error would read then goes into `truth`, in the order of the
-    measured channels.
+    `step(parameters, state, truth, command, effort)` is a static method that updates the device by one interval; it is
+    compiled. `parameters` holds the interval (s), the values of `nominal` and then those of `faults`, each in the order
+    of the class. `state` has `states` numbers, all zero at rest. `command` (m) is reached at the interval's end, and
+    `effort` (N) is the motor's force. The readings of sensors without error at the interval's end must be written into
+    `truth`, in the order of the measured channels.
     """
 
     follows: ClassVar[Follows] = Follows.DRIFT
@@ -123,19 +126,18 @@ class Device(Kind):
     faults: ClassVar[Mapping[str, Fault]] = {}
     states: ClassVar[int] = 0
     rms: ClassVar[Mapping[str, float]] = {}  # nominal noise by measured channel
-    most: ClassVar[Mapping[str, float]] = {}  # limits by signal, and of those that `limited` names
-    stiffness: ClassVar[str] = ""  # the nominal parameter that is the device's stiffness, N/m; empty for none
-    damping: ClassVar[str] = ""  # likewise its dashpot, N·s/m
+    most: ClassVar[Mapping[str, float]] = {}  # limits by signal, and by the names in `limited`
+    stiffness: ClassVar[str] = (
+        ""  # name of the nominal parameter for the device's stiffness, N/m; empty for none
+    )
+    damping: ClassVar[str] = ""  # name of that for its dashpot, N·s/m
     sites = (SITE,)
     record = DeviceRecord
     advance = staticmethod(advance_device)
     step: Callable[[Array, Array, Array, float, float], None]
 
     def __init_subclass__(cls) -> None:
-        """Complete the class: channels with noise are watched for sensors that repeat a value while it moves.
-
-        Pictures show its force over its position.
-        """
+        """Set defaults: channels with noise are checked for frozen sensors, and pictures show force over position."""
         if not isinstance(getattr(cls, "channels", None), Channels):
             return
         if "pictured" not in vars(cls):
@@ -145,7 +147,7 @@ class Device(Kind):
             cls.sensed = (Sensed(noisy, cls.channels.position),) if noisy else ()
 
     def move_by(self, kernel: Any) -> None:
-        """Take the compiled `step`, which every laboratory of this kind is then moved by."""
+        """Set the compiled `step`, which every laboratory of this kind uses from then on."""
         self._kernel = kernel
 
     @property
@@ -167,7 +169,7 @@ class Device(Kind):
         return self.nominal[name.partition(".")[2]].tolerance
 
     def scaled(self, system: System, name: str, factor: float) -> System:
-        """The system with a nominal parameter multiplied, as far as the class allows it."""
+        """The system with a nominal parameter multiplied, within the bounds of the class."""
         key = name.partition(".")[2]
         one, value = self.nominal[key], factor * self.planned(system.plan, name)
         value = min(max(value, one.least), math.inf if one.most is None else one.most)
@@ -181,7 +183,7 @@ class Device(Kind):
         """The nominal parameters by name: the class's, or the plan's where it gives them.
 
         Raises:
-            InputError: the plan gives one that the class does not have, no number, or one beyond its bounds.
+            InputError: the plan gives an unknown parameter, a value that is not a number, or one out of bounds.
         """
         where = "device.parameters"
         units = {name: one.unit for name, one in self.nominal.items()}
@@ -200,13 +202,13 @@ class Device(Kind):
         return DeviceRecord(self._kernel, np.array(row), np.zeros(self.states))
 
     def enter(self, lab: tuple[Any, ...], command: float, effort: float = 0.0) -> tuple[float, ...]:
-        """What sensors without error would read one interval later, for a caller outside compiled code."""
+        """The readings of sensors without error one interval later, for a caller outside compiled code."""
         truth = np.empty(len(self.channels.names))
         enter_device(lab, truth, command, effort)
         return tuple(truth.tolist())
 
     def coupling(self, plan: Plan) -> Coupling:
-        """The device's storey or floor as `[device]` says it."""
+        """The coupling to the storey or floor that `[device]` gives."""
         device, values = plan.device, self.values(plan)
         felt = device.ratio * device.scale
         return Coupling(
@@ -228,16 +230,16 @@ class Device(Kind):
         return Chosen(chosen.kind, chosen.parameters, "device.compensator")
 
     def noise(self, plan: Plan) -> Array:
-        """The class's, or the plan's where it gives it."""
+        """The class's noise, or the plan's where it gives it."""
         units = {signal.name: signal.unit for signal in self.channels.measured}
         rms = dict(self.rms) | self._given(plan.device.noise, units, "device.noise")
         return np.array([rms.get(name, 0.0) for name in self.channels.names])
 
     def limits(self, plan: Plan) -> Mapping[str, float]:
-        """The class's, or the plan's where it gives them.
+        """The class's limits, or the plan's where it gives them.
 
-        Where all laboratories are emulated, those of the class on how a command moves do not hold: after a pause of
-        the machine the newest command is ahead by as long a motion.
+        Where all laboratories are emulated, the class's limits on the rates of a command are infinite: after a pause of
+        the machine the newest command is ahead by the motion of that pause.
         """
         channels, limited = self.channels, self.limited
         signals = (channels.target, channels.command, channels.effort, *channels.measured)
@@ -256,7 +258,7 @@ class Device(Kind):
         return HoldRamp(plan, last, before, force, "device", "device", rest)
 
     def _given(self, table: Mapping[str, Any], units: Mapping[str, str], where: str) -> dict[str, float]:
-        """The numbers of a table of the plan, whose names are among `units`; raises InputError where one is none."""
+        """The numbers of a table of the plan, whose names must be among `units`; raises InputError."""
         for name in table:
             if name not in units:
                 raise InputError(f"Unknown key '{name}' in [{where}]: {nearest(name, units)}")

@@ -1,4 +1,4 @@
-"""A laboratory of any kind, emulated: its device and its sensors behind the interface of a rig."""
+"""An emulated laboratory of any kind: its model and its sensors behind the interface of a rig."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from models.system import System
 
 
 class EmulatedLab:
-    """The device of a kind as a system has it, at rest; `seed` is that of its sensors' noise.
+    """A kind's laboratory of a system, at rest; `seed` is that of its sensors' noise.
 
     Raises:
-        InputError: the device cannot be as the system has it.
+        InputError: parameters or effects of the system are not valid for the kind.
     """
 
     def __init__(self, kind: Kind, system: System, seed: int) -> None:
@@ -32,10 +32,10 @@ class EmulatedLab:
         self._true: tuple[float, ...] = (0.0,) * len(names)
 
     def arm(self) -> None:
-        """An emulated laboratory is always ready."""
+        """Do nothing: an emulated laboratory is always ready."""
 
     def read(self) -> Any:
-        """Readings at the present tick, with the sensors' noise."""
+        """The readings at the present tick, with the sensors' noise."""
         error, true, sensors = self._noise.row(), self._true, self._readings
         if self._plain:
             return self._measurement(*map(add, true, error))
@@ -46,8 +46,8 @@ class EmulatedLab:
         )
 
     def write(self, command: tuple[float, ...]) -> None:
-        """Move on by one interval: the transfer system follows its command, a motor holds its own."""
+        """Advance by one interval, in which the transfer system follows its command and a motor holds its force."""
         self._true = self._enter(self._lab, *command)
 
     def disarm(self) -> None:
-        """An emulated device stays where it is."""
+        """Do nothing: an emulated device stays where it is."""

@@ -1,8 +1,8 @@
-"""What a kind of laboratory says of itself: its channels, its place in the building, its model, its way to rest.
+"""The interface of a kind of laboratory: its channels, its coupling to the building, its model, its ramp to rest.
 
-Every laboratory is driven alike. At each tick it is told a target for the interval's end with the target's rates, and
-a force for its motor where it has one. Its compensator makes of that a command, which its transfer system follows;
-what it measures goes back, and one of the measured forces enters the building.
+All kinds are driven in the same way. At each tick a laboratory gets a target for the interval's end with the target's
+rates, and a force for its motor where it has one. Its compensator computes a command from them, which its transfer
+system follows. Its measurements go back to the master, and one of the measured forces enters the equation of motion.
 """
 
 from __future__ import annotations
@@ -27,27 +27,27 @@ if TYPE_CHECKING:
 
 
 class Follows(Enum):
-    """What of the building's motion a laboratory follows, and with it how its force acts on the building."""
+    """The motion of the building that a laboratory follows, and so how its force acts on the building."""
 
     DRIFT = "drift"  # of a storey; the force resists it, between the storey's two floors
     FLOOR = "floor"  # absolute displacement of a floor; the force pushes that floor
 
 
 class Coupling(NamedTuple):
-    """The place of a laboratory in the building of a plan."""
+    """The coupling of a laboratory to the building of a plan."""
 
     follows: Follows
     place: int  # storey or floor, from 1
     ratio: float  # target over that motion
     scale: float  # force on the building over force measured
     effort: (
-        float  # motor's force in the laboratory over velocity of the floor or drift, N·s/m; 0 without a motor
+        float  # motor's force in the laboratory over the velocity of floor or drift, N·s/m; 0 without a motor
     )
     correction: ForceCorrection  # of the measured force before it enters the equation of motion
-    stiffness: float  # N/m, nominal, of what the building feels against that motion; 0 where it is none
-    damping: float  # N·s/m, likewise
-    mass: float  # kg, likewise
-    share: float  # of the storey's numerical columns, which the specimen stands for
+    stiffness: float  # nominal stiffness against that motion, at the building's scale, N/m; 0 for none
+    damping: float  # nominal dashpot, likewise, N·s/m
+    mass: float  # nominal mass, likewise, kg
+    share: float  # of the storey's columns, which the specimen represents
 
 
 class Chosen(NamedTuple):
@@ -55,49 +55,49 @@ class Chosen(NamedTuple):
 
     kind: str
     parameters: Mapping[str, float]
-    where: str  # table of the plan's file, for sentences about it
+    where: str  # table of the plan's file, for messages about it
 
 
 class Limited(NamedTuple):
-    """The names of limits on how a laboratory's command may move, empty for none."""
+    """The names of the limits on the changes of a laboratory's command, empty for none."""
 
     step: str = ""  # largest change of the command within an interval
     velocity: str = ""
     acceleration: str = ""
     effort_step: str = ""  # largest change of the motor's force within an interval
-    error: str = ""  # of the measured position beside its target, lasting
+    error: str = ""  # lasting error of the measured position relative to its target
 
 
 class Sensed(NamedTuple):
-    """Readings that must go on to differ while a command moves: one part of a rig."""
+    """Readings of one part of a rig that must keep changing while a command moves; otherwise a sensor is frozen."""
 
     channels: tuple[str, ...]
-    moved: str  # the channel that reads what the command is about
-    by_effort: bool = False  # whether it is the motor's force that moves them, not the command
+    moved: str  # the channel that measures the commanded quantity
+    by_effort: bool = False  # whether the motor's force moves them rather than the transfer system's command
 
 
 class Hysteresis(NamedTuple):
-    """A motion and the force that goes with it: what makes a loop."""
+    """A motion and its force, which together show a hysteresis loop."""
 
-    name: str  # what is deformed, in a word: "damper"
+    name: str  # name of the deformed part: "damper"
     motion: str  # of the measured channels
     force: str  # likewise
-    across: str  # what the motion is called on an axis, behind that word: "stroke"
-    unit: str = "N"  # of the force where an axis cannot choose it by what is recorded: N or kN
+    across: str  # name of the motion on an axis, after that of the part: "stroke"
+    unit: str = "N"  # of the force on an axis whose unit does not follow from the recorded values: N or kN
 
 
 class Pictured(NamedTuple):
-    """What pictures and tables call the parts of a laboratory, and which of its signals they put together."""
+    """The names of a laboratory's parts in pictures and tables, and the signals that they combine."""
 
     system: str  # the transfer system: "actuator"
-    name: str  # what that moves, in a word: "column"
-    position: str  # what its motion is called, behind that word: "deformation"
+    name: str  # the part that it moves: "column"
+    position: str  # name of that part's motion: "deformation"
     loops: tuple[Hysteresis, ...]
-    also: tuple[str, ...] = ()  # measured channels in none of these loops whose histories are shown
+    also: tuple[str, ...] = ()  # further measured channels whose histories are shown
 
 
 def usual(channels: Channels) -> Pictured:
-    """What pictures call a laboratory of which they know the signals alone."""
+    """The names for pictures of a laboratory by its channels alone."""
     word = channels.target.name.removesuffix("_target").replace("_", " ")
     across = channels.position.replace("_", " ").removeprefix(f"{word} ")
     loop = Hysteresis(word, channels.position, channels.force, across)
@@ -106,41 +106,40 @@ def usual(channels: Channels) -> Pictured:
 
 
 class Machine(NamedTuple):
-    """A machine in a laboratory, one of its sites, as a diagnosis looks at it."""
+    """A machine in a laboratory, which is one of its sites, as a diagnosis treats it."""
 
     site: str
-    parameters: tuple[str, ...]  # nominal ones that may be a little off, as the plan's tolerances name them
-    sized: tuple[str, ...]  # channels that tell how large its effects may be, one per unit
-    curve: tuple[str, str]  # signals whose relation shows what it does: abscissa and ordinate
-    shown: tuple[str, ...] = ()  # channels of which one must be recorded to look for its effects; empty: none
-    drive: str = ""  # command without which it stands still; empty: it never does
+    parameters: tuple[str, ...]  # nominal parameters with a tolerance, as the plan's tolerances name them
+    sized: tuple[str, ...]  # channels from which the magnitudes of its effects follow, one per unit
+    curve: tuple[str, str]  # signals whose relation characterises it: abscissa and ordinate
+    shown: tuple[
+        str, ...
+    ] = ()  # channels of which one must be recorded for a search of its effects; empty: none
+    drive: str = ""  # command without which it does not move; empty: it always moves
 
 
 class Kind(ABC):
     """One kind of laboratory. A kind of a user's is a subclass of `laboratories.device.Device` in a file of its own."""
 
     name: str
-    says: str  # what stands in the laboratory, in a few words
+    says: str  # the devices in the laboratory, in a few words
     channels: Channels
     limited: Limited = Limited()
     sensed: tuple[Sensed, ...] = ()
-    sites: tuple[str, ...] = ()  # where effects can be, sensors apart
+    sites: tuple[str, ...] = ()  # sites of effects, without the sensors
     pictured: Pictured
-    reaches: ClassVar[
-        Mapping[tuple[str, str], float]
-    ] = {}  # channels, or their rates, on the default test, by unit
-    responses: tuple[str, ...] = ()  # by which a test's gap is judged; none: `position` and `force`
-    free: str = ""  # channel of a motion that nothing may bring back, so that a replay takes it up anew
-    record: type[Any]  # NamedTuple of the laboratory at work
+    reaches: ClassVar[Mapping[tuple[str, str], float]] = {}  # peaks on the default test, by channel and unit
+    responses: tuple[str, ...] = ()  # channels by which a test's gap is judged; none: `position` and `force`
+    free: str = ""  # channel of a motion without restoring force, which a replay therefore begins anew
+    record: type[Any]  # NamedTuple of the laboratory's state and constants
     advance: Callable[..., None]  # (record, truth, command, effort): one interval, see `kinds.advance`
-
     enter: Callable[
         ..., tuple[float, ...]
-    ]  # (record as `compiled.plain` gives it, commands...): truth after `advance`
+    ]  # (record as `compiled.plain` gives it, commands...): truth afterwards
 
     @property
     def effects(self) -> tuple[Effect, ...]:
-        """Its effects beside those in the folders of the catalogue."""
+        """Its effects in addition to those in the folders of the catalogue."""
         return ()
 
     def machines(self, plan: Plan) -> tuple[Machine, ...]:
@@ -154,7 +153,7 @@ class Kind(ABC):
         return attrgetter(name)(plan)
 
     def tolerance(self, plan: Plan, name: str) -> float:
-        """How well a nominal parameter is known, relative."""
+        """The relative tolerance of a nominal parameter."""
         return plan.tolerances.parameters.get(name, plan.tolerances.default)
 
     def scaled(self, system: System, name: str, factor: float) -> System:
@@ -167,24 +166,30 @@ class Kind(ABC):
         return system.moved("sensors", **rms)
 
     def settle(self, lab: Any, truth: Array, command: float, interval: float) -> bool:
-        """Bring a laboratory at rest to a command (m) that has been there for long; whether its model can be."""
+        """Bring a laboratory at rest to the steady state of a constant command (m).
+
+        False if the model does not support it.
+        """
         return False
 
     def resume(self, lab: Any, truth: Array, motion: float, rate: float) -> None:
-        """Take up the motion of `free` (m) with its rate (m/s)."""
-        raise NotImplementedError(f"No motion of a laboratory of the kind {self.name} can be taken up anew.")
+        """Set the motion of `free` (m) and its rate (m/s)."""
+        raise NotImplementedError(f"The kind {self.name} has no motion that can be set.")
 
     def drifts(self, plan: Plan) -> bool:
-        """Whether nothing brings the motion of `free` back."""
+        """Whether the motion of `free` has no restoring force."""
         return False
 
     @abstractmethod
     def build(self, system: System) -> Any:
-        """The laboratory of a system at rest, as its `record`; raises InputError where it cannot be."""
+        """The laboratory of a system at rest, as its `record`.
+
+        Raises InputError where parameters or effects are not valid.
+        """
 
     @abstractmethod
     def coupling(self, plan: Plan) -> Coupling:
-        """Its place in the building of a plan, as `plan.of(role)` shows it to the role that hosts it."""
+        """Its coupling to the building of a plan; `plan` as the role that hosts it sees it."""
 
     @abstractmethod
     def compensator(self, plan: Plan) -> Chosen:
@@ -195,9 +200,9 @@ class Kind(ABC):
         return np.array([getattr(plan.sensors, name) for name in self.channels.names])
 
     def limits(self, plan: Plan) -> Mapping[str, float]:
-        """Largest magnitudes by signal, and of those that `limited` names; what is not in it has no limit."""
+        """Largest magnitudes by signal, and by the names in `limited`; a signal that is not in it has no limit."""
         return dict(vars(plan.limits))
 
     @abstractmethod
     def ramp(self, plan: Plan, last: tuple[float, ...], before: tuple[float, ...]) -> Ramp:
-        """The way to rest from the last two commands written, in the order of `channels.drives`."""
+        """The ramp to rest from the last two commands written, in the order of `channels.drives`."""

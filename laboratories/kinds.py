@@ -1,9 +1,9 @@
-"""The kinds of laboratory by name, those of users included, and the kernel that moves a laboratory of any kind on.
+"""The kinds of laboratory by name, those of users included, and the kernel that advances a laboratory of any kind.
 
-A laboratory at work is a record of arrays. Compiled code chooses the kernel by the record's class, so that it holds the
-kernels that it needs and no table of functions at run time. All kinds of users share one record, which carries its
-kernel as an address, and `AnyLab` holds a laboratory of whichever kind: a loop that is compiled for it serves every
-combination of kinds, and none has to be compiled anew.
+A laboratory's state and constants are a record of arrays. Compiled code chooses the kernel by the record's class, so
+that it contains only the kernels that it needs and no table of functions at run time. All users' kinds share one class
+of record, which holds its kernel as an address. `AnyLab` holds a laboratory of any kind: a loop compiled for it serves
+all combinations of kinds without being compiled again.
 """
 
 from __future__ import annotations
@@ -40,11 +40,11 @@ KINDS: dict[str, Kind] = {kind.name: kind for kind in (COLUMN, TABLE)}
 """The kinds that ship, by the names that a plan gives them."""
 
 
-COLUMN_AT, TABLE_AT, DEVICE_AT, NOTHING = range(4)  # places of the records of `AnyLab`
+COLUMN_AT, TABLE_AT, DEVICE_AT, NOTHING = range(4)  # values of `AnyLab.place`
 
 
 class AnyLab(NamedTuple):
-    """A laboratory of whichever kind, or none: one record is at work, the others have no meaning."""
+    """A laboratory of any kind, or none: one of its records is used, the others have no meaning."""
 
     place: int  # which one it is; NOTHING where there is no laboratory
     column: ColumnLab
@@ -53,7 +53,7 @@ class AnyLab(NamedTuple):
 
 
 def advance_any(lab: AnyLab, truth: Array, command: float, effort: float) -> None:
-    """One interval of the record that is at work."""
+    """Advance the record that is used by one interval."""
     if lab.place == COLUMN_AT:
         advance(lab.column, truth, command, effort)
     elif lab.place == TABLE_AT:
@@ -63,7 +63,7 @@ def advance_any(lab: AnyLab, truth: Array, command: float, effort: float) -> Non
 
 
 def as_any(lab: Any) -> AnyLab:
-    """The record of a laboratory at work as one of whichever kind."""
+    """A laboratory's record as `AnyLab`."""
     if isinstance(lab, AnyLab):
         return lab
     place, name = PLACES[type(lab)]
@@ -72,7 +72,7 @@ def as_any(lab: Any) -> AnyLab:
 
 @cache
 def nothing() -> AnyLab:
-    """No laboratory; its records are of the standard plan, and stand there for their types alone."""
+    """No laboratory; its records, of the default plan, are needed for their types only."""
     system = System(Plan())
     device = DeviceRecord(cfunc(KERNEL, cache=True)(still), np.zeros(1), np.zeros(0))
     return AnyLab(NOTHING, COLUMN.build(system), TABLE.build(system), device)
@@ -86,7 +86,7 @@ PLACES = {
 
 
 def still(parameters: Array, state: Array, truth: Array, command: float, effort: float) -> None:
-    """The step of a device that is not there."""
+    """The step of a missing device, which does nothing."""
 
 
 KERNELS: dict[type[Any], Callable[..., None]] = {kind.record: kind.advance for kind in KINDS.values()} | {
@@ -102,7 +102,7 @@ def kind_of(plan: Plan, role: str) -> Kind:
         InputError: it hosts none, or the class that the plan names cannot be loaded or is no kind.
     """
     if role not in plan.kinds:
-        raise InputError(f"The plan gives the {role} no laboratory: look at its kind.")
+        raise InputError(f"The plan gives the {role} no laboratory: set its kind to another than 'none'.")
     return named(plan.kinds[role], plan.base, f"[{role}] kind")
 
 
@@ -112,7 +112,7 @@ def kinds_of(plan: Plan) -> dict[str, Kind]:
 
 
 def topics(plan: Plan) -> dict[str, tuple[Signal, ...]]:
-    """What a recording of the plan's test holds; raises InputError as `kind_of`, or as `common.signals.topics`."""
+    """The topics of a recording of the plan's test; raises InputError as `kind_of`, or as `common.signals.topics`."""
     return dict(_topics(tuple(plan.kinds.items()), plan.base))
 
 
@@ -124,7 +124,7 @@ def _hosted(names: tuple[tuple[str, str], ...], base: Path) -> dict[str, Kind]:
 
 @cache
 def _topics(names: tuple[tuple[str, str], ...], base: Path) -> dict[str, tuple[Signal, ...]]:
-    """What is recorded of laboratories of these names by role."""
+    """The topics of a recording of laboratories whose kinds have these names, by role."""
     return signals.topics({role: kind.channels for role, kind in _hosted(names, base).items()})
 
 
@@ -155,12 +155,12 @@ def _loaded(reference: str, base: Path, where: str) -> Kind:
 
 
 def advance(lab: Any, truth: Array, command: float, effort: float) -> None:
-    """Move a laboratory of any kind on by one interval; compiled code only.
+    """Advance a laboratory of any kind by one interval; for compiled code only.
 
-    `command` (m) is the transfer system's for the interval's end, `effort` (N) a motor's, 0 where the kind has none;
-    what the sensors would read without error then stands in `truth` (channels,).
+    `command` (m) is the transfer system's for the interval's end, `effort` (N) the motor's, 0 for a kind without one.
+    The readings of sensors without error at the interval's end are written into `truth` (channels,).
     """
-    raise NotImplementedError("Only compiled kernels move a laboratory of any kind on.")
+    raise NotImplementedError("Only compiled code can advance a laboratory of any kind.")
 
 
 @overload(advance, jit_options=MERGED, strict=False)  # strict compares annotations too

@@ -1,4 +1,4 @@
-"""What a laboratory checks before its rig moves: what it read, and what it is about to write."""
+"""The limits of a laboratory at a tick, on its measurements and on the commands that it is about to write."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from models.registry import Array
 
 
 class Limit(NamedTuple):
-    """The limit of a value by its name; of one that is none of the plan's own, its unit."""
+    """The limit of a value, by name."""
 
     name: str
     most: float  # NONE for none
-    unit: str = ""
+    unit: str = ""  # of a limit of a user's kind, which the plan's table of limits does not hold
 
 
 def quantities(kind: Kind) -> dict[str, str]:
-    """The units of what a kind of laboratory may limit, by name."""
+    """The units of the quantities that a kind of laboratory may limit, by name."""
     channels, moved = kind.channels, kind.limited
     found = {signal.name: signal.unit for signal in (*channels.driving, channels.command, *channels.measured)}
     found |= dict(zip(channels.rates, UNITS_OF_RATES, strict=True))
@@ -40,12 +40,12 @@ def quantities(kind: Kind) -> dict[str, str]:
 def limited(
     limits: Mapping[str, float], names: Iterable[str], units: Mapping[str, str] = UNITS
 ) -> list[Limit]:
-    """The limits on values of these names, in their `units`; a value without one is not checked."""
+    """The limits on the values of these names; a value without one is not checked."""
     return [Limit(name, limits.get(name, NONE), units.get(name, "")) for name in names]
 
 
 def first_beyond(limits: Sequence[Limit], values: Sequence[float]) -> LimitViolation | None:
-    """The first of some values that is beyond its limit."""
+    """The first value that is beyond its limit, None where none is."""
     for limit, value in zip(limits, values, strict=True):
         if limit.most != NONE and not abs(value) <= limit.most:
             return LimitViolation(limit.name, value, limit.most, limit.unit)
@@ -53,24 +53,24 @@ def first_beyond(limits: Sequence[Limit], values: Sequence[float]) -> LimitViola
 
 
 def of_readings(kind: Kind, plan: Plan) -> list[Limit]:
-    """The limits on what a kind's laboratory reads."""
+    """The limits on the measurements of a kind's laboratory."""
     return limited(kind.limits(plan), kind.channels.names, quantities(kind))
 
 
 def of_commands(kind: Kind, plan: Plan) -> list[Limit]:
-    """The limits on what its rig is written."""
+    """The limits on the commands written to its rig."""
     return limited(kind.limits(plan), kind.channels.drives, quantities(kind))
 
 
 def of_sent(kind: Kind, plan: Plan) -> list[Limit]:
-    """The limits on what it is told at a tick: target, motor's force, the target's rates."""
+    """The limits on the values sent to it at a tick: target, motor's force, the target's rates."""
     channels = kind.channels
     effort = channels.effort.name if channels.effort else ""
     return limited(kind.limits(plan), (channels.target.name, effort, *channels.rates), quantities(kind))
 
 
 def of_changes(kind: Kind, plan: Plan) -> list[Limit]:
-    """The limits on how its commands change, each one's step, velocity and acceleration, and on its lasting error."""
+    """The limits on step, velocity and acceleration of each command, and on the lasting error of the position."""
     moved, limits, units = kind.limited, kind.limits(plan), quantities(kind)
     names = [moved.step, moved.velocity, moved.acceleration]
     names += [moved.effort_step, "", ""] if kind.channels.effort else []
@@ -81,8 +81,8 @@ def of_changes(kind: Kind, plan: Plan) -> list[Limit]:
 class TickLimits:
     """All limits of a laboratory's tick; `kind` is None for a master without a laboratory.
 
-    `values` are the limits on what `violation` is given in every tick, the measurements first, `commands` is the place
-    of the commands among them. `written` is told of every command that went to the rig.
+    `values` are the limits on the values that `violation` takes, the measurements first; `commands` is the index of the
+    first command among them. `written` must be called with every command that is written to the rig.
     """
 
     def __init__(self, kind: Kind | None, plan: Plan, values: Sequence[Limit], commands: int) -> None:
@@ -106,9 +106,9 @@ class TickLimits:
         self._wrote = struct.Struct(f"{drives + 1}d").pack_into
 
     def violation(self, target: float, *values: float) -> LimitViolation | Standstill | None:
-        """The first value beyond its limit, changes of commands and lasting errors after them, or a frozen sensor.
+        """The first violation: of a value, of a command's change, of the lasting error, or a frozen sensor; else None.
 
-        `target` (m) is what the position measured at the tick should be.
+        `target` (m) is the target of the position measured at the tick.
         """
         self._fill(self._values, 0, *values)
         place = checks.enter(self._arrays, target)
@@ -123,16 +123,16 @@ class TickLimits:
         return Standstill(self._readings[read].name, float(state[checks.READING]), int(state[checks.SAME]))
 
     def written(self, command: tuple[float, ...]) -> None:
-        """The rig was given this command."""
+        """Take note of a command that was written to the rig."""
         self._wrote(self._written, 0, *command, 1.0)
 
     def standing(self, measured: tuple[float, ...]) -> str:
-        """Why a rig at rest may not be reset, empty where all it reads is within its limits."""
+        """Why a rig at rest may not be reset; empty where all measurements are within their limits."""
         return str(first_beyond(self._readings, measured) or "")
 
 
 def watching(kind: Kind | None, plan: Plan) -> tuple[Numbers, Array, int]:
-    """The sensors of a kind that must go on to differ, as `Checks` knows them, and how many parts they are of."""
+    """The sensors of a kind that are checked for frozen values, as `Checks` holds them, and the number of parts."""
     if kind is None:
         return np.zeros((0, 3), dtype=np.int64), checks.sensors(np.zeros(0), np.zeros(0)), 0
     names, noise = kind.channels.names, kind.noise(plan)

@@ -1,4 +1,4 @@
-"""How long the laboratories of a plan take at most to come to rest, by the ramp of each one's kind."""
+"""The longest time that the laboratories of a plan take to come to rest, by the ramp of each one's kind."""
 
 from __future__ import annotations
 
@@ -11,8 +11,10 @@ from common.plan.tables import Limits
 from laboratories.kind import Kind
 from laboratories.kinds import kinds_of
 
-MARGIN_S = 1.0  # on the way itself, for intervals that are left out
-BETWEEN = 2.0  # a drift is between two floors, and a floor moves on top of the ground
+MARGIN_S = 1.0  # for missed intervals, which lengthen the ramp: two pauses of the machine of 0.5 s
+# Factor from the displacement of a floor relative to the ground to that of a drift, since two floors may move in
+# opposite directions, or of a floor in absolute terms, since the ground moves as well.
+BETWEEN = 2.0
 
 
 def resting(plan: Plan) -> float:
@@ -26,7 +28,7 @@ def resting(plan: Plan) -> float:
 
 
 def way(kind: Kind, plan: Plan) -> float:
-    """The ramp of a kind from the largest command at the largest speed away from zero, s; `plan` as its role has it."""
+    """Duration (s) of a kind's ramp from the largest command with the largest velocity; `plan` as its role sees it."""
     limits, channels = (kind.limits(strict(plan)), kind.limits(Plan())), kind.channels
     far, step = reach(kind, plan, limits), speed(kind, plan, limits) * plan.test.interval
     effort = [least(limits, channels.effort.name)] if channels.effort else []
@@ -35,13 +37,13 @@ def way(kind: Kind, plan: Plan) -> float:
 
 
 def least(limits: tuple[Mapping[str, float], ...], *names: str) -> float:
-    """The first finite limit of one of these names: of the plan, then of a plan that writes none; inf where none is."""
+    """The first finite limit of these names, in the plan and then among the defaults; inf where there is none."""
     values = (one.get(name, math.inf) for one in limits for name in names)
     return next(filter(math.isfinite, values), math.inf)
 
 
 def reach(kind: Kind, plan: Plan, limits: tuple[Mapping[str, float], ...]) -> float:
-    """How far from zero a command may be, m; of a device that limits no motion as far as the building may move it."""
+    """The largest command, m; for a device without a limit on it the largest that the building's motion allows."""
     channels = kind.channels
     found = least(limits, channels.command.name, channels.target.name, channels.position)
     if math.isfinite(found):
@@ -50,7 +52,7 @@ def reach(kind: Kind, plan: Plan, limits: tuple[Mapping[str, float], ...]) -> fl
 
 
 def speed(kind: Kind, plan: Plan, limits: tuple[Mapping[str, float], ...]) -> float:
-    """How fast a command may move, m/s; of a device without a limit on it as fast as the building usually may."""
+    """The largest velocity of a command, m/s; for a device without a limit on it that of the building by default."""
     for one in limits:
         velocity = one.get(kind.limited.velocity, math.inf)
         found = min(velocity, one.get(kind.limited.step, math.inf) / plan.test.interval)

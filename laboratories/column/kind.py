@@ -1,4 +1,4 @@
-"""The kind `column`: what a plan says of an actuator and its specimen."""
+"""The kind `column`: an actuator and its specimen as a plan describes them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from laboratories.kind import Chosen, Coupling, Follows, Hysteresis, Kind, Limit
 from models.registry import Array
 from models.system import System
 
-PARAMETERS = {  # of [actuator] that may be a little off, by its model
+PARAMETERS = {  # parameters of [actuator] that have a tolerance, by its model
     "fopdt": ("actuator.gain", "actuator.delay", "actuator.time_constant"),
     "servo_hydraulic": (
         "actuator.servo.gain",
@@ -68,7 +68,7 @@ class ColumnKind(Kind):
         )
 
     def settle(self, lab: ColumnLab, truth: Array, command: float, interval: float) -> bool:
-        """The specimen deformed as far as the command says, at rest."""
+        """Bring the laboratory to rest with the specimen deformed by the command; always possible."""
         model.begin(lab, command, interval)
         truth[:] = lab.state[[model.DISPLACEMENT, model.FORCE]]
         return True
@@ -89,7 +89,7 @@ class ColumnKind(Kind):
         return model.enter(lab, command)
 
     def coupling(self, plan: Plan) -> Coupling:
-        """The storey of the specimen, whose force resists the drift `represents` times."""
+        """The coupling to the specimen's storey, whose drift its force resists `represents` times."""
         column = plan.column
         felt = column.deformation_ratio * column.represents
         return Coupling(

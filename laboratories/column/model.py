@@ -1,10 +1,9 @@
-"""Laboratory A: a hydraulic actuator deforms the column specimen.
+"""The laboratory of the kind column: a hydraulic actuator deforms a specimen.
 
-The actuator is a first-order lag with dead time, whose motion does not depend on the specimen, or servo-hydraulics that
-move the specimen's mass by their force. Effects are laid over either: a band of the loop's error may be lost (valve
-overlap), the piston is no faster than its valve lets oil through, under load it yields by the oil's and the frame's
-compliance, and play in the clevis of the lag lies between it and the specimen. A law learned from a recording moves the
-specimen beside what the lag does.
+The actuator is a first-order lag with dead time, whose motion does not depend on the specimen, or servo-hydraulics
+whose force moves the specimen's mass. Effects apply to either: valve overlap removes small errors of the loop, the flow
+of the valve limits the piston's velocity, and oil and frame are compliant under load; the lag may also have play in its
+clevis. A law learned from a recording adds to the motion of the lag.
 """
 
 from __future__ import annotations
@@ -25,19 +24,23 @@ from models.registry import Array
 from models.system import ActuatorEffects, ColumnEffects
 from models.transfer_systems import delay, first_order, servo_hydraulic
 
-SUBSTEP = 0.25e-3  # s, longest step where an effect is no matter of straight lines
-FINE_SUBSTEP = 0.05e-3  # s, the same where forces act back on the actuator
-SETTLING = 1.0  # s, in which servo-hydraulics are brought to a command that has been there for long
+# s, longest step with an effect that is not linear over an interval: an eighth of 2 ms, in which the signals of a test
+# (below 20 Hz) turn by less than 2°
+SUBSTEP = 0.25e-3
+# s, the same for servo-hydraulics, where a part of the force is held over a step: 0.016 rad of the default valve's 316
+# rad/s
+FINE_SUBSTEP = 0.05e-3
+SETTLING = 1.0  # s, in which `begin` ramps servo-hydraulics to a command, and in which they then settle
 
 # places in `state`: the lag's piston before compliance and play m, specimen m, load cell N, states of servo-hydraulics
 SERVO, DISPLACEMENT, FORCE, STATES = range(4)
 
-# places in `limits`; of servo-hydraulics the gain is that of the command, and what the highest speed is as flow
+# places in `limits`; for servo-hydraulics GAIN is that of the command, and VELOCITY_LIMIT is given as a flow
 PRESENT, VELOCITY_LIMIT, BACKLASH, COMPLIANCE, DEADBAND, GAIN, STIFFNESS, HELD, HYDRAULIC, BEYOND = range(10)
 
 
 class ColumnLab(NamedTuple):
-    """The state and constants of the laboratory, which `advance` moves on by one interval."""
+    """The state and constants of the laboratory, which `advance` updates by one interval."""
 
     taps: Array  # of the delayed command
     rows: Array  # of the actuator's propagation
@@ -46,7 +49,7 @@ class ColumnLab(NamedTuple):
     history: Array  # commands written, newest first
     state: Array
     specimen: Specimen
-    learned: Array  # a law of `models.preisach` of the piston's place, empty for none
+    learned: Array  # a law of `models.preisach` for the piston's position, empty for none
     learned_memory: Array
 
 
@@ -57,10 +60,10 @@ def build(
     actuator_effects: ActuatorEffects | None = None,
     column_effects: ColumnEffects | None = None,
 ) -> ColumnLab:
-    """The laboratory at rest, with the system's parameters and the effects laid over them.
+    """The laboratory at rest, with the system's parameters and effects.
 
     Raises:
-        InputError: the specimen cannot be, or servo-hydraulics have an effect that they cannot have.
+        InputError: parameters of the specimen are not valid, or servo-hydraulics are given backlash or no mass.
     """
     on_actuator, on_column = actuator_effects or ActuatorEffects(), column_effects or ColumnEffects()
     if actuator.model == "servo_hydraulic":
@@ -95,13 +98,17 @@ def hydraulic(
     on_actuator: ActuatorEffects,
     on_column: ColumnEffects,
 ) -> ColumnLab:
-    """The laboratory with servo-hydraulics: mass, dashpot and first stiffness of the specimen are in their loop."""
+    """The laboratory with servo-hydraulics; mass, dashpot and initial stiffness of the specimen are in their loop."""
     servo, mass, damping = actuator.servo, column.mass + on_column.inertia, column.damping + on_column.viscous
     if mass <= 0.0:
-        raise InputError("mass in [column] must be above 0 kg, as 'servo_hydraulic' moves it by its force.")
+        raise InputError(
+            "mass in [column] must be above 0 kg, because the actuator 'servo_hydraulic' moves it by its force: give "
+            "the moving mass."
+        )
     if on_actuator.backlash:
         raise InputError(
-            "The actuator 'servo_hydraulic' has no play: its piston carries the specimen's mass."
+            "The actuator 'servo_hydraulic' cannot have the effect 'actuator.backlash', because its piston carries the "
+            "specimen's mass: leave it out, or choose 'fopdt'."
         )
     bare = replace(column, mass=0.0, damping=0.0)
     on_column = replace(on_column, viscous=0.0, inertia=0.0)
@@ -127,12 +134,12 @@ def hydraulic(
 
 
 def substeps(interval: float) -> int:
-    """Steps of an interval where effects need short ones."""
+    """The number of steps of an interval (s) with effects that need short steps."""
     return max(1, math.ceil(interval / SUBSTEP - 1e-9))
 
 
 def begin(lab: ColumnLab, command: float, interval: float) -> None:
-    """Bring a laboratory at rest to a command (m) that has been there for long; `interval` s."""
+    """Bring a laboratory at rest to the steady state of a constant command (m); `interval` in s."""
     if lab.limits[HYDRAULIC] != 0.0:
         ticks = math.ceil(SETTLING / interval)
         for tick in range(2 * ticks):
@@ -207,7 +214,7 @@ def advance(lab: ColumnLab, command: float) -> tuple[float, float]:
 
 @jit
 def overlapped(limits: Array, state: Array, command: float) -> float:
-    """Part of the command (m) that the overlap of a servo-hydraulic valve swallows of its loop's error."""
+    """Part of the command (m) that has no effect because of the overlap of a servo-hydraulic valve."""
     half = 0.5 * limits[DEADBAND]
     if half == 0.0:
         return 0.0
@@ -220,7 +227,7 @@ def overlapped(limits: Array, state: Array, command: float) -> float:
 
 @jit
 def choked(limits: Array, state: Array) -> None:
-    """Keep the flow of a servo-hydraulic valve within what its opening lets through."""
+    """Limit the flow of a servo-hydraulic valve to its largest value."""
     if limits[PRESENT] == 0.0:
         return
     flow, most = state[STATES + servo_hydraulic.FLOW], limits[VELOCITY_LIMIT]
@@ -231,7 +238,7 @@ def choked(limits: Array, state: Array) -> None:
 
 @jit
 def limited(limits: Array, way: float, command: float, servo: float, length: float) -> float:
-    """Way of the piston (m) within a segment, from the `way` of a valve without overlap or end."""
+    """Displacement of the piston (m) within a segment of `length` s, from that of a valve without overlap or limit."""
     error = abs(limits[GAIN] * command - servo)
     half = 0.5 * limits[DEADBAND]
     if half > 0.0:
@@ -242,10 +249,10 @@ def limited(limits: Array, way: float, command: float, servo: float, length: flo
 
 @jit
 def loaded(limits: Array, servo: float, displacement: float, reaction: float) -> float:
-    """Deformation (m) of the specimen where the piston yields by `c·f` and the clevis has play.
+    """Deformation (m) of the specimen where the piston gives way by `c·f` and the clevis has play.
 
-    The force of the new deformation is `reaction + k·Δδ` with the specimen's first stiffness, which solves
-    a linear specimen at once and a yielding one to within one short step.
+    The force at the new deformation is taken as `reaction + k·Δδ` with the specimen's initial stiffness, which is exact
+    for a linear specimen and late by one short step for a yielding one.
     """
     compliance, stiffness = limits[COMPLIANCE], limits[STIFFNESS]
     pushed = servo - compliance * (reaction - stiffness * displacement)

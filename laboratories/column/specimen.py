@@ -1,10 +1,10 @@
-"""The specimen in laboratory A as its load cell feels it: the column's model and what comes on top.
+"""The specimen of a column laboratory as its load cell measures it: the column's model and effects on it.
 
     f = g(δ_max)·p(δ')·f_column(δ') + friction + c·δ̇ + m·δ̈,    δ' = δ outside the grip's gap
 
-with `f_column` the plan's model or, once it yields, one of `LAWS` in its place, and with the plan's mass and dashpot in
-m and c; a law learned from a recording adds to it. Without all these the force is that of the plan's model to the last
-bit.
+`f_column` is the plan's model or, with the effect of yielding, one of `LAWS`; m and c include the plan's mass and
+dashpot. A law learned from a recording adds to the force. Without any of these the force equals exactly that of the
+plan's model.
 """
 
 from __future__ import annotations
@@ -32,20 +32,22 @@ LAWS = (
     "bilinear",
     "menegotto_pinto",
     "clough",
-)  # of yielding, as `ColumnEffects.law` counts them
-DEGRADED_AT = 2e-3  # m, deformation at which most of the loss of a degrading column has happened
+)  # of yielding, in the order of `ColumnEffects.law`
+DEGRADED_AT = (
+    2e-3  # m, reference deformation of degradation, at which 63 % of the stiffness is lost that will be
+)
 
 
 class Specimen(NamedTuple):
-    """The state and constants of the specimen, which `force` moves on."""
+    """The state and constants of the specimen, which `force` updates."""
 
     code: int  # of the plan's model
     params: Array
     memory: Array
     effects: Array
-    yielding: Array  # of the law of yielding, behind the stiffness that it replaces
-    yielded: Array  # its memory
-    cell: Array  # what the effects remember
+    yielding: Array  # parameters of the law of yielding, which replaces the planned stiffness
+    yielded: Array  # memory of that law
+    cell: Array  # memory of the effects
     learned: Array  # a law of `models.preisach`, empty for none
     learned_memory: Array
 
@@ -93,7 +95,7 @@ def yielding(stiffness: float, effects: ColumnEffects) -> Array:
         return np.array([stiffness, limit, effects.hardening, effects.exponent, 0.5, 0.5])
     if name == "menegotto_pinto":
         return np.array([stiffness, limit, effects.hardening, effects.exponent, 0.925, 0.15])
-    if name == "clough":  # which cannot soften
+    if name == "clough":  # which has no negative hardening
         return np.array([stiffness, limit, max(effects.hardening, 0.0), effects.unloading, 0.0, 0.0])
     return np.array([stiffness, limit, effects.hardening])
 
@@ -111,27 +113,27 @@ def with_rates(column: Column, force: Array, displacement: Array, interval: floa
 
 
 def needs_substeps(effects: ColumnEffects | None) -> bool:
-    """Whether rates count, so that an interval must be walked in short steps."""
+    """Whether an effect depends on the rate of deformation, so that an interval must be divided into short steps."""
     more = effects or ColumnEffects()
     return bool(more.viscous or more.inertia or more.friction)
 
 
 @jit
 def force(specimen: Specimen, deformation: float, step: float) -> float:
-    """Reading (N) at a deformation (m) reached from the last one within `step` s; the memories move on.
+    """Reading (N) at a deformation (m) reached from the last one within `step` s; updates the memories.
 
-    `cell[REACTION]` keeps the part that loads the piston: without the fixture's inertia and the viscous force.
+    `cell[REACTION]` keeps the part that loads the piston, without the fixture's inertia and the viscous force.
     """
     if specimen.effects[PRESENT] == 0.0:
         plain = specimens.step(specimen.code, specimen.params, specimen.memory, deformation)
         specimen.cell[REACTION] = plain
         return plain
-    return felt(specimen, deformation, step)
+    return with_effects(specimen, deformation, step)
 
 
 @jit_apart
-def felt(specimen: Specimen, deformation: float, step: float) -> float:
-    """The same with effects."""
+def with_effects(specimen: Specimen, deformation: float, step: float) -> float:
+    """`force` for a specimen with effects."""
     effects, cell = specimen.effects, specimen.cell
     half = 0.5 * effects[SLIP]
     inside = min(max(deformation, -half), half)

@@ -1,7 +1,7 @@
 """The catalogue of unmodelled effects: one file each, in the folder of its site.
 
-A file in a site's folder is all that an effect needs: the catalogue finds it. It defines `EFFECT`, or `FAULT` where
-one law exists once per reading of any laboratory. The effects of a kind of a user's stand in its class.
+An effect consists of a file in the folder of its site, which the catalogue finds. The file defines `EFFECT`, or `FAULT`
+for an effect that exists once per reading of any laboratory. The effects of a user's kind stand in its class.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def modules() -> Iterator[dict[str, Any]]:
 
 FILES = tuple(modules())
 FAULTS: tuple[ReadingFault, ...] = tuple(file["FAULT"] for file in FILES if "FAULT" in file)
-"""What can be wrong with any reading."""
+"""The effects that any reading can have."""
 
 
 def shipped() -> Iterator[Effect]:
@@ -58,7 +58,7 @@ CATALOGUE: dict[str, Effect] = {
 
 
 def of_test() -> dict[str, Effect]:
-    """The effects that are in no laboratory, by name."""
+    """The effects on the building and on the link, by name."""
     return {name: effect for name, effect in CATALOGUE.items() if effect.site in OF_TEST}
 
 
@@ -75,7 +75,7 @@ def of_kind(kind: Kind, plan: Plan) -> dict[str, Effect]:
 
 
 def readings_of(kind: Kind, plan: Plan) -> dict[str, reading.SensorSignal]:
-    """How large the measured channels of a kind are, by name; `plan` as the role that hosts it sees it."""
+    """The typical magnitudes of the measured channels of a kind, by name; `plan` as the role that hosts it sees it."""
     limits = kind.limits(plan)
     return {
         signal.name: reading.channel(signal.name, signal.unit, limits.get(signal.name, 0.0), float(noise))
@@ -84,7 +84,7 @@ def readings_of(kind: Kind, plan: Plan) -> dict[str, reading.SensorSignal]:
 
 
 def of_role(plan: Plan, role: str) -> dict[str, Effect]:
-    """The effects that can be laid over what a role of the plan hosts, those of the whole test first, by name.
+    """The effects that apply to the laboratory of a role, and before them those of the whole test, by name.
 
     Raises:
         InputError: the kind that the plan names cannot be loaded.
@@ -107,10 +107,10 @@ def of_plan(plan: Plan) -> dict[str, Effect]:
 
 
 def lay(system: System, entries: Sequence[Entry], known: Mapping[str, Effect] | None = None) -> System:
-    """The system with effects laid over it, in the order given; of those `known`, else those that ship.
+    """The system with effects applied in the order given; `known` are the possible effects, by default those that ship.
 
-    Parameters of the plan are multiplied or added to, so that such effects given twice add up; of effects
-    with fields of their own the last one given holds.
+    Effects on parameters of the plan multiply or add, so that two of them accumulate; for effects with fields of their
+    own the last one holds.
 
     Raises:
         InputError: an effect or a parameter is unknown, a parameter is missing or out of its bounds, or the plan's
@@ -123,18 +123,18 @@ def lay(system: System, entries: Sequence[Entry], known: Mapping[str, Effect] | 
         effect = catalogue[name]
         if not effect.fits(system.plan):
             raise InputError(
-                f"The effect '{name}' is one of the actuator '{' or '.join(effect.actuators)}', but the plan's is "
-                f"'{system.plan.actuator.model}', which has none such: leave it out."
+                f"The effect '{name}' needs the actuator model '{' or '.join(effect.actuators)}', but the plan has "
+                f"'{system.plan.actuator.model}': leave the effect out."
             )
         system = effect.apply(system, **checked(effect, given))
     return system
 
 
 def checked(effect: Effect, given: Mapping[str, float]) -> dict[str, float]:
-    """All parameters of an effect by name, those not given at their default.
+    """All parameters of an effect by name, with defaults for those not given.
 
     Raises:
-        InputError: a parameter is unknown, missing, no number or out of its bounds.
+        InputError: a parameter is unknown, missing, not a number or out of its bounds.
     """
     known = {item.name: item for item in effect.every}
     for name, value in given.items():
@@ -164,8 +164,3 @@ def allowed(parameter: Parameter) -> str:
     """The allowed range of a parameter in words."""
     words = Rule(parameter.says, parameter.unit, least=parameter.least, most=parameter.most).allowed()
     return words + (", or inf for no effect" if math.isinf(parameter.null) else "")
-
-
-def of_site(site: str) -> list[Effect]:
-    """The effects at one site, in the catalogue's order; none at an unknown site."""
-    return [effect for effect in CATALOGUE.values() if effect.site == site]

@@ -1,4 +1,4 @@
-"""An entry of the catalogue of effects: its parameters, and the properties that others ask it for."""
+"""An entry of the catalogue of effects: its parameters and properties."""
 
 from __future__ import annotations
 
@@ -19,18 +19,20 @@ class Parameter:
 
     name: str
     unit: str
-    null: float  # the value at which the effect is not there
+    null: float  # the value without the effect
     least: float  # bounds that are physically possible
     most: float
-    sizes: tuple[float, ...]  # from barely visible to strong, where a search starts
+    sizes: tuple[float, ...]  # values from barely visible to strong, from which a search starts
     says: str = ""
-    shape: bool = False  # not how strong the effect is but what it looks like: at `null` unless it is given
+    shape: bool = (
+        False  # whether it is the effect's shape rather than its magnitude: `null` unless it is given
+    )
     follows: str = (
         ""  # recorded signal whose peak scales the sizes; empty: the site's signal of the same unit
     )
-    believed: float = math.inf  # largest value that a search believes
+    believed: float = math.inf  # largest value that a search accepts
     smoothing: float = (
-        0.0  # of a velocity that smooths a law at rest: its share of the peak velocity in a search
+        0.0  # for a velocity that smooths a law near rest: its share of the peak velocity in a search
     )
 
     @property
@@ -41,25 +43,25 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Law:
-    """One formula of a mechanism that has several."""
+    """One formula of an effect that has several."""
 
-    name: str  # as it stands in texts
-    shapes: Mapping[str, float]  # the parameters of shape that it has, and where a fit of them starts
+    name: str  # its name in texts
+    shapes: Mapping[str, float]  # its parameters of shape, with the values from which a fit starts
 
 
 @dataclass(frozen=True)
 class Contact:
-    """An end stop that a motion hits: where a search finds its place and from which stiffness it starts."""
+    """An end stop: the readings in which a search finds its position, and the stiffnesses from which it starts."""
 
-    motion: str  # reading that shows how far the moving part got, m
+    motion: str  # reading of the moving part's displacement, m
     force: str  # reading of the force on it, N
-    place: str  # parameter: from the middle to the stop, m
-    stiffness: str  # parameter, N/m
-    starts: tuple[float, ...]  # stiffness from which a fit starts, soft to hard
+    place: str  # name of the parameter for the distance from the middle to the stop, m
+    stiffness: str  # name of the parameter for its stiffness, N/m
+    starts: tuple[float, ...]  # stiffnesses from which a fit starts, soft to hard
 
 
 def no_starts(_plan: Plan) -> tuple[float, ...]:
-    """The default of `starts`: no plan needs other sizes."""
+    """The default of `Effect.starts`: no plan needs other sizes."""
     return ()
 
 
@@ -67,7 +69,7 @@ def no_starts(_plan: Plan) -> tuple[float, ...]:
 class Effect:
     """An effect that a plan's nominal models leave out.
 
-    Whoever asks something of an effect (a search, a page, the blind trial) asks these fields, never its name.
+    All code that needs a property of an effect (a search, a page, the blind trial) reads these fields, never its name.
     """
 
     name: str
@@ -76,17 +78,21 @@ class Effect:
     says: str
     parameters: tuple[Parameter, ...]
     reference: str
-    apply: Callable[..., System]  # lays it over a system; takes the parameters by name
+    apply: Callable[..., System]  # applies it to a system; takes the parameters by name
     actuators: tuple[str, ...] = ()  # models of [actuator] that can have it, empty for any
-    signal: str = ""  # the reading that it falsifies, empty where the machine itself differs
-    fault: str = ""  # what is wrong with that reading, in words; one effect per signal shares it
-    in_samples: bool = False  # told from single samples (noise, rounding): no fit of waveforms looks for it
+    signal: str = ""  # the reading that it falsifies, empty for an effect on the machine itself
+    fault: str = ""  # the kind of error of that reading, which the effects on all signals share
+    in_samples: bool = (
+        False  # visible in single samples (noise, rounding), so that no fit of waveforms finds it
+    )
     random: bool = False  # noise: a prediction without noise leaves it out
     contact: Contact | None = None  # an end stop: each impact depends on the ones before it
-    shifts_time: bool = False  # moves a motion in time: a search starts at the shift that correlation shows
-    starts: Callable[[Plan], tuple[float, ...]] = no_starts  # sizes for plans where the parameter's own fail
-    laws: tuple[Law, ...] = ()  # its formulas; the parameter `law` is a place among them
-    further: tuple[Parameter, ...] = ()  # parameters that need not be given: `law`, and shapes of some laws
+    shifts_time: bool = False  # moves a motion in time, so that a search starts at the shift by correlation
+    starts: Callable[[Plan], tuple[float, ...]] = (
+        no_starts  # sizes for plans for which the parameter's own fail
+    )
+    laws: tuple[Law, ...] = ()  # its formulas; the parameter `law` is an index into them
+    further: tuple[Parameter, ...] = ()  # optional parameters: `law`, and shapes of some laws
 
     @property
     def every(self) -> tuple[Parameter, ...]:
@@ -94,24 +100,24 @@ class Effect:
         return (*self.parameters, *self.further)
 
     def law(self, values: Mapping[str, float]) -> Law | None:
-        """The formula that these parameters choose, None where the mechanism has but one."""
+        """The formula that these parameters choose, None for an effect with a single one."""
         return self.laws[int(values.get("law", 0.0))] if self.laws else None
 
     def under(self, place: int, values: Mapping[str, float]) -> dict[str, float]:
-        """Parameters for the formula at a place of `laws`, with the shapes from which a fit of it starts."""
+        """Parameters for the formula `laws[place]`, with the shapes from which its fit starts."""
         kept = {item.name: values[item.name] for item in self.parameters}
         return kept | dict(self.laws[place].shapes) | ({"law": float(place)} if place else {})
 
     @property
     def family(self) -> str:
-        """The effect's name, or the one name of all effects that do the same to different readings."""
+        """The effect's name, or the common name of the effects of one kind on different readings."""
         return f"sensor: {self.fault}" if self.signal else self.name
 
     def fits(self, plan: Plan) -> bool:
-        """Whether the laboratory that the plan describes can have the effect."""
+        """Whether the plan's laboratory can have the effect."""
         return not self.actuators or plan.actuator.model in self.actuators
 
     def values(self, given: Mapping[str, float]) -> dict[str, float]:
-        """All parameters by name, those not given at their default."""
+        """All parameters by name, with defaults for those not given."""
         defaults = {item.name: item.default for item in self.parameters if item.default is not None}
         return defaults | dict(given)

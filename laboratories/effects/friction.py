@@ -1,4 +1,4 @@
-"""Constants of all friction in the catalogue: the velocity below which it falls off."""
+"""The parameter that all friction in the catalogue shares: the velocity below which its force decreases."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ VELOCITY = Parameter(
     least=1e-06,
     most=0.05,
     sizes=(0.0003, 0.001, 0.003),
-    says="below which it falls off, F·tanh(|v|/velocity); at its least it is Coulomb's",
+    says="velocity below which the force decreases, F·tanh(|v|/velocity); at its least value it is Coulomb friction",
     shape=True,
-    smoothing=0.03,  # of the peak velocity: smooth enough that a fit has a slope to follow, far from viscous
+    # of the peak velocity: a fit then has a gradient, and the force is still constant for most of a cycle
+    smoothing=0.03,
 )

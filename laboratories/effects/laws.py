@@ -1,4 +1,4 @@
-"""The laws that most effects share: a factor on one thing, an addition to one parameter, fields that no plan has."""
+"""The laws that most effects share: a factor, an addition to a parameter of the plan, or fields of `Effects`."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ def factor_on(
     sizes: tuple[float, ...],
     meaning: str = "",
 ) -> Effect:
-    """The effect `site.thing` with one parameter, `factor`, which is 1 where the effect is not there.
+    """The effect `site.thing` with one parameter, `factor`, which is 1 without the effect.
 
     Args:
-        site: where it is, as `laboratories/effects/sites.py` lists them.
-        thing: what is multiplied, the rest of the effect's name.
-        apply: lays it over a system, given the factor; `of_plan` and `of_site` make it.
-        says: what the effect is, in a few words.
+        site: one of those in `laboratories/effects/sites.py`.
+        thing: the quantity that is multiplied, the rest of the effect's name.
+        apply: applies it to a system, given the factor; `of_plan` and `of_site` make it.
+        says: the effect in a few words.
         reference: a source or an equation.
-        bounds: least and largest factor that is physically possible.
+        bounds: smallest and largest factor that is physically possible.
         sizes: factors on both sides of 1, from which a search starts.
-        meaning: what the factor is on, where `says` leaves that open.
+        meaning: the quantity that the factor multiplies, if `says` does not make that clear.
     """
     parameter = Parameter("factor", "", 1.0, *bounds, sizes, meaning)
     return Effect(f"{site}.{thing}", site, "physics", says, (parameter,), reference, apply)
@@ -52,13 +52,13 @@ def sets(
     """The effect `site.thing` whose parameters set fields of the site's record in `models.system.Effects`.
 
     Args:
-        site: where it is, as `laboratories/effects/sites.py` lists them.
+        site: one of those in `laboratories/effects/sites.py`.
         thing: the rest of the effect's name.
-        fields: the parameter that sets each field. The first one says how strong the effect is; where it has its null
-            value, the others, which shape the effect, leave no trace.
-        says: what the effect is, in a few words.
+        fields: the parameter that sets each field. The first one is the effect's magnitude; at its null value the
+            others, which are parameters of shape, have no influence.
+        says: the effect in a few words.
         reference: a source or an equation.
-        further: parameters that need not be given, by the field that each sets.
+        further: optional parameters, by the field that each sets.
         more: further fields of `Effect`.
     """
     rest = further or {}
@@ -84,7 +84,7 @@ def of_site(site: str, field: str) -> Apply:
 
 
 def of_plan(table: str, key: str) -> Apply:
-    """The law that multiplies one parameter of the plan, every storey's where it has several."""
+    """The law that multiplies one parameter of the plan, in every storey."""
     return partial(multiplied, table=table, key=key)
 
 
@@ -99,15 +99,23 @@ def added(system: System, *, table: str, key: str, **given: float) -> System:
     return system.moved(table, **{key: max(getattr(getattr(system.plan, table), key) + more, 0.0)})
 
 
+def extra_time(name: str, sizes: tuple[float, ...]) -> Parameter:
+    """The parameter of a time (s) that is added to a planned delay or lag, from −50 ms to 0.2 s.
+
+    The bounds are wide: the nominal actuator's whole delay is 44 ms, and hardly any loop is stable with 0.2 s.
+    """
+    return Parameter(name, "s", null=0.0, least=-0.05, most=0.2, sizes=sizes, says="added")
+
+
 def adds(site: str, thing: str, key: str, parameter: Parameter, *, says: str, reference: str) -> Effect:
     """The effect `site.thing` that adds to the parameter `key` of the plan's table of that name, in total not below 0.
 
     Args:
-        site: where it is, and the plan's table.
+        site: the site, and the plan's table of that name.
         thing: the rest of the effect's name.
-        key: of the table.
-        parameter: what is added.
-        says: what the effect is, in a few words.
+        key: the table's key.
+        parameter: the parameter that is added.
+        says: the effect in a few words.
         reference: a source or an equation.
     """
     law = partial(added, table=site, key=key)

@@ -1,7 +1,6 @@
 """Effects on readings: each exists once per signal and sets one field of `models.system.SensorEffects`.
 
-Their sizes are shares of what a signal typically is on the default test, or multiples of the noise that the
-default plan believes.
+Their sizes are shares of a signal's typical magnitude on the default test, or multiples of the default plan's noise.
 """
 
 from __future__ import annotations
@@ -32,25 +31,23 @@ SIGNALS = {
     "damper_stroke": SensorSignal("m", 50e-3, 2e-6),
     "damper_force": SensorSignal("N", 80.0, 0.2),
 }
-TYPICAL = {
-    "m": 20e-3,
-    "m/s": 0.1,
-    "m/s²": 1.0,
-    "N": 10e3,
-}  # of a reading by its unit, where nothing more is known
-QUIET = 1e-3  # noise over that, likewise
+# typical magnitude of a reading without a limit, by its unit: the order of the signals above
+TYPICAL = {"m": 20e-3, "m/s": 0.1, "m/s²": 1.0, "N": 10e3}
+QUIET = (
+    1e-3  # noise over typical magnitude of a reading without nominal noise: the order of the signals above
+)
 
 
 @dataclass(frozen=True)
 class ReadingFault:
-    """What can be wrong with any reading: the effects `sensor.<signal>.<name>` with one parameter each."""
+    """An error that any reading can have: the effects `sensor.<signal>.<name>` with one parameter each."""
 
     name: str  # the field of `SensorEffects` that the parameter sets
     parameter: Callable[[SensorSignal], Parameter]  # the parameter for a signal, with its unit and sizes
-    says: str  # what the effect is, in a few words
+    says: str  # the effect in a few words
     reference: str  # a source or an equation
-    in_samples: bool = False  # it is told from single samples, no fit looks for it
-    random: bool = False  # it is noise
+    in_samples: bool = False  # as in `Effect`
+    random: bool = False  # as in `Effect`
 
     def on(self, name: str, signal: SensorSignal) -> Effect:
         """The effect on the reading of that name."""
@@ -70,19 +67,19 @@ class ReadingFault:
 
 
 def channel(name: str, unit: str, limit: float, noise: float) -> SensorSignal:
-    """A reading of a kind of a user's, sized by its limit or else by its unit; `limit` and `noise` may be 0."""
+    """The reading of a user's kind, whose magnitude follows from its limit, or from its unit where `limit` is 0."""
     usable = limit if 0.0 < limit < math.inf else 0.0
     typical = usable or TYPICAL.get(unit, 1.0)
     return SIGNALS.get(name) or SensorSignal(unit, typical, noise or QUIET * typical)
 
 
 def sized(size: float, *shares: float) -> tuple[float, ...]:
-    """Shares of a size, rounded to be read."""
+    """Shares of a size, rounded to six digits for the reader."""
     return tuple(float(f"{share * size:.6g}") for share in shares)
 
 
 def falsified(system: System, *, signal: str, fault: str, **parameter: float) -> System:
-    """The system with the one parameter of an effect on a reading; a true reading leaves it unchanged."""
+    """The system with the one parameter of an effect on a reading set; unchanged at the parameter's null value."""
     (value,) = parameter.values()
     changed = system.sensed(signal, **{fault: value})
     before = system.effects.sensors.get(signal, SensorEffects())

@@ -1,4 +1,4 @@
-"""The places where an effect can be: the building, the link, and what a kind of laboratory consists of."""
+"""The sites of effects: the building, the link, and the parts of each kind of laboratory."""
 
 from __future__ import annotations
 

@@ -14,9 +14,13 @@ from models.transfer_systems import delay, first_order
 LEAST = 20  # samples: several for each parameter of the fit
 NAMES = ("delay", "time_constant", "gain")
 UNITS = ("s", "s", "")
-LONGEST = 0.5  # s, for either time: an actuator that is slower cannot take part in a test in real time
-SHORTEST = 1e-6  # s, of a time constant: below it the lag is none at any interval
-HOPELESS = 0.9  # nrmse above which nothing was identified: a constant leaves 1
+LONGEST = 0.5  # s, for dead time and lag: a slower actuator cannot take part in a test in real time
+SHORTEST = 1e-6  # s, of a time constant: a shorter lag has no influence at any control interval
+HOPELESS = 0.9  # nrmse above which the fit is rejected: a constant has the nrmse 1
+STEP = 1e-6  # relative step of the derivatives: the error of forward differences is smallest near √1e-12
+CONVERGED = (
+    1e-12  # relative change of parameters and misfit at which the fit ends: far below any interval's width
+)
 
 
 @jit
@@ -58,7 +62,7 @@ def response(
 def columns(
     command: Array, interval: float, dead_time: float, time_constant: float, *, held: bool = False
 ) -> Array:
-    """What the displacement is a sum of: response, level, fading of the state at the beginning; (n, 3)."""
+    """The terms whose sum is the displacement: response, level, decay of the initial state; (n, 3)."""
     moved = response(command, interval, dead_time, time_constant, held=held)
     fading = np.exp(-interval * np.arange(command.size) / time_constant)
     return np.column_stack([moved, np.ones(command.size), fading])
@@ -67,7 +71,11 @@ def columns(
 def first_guess(
     command: Array, measured: Array, interval: float, *, held: bool = False
 ) -> tuple[float, float, Array]:
-    """Best dead time and time constant of a coarse grid, with the sum's weights (3,)."""
+    """Best dead time and time constant (s) of a coarse grid, with the weights (3,) of `columns`.
+
+    Raises:
+        InputError: no point of the grid fits with a positive gain.
+    """
     horizon = min(LONGEST, 0.3 * interval * command.size)
     least, place = np.inf, (0.0, 0.0)
     best: Array = np.zeros(3)
@@ -89,10 +97,10 @@ def least_squares(command: Array, measured: Array, interval: float, *, held: boo
     """Dead time `delay` L (s), `time_constant` T (s) and `gain` K of `T·ẏ + y = K·u(t − L)` from any motion.
 
     `command` (m) and `measured` (m) have one value per tick of `interval` (s): the command written at tick k
-    is ramped and reached at tick k + 1, or where `held` acts as a step. The sensor's level and the state at the
-    beginning are fitted beside, so the record may begin at any level, best at rest. Prediction by the exact
-    kernels of the emulated actuator; intervals from Jacobian and residual, corrected for autocorrelation
-    (`estimate.of_fit`). A steady sine alone does not separate the three parameters, which the intervals show.
+    is ramped and reached at tick k + 1, or acts as a step where `held`. The sensor's level and the initial state are
+    fitted too, so the record may begin at any level, preferably at rest. The prediction uses the exact kernels of the
+    emulated actuator; the intervals follow from Jacobian and residual, corrected for autocorrelation
+    (`estimate.of_fit`). A steady sine alone does not separate the three parameters, and the intervals are then wide.
 
     Raises:
         InputError: too short, unequal lengths, not finite, constant, or a measurement that does not follow.
@@ -122,9 +130,9 @@ def least_squares(command: Array, measured: Array, interval: float, *, held: boo
         np.clip(start, low, high),
         bounds=(low, high),
         x_scale="jac",
-        diff_step=1e-6,
-        xtol=1e-12,
-        ftol=1e-12,
+        diff_step=STEP,
+        xtol=CONVERGED,
+        ftol=CONVERGED,
     )
     misfit = estimate.nrmse(measured, model(result.x))
     if misfit > HOPELESS:

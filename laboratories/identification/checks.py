@@ -1,4 +1,4 @@
-"""What every record must carry before anything is identified from it."""
+"""Checks of a record before parameters are identified from it."""
 
 from __future__ import annotations
 

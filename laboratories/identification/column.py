@@ -13,18 +13,20 @@ from laboratories.identification import checks, estimate
 from laboratories.identification.estimate import Estimate
 from models.registry import Array
 
-LEAST = 20  # samples: a line through fewer says little of its interval
-RETURN = 0.3  # share of the smallest amplitude by which the motion must come back to count as a reversal
-# share by which a cycle's amplitude may miss the protocol's: the paper's amplitudes differ by 20 % and more
+LEAST = 20  # samples of a regression line: with fewer its interval is very uncertain
+RETURN = 0.3  # share of the smallest amplitude by which the motion must reverse to count: above noise, below a cycle
+# Relative deviation of a cycle's amplitude from the protocol's: the paper's amplitudes differ by 20 % and more.
 MATCH = 0.2
-SMOOTH = 250  # samples of a cycle per sample of the average around its peaks
+# samples of a cycle per sample of the average at its peaks, in which a sine falls by 2e-5 of its amplitude
+SMOOTH = 250
+INCOMPLETE = 0.1  # of the smallest amplitude: a last cycle that ends farther from zero is not complete
 
 
 class Cycle(NamedTuple):
     """One cycle of the protocol."""
 
     begin: int  # tick of its beginning
-    end: int  # tick behind its end
+    end: int  # tick after its end
     nominal: float  # amplitude of the protocol, m
     amplitude: float  # half of peak to peak, m
     stiffness: float  # secant, peak to peak, N/m
@@ -34,7 +36,7 @@ class Cycle(NamedTuple):
 
 @dataclass(frozen=True)
 class CyclicTest:
-    """What the protocol gave."""
+    """The results of a cyclic test."""
 
     stiffness: Estimate  # elastic, N/m
     cycles: tuple[Cycle, ...]
@@ -108,7 +110,7 @@ def reversals(signal: Array, threshold: float) -> list[int]:
 
 
 def split(deformation: Array, smallest: float) -> list[tuple[int, int]]:
-    """First tick and tick behind the last of each complete cycle."""
+    """First tick, and tick after the last, of each complete cycle."""
     threshold = RETURN * smallest
     peaks = [k for k in reversals(deformation, threshold) if abs(deformation[k]) > threshold]
     if not peaks:
@@ -121,7 +123,7 @@ def split(deformation: Array, smallest: float) -> list[tuple[int, int]]:
     while i + 1 < len(peaks):
         first, second = peaks[i], peaks[i + 1]
         if not motion[first] > 0.0 > motion[second]:
-            i += 1  # a reversal on the way
+            i += 1  # a reversal before the peak
             begin = quiet(motion[: peaks[i] + 1])
             continue
         stop = peaks[i + 2] if i + 2 < len(peaks) else motion.size
@@ -130,7 +132,7 @@ def split(deformation: Array, smallest: float) -> list[tuple[int, int]]:
             end = second + int(back[0]) + 1
         else:
             end = second + int(np.argmax(motion[second:stop])) + 1
-            if motion[end - 1] < -0.1 * smallest:
+            if motion[end - 1] < -INCOMPLETE * smallest:
                 break
         result.append((begin, end))
         begin = end - 1
@@ -139,13 +141,13 @@ def split(deformation: Array, smallest: float) -> list[tuple[int, int]]:
 
 
 def quiet(motion: Array) -> int:
-    """Last tick at or below zero of a rise, or where it comes nearest to it."""
+    """Last tick at or below zero before a rise, or else the tick of the smallest value."""
     under = np.flatnonzero(motion <= 0.0)
     return int(under[-1]) if under.size else int(np.argmin(motion))
 
 
 def measure(deformation: Array, force: Array, begin: int, end: int, amplitudes: Sequence[float]) -> Cycle:
-    """What one cycle gives."""
+    """The results of the cycle from tick `begin` to before tick `end`; raises InputError for an unknown amplitude."""
     x, f = deformation[begin:end], force[begin:end]
     half = (x.size // SMOOTH) // 2
     top = slice(max(int(np.argmax(x)) - half, 0), int(np.argmax(x)) + half + 1)

@@ -26,18 +26,24 @@ from models.registry import Array
 
 LEAST = 100  # samples: more than ten for each parameter of the fit
 SUBSTEP = 0.25e-3  # s: an eighth of the usual interval, short beside the motor's lag
-PIECE, REACH = (
-    1.0,
-    10,
-)  # s between beginnings of a drive without a spring, ticks to each side that they are read from
-CREEP = 5e-4  # v₀, m/s: friction turns within it, so that its force has no jump
+# s: a drive without a spring is simulated in pieces of this length, because the effect of a wrong force grows with t²;
+# a second holds several cycles of the motions with which a damper is tested
+PIECE = 1.0
+# ticks on each side from which initial stroke and velocity are read: 20 ms, less than half a period of 20 Hz
+REACH = 10
+CREEP = 5e-4  # v₀, m/s: about 0.1 % of the velocities of a test, so that the friction force has no jump
+# share of a signal's scatter that its weight takes as least misfit, so that an exact fit has a finite weight
+WORST = 1e-9
+ROUNDS = (
+    3  # of weighting both signals by their misfit; it ends earlier when the weights change by less than 10 %
+)
 NAMES = ("mass", "damping", "stiffness", "motor_time_constant", "gain", "friction")
 UNITS = ("kg", "N·s/m", "N/m", "s", "", "N")
 
 
 @dataclass(frozen=True)
 class DamperFit:
-    """What was identified: `parameters` has an estimate for each free name."""
+    """The result of a fit: `parameters` holds an estimate for each free name."""
 
     parameters: dict[str, Estimate]
     stroke_nrmse: float
@@ -48,7 +54,7 @@ class DamperFit:
 
 
 class DamperRecord(NamedTuple):
-    """Tick by tick what moves a damper, and what it answers; (n,) each."""
+    """Input and output of a damper at each tick; (n,) each."""
 
     command: Array  # N, of the motor
     ground: Array  # m/s², acceleration of the table
@@ -60,10 +66,10 @@ class DamperRecord(NamedTuple):
 def respond(
     p: Array, interval: float, substeps: int, record: DamperRecord, begin: tuple[float, float]
 ) -> None:
-    """Fill stroke (m) and force (N) of a record; `p` in the order of NAMES, `begin` the stroke and its rate (m/s).
+    """Fill stroke (m) and force (N) of a record; `p` is in the order of NAMES, `begin` holds stroke and its rate (m/s).
 
-    Runge-Kutta of fourth order; the motor's lag is exact for its held command, the table's acceleration a
-    straight line from tick to tick.
+    The method is Runge-Kutta's of fourth order; the motor's lag is exact for its held command, and the table's
+    acceleration is linear between ticks.
     """
     command, ground, stroke, force = record.command, record.ground, record.stroke, record.force
     mass, damping, stiffness, lag, gain, friction = p[0], p[1], p[2], p[3], p[4], p[5]
@@ -108,10 +114,10 @@ def response(
 
 
 def anew(stroke: Array, interval: float) -> list[tuple[int, float, float]]:
-    """Ticks, places (m) and rates (m/s) from which a stroke that no spring brings back is followed anew.
+    """Ticks, strokes (m) and rates (m/s) at which the simulation of a drive without a spring begins anew.
 
-    Without a spring every error of a force adds up for ever. Places and rates are read off a cubic over `REACH` ticks
-    to each side.
+    Without a spring the error of a force accumulates. Strokes and rates are those of a cubic fitted to `REACH` ticks on
+    each side.
     """
     length = max(4 * REACH, round(PIECE / interval))
     found = []
@@ -125,7 +131,7 @@ def anew(stroke: Array, interval: float) -> list[tuple[int, float, float]]:
 def in_pieces(
     values: Array, command: Array, ground: Array, interval: float, begins: Sequence[tuple[int, float, float]]
 ) -> tuple[Array, Array]:
-    """Stroke (m) and force (N), each (n,), followed anew from each beginning."""
+    """Stroke (m) and force (N), each (n,), simulated anew from each beginning."""
     ends = [*(tick for tick, _, _ in begins[1:]), command.size]
     pieces = [
         response(values, command[tick:end], ground[tick:end], interval, place, rate)
@@ -145,19 +151,19 @@ def least_squares(
 ) -> DamperFit:
     """Parameters of damper and motor from stroke and force under a motor command or a moving table.
 
-    `damper_command` (N, held from tick k to k + 1), `stroke` (m), `force` (N, on the table; None where not
-    measured) and `table_acceleration` (m/s²; None on a still table) have one value per tick of `interval`
-    (s). `free` names what is fitted, of mass (kg), damping (N·s/m), stiffness (N/m), motor_time_constant
-    (s), gain and friction (N); the others keep the `nominal` damper's values, gain 1 and friction 0, from
-    which the fit starts too. The state at the beginning is fitted beside; a drive whose nominal stiffness is 0
-    is followed anew every second from its measured motion. Output error, both signals
-    weighted by their scatter; intervals from Jacobian and residual, corrected for autocorrelation signal by
-    signal (`estimate.of_fit`). A friction near zero may come out negative within its interval. What the
-    record cannot separate (mass and gain without a force) has infinite intervals.
+    `damper_command` (N, held from tick k to k + 1), `stroke` (m), `force` (N, on the table; None where not measured)
+    and `table_acceleration` (m/s²; None on a still table) have one value per tick of `interval` (s). `free` names what
+    is fitted, of mass (kg), damping (N·s/m), stiffness (N/m), motor_time_constant (s), gain and friction (N); the
+    others keep the `nominal` damper's values, gain 1 and friction 0, from which the fit also starts. The initial state
+    is fitted too; a drive whose nominal stiffness is 0 is simulated anew every second from its measured motion. The
+    output error is minimised, with both signals weighted by their scatter; intervals follow from Jacobian and residual,
+    corrected for the autocorrelation of each signal (`estimate.of_fit`). A friction near zero may be estimated as
+    negative within its interval. Parameters that the record cannot separate (mass and gain without a force) have
+    infinite intervals.
 
     Raises:
-        InputError: too short, unequal lengths, not finite, no excitation, constant stroke, or a free name
-            that is none of the parameters.
+        InputError: too short, unequal lengths, not finite, no excitation, constant stroke, or an unknown
+            free name.
 
     Source: Ljung, System Identification (1999), section 7.
     """
@@ -192,7 +198,7 @@ def chosen(free: Sequence[str]) -> list[int]:
 def fit(
     command: Array, ground: Array, outputs: list[Array], interval: float, places: list[int], nominal: Damper
 ) -> DamperFit:
-    """The fit itself: once with both signals weighted alike, then by the scatter left over."""
+    """Fit the parameters: first with equal weights of both signals, then with weights by their misfit."""
     from scipy import optimize
 
     values = np.array(
@@ -218,7 +224,7 @@ def fit(
     low = np.append(least, [-np.inf, -np.inf])
     high = np.append(np.full(len(places), 1e3), [np.inf, np.inf])
     weights = [1.0 / float(np.std(output)) for output in outputs]
-    for _ in range(3):
+    for _ in range(ROUNDS):
 
         def residual(x: Array, weights: list[float] = weights) -> Array:
             parts = zip(model(x), outputs, weights, strict=False)
@@ -226,11 +232,11 @@ def fit(
 
         x = optimize.least_squares(residual, np.clip(x, low, high), bounds=(low, high), x_scale="jac").x
         left = [float(np.std(fitted - output)) for fitted, output in zip(model(x), outputs, strict=False)]
-        least_left = [1e-9 * float(np.std(output)) for output in outputs]
+        least_left = [WORST * float(np.std(output)) for output in outputs]
         last, weights = weights, [1.0 / max(pair) for pair in zip(left, least_left, strict=True)]
         if np.allclose(last, weights, rtol=0.1):
             break
-    # the Jacobian again with smaller steps, which shows parameters that cannot be separated
+    # the Jacobian again with central differences, whose accuracy shows parameters that cannot be separated
     result = optimize.least_squares(
         lambda x: residual(x, weights), x, bounds=(low, high), x_scale="jac", jac="3-point", max_nfev=1
     )

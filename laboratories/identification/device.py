@@ -16,14 +16,16 @@ from models.registry import Array
 from models.system import System
 
 LEAST = 20  # samples: several for each parameter of the fit
-HOPELESS = 0.9  # nrmse above which nothing was identified: a constant leaves 1
-STEP = 1e-4  # of a parameter, relative, for the derivatives of the response
-MOST = 40  # steps: a device that follows its command is found in ten
+HOPELESS = 0.9  # nrmse above which the fit is rejected: a constant has the nrmse 1
+STEP = (
+    1e-4  # relative step of the derivatives: above the rounding of a long simulation, within the linear range
+)
+MOST = 40  # steps of the fit; a device that follows its command needs about ten
 
 
 @dataclass(frozen=True)
 class DeviceFit:
-    """What was identified: the parameters by name, and the misfit of each measured channel."""
+    """The result of a fit: the parameters by name, and the misfit of each measured channel."""
 
     parameters: dict[str, Estimate]
     nrmse: dict[str, float]
@@ -31,7 +33,7 @@ class DeviceFit:
 
 @jit_apart
 def follow(lab: DeviceRecord, commands: Array, efforts: Array, truth: Array, result: Array) -> None:
-    """What sensors without error read at each tick, (ticks, channels); the first row is that of rest."""
+    """Fill the readings of sensors without error at each tick, (ticks, channels); the first row is zero, at rest."""
     result[0, :] = 0.0
     for k in range(commands.size - 1):
         lab.step(lab.parameters, lab.state, truth, commands[k], efforts[k])
@@ -40,7 +42,7 @@ def follow(lab: DeviceRecord, commands: Array, efforts: Array, truth: Array, res
 
 
 def response(lab: DeviceRecord, commands: Array, efforts: Array, channels: int) -> Array:
-    """What a device at rest reads under commands (m) and a motor's forces (N) of every tick, (ticks, channels)."""
+    """Readings (ticks, channels) of a device, at first at rest, for commands (m) and a motor's forces (N) per tick."""
     result = np.empty((commands.size, channels))
     follow(lab, commands, efforts, np.zeros(channels), result)
     return result
@@ -57,10 +59,10 @@ def least_squares(kind: Device, plan: Plan, commands: Array, efforts: Array, mea
         measured: (ticks, channels), in the order of the kind's channels.
 
     Raises:
-        InputError: too short, not finite, no motion, no parameter, or a reading that does not follow.
+        InputError: too short, not finite, no motion, no parameter, or a reading that does not follow the command.
 
-    Each channel counts by its standard deviation. A parameter that does not show in this motion has an infinite
-    interval. Method as in `actuator.least_squares`.
+    Each channel is weighted by its standard deviation. A parameter without influence on this motion has an infinite
+    interval. The method is that of `actuator.least_squares`.
     """
     from scipy import optimize
 
@@ -96,7 +98,7 @@ def least_squares(kind: Device, plan: Plan, commands: Array, efforts: Array, mea
     parts = np.asarray(result.fun).reshape(len(names), -1)
     nrmse = {name: float(np.sqrt(np.mean(part**2))) for name, part in zip(names, parts, strict=True)}
     if max(nrmse.values()) > HOPELESS:
-        raise InputError("What was measured does not follow the command: check sensors and cabling.")
+        raise InputError("The measurements do not follow the command: check sensors and cabling.")
     units = [kind.nominal[name].unit for name in values]
     blocks = [commands.size] * len(names)
     return DeviceFit(estimate.of_fit(result, list(values), units, scales, blocks), nrmse)

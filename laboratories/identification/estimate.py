@@ -1,4 +1,4 @@
-"""Identified numbers with their 95 % intervals."""
+"""Identified values with their 95 % intervals."""
 
 from __future__ import annotations
 
@@ -11,12 +11,18 @@ import numpy as np
 from models.registry import Array
 
 COVERAGE = 0.95
-SINGULAR = 1e-7  # share of the largest singular value below which a direction is not identified
+# Share of the largest singular value of the Jacobian below which a direction is not identified: the accuracy of its
+# finite differences.
+SINGULAR = 1e-7
+INVOLVED = 1e-6  # share of a parameter in such a direction at which the parameter counts as not identified
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """A value and the ends of its 95 % interval, all in `unit`; the ends are ±inf where data say nothing."""
+    """A value and the ends of its 95 % interval, all in `unit`.
+
+    The ends are ±inf where the data do not determine it.
+    """
 
     value: float
     low: float
@@ -26,7 +32,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Identified:
-    """What was identified: the estimates by name, and the misfit over the measurement's standard deviation."""
+    """The result of a fit: the estimates by name, and the misfit over the measurement's standard deviation."""
 
     parameters: dict[str, Estimate]
     nrmse: float
@@ -49,9 +55,9 @@ def around(value: float, deviation: float, unit: str, freedom: float = np.inf) -
 
 
 def inflation(residual: Array) -> float:
-    """How many samples (≥ 1) of an autocorrelated residual count as one independent sample.
+    """The number of samples (≥ 1) of an autocorrelated residual that count as one independent sample.
 
-    `1 + 2·Σ ρ_j`, summed up to the first autocorrelation that white noise would show too. Source: Bayley
+    `1 + 2·Σ ρ_j`, summed up to the first autocorrelation that is within the 95 % band of white noise. Source: Bayley
     and Hammersley, The effective number of independent observations in an autocorrelated time series (1946).
     """
     centred = residual - residual.mean()
@@ -71,8 +77,8 @@ def deviations(jacobian: Array, residual: Array, blocks: Sequence[int]) -> tuple
 
     `jacobian` (n, p) and `residual` (n,) are those at the minimum; `blocks` are the lengths of the signals
     stacked in them, each of which has its own variance and its own effective sample number:
-    `(JᵀJ)⁻¹·(Σ v_b·J_bᵀJ_b)·(JᵀJ)⁻¹`. A parameter with a share in a direction that does not show in the
-    residual gets an infinite deviation.
+    `(JᵀJ)⁻¹·(Σ v_b·J_bᵀJ_b)·(JᵀJ)⁻¹`. A parameter with a share in a direction without influence on the residual has an
+    infinite deviation.
     """
     scale = np.linalg.norm(jacobian, axis=0)
     safe = np.where(scale > 0.0, scale, 1.0)
@@ -91,7 +97,7 @@ def deviations(jacobian: Array, residual: Array, blocks: Sequence[int]) -> tuple
         middle += variance * factor * scaled[part].T @ scaled[part]
         independent += length / factor
     result = np.sqrt(np.maximum(np.diag(inverse @ middle @ inverse), 0.0)) / safe
-    hidden = np.abs(rows[~seen]).max(axis=0, initial=0.0) > 1e-6
+    hidden = np.abs(rows[~seen]).max(axis=0, initial=0.0) > INVOLVED
     result[hidden | (scale == 0.0)] = np.inf
     return result, independent - scale.size
 

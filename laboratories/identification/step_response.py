@@ -1,11 +1,10 @@
 """Dead time, time constant and gain from a step by the tangent at the inflection, as in the paper.
 
-The tangent meets the start level at L and the steady level T later; K is the final over the commanded
-step. The step as the actuator sees it is a ramp of one interval, so times count from the ramp's middle; of a
-held command they count from the step's tick.
-Smoothing: behind the onset the response is fitted by a polynomial of second order in `e^(−t/T₀)`, T₀ being
-a first guess from the times at 28 % and 63 % (Smith 1957). That is free of bias for a first-order lag and
-bends with responses of higher order. Source: section 3.2 of Yokoyama et al. (17WCEE, 2020).
+The tangent meets the start level at L and the steady level T later; K is the final over the commanded step. The step as
+the actuator sees it is a ramp of one interval, so times count from the ramp's middle; of a held command they count from
+the step's tick. Smoothing: after the onset the response is fitted by a polynomial of second order in `e^(−t/T₀)`, where
+T₀ is a first estimate from the times at 28 % and 63 % (Smith 1957). The fit has no bias for a first-order lag and can
+follow responses of higher order. Source: section 3.2 of Yokoyama et al. (17WCEE, 2020).
 """
 
 from __future__ import annotations
@@ -20,19 +19,22 @@ from laboratories.identification import checks
 from laboratories.identification.estimate import Estimate, around
 from models.registry import Array
 
-BEFORE = 5  # samples of the start level that are needed
-MOST_BEFORE = 200  # that are used
-LEAST_AFTER = 20
-STEADY = 0.2  # share of the record behind the step that is averaged for the steady level
-UNSTEADY = 0.003  # share of the rise by which the halves of that may differ, beside noise
-LEVELS = (0.283, 0.632)  # of the rise, a third of T and T behind L
-WINDOW = 2.0  # times T₀
-ORDER = 2
-BACK = 2.5  # ticks over which the fitted curve is followed back to the start level
+BEFORE = 5  # least number of samples of the start level, for its mean and its noise
+MOST_BEFORE = 200  # largest number of them: with 0.4 s at 2 ms the level is 14 times as certain as one sample
+LEAST_AFTER = 20  # least number of samples after the step: a fifth of them, four, gives the steady level
+STEADY = 0.2  # share of the record after the step that is averaged for the steady level
+# Share of the rise by which the two halves of that part may differ, in addition to noise: an error of the steady level
+# of that size shifts T by 0.3 %.
+UNSTEADY = 0.003
+LEVELS = (0.283, 0.632)  # of the rise: 1 − e^(−1/3) and 1 − e^(−1), which a lag reaches T/3 and T after L
+WINDOW = 2.0  # length of the smoothing window over T₀, in which a first-order lag makes 86 % of its rise
+ORDER = 2  # of the polynomial: a lag, and its first correction for a response of higher order
+BACK = 2.5  # ticks by which the fitted curve is extrapolated back to the start level, over the ramp and the guard
+SIGNIFICANT = 10.0  # rise over noise below which a step is refused: T is then uncertain by more than 10 %
 
 
 class StepResponse(NamedTuple):
-    """What the tangent gives."""
+    """The result of the tangent method."""
 
     delay: Estimate  # L, s
     time_constant: Estimate  # T, s
@@ -43,8 +45,8 @@ class RiseCurve(NamedTuple):
     """The smoothed rise: times in s from the ramp's middle, heights as share of the rise."""
 
     base: float  # time of the window's first sample
-    earliest: float
-    end: float
+    earliest: float  # beginning of the extrapolated curve
+    end: float  # end of the window
     fade: float  # T₀
     weights: Array  # (ORDER + 1,)
     covariance: Array  # of the weights
@@ -53,9 +55,9 @@ class RiseCurve(NamedTuple):
 def tangent(t: Array, command: Array, measured: Array, begin: int, *, held: bool = False) -> StepResponse:
     """L (s), T (s) and K from one step by the tangent at the inflection.
 
-    `t` (s), `command` (m) and `measured` (m) have one value per tick; `command` stands still but for its
-    step from tick `begin` − 1 to tick `begin`; the record ends in the steady state. Intervals by
-    propagation of the measured noise and of the place of the smoothing window.
+    `t` (s), `command` (m) and `measured` (m) have one value per tick; `command` is constant except for its step from
+    tick `begin` − 1 to tick `begin`; the record ends in the steady state. The intervals follow from the measured noise
+    and from the sensitivity to the position of the smoothing window.
 
     Raises:
         InputError: too short, not finite, no step at `begin`, another step beside it, or no steady end.
@@ -75,9 +77,9 @@ def tangent(t: Array, command: Array, measured: Array, begin: int, *, held: bool
     start, steady = float(before.mean()), float(tail.mean())
     rise = steady - start
     noise = float(np.sqrt((before.var(ddof=1) + tail.var(ddof=1)) / 2.0))
-    if abs(rise) < 10.0 * noise or rise == 0.0:
+    if abs(rise) < SIGNIFICANT * noise or rise == 0.0:
         raise InputError(
-            f"The step at tick {begin} moves the displacement by no more than its noise: step further."
+            f"The step at tick {begin} moves the displacement by less than ten times its noise: make a larger step."
         )
     white = float(np.std(np.diff(tail))) / np.sqrt(2.0)  # without what drifts
     drift = float(tail[tail.size // 2 :].mean() - tail[: tail.size // 2].mean())
@@ -109,8 +111,8 @@ def tangents(
 ) -> StepResponse:
     """Mean L (s), T (s) and K of several steps in one record, with intervals from their scatter.
 
-    Arrays as for `tangent`; `steps` are the ticks at which a step begins, `length` the ticks (behind the
-    beginning) that belong to each. A single step gives what `tangent` gives.
+    Arrays are those of `tangent`; `steps` are the ticks at which a step begins, `length` is the number of ticks from
+    there on that belong to each. For a single step the result is that of `tangent`.
 
     Raises:
         InputError: as `tangent`, or no step given, or a step that reaches over the record's end.
@@ -163,7 +165,7 @@ def checked_step(command: Array, begin: int) -> float:
 
 
 def smooth(times: Array, share: Array, noise: float, interval: float, guard: int) -> RiseCurve:
-    """Fit of the first window behind the onset that the curve follows within the noise, `guard` ticks on."""
+    """Fit of the first window after the onset that the curve fits within the noise, moved on by `guard` ticks."""
     passed = [int(np.argmax(share >= level)) for level in LEVELS]
     crossed = [
         float(np.interp(level, share[k - 1 : k + 1], times[k - 1 : k + 1])) if k > 0 else float(times[0])
@@ -206,22 +208,22 @@ def heights(curve: RiseCurve, weights: Array, time: Array) -> tuple[Array, Array
 
 
 def draw(curve: RiseCurve, weights: Array) -> Array:
-    """L and T of the tangent at the steepest place, sought back to the start level; (2,)."""
+    """L and T (2,) of the tangent at the steepest point, which is searched back to the start level."""
     grid = np.linspace(curve.earliest, curve.end, 1500)
     height, slope = heights(curve, weights, grid)
     under = np.flatnonzero((height <= 0.0) & (grid < curve.base))
     from_here = int(under[-1]) if under.size else 0
-    if not under.size:  # a smooth onset: nothing to be followed back to
+    if not under.size:  # with a smooth onset the curve does not come back to the start level
         from_here = int(np.argmax(grid >= curve.base))
     place = from_here + int(np.argmax(slope[from_here:]))
     steepest = float(slope[place])
     if steepest <= 0.0:
-        raise InputError("The displacement does not rise behind the step: check the record.")
+        raise InputError("The displacement does not rise after the step: check the record.")
     return np.array([grid[place] - height[place] / steepest, 1.0 / steepest])
 
 
 def read(curve: RiseCurve) -> tuple[float, float, Array]:
-    """L, T and their gradient by the curve's weights (2, ORDER + 1)."""
+    """L, T, and their gradient (2, ORDER + 1) with respect to the curve's weights."""
     middle = draw(curve, curve.weights)
     gradient = np.empty((2, ORDER + 1))
     for i in range(ORDER + 1):

@@ -17,10 +17,14 @@ from models.registry import Array
 LEAST = 50  # samples: more than ten for each parameter of the fit
 NAMES = ("frequency", "damping_ratio", "delay")
 UNITS = ("Hz", "", "s")
+# Bounds of the fit, beyond any shaking table in use: slower ones cannot follow a building, faster ones look ideal at 2
+# ms.
 LOW = (0.2, 0.02, 0.0)
 HIGH = (200.0, 5.0, 0.5)
-HOPELESS = 0.8  # nrmse above which nothing was identified: a constant leaves 1
-COHERENT = 0.8  # least coherence of a frequency that is read: there a fifth of the power is noise
+HOPELESS = (
+    0.8  # nrmse above which the fit is rejected: a constant has the nrmse 1, and here no gain is fitted
+)
+COHERENT = 0.8  # least coherence of a frequency that is used: a fifth of the power there is noise
 
 
 class FrequencyResponse(NamedTuple):
@@ -32,7 +36,7 @@ class FrequencyResponse(NamedTuple):
 
 
 class Bandwidth(NamedTuple):
-    """Up to where a table follows; nan where the record does not reach that far."""
+    """The frequencies up to which a table follows; nan where the record does not reach that far."""
 
     half_power: float  # Hz, −3 dB
     quarter_turn: float  # Hz, −90°
@@ -59,10 +63,10 @@ def least_squares(command: Array, displacement: Array, interval: float) -> Ident
     """`frequency` (Hz), `damping_ratio` and dead time `delay` (s) of the table from a record of any motion.
 
     `command` (m) and `displacement` (m) have one value per tick of `interval` (s): the command written at
-    tick k is ramped and reached at tick k + 1. The record begins at rest; the sensor's level is fitted
-    beside; the gain is 1. Prediction by the exact kernel of the emulated table; intervals from Jacobian and
-    residual, corrected for autocorrelation (`estimate.of_fit`). Motion well below the natural frequency
-    shows L + 2ζ/ω only, which the intervals tell.
+    tick k is ramped and reached at tick k + 1. The record begins at rest; the sensor's level is fitted too; the gain is
+    1. The prediction uses the exact kernel of the emulated table; the intervals follow from Jacobian and residual,
+    corrected for autocorrelation (`estimate.of_fit`). Motion well below the natural frequency determines L + 2ζ/ω only,
+    and the intervals are then wide.
 
     Raises:
         InputError: too short, unequal lengths, not finite, constant, or a displacement that does not follow.
@@ -116,7 +120,7 @@ def least_squares(command: Array, displacement: Array, interval: float) -> Ident
 
 
 def reached(command: Array) -> Array:
-    """The command the rig's ramp has reached at each tick: that of the tick before."""
+    """The command that the rig's ramp has reached at each tick, which is that of the tick before."""
     return np.concatenate([command[:1], command[:-1]])
 
 
@@ -152,8 +156,8 @@ def frequency_response(command: Array, measured: Array, interval: float) -> Freq
 def bandwidth(response: FrequencyResponse) -> Bandwidth:
     """Frequencies (Hz) of −3 dB and of −90°, and the delay (s) at low frequency.
 
-    Reads the frequencies up to the first gap in coherence; −3 dB counts from the response at the lowest of
-    them. The delay is that of a phase `−2πτ·f + c·f³`, fitted up to half the frequency of −90°.
+    Only the frequencies below the first gap in coherence are used; −3 dB is relative to the response at the two lowest
+    of them. The delay is τ of a phase `−2πτ·f + c·f³`, fitted up to half the frequency of −90°.
 
     Raises:
         InputError: fewer than four frequencies are coherent from the lowest on.

@@ -1,1 +1,1 @@
-"""Sensors of an emulated laboratory: what they read, and their noise."""
+"""Sensors of an emulated laboratory: their readings and their noise."""

@@ -1,4 +1,4 @@
-"""White noise of the sensors: the same draws whether read one by one or all at once."""
+"""White noise of the sensors."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 from models.registry import Array
 
 LAB_A, LAB_B = 1, 2
-BLOCK = 1024  # rows drawn at once, so that a reading costs a list's pop
+BLOCK = 1024  # rows drawn at once, two seconds of a test, so that a reading only takes the next row of a list
 
 
 def lab_seed(seed: int, lab: int) -> int:
@@ -16,7 +16,7 @@ def lab_seed(seed: int, lab: int) -> int:
 
 
 class Noise:
-    """The noise of one laboratory's readings, tick by tick or all at once: the same draws either way."""
+    """The noise of one laboratory's readings, which is the same whether it is drawn tick by tick or all at once."""
 
     def __init__(self, seed: int, levels: Array) -> None:
         self._generator = np.random.default_rng(seed)

@@ -1,8 +1,7 @@
 """The reading of a value: `gain·delayed(lagged(value)) + bias + drift·t + noise`, rounded to the sensor's step.
 
-The lag is of first order, `τ·ẏ + y = x`, for a value that moves on a straight line from tick to tick; so does what is
-delayed, by any part of an interval. Before its first tick a value counts as zero.
-Without effects a reading is value plus noise to the last bit.
+The lag is of first order, `τ·ẏ + y = x`. Values are linear between ticks, for the lag and for a delay by any part of an
+interval, and zero before the first tick. Without effects a reading equals exactly value plus noise.
 """
 
 from __future__ import annotations
@@ -18,11 +17,12 @@ from models.system import SensorEffects
 from models.transfer_systems import first_order
 
 PRESENT, GAIN, BIAS, DRIFT, QUANTUM, FADE, EARLY, LATE, DELAY = range(9)
-LAGGED, PREVIOUS, NEWEST, KEPT = range(4)  # the newest of the values kept for a delay, which stand in a ring
+# from KEPT on a ring of the values kept for a delay; NEWEST is its newest place
+LAGGED, PREVIOUS, NEWEST, KEPT = range(4)
 
 
 class Readings(NamedTuple):
-    """One laboratory's sensors with their memory, which `step` moves on."""
+    """One laboratory's sensors with their memory, which `step` updates."""
 
     params: Array  # (signals, 9)
     state: Array  # (signals, 3 and as many as the longest delay needs)
@@ -43,14 +43,14 @@ def build(interval: float, names: Sequence[str], sensors: Mapping[str, SensorEff
 
 
 def levels(names: Sequence[str], nominal: Array, sensors: Mapping[str, SensorEffects]) -> Array:
-    """Rms noise of each reading: the plan's, and what an effect adds to it."""
+    """Noise (rms) of each reading: the plan's, and the noise that an effect adds to it."""
     more = np.array([sensors.get(name, SensorEffects()).noise for name in names])
     return np.where(more > 0.0, np.hypot(nominal, more), nominal)
 
 
 @jit
 def delayed(sensors: Readings, place: int, value: float) -> float:
-    """The value of signal `place` by its delay ago; the ring moves on by one tick."""
+    """The value of signal `place` before its delay; updates the ring by one tick."""
     params, state = sensors.params, sensors.state
     ticks = params[place, DELAY]
     if ticks == 0.0:
@@ -68,7 +68,7 @@ def delayed(sensors: Readings, place: int, value: float) -> float:
 
 @jit
 def step(sensors: Readings, place: int, value: float, noise: float, t: float) -> float:
-    """Reading of signal `place` at time `t` s; its state moves on by one tick."""
+    """The reading of signal `place` at time `t` (s); updates its state by one tick."""
     params, state = sensors.params, sensors.state
     if params[place, PRESENT] == 0.0:
         return value + noise

@@ -1,4 +1,4 @@
-"""Laboratory B on its ramp to rest: the table comes to a hold, the damper's motor force to zero."""
+"""The ramp to rest of a table laboratory: the table comes to a hold, the damper's motor force to zero."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from common.safety.ramp import ForceRelease, MotionRamp
 
 
 class TableRamp:
-    """The table's and the motor's commands from the last two written on."""
+    """The table's and the motor's commands on the ramp, from the last two written on."""
 
     def __init__(self, plan: Plan, last: tuple[float, ...], before: tuple[float, ...]) -> None:
         safety, interval = plan.safety, plan.test.interval
@@ -16,7 +16,7 @@ class TableRamp:
         self._motor = ForceRelease(safety, interval, last[1])
 
     def step(self, measured: tuple[float, ...] | None) -> tuple[float, ...]:
-        """The command for the coming interval, whatever is measured."""
+        """The commands for the coming interval, which do not depend on the measurements."""
         return self._table.step(None), self._motor.step()
 
     @property
@@ -26,14 +26,14 @@ class TableRamp:
 
     @property
     def left(self) -> float:
-        """How long it takes at most from here on, s."""
+        """The longest remaining time, s."""
         return max(self._table.left, self._motor.left)
 
     def doing(self, measured: tuple[float, ...] | None) -> str:
-        """What it does, in words, with the force that the motor still has, whatever is measured."""
+        """The present phase in words, with the motor's remaining force."""
         return f"bringing the table to a halt: {abs(self._motor.command):.0f} N of motor force left"
 
     @property
     def travel(self) -> float:
-        """How far apart the table's commands have been, m."""
+        """The distance between the largest and the smallest command of the table, m."""
         return self._table.travel

@@ -1,4 +1,4 @@
-"""The kind `table`: what a plan says of a shaking table and the active mass damper on it."""
+"""The kind `table`: a shaking table and the active mass damper on it, as a plan describes them."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class TableKind(Kind):
     record = TableLab
 
     def machines(self, plan: Plan) -> tuple[Machine, ...]:
-        """The table, which its command drives, and the damper on it."""
+        """The table, which its command moves, and the damper on it."""
         return (
             Machine(
                 "table",
@@ -63,7 +63,7 @@ class TableKind(Kind):
         )
 
     def resume(self, lab: TableLab, truth: Array, motion: float, rate: float) -> None:
-        """The damper with this stroke and its rate."""
+        """Set the damper's stroke (m) and its rate (m/s)."""
         lab.state[model.STROKE], lab.state[model.STROKE_RATE] = motion, rate
         truth[self.channels.names.index(self.free)] = motion
 
@@ -87,7 +87,7 @@ class TableKind(Kind):
         return model.enter(lab, command, effort)
 
     def coupling(self, plan: Plan) -> Coupling:
-        """The damper's floor; neither force nor motor where the building does without the damper."""
+        """The coupling to the damper's floor; without `amd` in [control] neither force nor motor acts."""
         scale = plan.damper.force_scale if plan.control.amd else 0.0
         return Coupling(
             follows=Follows.FLOOR,
@@ -103,12 +103,12 @@ class TableKind(Kind):
         )
 
     def compensator(self, plan: Plan) -> Chosen:
-        """That of `[table.compensator]`."""
+        """The compensator of `[table.compensator]`."""
         chosen = plan.table.compensator
         return Chosen(chosen.kind, chosen.parameters, plan.follows_in)
 
     def ramp(self, plan: Plan, last: tuple[float, ...], before: tuple[float, ...]) -> TableRamp:
-        """The table comes to a hold, the motor's force goes to zero."""
+        """The ramp on which the table comes to a hold and the motor's force goes to zero."""
         return TableRamp(plan, last, before)
 
 

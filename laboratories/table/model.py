@@ -1,11 +1,11 @@
-"""Laboratory B: a shaking table carries the active mass damper.
+"""The laboratory of the kind table: a shaking table carries the active mass damper.
 
 Table `Y = e^(−Ls)·ω²/(s² + 2ζωs + ω²)·U`; damper `m·(s̈ + ÿ) = −k·s − c·ṡ − g + u`, motor `T·u̇ + u = F`;
-force on the table `k·s + c·ṡ + g − u`, with g what end stops and the rail's friction add. Without such
-effects all of it is linear, so one matrix carries table, damper and motor over each segment without
-error, for a table command that is a straight line and a motor command that is held. With them g is held
-over short segments; friction is what it takes to stop the motion within a segment, up to its size, so it
-neither chatters nor creeps (the budget of Duclusaud et al., arXiv 2410.08650).
+force on the table `k·s + c·ṡ + g − u`, where g is the force of end stops and of the rail's friction. Without such
+effects the equations are linear, so one matrix propagates table, damper and motor exactly over each segment, for a
+table command that is linear in time and a motor command that is held. With them g is held over short segments; the
+friction of a segment is the force that stops the motion within it, up to its size, so it neither chatters nor creeps
+(the budget of Duclusaud et al., arXiv 2410.08650).
 """
 
 from __future__ import annotations
@@ -37,17 +37,16 @@ IDEAL = 11  # interval (s) of a table that follows at once, 0 for any other
 
 
 class TableLab(NamedTuple):
-    """The laboratory with its memories, which `advance` moves on."""
+    """The state and constants of the laboratory, which `advance` updates by one interval."""
 
     taps: Array  # of the delayed command
-    matrices: (
-        Array  # (m, n, n + 5): next state from state, command before and after, motor command, g, friction
-    )
+    # (m, n, n + 5): next state from state, command before and after, motor command, g, table friction
+    matrices: Array
     spring: Array  # (stiffness N/m, dashpot N·s/m) of the damper
-    limits: Array  # effects that no matrix holds
+    limits: Array  # effects that are not in the matrices
     history: Array  # table commands written, newest first
     state: Array  # (n,), n = 6, or 8 with an oil column
-    scratch: Array  # (n + 7,), the last two the command behind the play and an ideal table's last velocity
+    scratch: Array  # (n + 7,): the last two are the command after the play and an ideal table's last velocity
     learned: Array  # a law of `models.preisach` of the stroke, empty for none
     learned_memory: Array
 
@@ -59,10 +58,10 @@ def build(
     table_effects: TableEffects | None = None,
     damper_effects: DamperEffects | None = None,
 ) -> TableLab:
-    """Laboratory at rest with the nominal or true parameters given, and what is laid over them.
+    """The laboratory at rest, with the parameters given and the effects on them.
 
     Raises:
-        InputError: an effect that an ideal table cannot have.
+        InputError: an ideal table is given compliance, friction or an oil column.
     """
     on_table, on_damper = table_effects or TableEffects(), damper_effects or DamperEffects()
     present = on_table != TableEffects() or on_damper != DamperEffects()
@@ -99,7 +98,9 @@ def propagation(length: float, table: ShakingTable, damper: Damper, effects: Tab
         return lagging_matrix(length, table, damper, effects)
     for name, null in (("compliance", 0.0), ("friction", 0.0), ("oil_frequency", math.inf)):
         if getattr(effects, name) != null:
-            raise InputError(f"An ideal table (frequency inf) cannot have the effect '{name}'.")
+            raise InputError(
+                f"An ideal table (frequency inf) cannot have the effect '{name}': leave it out, or give a frequency."
+            )
     return ideal_matrix(length, damper)
 
 
@@ -113,7 +114,7 @@ def enter(lab: tuple[Any, ...], command: float, motor_command: float) -> tuple[f
 def advance(lab: TableLab, command: float, motor_command: float) -> tuple[float, float, float, float]:
     """Table displacement (m) and acceleration (m/s²), stroke (m) and force (N) one interval later.
 
-    The table's command is ramped to `command` (m) by then, the motor's (N) is held.
+    The table's command is ramped to `command` (m) until then, the motor's (N) is held.
     """
     taps, matrices, spring, limits = lab.taps, lab.matrices, lab.spring, lab.limits
     history, state, scratch = lab.history, lab.state, lab.scratch
@@ -149,7 +150,7 @@ def advance(lab: TableLab, command: float, motor_command: float) -> tuple[float,
             for column in range(size + INPUTS):
                 value += matrices[i, row, column] * scratch[column]
             state[row] = value
-    if limits[IDEAL] > 0.0:  # its velocity steps, and an accelerometer reads the mean over the interval
+    if limits[IDEAL] > 0.0:  # its velocity has steps, so the acceleration is the mean over the interval
         velocity = (state[TABLE] - start) / limits[IDEAL]
         state[ACCELERATION] = (velocity - scratch[played + 1]) / limits[IDEAL]
         scratch[played + 1] = velocity
@@ -159,14 +160,17 @@ def advance(lab: TableLab, command: float, motor_command: float) -> tuple[float,
 
 @jit
 def resist(matrix: Array, lab: TableLab, scratch: Array, size: int) -> None:
-    """Forces of a segment that oppose motion: the table's friction; the damper's stop, what was learned, friction."""
+    """Compute a segment's forces beyond the matrices.
+
+    Of the table's friction, and of the damper's stop, law and friction.
+    """
     limits = lab.limits
     rail, drag = size + 3, size + 4
     scratch[rail] = -limits[OFFSET]
     scratch[drag] = 0.0
     middle = scratch[STROKE] + 0.5 * matrix[STROKE, STROKE_RATE] * scratch[STROKE_RATE]
     over = abs(middle) - limits[STOP]
-    if over > 0.0:  # at the segment's middle, which keeps the energy of a bounce
+    if over > 0.0:  # at the segment's middle, with which a bounce conserves energy
         scratch[rail] += limits[STOP_STIFFNESS] * (over if middle > 0.0 else -over)
     if lab.learned.size > 0:
         scratch[rail] += preisach.step(lab.learned, lab.learned_memory, middle, scratch[STROKE_RATE])
@@ -181,13 +185,13 @@ def resist(matrix: Array, lab: TableLab, scratch: Array, size: int) -> None:
 
 @jit
 def falling(rate: float, velocity: float) -> float:
-    """Share of a friction that is left at a rate (m/s) where it falls off below a velocity; none falls off at 1e-6."""
+    """Factor on a friction force at a rate (m/s), which decreases below `velocity`; Coulomb friction at 1e-6 m/s."""
     return 1.0 if velocity <= 1e-6 else np.tanh(abs(rate) / velocity)
 
 
 @jit
 def stopping(matrix: Array, scratch: Array, rate: int, place: int, most: float) -> float:
-    """What must be added to input `place` so that state `rate` is zero at the segment's end, up to `most`."""
+    """The value of input `place` with which state `rate` is zero at the segment's end, limited to ±`most`."""
     free = 0.0
     for column in range(scratch.size - 2):
         free += matrix[rate, column] * scratch[column]
@@ -209,9 +213,9 @@ def damper_rows(a: Array, b: Array, damper: Damper) -> None:
 
 
 def lagging_matrix(length: float, table: ShakingTable, damper: Damper, effects: TableEffects) -> Array:
-    """Propagation over one segment of `length` s behind a table of second order; shape (n, n + 5).
+    """Propagation over one segment of `length` s for a table of second order; shape (n, n + 5).
 
-    Under the damper's force F the table gives way as if its command were moved by compliance·F.
+    Under the damper's force F the table gives way as if its command were changed by compliance·F.
     With an oil column the platform follows the table below it as a second oscillator.
     """
     size = 6 if math.isinf(effects.oil_frequency) else 8
@@ -248,7 +252,7 @@ def lagging_matrix(length: float, table: ShakingTable, damper: Damper, effects: 
 
 
 def ideal_matrix(length: float, damper: Damper) -> Array:
-    """Propagation behind a table that follows its ramped command at once; shape (6, 11).
+    """Propagation over one segment of `length` s for a table that follows its ramped command at once; shape (6, 11).
 
     The table's velocity is constant over a segment and steps at its beginning, which steps the stroke's
     velocity the other way; the acceleration is that step over the segment's length.
@@ -272,7 +276,7 @@ def propagate_ramp(a: Array, b: Array, length: float, damper: Damper) -> Array:
     """Exact propagation of `ż = a·z + b·(v, F, g, d)` with v moving from v0 to v1 and the others held.
 
     By one matrix exponential with the inputs as further states (Van Loan 1978); shape (n, n + 5). A motor
-    without lag has its command for its force. The row of the acceleration is left empty.
+    without lag has its command as its force. The row of the acceleration is left zero.
     """
     from scipy.linalg import expm
 

@@ -154,10 +154,10 @@ def test_a_step_with_other_arguments_is_no_kernel(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("line", "said"),
     [
-        ("truth[2] = 0.0", "writes beside the 2 numbers of truth"),
-        ("state[0] = 1.0", "writes beside the 0 numbers of state"),
+        ("truth[2] = 0.0", "writes beyond the 2 numbers of truth"),
+        ("state[0] = 1.0", "writes beyond the 0 numbers of state"),
         ("parameters[1] = 2.0", "changes parameters[1], which it may only read"),
-        ("truth[1] = parameters[2]", "gives push (truth[1]) no finite number under a sine of 1 mm"),
+        ("truth[1] = parameters[2]", "sets push (truth[1]) to no finite number along a sine of 1 mm"),
     ],
 )
 def test_a_step_that_writes_or_reads_beside_its_arrays_is_found_before_it_runs(

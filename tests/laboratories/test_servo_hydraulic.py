@@ -232,9 +232,9 @@ def test_gain_and_dead_time_act_on_the_command(plan: Plan) -> None:
     "entry", [("actuator.time_constant", {"factor": 1.3}), ("actuator.backlash", {"width": 2e-4})]
 )
 def test_effects_that_it_cannot_have_are_refused(plan: Plan, entry: tuple[str, dict[str, float]]) -> None:
-    with pytest.raises(InputError, match=f"'{entry[0]}' is one of the actuator 'fopdt'"):
+    with pytest.raises(InputError, match=f"'{entry[0]}' needs the actuator model 'fopdt'"):
         lay(System(plan), [entry])
-    with pytest.raises(InputError, match="has no play"):
+    with pytest.raises(InputError, match="cannot have the effect 'actuator.backlash'"):
         column_lab.build(DT, servo(), COLUMN, ActuatorEffects(backlash=1e-4))
     with pytest.raises(InputError, match="above 0 kg"):
         column_lab.build(DT, servo(), Column())

@@ -96,7 +96,7 @@ def test_an_effect_that_it_cannot_have_is_refused_with_a_sentence(
     secret.write_text("[[effect]]\nname = 'actuator.backlash'\nwidth = 1e-4\n")
     assert call("run", plan_file, "--virtual", "--reality", secret, "-o", tmp_path / "a.mcap") == 2
     error = capsys.readouterr().err
-    assert "'actuator.backlash' is one of the actuator 'fopdt', but the plan's is 'servo_hydraulic'" in error
+    assert "'actuator.backlash' needs the actuator model 'fopdt', but the plan has 'servo_hydraulic'" in error
 
 
 def test_it_simulates_with_ideal_transfer_systems(call: Call, plan_file: Path, tmp_path: Path) -> None:

@@ -1,1 +1,1 @@
-"""Effects on the ground motion that the building gets."""
+"""Effects on the ground motion of the building."""

@@ -1,9 +1,9 @@
-"""The motion that came starts earlier or later than the one believed.
+"""The ground motion starts earlier or later than planned.
 
     z̈_true(t) = z̈(t − shift)
 
-A positive shift is a later motion. Not to be confused with a delay inside the loop: the shift moves all
-signals in time alike, and costs no damping.
+A positive shift is a later motion. Not to be confused with a delay inside the loop: the shift moves all signals in time
+equally, and does not reduce the damping.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ EFFECT = Effect(
     name="ground.time_shift",
     site="ground",
     kind="physics",
-    says="the motion comes earlier or later than believed",
+    says="the ground motion comes earlier or later than planned",
     parameters=(
         Parameter(
             "shift",

@@ -1,9 +1,9 @@
-"""Messages take longer than the plan believes, in both directions alike.
+"""Messages take longer than planned, equally in both directions.
 
-    a message sent at t is there from the first tick at or after its nominal time + delay
+    a message sent at t is available from the first tick at or after its nominal time + delay
 
 so the round trip is longer by two delays, each rounded up to whole intervals. Not to be confused with
-`table.delay`: the messages' own stamps tell them apart.
+`table.delay`: the messages' time stamps distinguish them.
 """
 
 from __future__ import annotations
@@ -26,5 +26,5 @@ EFFECT = sets(
         ),
     },
     says="messages take longer",
-    reference="there from the first tick at or after nominal time + delay",
+    reference="available from the first tick at or after nominal time + delay",
 )

@@ -2,9 +2,8 @@
 
     delay of a message = delay + n,    n exponential: mean and standard deviation are std
 
-with the delay of `link.delay`, which no message beats, each direction alike. What counts is how many
-intervals a message is late. Not to be confused with noise of the damper's force: the age of each message
-tells them apart.
+with the delay of `link.delay`, in both directions. Only the number of whole intervals by which a message is late has an
+effect. Not to be confused with noise of the damper's force: the age of each message distinguishes them.
 """
 
 from __future__ import annotations

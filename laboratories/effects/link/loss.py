@@ -1,9 +1,9 @@
-"""Messages are lost, alone or several in a row; the last one received is used on.
+"""Messages are lost, singly or several in a row; the last one received stays in use.
 
     P(lost) = probability,    mean run of lost messages = burst
 
-a two-state chain (Gilbert): from good to bad with p = r·probability/(1 − probability), back with
-r = 1/burst. Not to be confused with `link.jitter`: late messages come after all.
+This is a two-state chain (Gilbert): from good to bad with p = r·probability/(1 − probability), back with r = 1/burst.
+Not to be confused with `link.jitter`, with which messages come late but come.
 """
 
 from __future__ import annotations

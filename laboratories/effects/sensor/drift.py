@@ -1,4 +1,4 @@
-"""A reading goes astray steadily: thermal drift, charge leaking.
+"""The error of a reading grows steadily: thermal drift, leaking charge.
 
     reading = value + rate·t
 
@@ -21,6 +21,6 @@ FAULT = ReadingFault(
         sizes=sized(signal.typical, -1e-3, 1e-4, 1e-3, 4e-3),
         says="offset per second",
     ),
-    says="the reading goes astray steadily",
+    says="the error of the reading grows steadily",
     reference="reading = value + rate·t",
 )

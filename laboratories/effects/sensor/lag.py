@@ -2,8 +2,8 @@
 
     time_constant·ẏ + y = value,    reading = y
 
-Not to be confused with a delay of what is measured: physics behind the sensor that other readings show is
-on time here. A lagging column force looks like a negative `column.viscous`.
+Not to be confused with a delay of the measured quantity itself: here other readings of the same motion are on time. A
+lagging column force looks like a negative `column.viscous`.
 """
 
 from __future__ import annotations
@@ -11,7 +11,8 @@ from __future__ import annotations
 from laboratories.effects.effect import Parameter
 from laboratories.effects.reading import ReadingFault
 
-LONGEST = 0.04  # s, of an amplifier or a filter against aliasing, whose corner is above 4 Hz; a longer one is a travel
+# s: an amplifier or an anti-aliasing filter has a corner above 4 Hz; a longer lag belongs to the measured motion
+LONGEST = 0.04
 
 FAULT = ReadingFault(
     "lag",

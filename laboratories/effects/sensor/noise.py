@@ -1,8 +1,8 @@
-"""A reading is noisier than the plan believes.
+"""A reading is noisier than planned.
 
-    reading = value + n + n',    n' white and normal with an rms beside the plan's n
+    reading = value + n + n',    n' white and normal, in addition to the plan's n
 
-Not to be confused with `link.jitter`, which scatters what is used, not what was read.
+Not to be confused with `link.jitter`, which varies the age of the values used, not the readings.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ FAULT = ReadingFault(
         least=0.0,
         most=signal.typical,
         sizes=sized(signal.noise, 0.7, 2.0, 6.0, 20.0),
-        says="beside the plan's noise",
+        says="in addition to the plan's noise",
     ),
-    says="the reading is noisier than believed",
+    says="the reading is noisier than planned",
     reference="reading = value + white noise",
     in_samples=True,
     random=True,

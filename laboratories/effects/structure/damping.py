@@ -1,9 +1,9 @@
-"""The numerical structure is damped more or less than believed.
+"""The numerical structure is damped more or less than planned.
 
     C_true = factor · C, of every storey
 
-Not to be confused with a delay in the transfer system, which takes damping from the loop as c = −k·τ but
-shows between command and achieved displacement.
+Not to be confused with a delay in the transfer system, which takes damping from the loop as c = −k·τ but is visible
+between command and achieved displacement.
 """
 
 from __future__ import annotations

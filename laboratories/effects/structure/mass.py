@@ -1,9 +1,9 @@
-"""The numerical floors are heavier or lighter than believed.
+"""The numerical floors are heavier or lighter than planned.
 
     M_true = factor · M, of every storey
 
-Not to be confused with `structure.stiffness`: both move the period, but only the mass changes how hard
-the ground and the damper's force push.
+Not to be confused with `structure.stiffness`: both change the period, but only the mass changes the response to the
+ground motion and to the damper's force otherwise.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Gravity on the drift: the weight above leans on the storey and pushes it on.
+"""Gravity on the drift (P-Δ effect): the weight above a drifting storey increases its drift.
 
     f = k·x + k_g·x,    k_g = −P/h
 
 with weight P above a storey of height h; the same k_g acts in every storey. Not to be confused with
-`structure.stiffness`: alike for one linear storey, apart for several or yielding ones.
+`structure.stiffness`: the two are equal for one linear storey, and differ for several or yielding ones.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from models.system import System
 
 
 def apply(system: System, stiffness: float) -> System:
-    """Geometric `stiffness` N/m, negative, beside the elastic one of every storey."""
+    """Geometric `stiffness` (N/m), negative, added to the elastic one of every storey."""
     return replace(system, effects=replace(system.effects, p_delta=stiffness))
 
 
@@ -23,7 +23,7 @@ EFFECT = Effect(
     name="structure.p_delta",
     site="structure",
     kind="physics",
-    says="gravity pushes the leaning storeys on",
+    says="gravity reduces the stiffness of drifting storeys",
     parameters=(
         Parameter(
             "stiffness",

@@ -1,10 +1,10 @@
-"""The numerical columns are stiffer or softer than believed.
+"""The numerical columns are stiffer or softer than planned.
 
     k_true = factor · k, of every storey
 
 Only the numerical columns change; the specimen keeps its own stiffness. Not to be confused with
-`column.stiffness`, which shows in the measured force at a given deformation, or with `structure.p_delta`,
-which adds the same stiffness to every storey instead of a share.
+`column.stiffness`, which is visible in the measured force at a given deformation, or with `structure.p_delta`, which
+adds the same stiffness to every storey in place of a share.
 """
 
 from __future__ import annotations

@@ -54,6 +54,27 @@ def test_a_specimen_that_has_yielded_is_left_where_its_force_is_gone() -> None:
     assert abs(ramp.command - 0.006) < 1e-3
 
 
+def test_an_elastic_specimen_whose_force_still_lags_at_the_hold_is_unloaded() -> None:
+    ramp, late = MotionRamp(PLAN, INTERVAL, 0.001, 0.0, unload=True), 22  # ticks, 44 ms
+    forces = [-30e3] * late  # before the hold the specimen was deformed to the other side
+    while not ramp.done:
+        forces.append(12.5e6 * ramp.step(forces[-late]))
+        if len(forces) == late + 3:
+            assert ramp.holding
+    assert abs(ramp.command) <= 2 * PLAN.velocity * INTERVAL + 5e-4
+    assert ramp.left == 0.0
+
+
+def test_a_force_that_opposes_the_unloading_to_the_end_leaves_the_specimen_at_the_hold() -> None:
+    ramp, ticks = MotionRamp(PLAN, INTERVAL, 0.001, 0.0, unload=True), 0
+    left = ramp.left
+    while not ramp.done:
+        ramp.step(-30e3)
+        ticks += 1
+    assert ramp.command == 0.001
+    assert PLAN.settle <= ticks * INTERVAL <= left
+
+
 def test_without_a_reading_it_holds() -> None:
     commands = run(MotionRamp(PLAN, INTERVAL, 0.01, 0.0, unload=True))
     assert commands[-1] == 0.01

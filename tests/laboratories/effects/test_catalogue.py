@@ -15,7 +15,7 @@ from common.plan.plan import Plan
 from common.plan.tables import Structure
 from common.signals import TOPICS
 from laboratories import effects
-from laboratories.effects import CATALOGUE, lay, of_site
+from laboratories.effects import CATALOGUE, lay
 from laboratories.effects.effect import Effect, Kind, Parameter
 from laboratories.effects.sites import SITES
 from models.system import Effects, SensorEffects, System
@@ -265,8 +265,8 @@ def test_an_unknown_effect_is_refused_with_the_nearest() -> None:
 
 
 def test_sites_share_out_the_catalogue() -> None:
-    assert [effect.name for site in SITES for effect in of_site(site)] == list(CATALOGUE)
-    assert of_site("roof") == []
+    of_sites = [effect.name for site in SITES for effect in CATALOGUE.values() if effect.site == site]
+    assert of_sites == list(CATALOGUE)
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,9 @@
-"""Oil column and reaction frame give way: the specimen gets less displacement the more it resists.
+"""Compliance of oil column and reaction frame: the specimen's force reduces its displacement.
 
     y = y_piston − compliance · f
 
-Not to be confused with `actuator.gain`: a linear specimen makes both a factor on the displacement,
-1/(1 + compliance·k); the compliance goes with the force and is gone where the force is.
+Not to be confused with `actuator.gain`: with a linear specimen both are a factor on the displacement, here
+1/(1 + compliance·k); the effect of the compliance is proportional to the force and vanishes with it.
 """
 
 from __future__ import annotations
@@ -19,6 +19,6 @@ EFFECT = sets(
             "compliance", "m/N", null=0.0, least=0.0, most=1e-06, sizes=(1e-09, 3e-09, 1e-08, 3e-08)
         ),
     },
-    says="the piston yields under the specimen's force",
+    says="the piston gives way under the specimen's force",
     reference="Merritt, Hydraulic Control Systems, Wiley 1967",
 )

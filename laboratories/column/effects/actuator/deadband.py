@@ -1,4 +1,4 @@
-"""Overlap of the servo valve: small errors of the loop move no oil.
+"""Overlap of the servo valve: small errors of the loop cause no flow.
 
     T·ẏ = e − clip(e, −width/2, +width/2),    e = K·u(t − L) − y
 
@@ -25,6 +25,6 @@ EFFECT = sets(
             says="whole band of the error",
         ),
     },
-    says="small errors of the loop move no oil",
+    says="small errors of the loop cause no flow",
     reference="Merritt, Hydraulic Control Systems, Wiley 1967",
 )

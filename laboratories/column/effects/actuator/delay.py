@@ -3,15 +3,16 @@
     T·ẏ + y = K·u(t − L − delay)
 
 or the same dead time on the command of servo-hydraulics. The total is at least 0. Not to be confused with
-`actuator.time_constant`, which delays slow motion alike but also flattens fast motion, or with negative
-damping of the specimen: c = −k·delay in the loop.
+`actuator.time_constant`, which delays slow motion in the same way but also reduces the amplitude of fast motion, or
+with negative damping of the specimen: c = −k·delay in the loop.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-from laboratories.effects.effect import Effect, Parameter
+from laboratories.effects.effect import Effect
+from laboratories.effects.laws import added, extra_time
 from models.system import System
 
 
@@ -21,7 +22,7 @@ def apply(system: System, delay: float) -> System:
     if actuator.model == "servo_hydraulic":
         servo = replace(actuator.servo, delay=max(actuator.servo.delay + delay, 0.0))
         return system.moved("actuator", servo=servo)
-    return system.moved("actuator", delay=max(actuator.delay + delay, 0.0))
+    return added(system, table="actuator", key="delay", delay=delay)
 
 
 EFFECT = Effect(
@@ -29,17 +30,7 @@ EFFECT = Effect(
     site="actuator",
     kind="physics",
     says="dead time of the actuator is longer or shorter",
-    parameters=(
-        Parameter(
-            "delay",
-            "s",
-            null=0.0,
-            least=-0.05,
-            most=0.2,
-            sizes=(-0.008, -0.002, 0.002, 0.005, 0.01, 0.02),
-            says="added",
-        ),
-    ),
+    parameters=(extra_time("delay", (-0.008, -0.002, 0.002, 0.005, 0.01, 0.02)),),
     reference="Horiuchi, Inoue, Konno, Namita, Earthq. Eng. Struct. Dyn. 28 (1999) 1121-1141",
     apply=apply,
 )

@@ -1,4 +1,4 @@
-"""The actuator goes farther or less far than told: calibration of the servo loop.
+"""The actuator's displacement is larger or smaller than commanded: calibration of the servo loop.
 
     T·ẏ + y = factor·K·u(t − L)
 
@@ -23,7 +23,7 @@ EFFECT = factor_on(
     "actuator",
     "gain",
     apply,
-    says="the actuator goes farther or less far than told",
+    says="the actuator's displacement is larger or smaller than commanded",
     reference="T·ẏ + y = factor·K·u(t − L)",
     bounds=(0.2, 3.0),
     sizes=(0.85, 0.93, 0.97, 1.03, 1.07, 1.15),

@@ -1,10 +1,9 @@
-"""The actuator's servo loop is slower or faster than believed.
+"""The actuator's servo loop is slower or faster than planned.
 
     factor·T·ẏ + y = K·u(t − L)
 
-Where the plan believes in no lag at all, the factor counts as if it believed in one of 1 ms and the lag is
-`(factor − 1)·1 ms`. Not to be confused with `actuator.delay`: at low frequency both
-are a delay; only the lag loses amplitude as the frequency rises.
+Where the plan has no lag, the lag is `(factor − 1)·1 ms`, as if the planned one were 1 ms. Not to be confused with
+`actuator.delay`: at low frequency both are a delay; only the lag reduces the amplitude at higher frequency.
 """
 
 from __future__ import annotations
@@ -16,17 +15,17 @@ from models.system import System
 
 def apply(system: System, factor: float) -> System:
     """Time constant multiplied by `factor`."""
-    believed = system.plan.actuator.time_constant
-    lag = believed + (factor - 1.0) * (believed or LEAST_LAG)
+    planned = system.plan.actuator.time_constant
+    lag = planned + (factor - 1.0) * (planned or LEAST_LAG)
     return system if factor == 1.0 else system.moved("actuator", time_constant=max(lag, 0.0))
 
 
 def starts(plan: Plan) -> tuple[float, ...]:
-    """Factors that make lags of 5 and 25 ms where the plan believes in none: its sizes would all stay near 0."""
+    """Factors that give lags of 5 and 25 ms where the plan has none, with which the usual sizes would stay near 0."""
     return () if plan.actuator.time_constant else (6.0, 26.0)
 
 
-LEAST_LAG = 1e-3  # s
+LEAST_LAG = 1e-3  # s: short for any hydraulic actuator, so that factors up to 100 reach lags up to 0.1 s
 
 EFFECT = Effect(
     name="actuator.time_constant",

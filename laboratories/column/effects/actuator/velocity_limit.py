@@ -2,9 +2,9 @@
 
     |ẏ| ≤ velocity
 
-Of servo-hydraulics it is the flow that ends, at what moves the piston as fast without a load: `|q| ≤ a2·velocity`.
-Not to be confused with a slower servo loop, which smooths every motion; this one leaves slow motion as it
-is and cuts fast flanks to straight lines.
+For servo-hydraulics the flow is limited to that of an unloaded piston at this speed: `|q| ≤ a2·velocity`. Not to be
+confused with a slower servo loop, which smooths every motion; this effect leaves slow motion as it is and turns fast
+flanks into straight lines.
 """
 
 from __future__ import annotations

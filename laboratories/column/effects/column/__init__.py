@@ -1,1 +1,1 @@
-"""Effects on the specimen of laboratory A and on its fixtures."""
+"""Effects on the specimen of a column laboratory and on its fixtures."""

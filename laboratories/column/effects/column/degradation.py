@@ -1,4 +1,4 @@
-"""The specimen loses stiffness with the largest deformation it has seen, and does not get it back.
+"""The specimen permanently loses stiffness with its largest deformation so far.
 
     f = (1 − rate·(1 − exp(−δ_max/δ_ref)))·f_column,    δ_max = largest |δ| so far, δ_ref = 2 mm
 
@@ -22,9 +22,9 @@ EFFECT = sets(
             least=0.0,
             most=0.95,
             sizes=(0.03, 0.08, 0.2, 0.4),
-            says="share lost in the end",
+            says="share lost at large deformation",
         ),
     },
-    says="stiffness is lost with the largest deformation seen",
+    says="stiffness is lost with the largest deformation so far",
     reference="f = (1 − rate·(1 − exp(−δ_max/2 mm)))·f_column",
 )

@@ -1,10 +1,9 @@
-"""Rubbing in the set-up (tension bars, slides), felt by the load cell.
+"""Friction in the set-up (tension bars, slides), which the load cell measures.
 
     f = f_column + force·s/presliding,    ṡ = δ̇ while |s| < presliding, else s stays
 
-A spring that slides at `force`: before it does, the contact deforms by `presliding` to one side. Not to
-be confused with `column.viscous`, whose loop grows with speed, or `column.yielding`, which has no loop at
-small amplitude.
+It acts as a spring that slides at `force`, before which the contact deforms by `presliding` to either side. Not to be
+confused with `column.viscous`, whose loop grows with speed, or `column.yielding`, which has no loop at small amplitude.
 """
 
 from __future__ import annotations
@@ -27,11 +26,11 @@ EFFECT = sets(
             least=1e-07,
             most=0.0003,
             sizes=(3e-06, 1e-05, 5e-05),
-            says="deformation before it slides, to one side",
+            says="deformation to either side before it slides",
             shape=True,
         ),
         "friction_velocity": VELOCITY,
     },
-    says="rubbing in the set-up of the specimen",
+    says="friction in the set-up of the specimen",
     reference="Armstrong-Hélouvry, Dupont, Canudas de Wit, Automatica 30 (1994) 1083-1138",
 )

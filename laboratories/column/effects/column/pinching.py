@@ -2,9 +2,9 @@
 
     f = (1 − factor·w + hardening·(1 − w))·f_column,    w = exp(−(δ/width)²)
 
-`width` is the deformation at which the pinch has faded to 1/e, counted from the origin to one side. With
-factor 0 there is no pinching and no hardening. Not to be confused with `column.slip`, which has a sharp
-edge and no force at all inside, or with `actuator.backlash`.
+`width` is the deformation at which the reduction has fallen to 1/e of that at the origin. With factor 0 there is no
+pinching and no hardening. Not to be confused with `column.slip`, which has a sharp edge and no force within it, or with
+`actuator.backlash`.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ EFFECT = sets(
             least=0.0,
             most=0.3,
             sizes=(0.0, 0.1, 0.3),
-            says="share of force added far out",
+            says="share of the force added at large deformation",
             shape=True,
         ),
         "pinching_width": Parameter(
@@ -42,10 +42,10 @@ EFFECT = sets(
             least=1e-05,
             most=0.05,
             sizes=(0.0003, 0.001, 0.003),
-            says="from the origin to where 1/e is left",
+            says="deformation at which 1/e of the reduction is left",
             shape=True,
         ),
     },
-    says="little stiffness until cracks have closed",
+    says="low stiffness until cracks have closed",
     reference="f = (1 − factor·w + hardening·(1 − w))·f_column, w = exp(−(δ/width)²)",
 )

@@ -1,4 +1,4 @@
-"""Loose fixture: the specimen can be moved inside a gap without any force.
+"""Loose fixture: within a gap the specimen moves without any force.
 
     f = f_column(δ'),    δ' = δ − clip(δ, −gap/2, +gap/2)
 
@@ -25,6 +25,6 @@ EFFECT = sets(
             says="whole gap",
         ),
     },
-    says="no force inside a gap",
+    says="no force within a gap",
     reference="f = f_column(δ − clip(δ, ±gap/2))",
 )

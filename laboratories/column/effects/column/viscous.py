@@ -2,8 +2,8 @@
 
     f = f_column + coefficient·δ̇
 
-Not to be confused with a lag of the load cell or of the displacement reading, which turns a linear
-specimen's loop alike; nor with `column.friction`, whose force does not grow with speed.
+Not to be confused with a lag of the load cell or of the displacement reading, which gives a linear specimen the same
+loop; nor with `column.friction`, whose force does not grow with speed.
 """
 
 from __future__ import annotations

@@ -2,9 +2,9 @@
 
     f = α·k·δ + (1 − α)·k·δ_y·z,    dz/dδ = (1 − |z|ⁿ·(1 + sgn(z·dδ))/2) / δ_y
 
-with yield displacement δ_y, hardening α and exponent n. The parameter `law` takes another formula in its place: 1 the
-bilinear one, 2 that of Menegotto and Pinto with R₀ for the exponent, 3 the peak-oriented one of Clough and Johnston
-with the exponent `unloading` of its unloading stiffness (models/specimens). Not to be confused with
+with yield displacement δ_y, hardening α and exponent n. The parameter `law` chooses another formula: 1 the bilinear
+one, 2 that of Menegotto and Pinto with R₀ as the exponent, 3 the peak-oriented one of Clough and Johnston with the
+exponent `unloading` of its unloading stiffness (models/specimens). Not to be confused with
 `column.degradation`, which softens without a loop, or `column.friction`, whose loop has the same height at every
 amplitude.
 """

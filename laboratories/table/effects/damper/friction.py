@@ -1,6 +1,6 @@
 """Coulomb friction of the damper's guide rail.
 
-A force of constant size against the stroke's velocity; at rest it balances what is applied, up to that size.
+A force of constant size against the stroke's velocity; at rest it balances the applied force up to that size.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The motor gives more or less force than told: motor constant, calibration of the drive.
+"""The motor's force is larger or smaller than commanded: motor constant, calibration of the drive.
 
     T_m·u̇ + u = factor·damper_command
 
@@ -14,7 +14,7 @@ EFFECT = factor_on(
     "damper",
     "gain",
     of_site("damper", "gain"),
-    says="the motor gives more or less force than told",
+    says="the motor's force is larger or smaller than commanded",
     reference="T_m·u̇ + u = factor·damper_command",
     bounds=(0.0, 3.0),
     sizes=(0.85, 0.93, 0.97, 1.03, 1.07, 1.15),

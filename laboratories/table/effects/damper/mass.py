@@ -1,9 +1,9 @@
-"""The damper's moving mass is heavier or lighter than believed.
+"""The damper's moving mass is heavier or lighter than planned.
 
     factor·m·(s̈ + ÿ) = −k·s − c·ṡ + u
 
-Not to be confused with `damper.gain`: where inertia rules, both are a factor on the stroke under the motor
-alone; the table's motion throws the damper as far whatever its mass.
+Not to be confused with `damper.gain`: where inertia dominates, both are a factor on the stroke under the motor's force
+alone, but the stroke under the table's motion does not depend on the mass.
 """
 
 from __future__ import annotations

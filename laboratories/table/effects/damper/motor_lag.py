@@ -1,4 +1,4 @@
-"""The motor's current loop is slower or faster than believed.
+"""The motor's current loop is slower or faster than planned.
 
     (T_m + time_constant)·u̇ + u = damper_command
 
@@ -8,22 +8,13 @@ reading (`sensor.damper_force.lag`), which leaves the stroke as it was.
 
 from __future__ import annotations
 
-from laboratories.effects.effect import Parameter
-from laboratories.effects.laws import adds
+from laboratories.effects.laws import adds, extra_time
 
 EFFECT = adds(
     "damper",
     "motor_lag",
     "motor_time_constant",
-    Parameter(
-        "time_constant",
-        "s",
-        null=0.0,
-        least=-0.05,
-        most=0.2,
-        sizes=(-0.002, 0.001, 0.003, 0.008, 0.02),
-        says="added",
-    ),
+    extra_time("time_constant", (-0.002, 0.001, 0.003, 0.008, 0.02)),
     says="the motor's force lags more or less behind its command",
     reference="(T_m + time_constant)·u̇ + u = damper_command",
 )

@@ -2,7 +2,7 @@
 
     m·(s̈ + ÿ) = … + force
 
-Felt on the table as its reaction. Not to be confused with `sensor.damper_force.bias`, which moves nothing.
+Its reaction acts on the table. Not to be confused with `sensor.damper_force.bias`, which moves nothing.
 """
 
 from __future__ import annotations

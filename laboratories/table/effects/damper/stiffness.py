@@ -1,9 +1,9 @@
-"""The damper's spring is stiffer or softer than believed.
+"""The damper's spring is stiffer or softer than planned.
 
     m·(s̈ + ÿ) = −factor·k·s − c·ṡ + u
 
-Nothing changes where the plan has k = 0. Not to be confused with `damper.mass`: both move the damper's
-period, but only the mass changes how far the motor and the table throw it.
+Nothing changes where the plan has k = 0. Not to be confused with `damper.mass`: both change the damper's period, but
+only the mass changes its stroke at high frequency.
 """
 
 from __future__ import annotations

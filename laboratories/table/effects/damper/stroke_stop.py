@@ -2,8 +2,8 @@
 
     m·(s̈ + ÿ) = −k·s − c·ṡ + u − stiffness·(|s| − stroke)·sgn(s) where |s| > stroke
 
-`stroke` counts from the middle to one stop. Not to be confused with `damper.force_limit`: a stop shows in
-the force at the largest strokes, and not at all below.
+`stroke` is the distance from the middle to one stop. Not to be confused with `damper.force_limit`: a stop changes the
+force at the largest strokes only.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""The damper's dashpot is stronger or weaker than believed.
+"""The damper's dashpot is stronger or weaker than planned.
 
     m·(s̈ + ÿ) = −k·s − factor·c·ṡ + u
 
-Nothing changes where the plan has c = 0. Not to be confused with `damper.friction`: the decay of a free
-oscillation is exponential here, straight there.
+Nothing changes where the plan has c = 0. Not to be confused with `damper.friction`: with a dashpot a free oscillation
+decays exponentially, with friction linearly.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""Effects on the shaking table of laboratory B: drive, loop, platform."""
+"""Effects on the shaking table: drive, servo loop, platform."""

@@ -2,8 +2,8 @@
 
     |u_true − u| ≤ width/2, and u_true moves only when the play is used up
 
-`width` is the whole play, from one flank to the other; it lies before the table's own dynamics. Not to be
-confused with `table.friction`, which also distorts reversals but grows no smaller with large motion.
+`width` is the whole play, from one flank to the other; it acts before the table's own dynamics. Not to be confused with
+`table.friction`, which also distorts reversals, but whose share does not decrease with the amplitude.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The table's loop is slower or faster than believed.
+"""The table's loop is slower or faster than planned.
 
     Y(s) = e^(−L·s)·(factor·ω)²/(s² + 2ζ·factor·ω·s + (factor·ω)²)·U(s)
 

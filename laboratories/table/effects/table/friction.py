@@ -2,8 +2,8 @@
 
     ÿ = ω²·(u − y) − 2ζω·ẏ − acceleration·sgn(ẏ)
 
-`acceleration` is the friction force over the moving mass; at rest it balances what is applied, up to that
-size. Not to be confused with `table.backlash`: friction shows as spikes of acceleration at reversals.
+`acceleration` is the friction force over the moving mass; at rest it balances the applied force up to that size. Not to
+be confused with `table.backlash`: friction causes spikes of acceleration at reversals.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Resonance of the table's oil column: the platform swings on top of the servo loop's motion.
+"""Resonance of the table's oil column: the platform vibrates relative to the servo loop's motion.
 
     Y(s) = ω_o²/(s² + 2ζ_o·ω_o·s + ω_o²)·Y_loop(s),    ω_o = 2π·frequency, ζ_o = damping
 

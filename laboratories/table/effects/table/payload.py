@@ -2,8 +2,8 @@
 
     Y(s) = G(s)·(e^(−L·s)·U(s) + compliance·damper_force(s))
 
-with G the second order of the table's loop: the force meets no dead time. Not to be confused with
-`table.gain` or `table.bandwidth`, which are there without any force of the damper too.
+where G is the table's loop of second order: the force acts without dead time. Not to be confused with `table.gain` or
+`table.bandwidth`, which also act without any force of the damper.
 """
 
 from __future__ import annotations
