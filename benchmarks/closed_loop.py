@@ -19,7 +19,8 @@ from common.plan.laboratory_tables import Control
 from common.plan.plan import Plan, ideal
 from common.plan.read import with_test
 from loop import substructure
-from loop.closed_loop import signals, simulate
+from loop.closed_loop import simulate
+from loop.signals import signals
 from models.registry import Array
 
 TARGET = 5e6

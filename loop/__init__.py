@@ -1,1 +1,1 @@
-"""The hybrid test as one simulated loop: building, laboratories and exchange, and what nominal models say of a plan."""
+"""The simulated closed loop of building, laboratories and exchange, and the analysis of a plan by nominal models."""

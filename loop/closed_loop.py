@@ -1,11 +1,11 @@
-"""The whole test as one compiled rollout: the building, the master's laboratory, and any number of slaves'.
+"""The simulation of a whole test, compiled: the building, the master's laboratory, and those of any number of slaves.
 
-It is the simulation that a recording is compared with, and the reference for the real loops.
+Recordings are compared with it, and tests compare the real loops with it bit by bit.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from common import signals as table
 from common.errors import InputError
 from common.plan.plan import Plan
-from common.roles import MASTER, SLAVE, name_of, title
+from common.roles import MASTER, title
 from laboratories import kinds
 from laboratories.column.model import ColumnLab
 from laboratories.kind import Kind
@@ -26,7 +26,6 @@ from laboratories.sensors import noise
 from laboratories.table.kind import TABLE
 from laboratories.table.model import TableLab
 from loop import site, substructure
-from loop.names import sent_names
 from loop.site import Site
 from loop.substructure import (
     COMMAND,
@@ -49,25 +48,25 @@ from models.system import Effects, System
 
 Index = NDArray[np.int64]
 
-LARGEST = float(np.finfo(np.float64).max)  # m: every command that is a finite number is below
+LARGEST = float(np.finfo(np.float64).max)  # m: no finite command exceeds it
 
 
 class MessagesUsed(NamedTuple):
-    """Which message each tick used: the link's whole effect on the loop."""
+    """The message that each tick used, which is the whole effect of the link on the loop."""
 
     command: Index  # (ticks,): command in force at the slave's tick, −1 for none yet
     feedback: Index  # (ticks,): feedback used at the master's tick, −1 for none yet
 
 
 class Rollout(NamedTuple):
-    """What a rollout gives: signals by name, one row per tick, up to where the loop diverged."""
+    """The result of a simulation: signals by name, one row per tick, up to where the loop diverged."""
 
     master: dict[
         str, Array
-    ]  # (ticks,), of several storeys (ticks, storeys), of several slaves (ticks, slaves)
+    ]  # (ticks,); of several storeys (ticks, storeys), of several slaves (ticks, slaves)
     slaves: dict[str, dict[str, Array]]  # by role, (ticks,) each: command of the transfer system, measured
     exchange: dict[str, MessagesUsed]  # by role of the slave
-    finite: bool  # False where the loop diverged
+    finite: bool  # False if the loop diverged
     ticks: int  # rows of every signal
 
 
@@ -80,7 +79,7 @@ class MasterLaboratory(NamedTuple):
 
 
 class Slave(NamedTuple):
-    """A slave's laboratory, which follows the target that it is sent."""
+    """A slave's laboratory, which follows the target sent to it."""
 
     site: Site
     compensator: Compensator
@@ -91,10 +90,10 @@ class Slave(NamedTuple):
 
 
 class Traffic(NamedTuple):
-    """What passes between the building and its slaves."""
+    """The data exchanged between the building and its slaves."""
 
-    outputs: Array  # (ticks, width): the building's rows, from which the slaves' commands are read
-    nothing: Array  # (width,) zeros: what a slave follows before its first command
+    outputs: Array  # (ticks, width): the building's output rows, from which the slaves' commands are taken
+    nothing: Array  # (width,) zeros: the row that a slave uses before its first command
     forces: Array  # (ticks, slaves) as measured, N
     used: Array  # (ticks, slaves) as the building used them, N
     command: Index  # (slaves, ticks), as in `Exchange`
@@ -106,12 +105,12 @@ class ClosedLoop(NamedTuple):
 
     building: Substructure
     own: MasterLaboratory
-    slaves: tuple[Slave, ...]  # all of one record; of as many as take part, the first ones
+    slaves: tuple[Slave, ...]  # all of one class of record; those that take part come first
     traffic: Traffic
 
 
 def on_time(ticks: int) -> MessagesUsed:
-    """The exchange in which every message is in time: command k is used at tick k, feedback k at tick k + 1."""
+    """The exchange without delays: command k is used at tick k, feedback k at tick k + 1."""
     return MessagesUsed(np.arange(ticks), np.arange(ticks) - 1)
 
 
@@ -126,19 +125,19 @@ def simulate(
     exchange: Mapping[str, MessagesUsed] | None = None,
     farthest: float = LARGEST,
 ) -> Rollout:
-    """Closed loop of a plan: its models over the whole test, with effects laid over them where given.
+    """Simulate the closed loop of a plan's models over the whole test, with effects where given.
 
-    `ground` as `substructure.ground_rows` gives it. Every slave is what `plan` and `effects` say, or its entry in
-    `slaves`, systems by role; with no entry at all, `{}`, building and master's laboratory move alone, which takes a
-    building on which no slave's force acts. With a `seed` the sensors read what the emulated laboratories read under
-    that seed of the plan; `noise` are rows (ticks, channels) that err in the readings of single roles; else they are
-    free of noise. Of the link's effects only the `exchange` of each role counts, in time where it is not given. A
-    command of the master's laboratory, or without one a floor's displacement, that is not finite or beyond `farthest`
-    (m) ends the loop.
+    `ground` is that of `substructure.ground_rows`. Every slave follows from `plan` and `effects`, or is its entry in
+    `slaves`, systems by role; with `slaves` empty, the building and the master's laboratory are simulated alone, which
+    requires that no slave's force acts on the building. With a `seed`, the sensors have the noise that the emulated
+    laboratories have under that seed of the plan; `noise` gives errors (ticks, channels) of the readings of single
+    roles; otherwise the readings have no noise. `exchange` gives the messages used by each role's link, which is
+    without delays where it is not given. The loop ends where a command of the master's laboratory, or without one a
+    floor's displacement, is not finite or beyond `farthest` (m).
 
     Raises:
-        InputError: a building on which slaves' forces act is to move alone, noise is given twice or has another
-            shape, or a model, method or parameter is unknown to the registries.
+        InputError: slaves are left out although their forces act on the building, noise is given twice or has a wrong
+            shape, or a model, method or parameter is unknown.
     """
     of_master = System(plan, effects or Effects())
     systems = {role: System(plan.of(role), of_master.effects) for role in plan.roles}
@@ -163,12 +162,12 @@ def simulate(
 
 
 def check_alone(plan: Plan) -> None:
-    """Raise InputError where the force of a slave acts on the building, which then cannot move without it."""
+    """Raise InputError where the force of a slave acts on the building, which then cannot be simulated without it."""
     acting = [role for role in plan.roles if kinds.kind_of(plan, role).coupling(plan.of(role)).scale != 0.0]
     if acting:
         raise InputError(
-            f"The force of the {title(acting[0])} acts on the building, which is to move without its slaves: leave "
-            "them in, or set amd in [control] to false where they carry dampers only."
+            f"The force of the {title(acting[0])} acts on the building, which therefore cannot be simulated without "
+            "its slaves: include them, or set amd in [control] to false if they carry dampers only."
         )
 
 
@@ -198,11 +197,12 @@ def at_rest(
 
 
 def compiled(mine: MasterLaboratory, slaves: list[Slave]) -> tuple[MasterLaboratory, list[Slave]]:
-    """The laboratories in records for which `roll` is compiled, whatever stands in them.
+    """The laboratories in records for which `roll` is compiled.
 
-    A column at the master with tables at the slaves has a loop of its own, into which their kernels are merged. All
-    others share one for laboratories of whichever kind, for two slaves or a larger power of two: the places that none
-    takes are never moved. A new combination of kinds is so compiled already, at half the speed.
+    A column at the master with tables at the slaves has a compiled loop of its own, into which their kernels are
+    merged. All other combinations share a loop for laboratories of any kind and for two slaves or a larger power of
+    two, in which unused places are never advanced. So a new combination of kinds needs no compilation; it runs at half
+    the speed.
     """
     if isinstance(mine.site.lab, ColumnLab) and all(isinstance(one.site.lab, TableLab) for one in slaves):
         return mine, slaves or [spare()]
@@ -214,7 +214,7 @@ def compiled(mine: MasterLaboratory, slaves: list[Slave]) -> tuple[MasterLaborat
 
 @cache
 def spare() -> Slave:
-    """A slave with a table that takes no part."""
+    """A slave with a table, for an unused place."""
     return follower(TABLE, System(Plan()), np.zeros((1, len(TABLE.channels.names))))
 
 
@@ -226,7 +226,7 @@ def own(kind: Kind | None, system: System, errors: Array | None) -> MasterLabora
 
 
 def channels(kind: Kind) -> tuple[int, int]:
-    """The channels of position and force among those that a kind measures."""
+    """The indices of position and force among the measured channels of a kind."""
     names = kind.channels.names
     return names.index(kind.channels.position), names.index(kind.channels.force)
 
@@ -245,10 +245,10 @@ def follower(kind: Kind, system: System, errors: Array) -> Slave:
 
 
 def errors(systems: Mapping[str, System], seed: int | None, given: Mapping[str, Array]) -> dict[str, Array]:
-    """What errs in the readings of every laboratory, (ticks, channels) by role; `systems` begin with the master's.
+    """The errors of every laboratory's readings, (ticks, channels) by role; `systems` begin with the master's.
 
     Raises:
-        InputError: the noise is given twice, or has another shape.
+        InputError: the noise is given twice, or has a wrong shape.
     """
     hosted = kinds_of(systems[MASTER].plan)
     result = {}
@@ -307,7 +307,7 @@ def within(building: Substructure, farthest: float) -> bool:
 
 @jit
 def follow(slave: Slave, place: int, traffic: Traffic, tick: int, interval: float) -> None:
-    """One tick of a slave: its readings, its command, and its laboratory one interval on."""
+    """One tick of a slave: its readings, its command, and the advance of its laboratory by an interval."""
     read = slave.site.measured
     site.read(slave.site, tick, tick * interval)
     traffic.forces[tick, place] = read[tick, slave.force]
@@ -329,13 +329,13 @@ def follow(slave: Slave, place: int, traffic: Traffic, tick: int, interval: floa
 
 
 def follow_all(slaves: tuple[Slave, ...], traffic: Traffic, tick: int, interval: float) -> None:
-    """`follow` of every slave that takes part; compiled code only."""
-    raise NotImplementedError("Only compiled kernels move slaves of any kinds on.")
+    """Call `follow` for every slave that takes part; for compiled code only."""
+    raise NotImplementedError("Only compiled code can advance slaves of any kinds.")
 
 
 @overload(follow_all, jit_options=MERGED, strict=False)  # strict compares annotations too
 def _follow_all(slaves: types.BaseTuple, traffic: Any, tick: Any, interval: Any) -> Any:
-    """Code for these slaves, whose number the compiler knows; of the last ones some may take no part."""
+    """The code for a tuple of slaves, whose length the compiler knows; the last ones may be unused."""
     count = len(slaves)
     if count == 1:
 
@@ -354,7 +354,7 @@ def _follow_all(slaves: types.BaseTuple, traffic: Any, tick: Any, interval: Any)
 
 
 def master_signals(plan: Plan, loop: ClosedLoop, slaves: Sequence[str], ticks: int) -> dict[str, Array]:
-    """What the master computed, measured and used."""
+    """The signals that the master computed, measured and used."""
     result = substructure.named(loop.traffic.outputs[:ticks], plan, slaves)
     if own_kind := kinds.own(plan):
         read = loop.own.site.measured[:ticks]
@@ -364,7 +364,10 @@ def master_signals(plan: Plan, loop: ClosedLoop, slaves: Sequence[str], ticks: i
 
 
 def per_kind(plan: Plan, values: Mapping[str, Any], what: str) -> dict[str, Any]:
-    """Values (ticks,) of each slave's force by the master's signals, those of slaves of one kind together."""
+    """Values (ticks,) for each slave's force by the names in the master's topic.
+
+    Slaves with the same channels share one.
+    """
     hosted = kinds_of(plan)
     groups = table.alike({role: hosted[role].channels for role in values})
     return {
@@ -379,85 +382,6 @@ def together(values: Sequence[Any]) -> Any:
 
 
 def slave_signals(kind: Kind, slave: Slave, ticks: int) -> dict[str, Array]:
-    """What a slave wrote and measured."""
+    """The signals that a slave wrote and measured."""
     measured = dict(zip(kind.channels.names, slave.site.measured[:ticks].T, strict=True))
     return {kind.channels.command.name: slave.written[:ticks]} | measured
-
-
-def signals(plan: Plan, rollout: Rollout) -> dict[str, Array]:
-    """The rollout's signals by name, as a recording names them; (ticks,), (ticks, storeys) or (ticks, slaves) each.
-
-    Those of a named slave are called `NAME.signal`, those of a slave without a name that the master's own laboratory
-    has too `slave.signal`.
-    """
-    result: dict[str, Array] = {}
-    order = kinds.topics(plan)
-    own = {row.name for row in order[MASTER] if not row.slaves} - {table.TIME.name}
-    for topic, columns in topics(plan, rollout).items():
-        name = name_of(topic)
-        for row in order[topic]:
-            key = row.name
-            if row.kind not in (table.FieldType.NUMBER, table.FieldType.STOREYS) or key not in columns:
-                continue
-            if name and key != table.TIME.name:
-                result[f"{name}.{key}"] = columns[key]
-            elif topic != MASTER and key in own:
-                result[f"{SLAVE}.{key}"] = columns[key]
-            elif not name:
-                result.setdefault(key, columns[key])
-    for name in [name for name in result if name in ages(plan, rollout.slaves)]:
-        del result[name]
-    return result
-
-
-def ages(plan: Plan, slaves: Iterable[str]) -> set[str]:
-    """The names of the ages of the forces that the master used."""
-    hosted = kinds_of(plan)
-    return {f"{hosted[role].channels.force}_age" for role in slaves}
-
-
-def received(plan: Plan, rollout: Rollout) -> dict[str, dict[str, Array]]:
-    """What each slave was sent, (ticks,) each, by role and the names of its own topic, at the ticks of its sending."""
-    hosted, names = kinds_of(plan), sent_names(plan)
-    groups = table.alike({role: hosted[role].channels for role in rollout.slaves})
-    result: dict[str, dict[str, Array]] = {}
-    for channels, roles in groups.items():
-        for place, role in enumerate(roles):
-            sent = (rollout.master[name] for name in names[role])
-            values = (every if len(roles) == 1 else every[:, place] for every in sent)
-            result[role] = dict(zip(channels.sent, values, strict=True))
-    return result
-
-
-def by_role(plan: Plan, rollout: Rollout) -> dict[str, dict[str, Array]]:
-    """The building's and the master's signals, and by role what each slave was sent, wrote and measured."""
-    sent = received(plan, rollout)
-    return {MASTER: rollout.master} | {role: sent[role] | own for role, own in rollout.slaves.items()}
-
-
-def topics(plan: Plan, rollout: Rollout) -> dict[str, dict[str, Any]]:
-    """Everything that a recording of the rollout holds, by topic and signal."""
-    seq = np.arange(rollout.ticks)
-    own: dict[str, Any] = {"seq": seq, "t": seq.astype(np.float64) * plan.test.interval}
-    used = {role: item.feedback[: rollout.ticks] for role, item in rollout.exchange.items()}
-    age = {role: np.where(of < 0, 0.0, (seq - of) * plan.test.interval) for role, of in used.items()}
-    about = per_kind(plan, used, "seq") | per_kind(plan, age, "age")
-    result = {MASTER: own | rollout.master | about}
-    sent = received(plan, rollout)
-    for role, columns in rollout.slaves.items():
-        command = rollout.exchange[role].command[: rollout.ticks]
-        came = {name: np.where(command < 0, 0.0, values[command]) for name, values in sent[role].items()}
-        result[role] = own | {"command_seq": command} | came | columns
-    return result
-
-
-def rows(plan: Plan, rollout: Rollout) -> Iterator[tuple[str, tuple[Any, ...]]]:
-    """The rollout's messages as a recording holds them: topic and values in the order of the signal table."""
-    order = kinds.topics(plan)
-    tables = {
-        topic: list(zip(*(columns[row.name].tolist() for row in order[topic]), strict=True))
-        for topic, columns in topics(plan, rollout).items()
-    }
-    for tick in range(rollout.ticks):
-        for topic, values in tables.items():
-            yield topic, values[tick]

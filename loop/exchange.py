@@ -1,4 +1,4 @@
-"""Which message each tick uses under a link plug-in, all ticks at once: the mailboxes' rule without the loops."""
+"""The messages that each tick uses under a link plug-in, for all ticks at once, by the same rule as the mailboxes."""
 
 from __future__ import annotations
 
@@ -7,22 +7,19 @@ import numpy as np
 from common.link.mailbox import LinkModel, ticks_late
 from loop.closed_loop import Index, MessagesUsed
 
-COMMAND, FEEDBACK = (
-    ("command", 0),
-    ("feedback", 1),
-)  # direction, and ticks after its own that a message is used
+COMMAND, FEEDBACK = ("command", 0), ("feedback", 1)  # direction, and after how many ticks a message is used
 
 
 def exchange(ticks: int, interval: float, link: LinkModel) -> MessagesUsed:
-    """The exchange of a test in which no laboratory is ever late: command and feedback used at each tick."""
+    """Command and feedback used at each tick of a test in which no laboratory is late."""
     return MessagesUsed(used(ticks, interval, link, *COMMAND), used(ticks, interval, link, *FEEDBACK))
 
 
 def used(ticks: int, interval: float, link: LinkModel, direction: str, nominal: int) -> Index:
-    """The newest message that is there at each tick, −1 for none yet."""
+    """The newest message available at each tick, −1 for none yet."""
     newest = np.full(ticks, -1, dtype=np.int64)
     for seq in range(ticks):
         extra = link.fate(direction, seq, seq * interval)
         if extra is not None and (due := seq + nominal + ticks_late(extra, interval)) < ticks:
-            newest[due] = seq  # numbers rise: of two that are due together the newer stays
+            newest[due] = seq  # of two messages due at one tick the newer one stays
     return np.maximum.accumulate(newest)

@@ -1,4 +1,4 @@
-"""The measured column force beside that of the plan's specimen at the measured displacement."""
+"""Compares the measured column force with that of the plan's specimen at the measured displacement."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from models.system import System
 
 
 def force_path(plan: Plan, displacement: Array, force: Array) -> ForcePath | None:
-    """Delay (s) and gain of the force (ticks,) N at the displacement (ticks,) m; None where nothing can be said.
+    """Delay (s) and gain of the force (ticks,) N at the displacement (ticks,) m; None where they cannot be determined.
 
-    The plan's specimen is played over the measured displacement. So what its model leaves out counts as well: a
-    dashpot or hysteresis that it lacks is a lead of the force.
+    The plan's specimen is simulated for the measured displacement, so what its model lacks counts too: a missing
+    dashpot or hysteresis appears as a lead of the force.
     """
     try:
         return indicators.force_path(replay.column(System(plan), displacement), force, plan.test.interval)

@@ -19,12 +19,12 @@ def link_model(reality: Reality) -> LinkModel:
     """The impairment of one direction, to or from the slave whose reality it is.
 
     Raises:
-        InputError: the plug-in cannot be constructed, or effects of the reality cannot be laid.
+        InputError: the plug-in cannot be constructed, or effects of the reality cannot be applied.
     """
     rig, options = reality.link, impairment(reality)
     if rig.class_ and options:
         raise InputError(
-            "Effects on the link cannot be laid over the plug-in in [link]: leave one of them out."
+            "Effects on the link cannot be applied to the plug-in in [link]: leave one of them out."
         )
     if not rig.class_ and not options:
         return PerfectLink()
@@ -43,6 +43,6 @@ def seed_of(reality: Reality) -> int:
 
 
 def impairment(reality: Reality) -> dict[str, float]:
-    """Options of the emulated network that the reality's effects ask for; none where they leave it as planned."""
+    """Options of the emulated network from the reality's effects; empty without effects on the link."""
     effects = true_system(reality).effects.link
     return {} if effects == LinkEffects() else vars(effects)

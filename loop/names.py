@@ -1,4 +1,4 @@
-"""What the master's topic calls what it sends: the kinds' names, and another where its own laboratory has that one."""
+"""The names of sent signals in the master's topic, which differ where its own laboratory has the same signal."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from laboratories import kinds
 
 
 def sent_names(plan: Plan) -> dict[str, tuple[str, ...]]:
-    """The names in the master's topic of what each slave is sent, by role, in the order of its kind's `sent`.
+    """The names in the master's topic of the values sent to each slave, by role, in the order of its kind's `sent`.
 
     Raises:
         InputError: a kind cannot be loaded, or two signals would have one name.

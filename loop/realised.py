@@ -1,4 +1,4 @@
-"""The laboratories as the reality describes them, with effects laid over the plan's parameters."""
+"""The laboratories as the reality describes them, with true parameters and effects."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from models.system import System
 
 
 def true_system(reality: Reality) -> System:
-    """The plan's parameters as they really are for a role, with the effects laid over them that it can have.
+    """The true parameters for a role, with the effects that apply to it.
 
-    Of a reality that is not of one role it is the master's. An effect holds for every laboratory that has its place,
-    or for the one that it names; those in no laboratory hold for all.
+    For a reality that is not of one role the role is the master. An effect applies to every laboratory that has its
+    site, or to the one that it names; effects on the building apply to all.
 
     Raises:
-        InputError: an effect that the plan's test cannot have, parameters it cannot have, an effect on a laboratory
-            whose rig is a plug-in: it brings its own physics, or one that names a role which does not have its place.
+        InputError: an effect is unknown to the plan's test, has invalid parameters, is on a laboratory whose rig is a
+            plug-in, which brings its own physics, or names a role that does not have its site.
     """
     one = reality if reality.whole else reality.of(MASTER)
     whole = one.whole or one
@@ -50,12 +50,12 @@ def with_learned(system: System, given: LearnedEntry) -> System:
 
 
 def check(name: str, only: str, whole: Plan, known: dict[str, Effect]) -> None:
-    """Raise InputError where the test of a plan cannot have an effect, or the one role that it names cannot."""
+    """Raise InputError where the test of a plan cannot have an effect, or the role that the effect names cannot."""
     if name not in known:
         if name in CATALOGUE:
             raise InputError(
-                f"The effect '{name}' is of the {CATALOGUE[name].site}, which the plan's test does not have: leave it "
-                "out, or look at kind in [master] and [slave]."
+                f"The effect '{name}' acts on the {CATALOGUE[name].site}, which the plan's test does not have: leave "
+                "it out, or change kind in [master] or [slave]."
             )
         raise InputError(f"Unknown effect '{name}': {nearest(name, known)}")
     site = known[name].site
@@ -75,12 +75,12 @@ def check_rig(one: Reality) -> None:
     for name, _ in one.effects:
         if name in CATALOGUE and CATALOGUE[name].site in places:
             raise InputError(
-                f"The effect '{name}' cannot be laid over the plug-in in [{one.role}.rig]: "
+                f"The effect '{name}' cannot be applied to the plug-in in [{one.role}.rig]: "
                 "put it into that rig, name the laboratory that it is for, or leave the rig out of the reality and "
                 "the plan."
             )
 
 
 def true_slaves(reality: Reality) -> dict[str, System]:
-    """The laboratories of all slaves as they really are, by role; raises InputError as `true_system` does."""
+    """The true systems of all slaves, by role; raises InputError as `true_system` does."""
     return {role: true_system(reality.of(role)) for role in reality.plan.roles}

@@ -1,4 +1,4 @@
-"""Replay of one part: its model is driven by recorded inputs and gives the readings that it would have had.
+"""Replay of one part: its model computes the readings for recorded inputs.
 
 Reading k is taken before the command of tick k acts, as in the test.
 """
@@ -28,9 +28,9 @@ def laboratory(
 ) -> Array:
     """Readings (ticks, channels) of a laboratory without noise under its commands, from rest.
 
-    `drive` (ticks, 2) are the transfer system's command (m) and a motor's (N), zero where the kind has none. `start` is
-    a command (m) that has been there for long before the first tick. `anew` (m, 3) are ticks, ascending, at which the
-    kind's free motion begins anew with a place (m) and a rate (m/s).
+    `drive` (ticks, 2) holds the transfer system's command (m) and a motor's (N), zero for a kind without one. `start`
+    is a constant command (m) before the first tick, whose steady state is the initial one. `anew` (m, 3) holds
+    ascending ticks at which the kind's free motion is set to a position (m) and a rate (m/s).
     """
     ticks, interval = drive.shape[0], system.plan.test.interval
     played = silent(kind, system, ticks)
@@ -54,7 +54,8 @@ def silent(kind: Kind, system: System, ticks: int) -> Site:
 def column(system: System, deformation: Array) -> Array:
     """Force readings (ticks,) of the specimen without noise for its true deformation (ticks,) m at the ticks.
 
-    The plan's mass and dashpot move by central differences, which short steps along straight lines do not give.
+    The forces of the plan's mass and dashpot follow from central differences, because a motion that is linear between
+    ticks has no acceleration.
     """
     force, result = np.empty(deformation.size), np.empty(deformation.size)
     interval, effects, column = system.plan.test.interval, system.effects, system.plan.column
@@ -69,7 +70,7 @@ def column(system: System, deformation: Array) -> Array:
 def building(
     system: System, ground: Array, displacement: Array, force: Array, dampers: Array
 ) -> dict[str, Array]:
-    """What the building computes, by signal, for the measurements (ticks,) used.
+    """The signals that the building computes from the measurements (ticks,) used, by name.
 
     `dampers` are the dampers' forces (N) used, (ticks,), or (ticks, slaves) where there are several.
     """
@@ -96,7 +97,7 @@ def play_column(tested: Specimen, deformation: Array, interval: float, steps: in
 
 @jit
 def play_reading(sensors: Readings, values: Array, interval: float, result: Array) -> None:
-    """Fill `result` (ticks,) with what the first sensor makes of the values (ticks,)."""
+    """Fill `result` (ticks,) with the readings of the first sensor for the values (ticks,)."""
     for tick in range(values.size):
         result[tick] = readings.step(sensors, 0, values[tick], 0.0, tick * interval)
 

@@ -1,4 +1,4 @@
-"""The rig of a role as the plan and the reality have it: emulated, of a class of the user's, or none at all."""
+"""The rig of a role by plan and reality: emulated, of a class of the user's, or none."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ def hosted(reality: Reality, role: str) -> Kind | None:
 
 
 def build(reality: Reality, role: str, at_rest: AtRest | None = None, *, paced: bool = False) -> GuardedRig:
-    """A role's laboratory, of a slave from that slave's reality, judged `at_rest` as it is armed.
+    """A role's rig, whose sensors `at_rest` judges when it is armed; `reality` is that of the slave's role.
 
-    A rig in another process is waited for no longer than the plan says where the test is `paced`, in real time.
+    In a test in real time (`paced`) the answers of a rig in another process must come within the plan's time limits.
 
     Raises:
         InputError: it cannot be constructed.
@@ -66,9 +66,9 @@ def build(reality: Reality, role: str, at_rest: AtRest | None = None, *, paced: 
 def exchange(reality: Reality, role: str, seed: int, *, paced: bool) -> Terms:
     """The terms of the exchange with a role's rig in another process.
 
-    It may be left without packets as long as this laboratory's loop may be late before it trips by itself, and twice
-    as long as it may miss answers, so that a laboratory that lives brings it to rest. In virtual time a tick may take
-    any time.
+    The rig's own time limit without packets is the larger of the time by which this laboratory's loop may be late and
+    twice the time of missing answers after which the laboratory ramps down: as long as the laboratory runs, it brings
+    the rig to rest itself. In virtual time a tick may take any time.
     """
     plan = patience.strict(reality.plan)
     rig = reality.master if role == MASTER else reality.slave
@@ -87,7 +87,7 @@ def exchange(reality: Reality, role: str, seed: int, *, paced: bool) -> Terms:
 
 
 def probed(plan: Plan) -> list[Probed]:
-    """Every rig of a plan that stands in another process, asked whether it is there; nothing moves."""
+    """Ask every rig of a plan that runs in another process whether it answers; nothing moves."""
     reality, found = as_planned(plan), []
     for role, kind in kinds.kinds_of(plan).items():
         own = reality.of(role)
@@ -99,14 +99,14 @@ def probed(plan: Plan) -> list[Probed]:
 
 
 def called(role: str) -> str:
-    """What errors call the laboratory of a role."""
+    """The name of a role's laboratory in errors."""
     if role == MASTER:
         return "laboratory A"
     return f"laboratory B of the {title(role)}" if name_of(role) else "laboratory B"
 
 
 def check(reality: Reality, role: str) -> None:
-    """Raise InputError where a role's laboratory could not be built; nothing of it is constructed or moved."""
+    """Raise InputError where a role's laboratory could not be built, without constructing or moving the rig."""
     kind = hosted(reality, role)
     if kind is not None:
         kind.build(true_system(reality))
@@ -116,17 +116,18 @@ def check(reality: Reality, role: str) -> None:
 
 
 def at_rest(gate: Gate | None, setting: Setting, role: str) -> AtRest | None:
-    """What judges the sensors of a role's rig as it arms: the gate, where there is one and the role has a rig."""
+    """The check of the sensors of a role's rig at rest, None without a gate or without a rig."""
     if gate is None or role not in setting.plan.kinds:
         return None
     kind = kinds.kind_of(setting.plan, role)
-    plan = patience.strict(setting.plan.of(role))  # what is off zero is so beside an emulation too
+    # offsets are compared with the limits for a rig, even for emulated ones
+    plan = patience.strict(setting.plan.of(role))
     levels = dict(zip(kind.channels.names, kind.noise(plan).tolist(), strict=True))
     return SensorsAtRest(gate, setting, kind.limits(plan), levels)
 
 
 def warm_up(reality: Reality, role: str) -> None:
-    """Compile the kernels of a role's emulated laboratory and of its limits on arrays that are thrown away."""
+    """Compile the kernels of a role's emulated laboratory and of its limits."""
     kind = hosted(reality, role)
     if kind is not None:
         kind.enter(plain(kind.build(true_system(reality))), *(0.0 for _ in kind.channels.drives))

@@ -1,6 +1,6 @@
-"""A laboratory in a simulated test: its kernel, its sensors and what they read at every tick.
+"""A laboratory in a simulated test: its kernel, its sensors and their readings at every tick.
 
-The same steps play a laboratory in the closed loop and alone behind recorded commands.
+The closed loop and the replay of a single laboratory use the same steps.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from models.system import System
 
 
 class Site(NamedTuple):
-    """A laboratory with its sensors, which `read` and `play` move on."""
+    """A laboratory with its sensors, which `read` and `play` update."""
 
     lab: Any  # record of its kind
     sensors: Readings
-    errors: Array  # (ticks, channels) what errs in the readings
-    truth: Array  # (channels,) what sensors without error would read now
+    errors: Array  # (ticks, channels): errors of the readings
+    truth: Array  # (channels,): present readings of sensors without error
     measured: Array  # (ticks, channels), filled tick by tick
 
 
@@ -43,7 +43,7 @@ def none(ticks: int) -> Site:
 
 
 def of_any(played: Site) -> Site:
-    """The same laboratory in the record that holds one of whichever kind."""
+    """The same laboratory in the record for any kind."""
     return played._replace(lab=kinds.as_any(played.lab))
 
 
@@ -57,7 +57,7 @@ def errors(kind: Kind, system: System, ticks: int, seed: int | None = None) -> A
 
 @jit
 def read(site: Site, tick: int, t: float) -> None:
-    """The readings at a tick, `t` s, into its row of `measured`."""
+    """Write the readings at a tick, at the time `t` (s), into its row of `measured`."""
     for channel in range(site.truth.size):
         site.measured[tick, channel] = readings.step(
             site.sensors, channel, site.truth[channel], site.errors[tick, channel], t
@@ -66,7 +66,7 @@ def read(site: Site, tick: int, t: float) -> None:
 
 @jit
 def play(site: Site, drive: Array, interval: float, start: int, stop: int) -> None:
-    """The readings at the ticks from `start` to before `stop` under commands; `drive` (ticks, 2): m and N."""
+    """Fill the readings at the ticks from `start` to before `stop` for the commands `drive` (ticks, 2) in m and N."""
     for tick in range(start, stop):
         read(site, tick, tick * interval)
         kinds.advance(site.lab, site.truth, drive[tick, 0], drive[tick, 1])

@@ -2,11 +2,11 @@
 
     M_N·ẍ + C_N·ẋ + f_numerical(x) + Σ λ·f_drift = −M·1·z̈ + Σ λ·f_floor
 
-with the whole building's mass M under the ground, the numerical part's M_N and C_N, and one force f of each laboratory
-at its scale λ: one that follows the drift of a storey resists it, one that follows a floor pushes it. At tick k the
-forces measured at the displacement x_k, corrected and with `unit_delay` those of the tick before, complete the equation
-of motion; the integrator then gives x_{k+1}, from which the targets of the interval's end follow (contract, sections 2
-and 3). The compensator of the master's own laboratory, where it has one, is part of the computation.
+M is the mass of the whole building, M_N and C_N belong to the numerical part, and each laboratory has one force f at
+its scale λ: a laboratory that follows a storey's drift resists it, one that follows a floor pushes it. At tick k the
+forces measured at the displacement x_k, corrected, and with `unit_delay` those of the tick before, complete the
+equation of motion. The integrator then gives x_{k+1}, from which the targets for the interval's end follow. The
+compensator of the master's own laboratory, where it has one, is part of the computation.
 """
 
 from __future__ import annotations
@@ -39,24 +39,24 @@ from models.transfer_systems import delay
 Codes = NDArray[np.int64]
 
 # places in `codes` and in `scalars`; rows of `places` and of `labs`, which have a column for each laboratory
-INTEGRATOR, SPECIMEN, OWN = range(3)  # OWN is 1 where the master has a laboratory, whose column is the first
+INTEGRATOR, SPECIMEN, OWN = range(
+    3
+)  # OWN is 1 if the master has a laboratory, which is then the first column
 INTERVAL, P_DELTA = range(2)
 FOLLOWED, PLACE = range(2)
 RATIO, FORCE_SCALE, MOTOR_GAIN, HIGH_PASS, HIGH_PASS_GAIN, UNIT_DELAY, FORCE_USED, EXERTED = range(8)
-DRIFT, FLOOR = range(2)  # what a laboratory follows
-MATRIX = -1  # in place of a specimen's code: the numerical part is linear and coupled by a stiffness matrix
+DRIFT, FLOOR = range(2)  # the motion that a laboratory follows
+MATRIX = -1  # in place of a specimen's code: the numerical part is linear with a stiffness matrix
 DELAYED = force_correction.CORRECTED + 1  # place in a row of `filtered`
 
-# places in the output row: what is the ground's and the master's own laboratory's; then what each slave is sent, one
-# slave after the other; then what each storey has, one signal after the other
+# places in the output row: the values of the ground and of the master's own laboratory; then the values sent, slave by
+# slave; then the values of the storeys, signal by signal
 GROUND_ACCELERATION, TARGET, COMMAND, EFFORT = range(4)
-OF_SLAVES = 4  # first place of what is sent
+OF_SLAVES = 4  # first place of the values sent
 SENT_TARGET, SENT_EFFORT, SENT_VELOCITY, SENT_ACCELERATION, SENT_JERK = range(5)  # to one slave
 SENT_VALUES = 5
-STOREY_DISPLACEMENT, STOREY_VELOCITY, STOREY_ACCELERATION, STOREY_ABSOLUTE, STOREY_FORCE = range(
-    5
-)  # `OF_STOREYS`
 STOREY_VALUES = len(OF_STOREYS)
+STOREY_DISPLACEMENT, STOREY_VELOCITY, STOREY_ACCELERATION, STOREY_ABSOLUTE, STOREY_FORCE = range(5)
 
 
 def layout(plan: Plan, slaves: Sequence[str]) -> dict[str, list[int]]:
@@ -91,12 +91,12 @@ def named(rows: Array, plan: Plan, slaves: Sequence[str]) -> dict[str, Array]:
 
 
 class Substructure(NamedTuple):
-    """The numerical side with its memories, which `advance` moves on."""
+    """The numerical substructure with its state, which `advance` updates."""
 
     compensator: Compensator  # of the master's own laboratory
     codes: Codes
     scalars: Array
-    places: Codes  # (2, laboratories): what each follows, and the storey or floor, from 0
+    places: Codes  # (2, laboratories): the motion that each follows, and its storey or floor, from 0
     labs: Array  # (8, laboratories): target over motion, λ, motor force over velocity N·s/m, correction, forces N
     mass: Array  # (n,) kg
     coefficients: Array  # of the integrator
@@ -106,20 +106,20 @@ class Substructure(NamedTuple):
     column_memory: Array  # (n, memory)
     recent: Array  # (laboratories, RECENT): accelerations of the motion that each follows, newest first, m/s²
     filtered: Array  # (laboratories, 3): force of the tick before, measured, corrected and to be used next, N
-    asked: Array  # (5,): what the master's own laboratory was told last, its target that of the present tick
+    asked: Array  # (5,): values for the master's own laboratory; the target is that of the present tick
     balance: Array  # (n,): external minus restoring force, N
     output: Array
 
 
 def build(plan: Plan, rows: Array, p_delta: float = 0.0, *, slaves: bool = True) -> Substructure:
-    """The numerical side of a plan at rest; `rows` of the ground as `ground_rows` gives them.
+    """The numerical substructure of a plan at rest; `rows` are those of `ground_rows`.
 
     `p_delta` is the stiffness (N/m, negative) that gravity adds to every storey. Without `slaves` nothing is computed
     for them.
 
     Raises:
-        InputError: a kind of laboratory, model, method or parameter that is not known, or a laboratory that has no
-            place in the building.
+        InputError: a kind, model, method or parameter is unknown, or a laboratory's storey or floor is not in the
+            building.
     """
     mass, n, interval = np.array(plan.structure.mass), plan.storeys, plan.test.interval
     columns, method = numerical_columns(plan), integration(plan)
@@ -157,12 +157,12 @@ def check_place(plan: Plan, role: str, coupling: Coupling) -> None:
         what = "storey" if coupling.follows is Follows.DRIFT else "floor"
         raise InputError(
             f"The laboratory of the {title(role)} stands at {what} {coupling.place}, but the structure has "
-            f"{plan.storeys}: look at its place in the plan."
+            f"{plan.storeys}: correct its place in the plan."
         )
 
 
 def own_compensator(plan: Plan) -> Compensator:
-    """The compensator of the master's laboratory; one that does nothing where it has none."""
+    """The compensator of the master's laboratory; `none` where it has no laboratory."""
     interval, kind = plan.test.interval, kinds_of(plan).get(MASTER)
     if kind is None:
         return compensators.build("none", {}, interval)
@@ -176,7 +176,7 @@ def placed(coupling: Coupling) -> tuple[int, int]:
 
 
 def laboratory(coupling: Coupling, interval: float) -> list[float]:
-    """A laboratory's column of `labs` at an interval (s), no force used yet."""
+    """A laboratory's column of `labs` at an interval (s), before any force."""
     memory, gain = force_correction.coefficients(coupling.correction, interval)
     delayed = float(coupling.correction.unit_delay)
     return [coupling.ratio, coupling.scale, coupling.effort, memory, gain, delayed, 0.0, 0.0]
@@ -220,7 +220,7 @@ def motion(plan: Plan) -> GroundMotion:
 def ground_rows(plan: Plan, record: GroundMotion, shift: float = 0.0) -> Array:
     """Scaled ground acceleration (m/s²) and displacement (m) at every tick and the test's end; (2, ticks + 1).
 
-    With a `shift` (s) the motion comes that much later, and the ground is still before and after it.
+    With a `shift` (s) the motion comes later by it, and the ground is at rest before and after.
     """
     interval = plan.test.interval
     rows = ground(record.scaled(plan.ground_motion.scale), interval, plan.ticks * interval)
@@ -235,7 +235,7 @@ def shifted(rows: Array, ticks: float) -> Array:
 
 @jit
 def couple(K: Array, state: Array, first: int, output: Array) -> None:
-    """Storey forces (N) of the stiffness matrix K (n, n) N/m at x_k into `output` from place `first` on.
+    """Write the storey forces (N) of the stiffness matrix K (n, n) N/m at x_k into `output` from place `first` on.
 
     A storey carries the sum of the restoring forces on the floors above it.
     """
@@ -248,19 +248,19 @@ def couple(K: Array, state: Array, first: int, output: Array) -> None:
 
 
 def forces(building: Substructure) -> Array:
-    """The slaves' forces (slaves,) N that the next tick uses, as measured: a view to be filled."""
+    """The slaves' measured forces (slaves,) N that the next tick uses: a view, which the caller fills."""
     return building.labs[FORCE_USED, building.codes[OWN] :]
 
 
 @jit
 def receive(building: Substructure, slave: int, force: float) -> None:
-    """The force (N) of a slave, as measured in its laboratory, that the next tick uses."""
+    """Set the measured force (N) of a slave that the next tick uses."""
     building.labs[FORCE_USED, building.codes[OWN] + slave] = force
 
 
 @jit
 def tell(building: Substructure, lab: int, tick: int, told: Array, first: int) -> None:
-    """What a laboratory is told for the interval's end, into `told` from place `first` on."""
+    """Write the values for a laboratory at the interval's end into `told` from place `first` on."""
     place, followed = building.places[PLACE, lab], building.places[FOLLOWED, lab]
     labs, state, past = building.labs, building.state, building.recent[lab]
     interval, ratio, ground = building.scalars[INTERVAL], labs[RATIO, lab], building.ground
@@ -297,10 +297,10 @@ def enter(building: tuple[Any, ...], tick: int, position: float, force: float) -
 
 @jit
 def advance(building: Substructure, tick: int, position: float, force: float) -> None:
-    """One tick: from the measurements at t_k to the commands for the interval's end, into the `output`.
+    """Compute one tick: from the measurements at t_k to the commands for the interval's end, which go into `output`.
 
-    `position` m and `force` N are those of the master's own laboratory as measured at t_k; the slaves' forces, each at
-    its own scale, have been given to `receive`. The memories move on by one interval.
+    `position` (m) and `force` (N) are those of the master's own laboratory measured at t_k; the slaves' forces, each at
+    its own scale, must have been given to `receive`. The state advances by one interval.
     """
     codes, scalars, state, output = building.codes, building.scalars, building.state, building.output
     ground, own = building.ground, codes[OWN]
@@ -327,7 +327,7 @@ def advance(building: Substructure, tick: int, position: float, force: float) ->
 
 @jit
 def exert(building: Substructure) -> None:
-    """The force (N) of every laboratory on the building at t_k: the one used, corrected and scaled."""
+    """Compute the force (N) of every laboratory on the building at t_k from the measured one, corrected and scaled."""
     labs = building.labs
     for lab in range(labs.shape[1]):
         filtered = building.filtered[lab]
@@ -341,7 +341,7 @@ def exert(building: Substructure) -> None:
 
 @jit
 def equilibrate(building: Substructure, tick: int) -> None:
-    """External minus restoring force (N) of every floor at t_k into `balance`; numerical forces into `output`."""
+    """Write external minus restoring force (N) of every floor at t_k into `balance`, numerical forces into `output`."""
     codes, mass, places, labs = building.codes, building.mass, building.places, building.labs
     state, balance, output = building.state, building.balance, building.output
     n = mass.size
@@ -371,7 +371,7 @@ def equilibrate(building: Substructure, tick: int) -> None:
 
 @jit
 def actuate(building: Substructure, tick: int, measured: float) -> None:
-    """What the master's own laboratory does in the interval, into its `output`; `measured` m is its position at t_k."""
+    """Write target, command and effort of the master's own laboratory into `output`; `measured` is its position, m."""
     asked, output = building.asked, building.output
     present = asked[SENT_TARGET]
     tell(building, 0, tick, asked, 0)

@@ -1,1 +1,1 @@
-"""Laboratory A: integrates the building, and drives a laboratory of its own where the plan gives it one."""
+"""The master: it integrates the building, and drives a laboratory of its own where the plan gives it one."""

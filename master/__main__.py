@@ -26,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the master; its exit code."""
+    """Run the master; returns its exit code."""
     from master import assembly
 
     return process.conduct("master", args, assembly, listen=args.listen)

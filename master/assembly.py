@@ -1,4 +1,4 @@
-"""Everything the master's loop is made of, built and warmed up before anything moves."""
+"""Builds the parts of the master's loop, and compiles their kernels, before anything moves."""
 
 from __future__ import annotations
 
@@ -24,29 +24,32 @@ from models.system import System
 
 
 def preflight(plan: Plan) -> list[PreflightCheck]:
-    """What nominal models say of the test before anything is built; raises InputError where they cannot be."""
+    """The checks of the plan by nominal models; raises InputError where a model or parameter is not valid."""
     return nominal.checks(plan)
 
 
 def build_rig(reality: Reality, at_rest: AtRest | None = None, *, paced: bool = False) -> GuardedRig:
-    """The master's own laboratory, judged `at_rest` as it is armed; raises InputError where it cannot be."""
+    """The master's own rig, whose sensors `at_rest` judges when it is armed.
+
+    Raises InputError if it cannot be built.
+    """
     return rigs.build(reality, MASTER, at_rest, paced=paced)
 
 
 def check(reality: Reality) -> None:
-    """Raise InputError where the laboratory could not be built; nothing of it is constructed or moved."""
+    """Raise InputError where the laboratory could not be built, without constructing or moving the rig."""
     master_step(reality)
     rigs.check(reality, MASTER)
 
 
 def master_step(reality: Reality) -> MasterStep:
-    """The master's computation for the building and the ground motion that really are."""
+    """The master's computation for the true building and the true ground motion."""
     system = true_system(reality)
     return MasterStep(system.plan, true_ground(system), system.effects.p_delta)
 
 
 def true_ground(system: System) -> Array:
-    """Ground motion that really comes, as the master's kernel takes it."""
+    """The true ground motion (2, ticks + 1), as `substructure.ground_rows` returns it."""
     return substructure.ground_rows(system.plan, substructure.motion(system.plan), system.effects.time_shift)
 
 
@@ -58,9 +61,9 @@ def build_loop(
     epoch_ns: int | None = None,
     gate: Gate | None = None,
 ) -> MasterLoop:
-    """The master's loop, its kernels compiled; session and epoch are drawn and read where none are given.
+    """The master's loop with compiled kernels; by default the session is drawn and the epoch read from the clock.
 
-    With a `gate` its rig's sensors must pass it.
+    With a `gate` the sensors of its rig must pass their check.
     """
     warm_up(reality)
     return MasterLoop(
@@ -75,7 +78,7 @@ def build_loop(
 
 
 def warm_up(reality: Reality) -> None:
-    """Compile the kernels on arrays that are thrown away."""
+    """Compile the kernels by calling them once."""
     plan = reality.plan
     own = OwnLaboratory(plan)
     outputs = master_step(reality)(0, 0.0, 0.0, [0.0] * len(plan.roles))

@@ -1,4 +1,4 @@
-"""Energies of the running test, watched at every tick: of the interface's error, and of the integration."""
+"""The energy balance of the running test, checked at every tick: error energy of interface and of integration."""
 
 from __future__ import annotations
 
@@ -20,13 +20,17 @@ from models import energy_balance
 from models.compiled import plain
 from models.energy_balance import DRIFT_SHARE, ERROR_SHARE
 
-# of the largest displacement allowed: with less motion a share of the ground's energy says nothing
+# Share of the limit of displacement at which the floor of the energy input is reached: with less motion than 1 % of it,
+# 1.5 mm by default, sensor noise would dominate the shares.
 FLOOR_SHARE = 0.01
-LIMITED = ("error_energy", "numerical_drift")  # the limits of both shares, in the order of the kernel's
+LIMITED = (
+    "error_energy",
+    "numerical_drift",
+)  # the limits of both shares, in the order of the kernel's `most`
 
 
 class EnergyMonitor:
-    """The balance of one test, moving on tick by tick, and its limits `error_energy` and `numerical_drift`."""
+    """The energy balance of one test, and its limits `error_energy` and `numerical_drift`."""
 
     def __init__(self, plan: Plan) -> None:
         self._limits, self._motions = vars(plan.limits), 3 * plan.storeys
@@ -40,21 +44,21 @@ class EnergyMonitor:
             np.array([self._limits[name] for name in LIMITED]),
         )
         self._enter, self._sums = energy_balance.enter, plain(self._balance)
-        # displacements, velocities and accelerations, as they stand first in the table of motion
+        # displacements, velocities and accelerations are the first rows of `motion`
         self._fill, self._motion = struct.Struct(f"{self._motions}d").pack_into, self._balance.motion.data
 
     @property
     def error_energy(self) -> float:
-        """Energy that the interface's error has put in, over that of the ground."""
+        """Energy input by the error of the interface, over that of the ground."""
         return self._balance.sums.item(ERROR_SHARE)
 
     @property
     def numerical_drift(self) -> float:
-        """Energy that the integration has made, over that of the ground."""
+        """Energy made by the integration, over that of the ground."""
         return self._balance.sums.item(DRIFT_SHARE)
 
     def violation(self, measured: tuple[float, ...], outputs: Outputs) -> LimitViolation | None:
-        """Take one tick into the sums; the first of them beyond its limit."""
+        """Update the sums by one tick; returns the first of them beyond its limit, or None."""
         self._fill(self._motion, 0, *outputs.storeys[: self._motions])
         position, force = self._felt(measured)
         if self._enter(self._sums, outputs.ground_acceleration, outputs.target, position, force):
@@ -64,9 +68,9 @@ class EnergyMonitor:
 
 
 def interface(own: Kind | None, plan: Plan) -> tuple[float, float, Callable[[Any], tuple[float, float]]]:
-    """Deformation over motion and force over force of the master's own laboratory, and its position and force.
+    """Ratio and force scale of the master's own laboratory, and a function for its position (m) and force (N).
 
-    A force that pushes counts as one that resists with the other sign. Without a laboratory there is no error.
+    A force that pushes counts as a resisting one with the other sign. Without a laboratory there is no error.
     """
     if own is None:
         return 1.0, 0.0, lambda _: (0.0, 0.0)
@@ -80,10 +84,10 @@ def interface(own: Kind | None, plan: Plan) -> tuple[float, float, Callable[[Any
 
 
 def floor(plan: Plan) -> float:
-    """Energy (J) below which nothing is judged: strain of the specimen's storey at `FLOOR_SHARE` of the limit.
+    """Floor (J) of the energy input: strain energy of the specimen's storey at `FLOOR_SHARE` of the limit.
 
-    It is the storey of the first specimen, without one that below the floor of the first laboratory. Infinite for a
-    storey without stiffness, of which no share can be taken.
+    The storey is that of the first specimen, or without one that below the floor of the first laboratory. The floor is
+    infinite for a storey without stiffness, so that nothing is judged.
     """
     role = next(iter(drifts(plan) or plan.kinds))
     stiffness = max(storey_stiffness(plan, role), felt(plan, role).stiffness)

@@ -1,4 +1,4 @@
-"""The master's part of the handshake: slaves register, arm, show their clocks, agree on the start."""
+"""The master's part of the handshake: slaves register, arm, synchronise their clocks, and agree on the start."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from common.rig import GuardedRig
 from common.safety.modes import STILL_LATCHED
 from master.partner import Partner
 
-# from the agreement on the start to the start: a message that is lost is sent again twice in that time
+# From the choice of the start to the start: a lost message is repeated twice in that time (REPEAT_NS).
 LEAD_NS = 250_000_000
 
 
 class MasterHandshake:
-    """The master's handshake, from the first call to the start; `wall_ns` is the wall clock minus the laboratory's.
+    """The master's handshake up to the start; `wall_ns` is the wall clock minus the laboratory's clock.
 
-    With a `gate` the link to every slave must pass its exchanges.
+    With a `gate` the link to every slave must pass its check.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class MasterHandshake:
                 pass
 
     def one_too_many(self, partner: Partner, instance: int) -> None:
-        """A process waits to take part: if another one has its place, it is told so."""
+        """Tell a process that waits to take part that its role is taken, if another process has it."""
         over = self._lab.exchange.ended or self._lab.exchange.state is State.STOPPING
         if partner.registered and not over and instance != partner.instance:
             partner.arm()
@@ -73,14 +73,14 @@ class MasterHandshake:
             self._lab.fail(Event.TRIP, RigError(reason), code="not_armed", remote=True)
 
     def _await_reset(self, partner: Partner) -> None:
-        """Ask a latched slave again until it is reset, because the reset reaches it through this session."""
+        """Keep asking a latched slave until it is reset, because its reset reaches it through this session."""
         if not partner.latched:
             partner.latched = True
             text = f"The {partner.title} refuses the test: {STILL_LATCHED}"
             self._lab.note("latched", text, level="warning")
 
     def _agree(self, partner: Partner, message: Registered | Armed | Scheduled, received_ns: int) -> None:
-        """Take an answer that the present state waits for, and move on where all have given it."""
+        """Take an answer that the present state waits for, and leave the state when all slaves have given it."""
         state = self._lab.exchange.state
         match message:
             case Registered() if state is State.IDLE:
@@ -94,7 +94,7 @@ class MasterHandshake:
         self._move_on()
 
     def _move_on(self) -> None:
-        """Leave the present state where every slave has given the answer that it waits for."""
+        """Leave the present state if every slave has given the answer that it waits for."""
         state, partners = self._lab.exchange.state, self._partners
         if state is State.IDLE and all(one.registered for one in partners) and self._recorder_is_here():
             self._move(Event.REGISTER)
@@ -138,7 +138,7 @@ class MasterHandshake:
             self._ask_anew(received_ns)
 
     def _link_serves(self) -> bool:
-        """Whether every slave's link has passed the gate; ends the test where one has not."""
+        """Whether every slave's link has passed its check; ends the test where one has not."""
         try:
             if self._gate is not None:
                 plan = self._lab.plan
@@ -153,7 +153,7 @@ class MasterHandshake:
         return all(partner.synchronised for partner in self._partners)
 
     def poll(self) -> None:
-        """Before the first tick: ask for what comes next, again where no answer came; give up in time."""
+        """Before the first tick: send the next request, repeat unanswered ones, and give up after `connect_timeout`."""
         lab = self._lab
         if lab.exchange.ended or lab.exchange.state is State.SCHEDULED:
             return
@@ -170,7 +170,7 @@ class MasterHandshake:
                     self._ask(partner, now)
             if not self._partners:
                 self._schedule(now)
-        if not self._partners:  # nobody's answer moves it on
+        if not self._partners:  # without slaves there is no answer that would call it
             self._move_on()
 
     def _nobody(self) -> None:
@@ -190,7 +190,7 @@ class MasterHandshake:
         self._lab.fail(Event.LOSE, error, code="nobody")
 
     def _hesitant(self) -> None:
-        """End the handshake where all processes have joined and one of them does not go on."""
+        """End the handshake because all processes have joined and one of them does not answer."""
         arming = self._lab.exchange.state is State.REGISTERED
         who = next(one for one in self._partners if not (one.armed if arming else one.scheduled))
         seconds = self._lab.plan.link.connect_timeout
@@ -198,7 +198,7 @@ class MasterHandshake:
         self._lab.fail(
             Event.LOSE,
             LostError(
-                f"The {who.title} did not {what} within {seconds:g} s: look what its laboratory waits for, "
+                f"The {who.title} did not {what} within {seconds:g} s: find out what its laboratory waits for, "
                 "or raise connect_timeout in [link]."
             ),
             code="hesitant",

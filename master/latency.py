@@ -1,10 +1,10 @@
-"""Where the time of each tick went: stamps of both laboratories put together on the master's clock.
+"""The latency of each tick: time stamps of master and slave combined on the master's clock.
 
-The row of a tick follows its command: to the slave, in force there at once or some ticks later, and back with the
-first feedback that names it. The row is written when that feedback is there, at best as the next tick begins, or when
-a feedback names a later command: then this one was lost, overtaken or never sent, and its segments are NaN,
-its stamps 0. A delay of a link plug-in is part of the stamps, as if the network were that slow; the clocks'
-offset is estimated without it, by the command that the slave heard last and the moment when it did.
+The row of a tick follows its command: to the slave, into force there at once or some ticks later, and back with the
+first feedback that names it. The row is written when that feedback is there, at the earliest when the next tick begins,
+or when a feedback names a later command: then this one was lost, overtaken or never sent, its segments are NaN and its
+stamps 0. A delay of a link plug-in is included in the stamps, as if the network were that slow; the offset of the
+clocks is estimated without it, from the command that the slave received last and the time when it did.
 """
 
 from __future__ import annotations
@@ -23,23 +23,23 @@ NAN = math.nan
 
 @dataclass(slots=True)
 class LatencyRow:
-    """What the master knows of a tick; `sent_ns` 0 where no command went out, `used_ns` 0 while it lasts."""
+    """The master's stamps of a tick; `sent_ns` is 0 if no command was sent, `used_ns` is 0 until the next tick."""
 
     tick: int
     wake_ns: int
-    ready_ns: int  # the command's values are there
-    sent_ns: int  # its frame was handed to the link
+    ready_ns: int  # when the command's values were computed
+    sent_ns: int  # when its frame was handed to the link
     age: float  # s, of the feedback that the tick used
     used_ns: int = 0
     missed: bool = False
     feedback: Feedback | None = None
     received_ns: int = 0
-    decoded_ns: int = 0  # the feedback's values are in the loop
-    extra: float = 0.0  # s, of a link plug-in on the feedback
+    decoded_ns: int = 0  # when the feedback was decoded
+    extra: float = 0.0  # s, delay of the feedback by a link plug-in
 
 
 class LatencyAccount:
-    """Latency of the ticks in the exchange with one slave, one row each, in order, into a topic of its own."""
+    """Writes the latency of the exchange with one slave, one row per tick in order, into a topic of its own."""
 
     def __init__(self, lab: Laboratory, offset: ClockOffset, topic: str) -> None:
         self._lab = lab
@@ -48,11 +48,13 @@ class LatencyAccount:
         self._rows: dict[int, LatencyRow] = {}
         self._on_the_way: deque[tuple[int, int]] = (
             deque()
-        )  # commands that the slave has not heard: tick, sent_ns
+        )  # commands not received by the slave yet: tick, sent_ns
         self._named = -1  # newest command that a feedback has named
         self.missed = 0
-        self._prompt = -1  # newest feedback that came over the wire with its own tick's command heard
-        self.late_last = False  # whether the tick that was judged last kept no real time, plug-ins apart
+        self._prompt = (
+            -1
+        )  # newest feedback that came after its tick's command had been received, without plug-ins
+        self.late_last = False  # whether the last tick was late, without the delay of plug-ins
         self.round_trip = NAN
 
     def open(self, tick: int, wake_ns: int, ready_ns: int, sent_ns: int, used: Feedback) -> None:
@@ -63,7 +65,7 @@ class LatencyAccount:
             self._on_the_way.append((tick, sent_ns))
 
     def answer(self, feedback: Feedback, received_ns: int, decoded_ns: int, extra: float | None) -> None:
-        """A feedback came, delayed by a link plug-in where `extra` (s) is positive, lost by it where None."""
+        """Take a feedback, which a link plug-in delays by `extra` (s), or loses where it is None."""
         self._compare_clocks(feedback, received_ns)
         self._named = max(self._named, feedback.command_seq)
         if feedback.heard_seq >= feedback.seq:
@@ -77,14 +79,14 @@ class LatencyAccount:
         self.round_trip = (row.received_ns - row.sent_ns) * 1e-9
 
     def _compare_clocks(self, feedback: Feedback, received_ns: int) -> None:
-        """Each command that the slave has heard gives one exchange of stamps."""
+        """Add an exchange of stamps for the command that the slave has received last."""
         while self._on_the_way and self._on_the_way[0][0] <= feedback.heard_seq:
             tick, sent_ns = self._on_the_way.popleft()
             if tick == feedback.heard_seq:
                 self._offset.add(sent_ns, feedback.heard_ns, feedback.sent_ns, received_ns)
 
     def close(self, tick: int, used_ns: int) -> None:
-        """Judge `tick` as the next one begins, and write the rows that are complete."""
+        """Judge `tick` when the next one begins, and write the rows that are complete."""
         row = self._rows.get(tick)
         if row is not None and not row.used_ns:
             row.used_ns = used_ns
@@ -146,18 +148,19 @@ class LatencyAccount:
         lab.outlet.add(self._topic, log_ns, lab.epoch_ns + now - lab.start_ns, values)
 
 
-# of a tick that no feedback answers: six segments, s, and four stamps, ns, as `segments` gives them
+# six segments (s) and four stamps (ns) of a tick that no feedback answers, in the order of `segments`
 UNANSWERED = ((NAN,) * 6, (0,) * 4)
 
 
 def segments(row: LatencyRow, offset: int) -> tuple[tuple[float, ...], tuple[int, ...]]:
-    """The segments of an answered tick, s, and its stamps as they were read, ns.
+    """The segments (s) of an answered tick, and its stamps (ns) as they were read.
 
-    They are: command one way, time in the slave, the computing in it, feedback one way, round trip, decoding; command
-    received, slave started, feedback sent, received. `offset` (ns) is the slave's clock minus the master's.
+    The segments are command one way, time in the slave, computation in it, feedback one way, round trip, decoding. The
+    stamps are command received, slave started, feedback sent, received. `offset` (ns) is slave clock minus master
+    clock.
     """
     feedback = row.feedback
-    assert feedback is not None  # noqa: S101 - the caller has looked
+    assert feedback is not None  # noqa: S101 - the caller has checked it
     received, started, sent = feedback.command_received_ns, feedback.started_ns, feedback.sent_ns
     back = row.received_ns
     found = (

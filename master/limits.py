@@ -1,4 +1,4 @@
-"""What the master checks before its rig moves: the measurements it read and the commands it computed."""
+"""The limits that the master checks at each tick, on the measurements read and on the commands computed."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from master.step import Outputs
 class MasterLimits:
     """The plan's limits on the master's own laboratory, on the building, and on what is sent to the slaves.
 
-    `violation` is asked once in every tick; `written` is told of every command that went to the rig.
+    `violation` must be called once in every tick, and `written` with every command that is written to the rig.
     """
 
     def __init__(self, plan: Plan) -> None:

@@ -49,7 +49,7 @@ from master.step import MasterStep, Outputs
 
 
 class MasterLoop(RigLoop):
-    """Laboratory A in a test; `links` are the impairments of what comes from each slave, by role."""
+    """The master in a test; `links` are the plug-ins that delay the messages of each slave, by role."""
 
     def __init__(
         self,
@@ -79,7 +79,7 @@ class MasterLoop(RigLoop):
         self._measured: tuple[float, ...] = ()
         self._sent_ns = 0  # when the newest command went out
         self._digest = plan.digest()
-        # what is left of an interval beside the share in which a slave waits
+        # the rest of an interval after the share for which a slave waits
         self._wait_ns = round((1.0 - plan.link.wait_share) * self.lab.interval_ns)
         self._late = lateness.LateTicks()
         self._others_rest = resting(plan)
@@ -118,7 +118,7 @@ class MasterLoop(RigLoop):
                 self._handshake.take(partner, message, received_ns)
 
     def _welcome(self, recorder: Recorder) -> None:
-        """A recorder that comes while the test runs without one may record the rest."""
+        """Register a recorder that comes while the test runs without one, so that it records the rest."""
         lab = self.lab
         if (
             lab.running
@@ -135,9 +135,9 @@ class MasterLoop(RigLoop):
     # -- ticks ------------------------------------------------------------------------------------
 
     def tick(self, tick: int) -> None:
-        """Play one control interval (contract, section 3); a tick that is a whole interval late writes no new command.
+        """Run one control interval; a tick that is late by a whole interval writes no new command.
 
-        Where all laboratories are emulated the tick is made up for, because only the emulation waits for it.
+        Where all laboratories are emulated a late tick is caught up, because only the emulation waits for it.
         """
         lab = self.lab
         wake = lab.clock.now()
@@ -182,7 +182,7 @@ class MasterLoop(RigLoop):
         return worst, who
 
     def _write(self, wanted: Any, outputs: Outputs, *, held: bool) -> None:
-        """Move to the tick's command, or stay where it came too late."""
+        """Write the tick's command to the rig, or the last one again if the tick is too late (`held`)."""
         if not held:
             self._command = wanted
             for partner, sent in zip(self._partners, outputs.sent, strict=True):
@@ -192,9 +192,9 @@ class MasterLoop(RigLoop):
         self._limits.written(self._command)
 
     def _tell_late(self, tick: int) -> None:
-        """Warn where too many ticks up to this one, which has just been judged, came late in any exchange.
+        """Warn if too many ticks up to this one, which has just been judged, were late with any slave.
 
-        A delay or loss by a link plug-in is of the simulated network, and says nothing of real time.
+        A delay or loss by a link plug-in belongs to the simulated network, and does not count.
         """
         late = any(partner.account.late_last for partner in self._partners)
         if tick >= 0 and (count := self._late.take(tick, late=late)):
@@ -214,7 +214,7 @@ class MasterLoop(RigLoop):
             partner.heard_ns = now
 
     def _send(self, tick: int, wake_ns: int, *, nothing: bool) -> None:
-        """Send each slave the tick's command, unless `nothing` goes out, and open its account."""
+        """Send each slave the tick's command, unless `nothing`, and open the tick's row of latency."""
         for partner in self._partners:
             ready, self._sent_ns = (0, 0) if nothing else partner.send(tick)
             partner.account.open(tick, wake_ns, ready, self._sent_ns, partner.used)
@@ -235,7 +235,7 @@ class MasterLoop(RigLoop):
         lab.outlet.add("master", log_ns, publish_ns, values)
 
     def _exchanged(self, tick: int) -> list[float]:
-        """What was used and what was sent; of several slaves of one kind each signal with the values of all."""
+        """The values used and sent; slaves with the same channels share each signal, with a value for each slave."""
         found: list[float] = []
         for group in self._groups:
             if len(group) == 1:
@@ -245,7 +245,7 @@ class MasterLoop(RigLoop):
         return found
 
     def _watch(self, tick: int, now: int) -> None:
-        """End the test where a slave or the recorder is gone or cannot go on."""
+        """End the test if a slave or the recorder is silent for too long or cannot go on."""
         for partner in self._partners:
             if now - partner.heard_ns > self.lab.loss_ns:
                 self.lab.lost(f"The {partner.title}", self.lab.plan.link.loss_timeout, tick)
@@ -254,7 +254,7 @@ class MasterLoop(RigLoop):
             self._watch_recorder(tick, now)
 
     def _watch_recorder(self, tick: int, now: int) -> None:
-        """End the test, which needs its recording, where that fails."""
+        """End a test that requires its recording if the recording fails."""
         lab, recorder = self.lab, self.lab.recorder
         if recorder is not None and recorder.state == "failed":
             error = InterlockError(f"The recording is lost: {recorder.reason}")
@@ -271,7 +271,10 @@ class MasterLoop(RigLoop):
         self.end(reason)
 
     def leave(self, *, last: bool = False) -> None:
-        """Tell the slaves and give the recorder the rest; may be called again until `left`, and a `last` time."""
+        """Tell the slaves of the end and send the recorder the rest.
+
+        Repeated until `left`, and called a `last` time.
+        """
         lab = self.lab
         waited = [partner for partner in self._partners if partner.registered and not partner.stopped]
         if lab.exchange.state is State.STOPPING and not waited:
@@ -293,7 +296,7 @@ class MasterLoop(RigLoop):
             lab.say_why()
 
     def disarm(self) -> None:
-        """Bring the rig to a safe stop and close the accounts; once, before leaving."""
+        """Disarm the rig and write the remaining rows of latency; called once, before leaving."""
         self.disarm_rig()
         if self.ticks:
             for partner in self._partners:
@@ -314,13 +317,13 @@ class MasterLoop(RigLoop):
 
     @property
     def needed(self) -> bool:
-        """Whether recorder and operator still reach a slave through this session: it is heard until it leaves."""
+        """Whether a slave has not left yet, which recorder and operator reach through this session alone."""
         now = self.lab.clock.now()
         return any(partner.there(now) for partner in self._partners)
 
     @property
     def others_rest(self) -> float:
-        """How long the slaves take at most to come to rest, s."""
+        """The longest time that the slaves take to come to rest, s."""
         return self._others_rest
 
     @property
@@ -334,10 +337,10 @@ class MasterLoop(RigLoop):
 
     @property
     def progress(self) -> dict[str, float]:
-        """What a user watches: a storey's drift (m), forces by channel (N), round trip (s), missed deadlines.
+        """The figures of the progress report: a storey's drift (m), forces (N), round trip (s), missed deadlines.
 
-        Of several slaves of a kind the largest force without its sign, of all the longest round trip and the most
-        deadlines missed.
+        For several slaves with the same channels it is the largest magnitude of force, and for all slaves the longest
+        round trip and the largest number of missed deadlines.
         """
         accounts = [partner.account for partner in self._partners]
         forces = self._own.force(self._measured)
@@ -367,11 +370,11 @@ class MasterLoop(RigLoop):
         return self.lab.tick_ns(tick)
 
     def latest(self, tick: int) -> int:
-        """Until when a tick waits for the feedbacks of the tick before, a little after its nominal time, ns."""
+        """Until when a tick waits for the feedbacks of the tick before, ns: shortly after its nominal time."""
         return self.lab.tick_ns(tick) + self._wait_ns
 
     def heard(self, tick: int) -> bool:
-        """Whether what the tick waits for has come: every slave's feedback of the tick before."""
+        """Whether every slave's feedback of the tick before has come."""
         for partner in self._partners:  # noqa: SIM110 - a generator for `all` takes twice as long
             if not partner.heard(tick - 1):
                 return False

@@ -1,4 +1,4 @@
-"""The master's own laboratory as its loop sees it, of any kind or none."""
+"""The interface between the master's loop and its own laboratory, of any kind or none."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from laboratories import kinds
 from laboratories.kind import Follows
 from master.step import Outputs
 
-NOWHERE = (0.0, 0.0)  # position and force of a laboratory that is not there
+NOWHERE = (0.0, 0.0)  # position and force for a master without a laboratory
 
 
 class NoRigAtRest:
@@ -24,16 +24,16 @@ class NoRigAtRest:
     done, travel, left = True, 0.0, 0.0
 
     def step(self, _measured: tuple[float, ...] | None) -> tuple[float, ...]:
-        """No command."""
+        """An empty command."""
         return ()
 
     def doing(self, _measured: tuple[float, ...] | None) -> str:
-        """Nothing moves."""
-        return "nothing to bring to rest"
+        """The text for a master without a rig."""
+        return "no rig has to come to rest"
 
 
 class OwnLaboratory:
-    """What a tick hands to the master's own laboratory, and what it takes from it and records of it."""
+    """The commands for the master's own laboratory, the measurements used from it, and its recorded values."""
 
     def __init__(self, plan: Plan) -> None:
         self._plan, self._kind = plan, kinds.own(plan)
@@ -53,11 +53,14 @@ class OwnLaboratory:
         self._storey, self._ratio = watched(plan)
 
     def ramp(self, last: tuple[float, ...], before: tuple[float, ...]) -> Ramp:
-        """The way to rest from the last two commands."""
+        """The ramp to rest from the last two commands."""
         return self._kind.ramp(self._plan, last, before) if self._kind else NoRigAtRest()
 
     def row(self, outputs: Outputs, command: Any, measured: tuple[float, ...]) -> tuple[float, ...]:
-        """Its recorded values: target, motor's force, command, readings; empty for a master without a laboratory."""
+        """Its recorded values: target, motor's force, command, measurements.
+
+        Empty for a master without a laboratory.
+        """
         if self.channels is None:
             return ()
         return (outputs.target, *command[1:], command[0], *measured)
@@ -71,17 +74,20 @@ class OwnLaboratory:
         )
 
     def drift(self, outputs: Outputs) -> float:
-        """Drift (m) of the storey that a user watches."""
+        """Drift (m) of the storey in the progress report."""
         if self._ratio:
             return outputs.target / self._ratio
-        moved, storey = outputs.storeys, self._storey  # the displacements come first
+        moved, storey = (
+            outputs.storeys,
+            self._storey,
+        )  # the displacements are the first of the storeys' values
         return moved[storey - 1] - (moved[storey - 2] if storey > 1 else 0.0)
 
 
 def watched(plan: Plan) -> tuple[int, float]:
-    """The storey whose drift a user watches, and target over drift where the master's own laboratory follows it.
+    """The storey whose drift is reported, and target over drift if the master's own laboratory follows it, else 0.
 
-    It is the first that a laboratory follows, the master's before the slaves'; the lowest where none does.
+    It is the first storey that a laboratory follows, the master's before the slaves', or else the lowest one.
     """
     for role, kind in kinds.kinds_of(plan).items():
         coupling = kind.coupling(plan.of(role))

@@ -1,4 +1,4 @@
-"""One slave as the master knows it: what it has answered, what came from it, what was sent to it."""
+"""The master's state of one slave: its answers, the messages from it, the messages to it."""
 
 from __future__ import annotations
 
@@ -14,22 +14,24 @@ from common.signals import Channels
 from master.latency import LatencyAccount
 from master.step import Sent
 
-# before the start: most exchanges wait in no queue, so that some of these show the shortest round trip
+# Exchanges of clock readings before the start. Most of them wait in no queue, so some of 200 have nearly the shortest
+# round trip; they take less than 0.1 s on a local network.
 SYNC_EXCHANGES = 200
-OFFSET_BLOCK, OFFSET_BLOCKS = 250, 40  # exchanges: the best of half a second each, twenty seconds of them
-GIVEN_UP_NS = 5 * REPEAT_NS  # silence after which another process may register under the same name
+# Blocks of exchanges for the clock's offset: the best of each half a second, over twenty seconds, in which the drift of
+# a crystal changes little.
+OFFSET_BLOCK, OFFSET_BLOCKS = 250, 40
+GIVEN_UP_NS = (
+    5 * REPEAT_NS
+)  # silence, five unanswered requests, after which another process may take the role
 
-# stands for what has not come; a partner's own has as many channels as its laboratory
+# the feedback before the first one; `Partner.used` has as many channels as the slave's laboratory
 NO_FEEDBACK = Feedback(0, -1, -1, 0, -1, 0, 0, 0, (0.0, 0.0, 0.0, 0.0))
 
 NOTHING_SENT = (0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Partner:
-    """A slave in a test; `role` is what it is called, `link` the impairment of what comes from it.
-
-    `channels` are those of its laboratory.
-    """
+    """A slave in a test; `link` is the plug-in that delays its messages, `channels` are those of its laboratory."""
 
     def __init__(self, role: str, lab: Laboratory, link: LinkModel, channels: Channels) -> None:
         interval = lab.plan.test.interval
@@ -44,7 +46,7 @@ class Partner:
         self._syncs = 0
         self._exchanges = SYNC_EXCHANGES
         self.trips: list[float] = []  # of the exchanges before the start, s
-        self._asked = self._answered = 0  # how often for an exchange, how often it came back
+        self._asked = self._answered = 0  # exchanges requested, and answered
         self._asked_ns = -REPEAT_NS
         self._watchdog = Watchdog(lab.plan.safety, interval)
         self._silence_ns = max(round(lab.plan.link.loss_timeout * 1e9), GIVEN_UP_NS)
@@ -55,7 +57,7 @@ class Partner:
         self.scheduled = False
         self.stopped = False
         self.heard_ns = 0
-        self.latched = False  # since a test before, so that it refuses this one
+        self.latched = False  # latched since an earlier test, so that it refuses this one
         self.commands = 0  # sent
         self.channels = channels
         self._force = channels.names.index(channels.force)
@@ -70,7 +72,7 @@ class Partner:
         return self.instance != 0
 
     def register(self, instance: int, now: int) -> None:
-        """A process registers: the first one counts, or a later one once that has fallen silent."""
+        """Register a process: the first one, or a later one if the first has fallen silent."""
         if not self.registered or now - self.heard_ns > GIVEN_UP_NS:
             self.instance = instance
         if instance == self.instance:
@@ -78,50 +80,50 @@ class Partner:
 
     @property
     def synchronised(self) -> bool:
-        """Whether enough is known of its clock."""
+        """Whether enough exchanges of clock readings were made."""
         return self._syncs >= self._exchanges
 
     def there(self, now: int) -> bool:
-        """Whether it takes part: its last message has not come, and it was not silent for too long."""
+        """Whether it takes part: it has not left, and was not silent for too long."""
         return self.registered and not self.stopped and now - self.heard_ns < self._silence_ns
 
     def pass_gate(self, exchanges: int) -> None:
-        """So many exchanges must be made before the start."""
+        """Require at least so many exchanges before the start."""
         self._exchanges = max(exchanges, SYNC_EXCHANGES)
 
     @property
     def start_option(self) -> str:
-        """The option that its process is started with, beside plan and address."""
+        """The option with which its process is started, in addition to plan and address."""
         return f", --name {name_of(self.role)}" if self._address else ""
 
     def ask_anew(self, now: int) -> None:
-        """Ask the next question at once, not when the last one is due again."""
+        """Let the next request be sent at once."""
         self._asked_ns = now - REPEAT_NS
 
     def due(self, now: int) -> bool:
-        """Whether it is time to ask, and takes note of it."""
+        """Whether a request is due; takes note of the time if it is."""
         if now - self._asked_ns < REPEAT_NS:
             return False
         self._asked_ns = now
         return True
 
     def arm(self) -> None:
-        """Ask the process that has registered to arm; another of the same name learns by it that its place is taken."""
+        """Ask the registered process to arm; another process of this role learns by it that the role is taken."""
         self._lab.endpoint.send(Arm(self._lab.exchange.session, self.instance), self._address)
 
     def synchronise(self, now: int) -> None:
-        """Ask for one exchange of clock readings."""
+        """Request an exchange of clock readings."""
         self._asked += 1
         self._sync_sent_ns = now
         self._lab.endpoint.send(Sync(self._lab.exchange.session, self._syncs, now), self._address)
 
     @property
     def lost(self) -> int:
-        """Exchanges asked for that never came back; one that was asked again and came twice is not lost."""
+        """The number of exchanges without an answer."""
         return self._asked - self._answered
 
     def take_sync(self, reply: SyncReply, received_ns: int) -> bool:
-        """Take in the answer to the last one asked for; whether it was that."""
+        """Take an answer; returns whether it is that to the last request."""
         self._answered += 0 <= reply.seq <= self._syncs and self._answered < self._asked
         if reply.seq != self._syncs:
             return False
@@ -132,7 +134,7 @@ class Partner:
         return True
 
     def settle(self) -> None:
-        """Keep the present estimate of its clock, because the start is chosen by it."""
+        """Keep the present estimate of the offset, by which the start is chosen."""
         self._first_offset = self._offset.at(self._lab.start_ns)
 
     def schedule(self) -> None:
@@ -144,7 +146,7 @@ class Partner:
     # -- ticks ------------------------------------------------------------------------------------
 
     def take(self, feedback: Feedback, received_ns: int, decoded_ns: int) -> None:
-        """Take in a feedback, unless it is not fresh."""
+        """Take a feedback, if it is fresh."""
         expected = self._lab.tick_at(received_ns - self._lab.start_ns)
         if not self.tally.admit(feedback.seq, expected):
             return
@@ -155,11 +157,11 @@ class Partner:
         self.account.answer(feedback, received_ns, decoded_ns, extra)
 
     def heard(self, seq: int) -> bool:
-        """Whether the feedback of a tick has come, or a later one."""
+        """Whether the feedback of a tick or a later one has come."""
         return self._feedback.newest_seen >= seq
 
     def begin(self, tick: int, now: int) -> float:
-        """The force (N) that a tick uses: that of the newest feedback received before the tick."""
+        """Begin a tick; returns the force (N) that it uses, that of the newest feedback available."""
         if (feedback := self._feedback.take(tick)) is not None:
             self.used = feedback
             self.tally.use(feedback.seq)
@@ -177,7 +179,7 @@ class Partner:
         return self._watchdog.look(tick - 1, judged.seq, judged.heard_seq)
 
     def send(self, tick: int) -> tuple[int, int]:
-        """Send the command; return when its turn came and when its frame was handed to the link, ns."""
+        """Send the command; returns when its turn came and when its frame was handed to the link, ns."""
         lab = self._lab
         now = lab.clock.now()
         shift = self._offset.at(now) - self._first_offset
@@ -186,8 +188,8 @@ class Partner:
         return now, lab.endpoint.send(command, self._address)
 
     def exchanged(self) -> tuple[str, dict[str, float]]:
-        """The fate of the messages of both directions as far as this end knows: a sentence and its numbers."""
-        if (last := self._feedback.take(self.commands)) is not None:  # came for the tick after the last one
+        """The counts of the messages of both directions that the master knows: a sentence and its values."""
+        if (last := self._feedback.take(self.commands)) is not None:  # for the tick after the last one
             self.tally.use(last.seq)
         values = {f"{self.role}.commands_sent": float(self.commands)}
         values |= self.tally.values(f"{self.role}.feedbacks")

@@ -1,4 +1,4 @@
-"""The master's computation of one tick, from measurements to commands."""
+"""The master's computation of a tick, from measurements to commands."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ Sent = tuple[float, ...]  # target m, motor force N, and the rates of the target
 
 
 class Outputs(NamedTuple):
-    """What a tick computes: the building and the targets at t_k, and the commands for the interval's end.
+    """The results of a tick: the building and the target at t_k, and the commands for the interval's end.
 
-    Of a master without a laboratory target, command and effort are zero.
+    For a master without a laboratory target, command and effort are zero.
     """
 
     ground_acceleration: float
@@ -25,9 +25,7 @@ class Outputs(NamedTuple):
     command: float  # of its transfer system, m
     effort: float  # of its motor, N
     sent: list[Sent]  # to each slave, in the plan's order
-    storeys: list[
-        float
-    ]  # of each signal of the storeys in turn (`common.signals.OF_STOREYS`) the value of every one
+    storeys: list[float]  # signal by signal (`common.signals.OF_STOREYS`) the values of all storeys
 
     @property
     def of_storeys(self) -> dict[str, list[float]]:
@@ -37,7 +35,7 @@ class Outputs(NamedTuple):
 
 
 class MasterStep:
-    """The numerical substructure with the control of every laboratory, moving on tick by tick."""
+    """The numerical substructure with the control of every laboratory; each call computes a tick."""
 
     def __init__(self, plan: Plan, ground: Array, p_delta: float = 0.0) -> None:
         building = substructure.build(plan, ground, p_delta)
@@ -50,7 +48,7 @@ class MasterStep:
         self._advance = substructure.enter
 
     def __call__(self, tick: int, position: float, force: float, forces: Sequence[float]) -> Outputs:
-        """One tick, from the master's own position (m) and force (N) as measured and each slave's force (N)."""
+        """Compute a tick from position (m) and force (N) of the master's laboratory and the slaves' `forces` (N)."""
         for place, used in enumerate(forces):
             self._forces[place] = used
         self._advance(self._building, tick, position, force)

@@ -1,1 +1,1 @@
-"""The recorder: its own process, which writes every sample of both laboratories to one MCAP file."""
+"""The recorder: a process that writes every sample of all laboratories to one MCAP file."""

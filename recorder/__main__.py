@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from common.plan.plan import Plan
     from recorder.loop import RecorderLoop
 
-WAIT_S = 0.02  # a request to stop waits no longer than this for the next message
+WAIT_S = 0.02  # longest wait for a message: a request to stop and the requests every `ASK_NS` wait no longer
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the recorder; its exit code."""
+    """Run the recorder; returns its exit code."""
     from recorder import files
 
     plan = cli.load_plan(args)
@@ -48,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def record(args: argparse.Namespace, plan: Plan, path: Path) -> int:
-    """Record a test into a file; the exit code."""
+    """Record a test into a file; returns the exit code."""
     from loop import substructure
     from recorder import files, space
     from recorder.loop import RecorderLoop
@@ -79,7 +79,7 @@ def record(args: argparse.Namespace, plan: Plan, path: Path) -> int:
 
 
 def receive(loop: RecorderLoop, endpoint: Endpoint, stopping: Stopper) -> None:
-    """Take messages until the test is over or a stop is asked for."""
+    """Take messages until the test is over or a stop is requested."""
     while not loop.done:
         if (received := endpoint.receive(WAIT_S)) is not None:
             loop.take(received.message, received.received_ns)

@@ -1,7 +1,7 @@
-"""Rows of numbers as MCAP messages with their protobuf content, checked and encoded many in one call of a kernel.
+"""Checks plain rows and encodes them as MCAP messages with protobuf content, many in one call of a kernel.
 
-Byte for byte it is what protobuf's own library and the MCAP library write, in a tenth of their time: a test in virtual
-time has some forty thousand messages per second. In proto3 a field that holds 0 or false is left out; −0.0 is not 0.
+The result equals byte by byte that of protobuf's own library and the MCAP library, in a tenth of their time: a test in
+virtual time has some forty thousand messages per second. In proto3 a field that is 0 or false is left out; −0.0 is not.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ Numbers = npt.NDArray[np.int64]
 HEAD = 31  # bytes of an MCAP message record before its data: opcode, length, channel, sequence, both times
 PREFIX = 9  # bytes of opcode and length, which the length does not count
 OPCODE = 5  # of a message
-LONGEST = 12  # bytes of a field at most beside its numbers: a tag of two, and a length of ten
-MOST = 10  # bytes of a number at most: a negative one
+LONGEST = 12  # largest number of bytes of a field without its numbers: a tag of two, and a length of ten
+MOST = 10  # largest number of bytes of a number: that of a negative one
 VARINT, DOUBLE, PACKED = 0, 1, 2  # how a field's value is stored: the low three bits of its tag
 END, OF_DOUBLE, OF_COUNT, OF_INDEX, OF_STAMP, OF_FLAG = range(6)
-KIND, COUNT = range(2)  # of a field, in a table of fields
+KIND, COUNT = range(2)  # columns of a table of fields
 
 KINDS: Mapping[FieldType, int] = {
     FieldType.NUMBER: OF_DOUBLE,
@@ -36,11 +36,11 @@ KINDS: Mapping[FieldType, int] = {
     FieldType.INDEX: OF_INDEX,
     FieldType.STAMP: OF_STAMP,
     FieldType.FLAG: OF_FLAG,
-}  # how the kernels name a signal's kind
+}  # codes of the kernels for the types of signals
 
 
 class RowTable:
-    """The plain topics among `topics` as the kernels know them, and rows of theirs as they read them."""
+    """The plain topics among `topics` as tables for the kernels."""
 
     def __init__(self, topics: Mapping[str, Sequence[Signal]], storeys: int) -> None:
         plain = {topic: rows for topic, rows in topics.items() if is_plain(rows)}
@@ -53,13 +53,13 @@ class RowTable:
                 self.fields[place, field] = KINDS[row.kind], row.count(storeys)
 
     def gathered(self, items: Sequence[Item]) -> tuple[ByteArray, ByteArray]:
-        """The rows of items one after the other, and the place of each one's topic."""
+        """The rows of items one after the other, and the index of each item's topic."""
         topics, rows = zip(*items, strict=True)
         places = bytes(map(self._places.__getitem__, topics))
         return np.frombuffer(b"".join(rows), dtype=np.uint8), np.frombuffer(places, dtype=np.uint8)
 
     def sound(self, items: Sequence[Item], ticks: int) -> bool:
-        """Whether rows of plain topics have their size, stamps that are times, ticks below `ticks`, and true flags."""
+        """Whether rows of plain topics have the right size, valid stamps, ticks below `ticks`, and flags of 0 or 1."""
         topics, rows = zip(*items, strict=True)
         if any(map(ne, map(len, rows), map(self.sizes.__getitem__, topics))):
             return False
@@ -67,7 +67,7 @@ class RowTable:
 
 
 class RowEncoder:
-    """Encodes rows of the plain topics among `topics`; `channels` are the numbers under which a file knows them."""
+    """Encodes rows of the plain topics among `topics`; `channels` are the file's channel numbers by topic."""
 
     def __init__(
         self, topics: Mapping[str, Sequence[Signal]], channels: Mapping[str, int], storeys: int
@@ -79,9 +79,7 @@ class RowEncoder:
         counts = self._table.fields[:, :, COUNT]
         self._most = HEAD + int(np.max(np.sum(LONGEST + MOST * counts, axis=1), initial=0))
         self._room(16)
-        for topic, size in list(self.sizes.items())[
-            :1
-        ]:  # the kernel is compiled, or loaded, before a test begins
+        for topic, size in list(self.sizes.items())[:1]:  # compiles or loads the kernel before a test begins
             self.encode([(topic, bytes(size))])
 
     def _room(self, rows: int) -> None:
@@ -90,7 +88,7 @@ class RowEncoder:
         self._size = np.zeros(1, dtype=np.int64)
 
     def encode(self, items: Sequence[Item]) -> Block:
-        """The messages of items, whose topics are plain."""
+        """The encoded messages of items, whose topics must be plain."""
         if len(items) > len(self._entries):
             self._room(2 * len(items))
         rows, places = self._table.gathered(items)
@@ -105,7 +103,10 @@ class RowEncoder:
 
 @jit_apart
 def put_varint(out: ByteArray, at: int, number: int) -> int:
-    """A number in groups of seven bits, the lowest first; all but the last have the eighth bit set. Its end."""
+    """Write a number in groups of seven bits, the lowest first, all but the last with the eighth bit.
+
+    Returns the end.
+    """
     rest = number
     while rest & -128:
         out[at] = (rest & 127) | 128
@@ -117,7 +118,7 @@ def put_varint(out: ByteArray, at: int, number: int) -> int:
 
 @jit_apart
 def varint_size(number: int) -> int:
-    """How many bytes `put_varint` needs for a number."""
+    """The number of bytes that `put_varint` needs."""
     rest, size = number, 1
     while rest & -128:
         rest = (rest >> 7) & 0x01FFFFFFFFFFFFFF
@@ -127,7 +128,7 @@ def varint_size(number: int) -> int:
 
 @jit_apart
 def copied(source: ByteArray, begin: int, out: ByteArray, at: int, count: int) -> bool:
-    """Copy bytes; whether any of them is not 0."""
+    """Copy bytes; returns whether any of them is not 0."""
     some = 0
     for place in range(count):
         byte = source[begin + place]
@@ -138,7 +139,7 @@ def copied(source: ByteArray, begin: int, out: ByteArray, at: int, count: int) -
 
 @jit_apart
 def whole(source: ByteArray, begin: int, count: int) -> int:
-    """The whole number that some bytes hold, the lowest first."""
+    """The whole number in little-endian bytes."""
     number = np.int64(0)
     for place in range(count):
         number |= np.int64(source[begin + place]) << np.int64(8 * place)
@@ -147,7 +148,7 @@ def whole(source: ByteArray, begin: int, count: int) -> int:
 
 @jit_apart
 def size_of(kind: int) -> int:
-    """Bytes of a number of this kind in a row."""
+    """The number of bytes of a number of this kind in a row."""
     if kind in (OF_DOUBLE, OF_STAMP):
         return 8
     return 1 if kind == OF_FLAG else 4
@@ -155,7 +156,7 @@ def size_of(kind: int) -> int:
 
 @jit_apart
 def number_of(rows: ByteArray, begin: int, kind: int) -> int:
-    """The whole number of this kind that stands in a row."""
+    """The whole number of this kind at a place of a row."""
     number = whole(rows, begin, size_of(kind))
     if kind == OF_INDEX and number >= 1 << 31:
         number -= 1 << 32
@@ -164,7 +165,7 @@ def number_of(rows: ByteArray, begin: int, kind: int) -> int:
 
 @jit_apart
 def put_one(rows: ByteArray, begin: int, field: int, kind: int, out: ByteArray, at: int) -> int:
-    """A field of one number, left out where that is 0; the end of the message so far."""
+    """Write a field of one number, unless it is 0; returns the end of the message so far."""
     if kind == OF_DOUBLE:
         after = put_varint(out, at, (field + 1) << 3 | DOUBLE)
         return after + 8 if copied(rows, begin, out, after, 8) else at
@@ -178,7 +179,7 @@ def put_one(rows: ByteArray, begin: int, field: int, kind: int, out: ByteArray, 
 def put_several(
     rows: ByteArray, begin: int, field: int, kind: int, count: int, out: ByteArray, at: int
 ) -> int:
-    """A field of several numbers, packed; the end of the message so far."""
+    """Write a field of several numbers, packed; returns the end of the message so far."""
     at = put_varint(out, at, (field + 1) << 3 | PACKED)
     if kind == OF_DOUBLE:
         at = put_varint(out, at, 8 * count)
@@ -195,7 +196,7 @@ def put_several(
 
 @jit_apart
 def put_fields(rows: ByteArray, begin: int, fields: Numbers, out: ByteArray, at: int) -> tuple[int, int]:
-    """The protobuf message of a row's values; the ends of the row and of the message."""
+    """Write the protobuf message of a row's values; returns the ends of the row and of the message."""
     for field in range(fields.shape[0]):
         kind, count = fields[field, KIND], fields[field, COUNT]
         if kind == END:
@@ -218,7 +219,7 @@ def pack(
     entries: Numbers,
     size: Numbers,
 ) -> None:
-    """The MCAP records of rows, with each one's log time and place, and the `size` of all of them, bytes."""
+    """Write MCAP records of rows into `out`, their log times and offsets into `entries`, the total into `size`."""
     begin = at = 0
     for row in range(topics.shape[0]):
         topic, start = topics[row], at
@@ -235,7 +236,7 @@ def pack(
 
 @jit_apart
 def check(rows: ByteArray, topics: ByteArray, fields: Numbers, ticks: int) -> bool:
-    """Whether all rows have stamps that are times, ticks below `ticks`, and flags that are 0 or 1."""
+    """Whether all rows have stamps of at least 0, ticks below `ticks`, and flags of 0 or 1."""
     begin = 0
     for row in range(topics.shape[0]):
         if whole(rows, begin, 8) < 0 or whole(rows, begin + 8, 8) < 0:

@@ -1,4 +1,4 @@
-"""The file of a test: its name, what is written before the first sample."""
+"""The file of a test: its name, and the content before the first sample."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ PACKAGES = ("rths", "eclipse-zenoh", "mcap", "msgpack", "numba", "numpy", "proto
 
 @contextlib.contextmanager
 def reserved(given: Path | None, plan: Plan, label: str = "", *, force: bool = False) -> Iterator[Path]:
-    """A new file for a recording: the one given, or `<folder>/<test>[-<label>]-<time>.mcap` in a folder that is made.
+    """Reserve a file for a recording: the one given, or `<test>[-<label>]-<time>.mcap` in the plan's folder.
 
-    It is this command's from the context's beginning on, and gone at its end if nothing was recorded. Where two tests
-    begin in one second, the second file's name ends in `-2`.
+    The folder is created. At the end of the context the file is removed if nothing was recorded. Where two tests begin
+    in one second, the name of the second file ends in `-2`.
 
     Raises:
         InputError: a file is there and `force` is not given, or no recording can be written there.
@@ -45,7 +45,7 @@ def reserved(given: Path | None, plan: Plan, label: str = "", *, force: bool = F
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(
-            f"Cannot make the folder {folder} for recordings: {error.strerror}; give a file with -o."
+            f"Cannot create the folder {folder} for recordings: {error.strerror}; give a file with -o."
         ) from None
     name = f"{plan.test.name}-{label}" if label else plan.test.name
     with outputs.free_name(folder, f"{name}-{time.strftime('%Y%m%d-%H%M%S')}", ".mcap") as path:
@@ -53,7 +53,7 @@ def reserved(given: Path | None, plan: Plan, label: str = "", *, force: bool = F
 
 
 def checked(path: Path) -> Path:
-    """The path, where a test can be recorded: a pipe may hold the recorder up; raises InputError."""
+    """The path, unless it is a pipe or the standard output, which could block the recorder; raises InputError."""
     if outputs.is_stream(path) and (str(path) in outputs.STANDARD or not path.is_char_device()):
         raise InputError(f"Cannot record a test into {path}, which is not a file: give a file with -o.")
     return path
@@ -69,11 +69,10 @@ def begin(
     *,
     clock: str = "virtual",
 ) -> Recording:
-    """A recording with schemas, plan, versions, host, ground motion and a first event at `at_ns` (Unix), flushed.
+    """Begin a recording with schemas, plan, versions, host, ground motion and a first event at `at_ns` (Unix).
 
-    `clock` is the kind of clock that the test runs on, `virtual` or `real`.
-
-    The first chunk and the metadata reach the file with the first message only, so that event must not wait.
+    `clock` is the test's kind of clock, `virtual` or `real`. The recording is flushed, because the metadata reach the
+    file with the first chunk only.
 
     Raises:
         InputError: the disk does not take it.
@@ -95,13 +94,13 @@ def begin(
     except OSError as error:
         recording.abandon()
         raise InputError(
-            f"Cannot begin the recording {path}: {error.strerror}; make room or give another place with -o."
+            f"Cannot begin the recording {path}: {error.strerror}; free disk space or give another file with -o."
         ) from None
     return recording
 
 
 def host() -> dict[str, str]:
-    """The machine the recorder runs on."""
+    """The facts of the machine that the recorder runs on."""
     return {
         "system": platform.platform(),
         "machine": platform.machine(),

@@ -1,4 +1,4 @@
-"""Which items of a laboratory's stream may be recorded: its own topics, and values as the signals have them."""
+"""Checks which items of a laboratory's stream may be recorded: topics of its own, with values of the signals' types."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ INTEGERS = {
 
 
 class Items:
-    """What one laboratory of a plan may send to the recorder."""
+    """The items that one laboratory of a plan may send to the recorder."""
 
     def __init__(self, plan: Plan, lab: str) -> None:
         topics = kinds.topics(plan)
@@ -56,9 +56,9 @@ class Items:
         return items
 
     def _admits(self, topic: str, row: bytes) -> bool:
-        """Whether a row that is not of numbers alone holds times, and what its signals must be; its tick may be any.
+        """Whether a row that is not plain has valid stamps and values; its tick is not checked.
 
-        Such rows are events and the ramp to rest, which goes on after the last tick.
+        Such rows are events and those of the ramp to rest, which continues after the last tick.
         """
         if topic not in self._others:
             return False
@@ -77,7 +77,7 @@ class Items:
 
 
 def is_piece(found: Any) -> bool:
-    """Whether something is some items, each a topic and a row."""
+    """Whether a value is a tuple of items, each a topic and a row, at most `PIECE` of them."""
     if type(found) is not tuple or not 0 < len(found) <= PIECE or set(map(type, found)) != {tuple}:
         return False
     if set(map(len, found)) != {2}:
@@ -87,12 +87,12 @@ def is_piece(found: Any) -> bool:
 
 
 def checks(rows: tuple[Signal, ...], plan: Plan) -> list[Check]:
-    """What each value of a topic must be, in the order of the signal table."""
+    """The checks of a topic's values, in the order of the signal table."""
     return [value_check(row, plan.storeys) for row in rows]
 
 
 def value_check(row: Signal, storeys: int) -> Check:
-    """What the value of a signal must be to be recorded."""
+    """The check of a signal's value."""
     one = CHECKS[row.kind]
     count = row.count(storeys)
     if count == 1:
@@ -101,7 +101,7 @@ def value_check(row: Signal, storeys: int) -> Check:
 
 
 def is_number(value: Any) -> bool:
-    """Whether a value can be stored as a double; a sensor's may be no finite number."""
+    """Whether a value can be stored as a double; it need not be finite, since a sensor's may not be."""
     return type(value) is float or type(value) is int
 
 
@@ -113,7 +113,7 @@ def is_values(value: Any) -> bool:
 
 
 def integer(kind: FieldType) -> Check:
-    """Whether a value is a whole number that its field can hold."""
+    """The check for a whole number that a field of this type can hold."""
     limits: Mapping[FieldType, range] = INTEGERS
     return lambda value: type(value) is int and value in limits[kind]
 

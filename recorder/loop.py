@@ -1,8 +1,11 @@
-"""The recorder's loop: takes all streams in order, asks again for missing items, reports those that never came."""
+"""The recorder's loop.
+
+It takes all streams in order, asks again for missing items, and reports those that never came.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from common import signals
@@ -16,31 +19,34 @@ from common.plan import patience
 from common.plan.plan import PROTOCOL_VERSION, Plan
 from common.plan.plan_difference import differences, digest_of, said
 from common.protocol.messages import Finished, Message, Recorder, Register, Resend, Samples
-from common.recording.rows import HEAD, Item, layout, other, values_of
+from common.recording.rows import HEAD, Item, layout, named_values, other
 from common.reporting import Report
 from common.roles import MASTER, RECORDER, kind_of, latency_topic, title
 from laboratories import kinds
 from recorder.items import Items
 from recorder.sink import Sink
 
-# a test from which nothing is heard for so long is over: its laboratories repeat their last words for as long
+# silence after which a test is over: its laboratories repeat their closing messages for that time (LEAVE_NS)
 SILENCE_NS = 5_000_000_000
-ITEMS_PER_TICK, SPARE_TICKS = 4, 100_000  # bounds a stream's items: its topics of every tick, and events
-ASK_NS = 20_000_000  # from asking a laboratory to asking it again, where the answer has come
+# Bounds on a stream's number of items: two topics per tick and as much again, and events for so many ticks.
+ITEMS_PER_TICK, SPARE_TICKS = 4, 100_000
+ASK_NS = 20_000_000  # between two requests to a laboratory that has answered: ten intervals, in which it sends `BURST`
 ASKED_SILENCE_NS = (
-    2_000_000_000  # the same once it was asked to stop: laboratories that move are heard every interval
+    2_000_000_000  # as SILENCE_NS after a request to stop: moving laboratories are heard every interval
 )
-ASKED_NS = 20_000_000_000  # how long it goes on recording once asked: longer than a ramp to rest at the default limits
-STALL_NS = 1_000_000_000  # a recorder that did nothing for so long was held up itself
-ROWS_LOST = "rows_lost"  # code of the event that says what a laboratory did not send again
-MISSED = ("watchdog", "lost")  # a laboratory has missed another
-CONSEQUENCE = "remote_trip"  # the other laboratory's cause counts
-# where a row of latency says that its deadline was missed: behind the numbers before that signal
+ASKED_NS = (
+    20_000_000_000  # it records for so long after a request to stop: longer than a ramp at the default limits
+)
+STALL_NS = 1_000_000_000  # a longer pause of this process is its own, and extends all deadlines: 0.5 s are usual ones
+ROWS_LOST = "rows_lost"  # code of the event for items that a laboratory did not send again
+MISSED = ("watchdog", "lost")  # codes with which a laboratory ends because it missed another
+CONSEQUENCE = "remote_trip"  # code of an end that follows from another laboratory's, whose cause counts
+# offset of the flag of a missed deadline in a row of latency, after the numbers of the signals before it
 MISSED_AT = layout(signals.LATENCY[: [row.name for row in signals.LATENCY].index("deadline_missed")], 1).size
 
 
 class StreamHole(NamedTuple):
-    """Where a stream is broken: its first missing item, since when it is that one, and when it was asked for."""
+    """A gap in a stream: its first missing item, since when it is the first, and when it was requested (ns)."""
 
     first: int
     since_ns: int
@@ -48,7 +54,7 @@ class StreamHole(NamedTuple):
 
 
 class RecorderLoop:
-    """Receives one test and hands it to a sink."""
+    """Receives the streams of one test and hands their items to a sink."""
 
     def __init__(self, setting: Setting, sink: Sink) -> None:
         self._plan: Plan = setting.plan
@@ -77,8 +83,8 @@ class RecorderLoop:
         self._outcome = ("", "")
         self._said_failure = False
         self._unended: list[str] = []  # laboratories the end of whose stream never came
-        self._settled = False  # the test had ended when somebody stopped the recorder
-        self._begun = False  # whether a tick has come
+        self._settled = False  # whether the test had ended when the recorder was stopped
+        self._begun = False  # whether a tick has been received
         self._newest_ns = self._newest_tick = 0  # log time and number of the newest tick
         self._wish = ""  # why it was asked to stop
         self._asked_ns = 0
@@ -140,15 +146,15 @@ class RecorderLoop:
             if topic in self._latencies:
                 self._missed += row[MISSED_AT]
         elif topic == "event":
-            self._take_event(values_of(row)[2:])
+            self._take_event(named_values(signals.EVENT, row))
 
-    def _take_event(self, values: Sequence[Any]) -> None:
-        """Keep what an event says of the machines and of the test's end, of which the earliest cause counts."""
-        _, lab, level, code, text, numbers = values
+    def _take_event(self, event: Mapping[str, Any]) -> None:
+        """Keep an event's facts on the machines and on the test's end, of which the earliest cause counts."""
+        level, code, text = event["level"], event["code"], event["text"]
         if code in CODES:
-            self._machines |= described(lab, code, numbers)
+            self._machines |= described(event["lab"], code, event["values"])
         settled = self._outcome[0] not in ("", CONSEQUENCE)
-        if code == SLOW_RIG and self._outcome[0] in MISSED:  # the silence was its doing
+        if code == SLOW_RIG and self._outcome[0] in MISSED:  # the slow rig caused the silence
             settled = False
         if (
             (level == "error" or code == "stop")
@@ -160,7 +166,7 @@ class RecorderLoop:
     # -- housekeeping -----------------------------------------------------------------------------
 
     def poll(self) -> None:
-        """Report its progress, ask for missing rows, and notice when it has all rows or every laboratory has left."""
+        """Report the progress, request missing items, and end when all items are there or every laboratory has left."""
         now = self._clock.now()
         self._notice_stall(now)
         if self._session and now - self._filled_ns >= ASK_NS:
@@ -172,7 +178,7 @@ class RecorderLoop:
         self._end(now)
 
     def _notice_stall(self, now: int) -> None:
-        """Extend the others' deadlines by the time for which this process itself was held up."""
+        """Extend the laboratories' deadlines by the time for which this process was held up."""
         held = now - self._polled_ns
         self._polled_ns = now
         if held > STALL_NS:
@@ -208,7 +214,7 @@ class RecorderLoop:
                 self._ask(lab, missing[0], hole, now)
 
     def _give_up(self, lab: str) -> None:
-        """Count the first hole of a stream as lost, say so, and go on behind it."""
+        """Count the first hole of a stream as lost, report it, and go on after it."""
         inlet = self._inlets[lab]
         before = inlet.lost
         items = inlet.give_up()
@@ -220,13 +226,16 @@ class RecorderLoop:
         self._write(items)
 
     def _give_up_rest(self) -> None:
-        """Write the items behind holes that are still open, and report what is missing of the streams."""
+        """Write the items after holes that are still open, and report the streams whose end is missing.
+
+        A laboratory that has sent nothing when no tick was played has taken no part in the test.
+        """
         for lab, inlet in self._inlets.items():
             while inlet.missing() is not None:
                 self._give_up(lab)
-            if self._session and inlet.total is None:
+            if self._session and inlet.total is None and (self._begun or inlet.begun):
                 self._unended.append(lab)
-                self._say_lost(f"The end of what the {title(lab)} records did not reach the recorder.", {})
+                self._say_lost(f"The end of the stream of the {title(lab)} did not reach the recorder.", {})
 
     def _say_lost(self, text: str, values: Mapping[str, float]) -> None:
         """Record and report a loss of items, at the time of the newest tick."""
@@ -237,12 +246,12 @@ class RecorderLoop:
         self._report("event", said | dict(values))
 
     def _ask(self, lab: str, first: int, hole: StreamHole | None, now: int) -> None:
-        """Ask for what is missing first, again at once where the last answer has come."""
+        """Request the first missing items, again at once where the last answer has come."""
         moved = hole is None or hole.first != first
         if hole is not None and now - hole.asked_ns < (ASK_NS if moved else REPEAT_NS):
             return
         self._holes[lab] = StreamHole(first, now if hole is None or moved else hole.since_ns, now)
-        left = BURST * PIECE  # what a laboratory sends again at once is bounded: it does so between its ticks
+        left = BURST * PIECE  # a laboratory sends again no more at once, because it does so between its ticks
         for begin, end in self._inlets[lab].holes():
             last = min(end, begin + left - 1)
             self._endpoint.send(Resend(self._session, lab, begin, last))
@@ -270,11 +279,11 @@ class RecorderLoop:
 
     @property
     def _silence_ns(self) -> int:
-        """Silence after which a test is over; before its first tick a rig may be arming, and its laboratory waits."""
+        """Silence after which a test is over; before the first tick it is longer, because a rig may be arming."""
         return SILENCE_NS if self._begun else max(SILENCE_NS, round(self._plan.link.connect_timeout * 1e9))
 
     def _fell_silent(self) -> None:
-        """End the recording because no laboratory is heard; every laboratory must have reported an orderly end."""
+        """End the recording because no laboratory is heard; without an orderly end of all of them the test is lost."""
         code, text = self._outcome
         missing = [title(lab) for lab, inlet in self._inlets.items() if inlet.total is None]
         if code == "stop" and missing:
@@ -286,12 +295,12 @@ class RecorderLoop:
         elif not code:
             self._outcome = ("lost", "The laboratories fell silent.")
         if self._outcome[0] == "lost" and self._outcome[0] != code:
-            self.error = LostError(f"{self._outcome[1].removesuffix('.')}; what came until then is recorded.")
+            self.error = LostError(f"{self._outcome[1].removesuffix('.')}; the recording ends there.")
 
     def stop(self, reason: str) -> None:
-        """End the recording on request; where the test had ended before, its own cause stays the outcome.
+        """End the recording on request; if the test has ended before, its own cause stays the outcome.
 
-        A test that needs its recording is asked to end, and its ramp to rest is recorded.
+        A test that requires its recording is asked to end, and its ramp to rest is recorded.
         """
         if self._wish or self.done:
             return
@@ -302,7 +311,7 @@ class RecorderLoop:
             self._leave(reason)
 
     def _leave(self, reason: str) -> None:
-        """Stop recording although the test may go on."""
+        """Stop recording, even though the test may go on."""
         self.error = LostError(reason)
         self._settled = bool(self._outcome[0])
         if not self._settled:
@@ -311,7 +320,10 @@ class RecorderLoop:
         self.done = True
 
     def close(self) -> Mapping[str, str]:
-        """Say goodbye, write the summary, close the file; the summary as written, and in `error` what is lost of it."""
+        """Send the last state, write the summary and close the file.
+
+        Returns the summary, and sets `error` for losses.
+        """
         self._give_up_rest()
         self._judge()
         self._say()
@@ -319,12 +331,12 @@ class RecorderLoop:
         self._sink.close(summary, self._machines)
         if self._sink.failure:
             self.error = LostError(
-                f"The recording is lost from some point on: {self._sink.failure} What came before is in the file."
+                f"The recording is incomplete: {self._sink.failure} The file holds all data before that."
             )
         return summary
 
     def _judge(self) -> None:
-        """The error of a required recording that misses something, unless something worse has happened."""
+        """Set the error of a required recording with losses, unless another error counts more."""
         lost = sum(inlet.lost for inlet in self._inlets.values())
         worse = self.error is not None and not self._settled
         if not self._plan.recording.required or worse or not (lost or self._unended):

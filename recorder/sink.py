@@ -1,4 +1,4 @@
-"""Where the recorder's items go: straight into the file, or through a bounded queue and a thread."""
+"""Takes the recorder's items: straight into the file, or through a bounded queue and a thread."""
 
 from __future__ import annotations
 
@@ -13,15 +13,17 @@ from common.recording.run import MACHINES
 from common.recording.writer import Recording
 from recorder.encoding import RowEncoder
 
-FLUSH_NS = 50_000_000  # with a piece of a laboratory's stream on its way, less than 0.1 s is not in the file
-# of a recording in virtual time, where a second passes in some hundredths of one: full chunks cost half as much
+FLUSH_NS = (
+    50_000_000  # between two flushes: with the time of a piece on its way, the file lacks less than 0.1 s
+)
+# The same in virtual time, where a second passes in some hundredths of one: full chunks take half the time.
 SELDOM_NS = 1_000_000_000
 BLOCK_BYTES = (
     8 << 10
-)  # of rows encoded at once: a kernel's call costs as much as ten rows; an eighth of a chunk
-SYNC_NS = 1_000_000_000  # a power cut costs a second at most; a sync takes tens of ms on a slow disk
-QUEUE_ITEMS = 60_000  # a disk may hang for forty seconds of a default test before items are dropped
-CLOSE_S = 25.0  # less than `rths run` allows the recorder to write what it holds
+)  # of rows encoded at once, an eighth of a chunk: a kernel's call takes as long as ten rows
+SYNC_NS = 1_000_000_000  # a power failure loses a second at most; a sync takes tens of ms on a slow disk
+QUEUE_ITEMS = 60_000  # a disk may block for forty seconds of a default test before items are dropped
+CLOSE_S = 25.0  # to write the queue at the end: less than `rths run` waits for the recorder
 
 
 class Sink(Protocol):
@@ -29,7 +31,7 @@ class Sink(Protocol):
 
     @property
     def failure(self) -> str:
-        """Why nothing can be written any more, empty while it can."""
+        """Why nothing can be written, empty while it can."""
 
     @property
     def dropped(self) -> int:
@@ -37,19 +39,19 @@ class Sink(Protocol):
 
     @property
     def most_waiting(self) -> int:
-        """The most items that ever waited to be written."""
+        """The largest number of items that waited to be written."""
 
     def put(self, items: list[Item]) -> None:
         """Take items; never waits for the disk in real time."""
 
     def close(self, summary: dict[str, str], machines: dict[str, str]) -> None:
-        """Write the remaining items, the summary and the properties of the machines."""
+        """Write the remaining items, the summary and the metadata of the machines."""
 
 
 class FileSink:
-    """Writes straight away; flushes twenty times a second and after every event, syncs once a second.
+    """Writes at once; flushes twenty times a second and after every event, syncs once a second.
 
-    Where it is not `timely`, as in virtual time, it flushes once a second and syncs at its end.
+    If it is not `timely`, as in virtual time, it flushes once a second and syncs at the end.
     """
 
     def __init__(self, recording: Recording, clock: Clock, *, timely: bool = True) -> None:
@@ -86,14 +88,14 @@ class FileSink:
         self.keep_up(at_once=at_once)
 
     def _encode(self) -> None:
-        """Hand rows of numbers that wait to the file."""
+        """Encode the waiting plain rows into the file."""
         if self._numbers:
             self._recording.add_block(self._encoder.encode(self._numbers))
             self._numbers.clear()
             self._held = 0
 
     def keep_up(self, *, at_once: bool = False) -> None:
-        """Flush and sync where it is time; flush `at_once` in any case."""
+        """Flush and sync when they are due; flush in any case if `at_once`."""
         now = self._clock.now()
         try:
             if at_once or now - self._flushed_ns >= self._flush_ns:
@@ -104,10 +106,10 @@ class FileSink:
                 self._synced_ns = now
                 self._recording.sync()
         except OSError as error:
-            self.failure = f"the disk does not take it ({error.strerror})."
+            self.failure = f"the disk cannot be written ({error.strerror})."
 
     def close(self, summary: dict[str, str], machines: dict[str, str]) -> None:
-        """Finish the file; after a failure it stays readable up to there."""
+        """Finish the file; after a failure it stays readable up to that point."""
         try:
             if not self.failure:
                 self._encode()
@@ -116,12 +118,12 @@ class FileSink:
                 self._recording.close(summary)
                 return
         except OSError as error:
-            self.failure = f"the disk does not take it ({error.strerror})."
+            self.failure = f"the disk cannot be written ({error.strerror})."
         self._recording.abandon()
 
 
 class ThreadedSink:
-    """A bounded queue in front of another sink, emptied by a thread: a slow disk costs drops, never time."""
+    """A bounded queue before another sink, emptied by a thread: a slow disk drops items, but delays nothing."""
 
     def __init__(self, sink: FileSink, capacity: int = QUEUE_ITEMS) -> None:
         self._sink = sink
@@ -138,7 +140,7 @@ class ThreadedSink:
 
     @property
     def failure(self) -> str:
-        """Why nothing can be written any more."""
+        """Why nothing can be written, empty while it can."""
         if self._overflow and not self._sink.failure:
             return f"the disk is too slow: {self._overflow} samples were dropped."
         return self._sink.failure or self._hung
@@ -149,7 +151,7 @@ class ThreadedSink:
         return self._overflow + self._sink.dropped
 
     def put(self, items: list[Item]) -> None:
-        """Queue items, or count them where the queue is full."""
+        """Queue items, or count them as dropped if the queue is full."""
         with self._lock:
             if self._waiting + len(items) > self._capacity:
                 self._overflow += len(items)
@@ -170,10 +172,10 @@ class ThreadedSink:
                 self._waiting -= len(items)
 
     def close(self, summary: dict[str, str], machines: dict[str, str]) -> None:
-        """Write the queue, the summary and what is known of the machines; give up where the disk hangs."""
+        """Write the queue, the summary and the metadata of the machines; give up after `CLOSE_S` if the disk blocks."""
         self._ending.set()
         self._thread.join(CLOSE_S)
         if self._thread.is_alive():
-            self._hung = f"the disk has not taken the last {self._waiting} samples within {CLOSE_S:g} s."
+            self._hung = f"the disk has not written the last {self._waiting} samples within {CLOSE_S:g} s."
             return
         self._sink.close(summary, machines)

@@ -1,4 +1,4 @@
-"""Whether a disk has room for a recording: its size estimated from the table of signals."""
+"""Checks whether a disk has room for a recording, whose size is estimated from the table of signals."""
 
 from __future__ import annotations
 
@@ -25,7 +25,9 @@ VALUES = {
 ONE_BYTE_TAGS = 15  # fields up to this number
 MESSAGE_HEAD = 31  # bytes before a message in a chunk
 INDEX_ENTRY = 16  # bytes of the chunk's index for a message
-COMPRESSED = 0.7  # of a chunk of measurements with noise, zstd; constant ones take less
+COMPRESSED = (
+    0.7  # compressed size over size of a chunk of noisy measurements with zstd; constant ones take less
+)
 GROUND_ROWS = 2 * 8  # bytes of the ground motion per tick
 FIXED = 50_000  # bytes of plan, schemas and host, rounded up
 SPARE = 1.1  # a tenth more for events and the index, whose size depends on the test
@@ -47,7 +49,7 @@ def payload(rows: tuple[Signal, ...], storeys: int) -> int:
 
 
 def field(number: int, row: Signal, storeys: int) -> int:
-    """Bytes of one of its fields; several values stand behind one tag and their length."""
+    """Bytes of one field of a message; several values follow one tag and their length."""
     tag = 1 if number <= ONE_BYTE_TAGS else 2
     count = row.count(storeys)
     value = VALUES.get(row.kind, 0)
@@ -55,7 +57,7 @@ def field(number: int, row: Signal, storeys: int) -> int:
 
 
 def check(plan: Plan, folder: Path) -> PreflightCheck:
-    """Whether a folder has room for the recording of a test."""
+    """The check whether a folder has room for the recording of a test."""
     wanted = plan.preflight.disk_factor * need(plan)
     try:
         disk = shutil.disk_usage(folder)
@@ -63,7 +65,9 @@ def check(plan: Plan, folder: Path) -> PreflightCheck:
         return PreflightCheck(
             "", Risk("disk", f"the free space of the folder {folder} is unknown: {error.strerror}")
         )
-    if disk.free >= wanted or not disk.total:  # what has no size is no disk, and writing there will say so
+    if (
+        disk.free >= wanted or not disk.total
+    ):  # a file system without a size is no disk, and writing there will fail
         return PreflightCheck(
             f"The disk has {disk.free / 1e6:.0f} MB free; the recording takes {need(plan) / 1e6:.1f} MB"
         )
@@ -72,7 +76,7 @@ def check(plan: Plan, folder: Path) -> PreflightCheck:
         Risk(
             "disk",
             f"the folder {folder} has {disk.free / 1e6:.1f} MB free, and the recording needs {wanted / 1e6:.1f} MB "
-            f"({plan.preflight.disk_factor:g} times its expected {need(plan) / 1e6:.1f} MB), so make room, give "
-            "another place with -o, or lower disk_factor in [preflight]",
+            f"({plan.preflight.disk_factor:g} times its expected {need(plan) / 1e6:.1f} MB), so free disk space, "
+            "give another place with -o, or lower disk_factor in [preflight]",
         ),
     )

@@ -45,7 +45,8 @@ def columns(name: str, tell: Tell = untold) -> ComparedRun:
 def simulated(path: Path) -> ComparedRun:
     """The simulation of a plan."""
     from loop import substructure
-    from loop.closed_loop import signals, simulate
+    from loop.closed_loop import simulate
+    from loop.signals import signals
 
     test = plans.load(path)
     record = substructure.motion(test)

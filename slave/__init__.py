@@ -1,1 +1,1 @@
-"""Laboratory B: drives a laboratory of any kind by what the master sends."""
+"""The slave: it drives a laboratory of any kind by the commands of the master."""

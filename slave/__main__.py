@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the slave; its exit code."""
+    """Run the slave; returns its exit code."""
     from slave import assembly
 
     return process.conduct("slave", args, assembly, connect=args.connect)

@@ -1,4 +1,4 @@
-"""Everything the slave's loop is made of, built and warmed up before anything moves."""
+"""Builds the parts of the slave's loop, and compiles their kernels, before anything moves."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from slave.step import SlaveStep
 
 
 def preflight(_plan: Plan) -> list[PreflightCheck]:
-    """No check: the master judges the test as a whole, and a slave's gate judges its own rig as it arms."""
+    """No check: the master judges the test as a whole, and a slave judges its own rig when it is armed."""
     return []
 
 
 def build_rig(reality: Reality, at_rest: AtRest | None = None, *, paced: bool = False) -> GuardedRig:
-    """The laboratory of the slave whose reality is given, judged `at_rest` as it is armed.
+    """The rig of the slave whose reality is given, whose sensors `at_rest` judges when it is armed.
 
     Raises:
         InputError: it cannot be constructed.
@@ -31,14 +31,14 @@ def build_rig(reality: Reality, at_rest: AtRest | None = None, *, paced: bool = 
 
 
 def build_step(reality: Reality) -> SlaveStep:
-    """The slave's computation; raises InputError where its compensator cannot be."""
+    """The slave's computation; raises InputError where its compensator is not valid."""
     kind = rigs.hosted(reality, reality.role)
     assert kind is not None  # noqa: S101 - every slave has a laboratory
     return SlaveStep(reality.plan, kind)
 
 
 def check(reality: Reality) -> None:
-    """Raise InputError where a slave's laboratory could not be built; nothing of it is constructed or moved."""
+    """Raise InputError where a slave's laboratory could not be built, without constructing or moving the rig."""
     rigs.check(reality, reality.role)
     build_step(reality)
 
@@ -46,10 +46,10 @@ def check(reality: Reality) -> None:
 def build_loop(
     setting: Setting, reality: Reality, *, instance: int | None = None, gate: Gate | None = None
 ) -> SlaveLoop:
-    """The loop of the slave whose reality is given, its kernels compiled; the setting's plan is the whole test's.
+    """The loop of the slave whose reality is given, with compiled kernels; the setting's plan is the whole test's.
 
-    The number that tells this process from others of its role is drawn where none is given. With a `gate` its rig's
-    sensors must pass it.
+    `instance` identifies this process among others of its role; it is drawn by default. With a `gate` the sensors of
+    its rig must pass their check.
     """
     warm_up(reality)
     return SlaveLoop(
@@ -62,7 +62,7 @@ def build_loop(
 
 
 def warm_up(reality: Reality) -> None:
-    """Compile the kernels on arrays that are thrown away."""
+    """Compile the kernels by calling them once."""
     rigs.warm_up(reality, reality.role)
     kind = rigs.hosted(reality, reality.role)
     build_step(reality)(NO_COMMAND, (0.0,) * len(kind.channels.names if kind else ()))

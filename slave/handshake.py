@@ -1,4 +1,4 @@
-"""A slave's part of the handshake: it waits, registers, arms, shows its clock, agrees on the start."""
+"""A slave's part of the handshake: it waits, registers, arms, synchronises its clock, agrees on the start."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from common.safety.modes import STILL_LATCHED
 
 
 class SlaveHandshake:
-    """A slave's handshake, up to the start; `instance` tells this process from others of its role."""
+    """A slave's handshake up to the start; `instance` identifies this process among others of its role."""
 
     def __init__(self, lab: Laboratory, rig: GuardedRig, instance: int) -> None:
         self._lab = lab
@@ -36,13 +36,13 @@ class SlaveHandshake:
         self._said_ns = -REPEAT_NS
 
     def follow(self, message: Message, received_ns: int) -> None:
-        """Do what the master of this session wants before the start."""
+        """Obey a message of this session's master before the start."""
         lab = self._lab
         match message:
             case Arm():
                 self._arm()
             case Sync() | Start() if lab.exchange.state is State.REGISTERED:
-                pass  # for another process of this role: this one was never armed
+                pass  # it is for another process of this role, since this one was never armed
             case Sync():
                 lab.endpoint.send(SyncReply(message.session, message.seq, received_ns, lab.clock.now()))
             case Start():
@@ -51,7 +51,7 @@ class SlaveHandshake:
                 pass
 
     def register(self, request: Register) -> None:
-        """The master calls: take part in its test, or say why not."""
+        """Answer a master's call: take part in its test, or refuse it with the reason."""
         lab = self._lab
         if lab.exchange.state is State.IDLE:
             complaint = self._complaint(request)
@@ -67,7 +67,9 @@ class SlaveHandshake:
             lab.endpoint.send(Registered(request.session, self._instance))
         elif lab.safety.latched:
             lab.endpoint.send(Refused(request.session, STILL_LATCHED))
-        elif not lab.exchange.ended:  # a process that leaves does not answer: its role may be taken
+        elif (
+            not lab.exchange.ended
+        ):  # a process that leaves does not answer, so that another may take its role
             lab.endpoint.send(Refused(request.session, "it takes part in another test already."))
 
     def make_way(self, session: int) -> None:
@@ -104,7 +106,7 @@ class SlaveHandshake:
 
     def _schedule(self, start: Start) -> None:
         far = abs(start.start_ns - self._lab.clock.now()) > self._lab.plan.link.connect_timeout * 1e9
-        if far:  # no time that anybody could have meant
+        if far:  # not a plausible start
             return
         if self._lab.exchange.state is State.ARMED:
             self._lab.start_ns = start.start_ns
@@ -113,7 +115,7 @@ class SlaveHandshake:
         self._lab.endpoint.send(Scheduled(self._lab.exchange.session))
 
     def poll(self) -> None:
-        """Before the first tick: give up when no master comes, or when it has fallen silent."""
+        """Before the first tick: announce this process, and give up when no master comes or it has fallen silent."""
         lab = self._lab
         seconds = lab.plan.link.connect_timeout
         if lab.exchange.ended or lab.exchange.state is State.SCHEDULED:

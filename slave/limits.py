@@ -1,4 +1,4 @@
-"""What a slave checks before its rig moves: the measurements it read and the command it was sent."""
+"""The limits that a slave checks at each tick, on the measurements read and on the command received."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ TARGET = Command._fields.index("target")
 class SlaveLimits:
     """The limits of a slave's laboratory, as its own plan has them.
 
-    `violation` is asked once in every tick; `written` is told of every command that went to the rig.
+    `violation` must be called once in every tick, and `written` with every command that is written to the rig.
     """
 
     def __init__(self, kind: Kind, plan: Plan) -> None:
         before = [*of_readings(kind, plan), *of_sent(kind, plan)]
         self._tick = TickLimits(kind, plan, [*before, *of_commands(kind, plan)], commands=len(before))
-        self._target = 0.0  # of the command asked about last
-        self._present = 0.0  # of the command that was in force over the interval just over
+        self._target = 0.0  # target of the command that was checked last
+        self._present = 0.0  # target of the command that was in force over the last interval
         self.standing = self._tick.standing
 
     def violation(
@@ -32,6 +32,6 @@ class SlaveLimits:
         return self._tick.violation(self._present, *measured, *command[TARGET:], *wanted)
 
     def written(self, command: tuple[float, ...]) -> None:
-        """Take note of a command that went to the rig for the target asked about last."""
+        """Take note of a command that was written to the rig for the target checked last."""
         self._present = self._target
         self._tick.written(command)

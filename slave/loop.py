@@ -44,7 +44,7 @@ NOTHING_HEARD = (-1, 0)
 
 
 class SlaveLoop(RigLoop):
-    """Laboratory B in a test, or one of several; `instance` tells this process from others of its role."""
+    """A slave in a test; `instance` identifies this process among others of its role."""
 
     def __init__(
         self, setting: Setting, rig: GuardedRig, link: LinkModel, *, role: str = SLAVE, instance: int = 1
@@ -65,19 +65,17 @@ class SlaveLoop(RigLoop):
         self._step = SlaveStep(plan, kind)
         self._command = NO_COMMAND
         self._shift_ns = 0
-        self._leap_ns = (
-            setting.plan.window * self.lab.interval_ns
-        )  # clocks drift slowly: beyond it is no drift
+        self._leap_ns = setting.plan.window * self.lab.interval_ns  # a larger change of the drift is an error
         self._watchdog = Watchdog(setting.plan.safety, setting.plan.test.interval)
         self._wait_ns = round(setting.plan.link.wait_share * self.lab.interval_ns)
         self._tally = Tally(setting.plan.ticks, setting.plan.window)
-        self._feedbacks = 0  # sent
-        self._master_ticks = 0  # those it says it has done
+        self._feedbacks = 0  # number of feedbacks sent
+        self._master_ticks = 0  # number of ticks that the master has run, by its Stop
 
     # -- messages ---------------------------------------------------------------------------------
 
     def take(self, received: Received) -> None:
-        """Act on one message of the master or the recorder; what it says tells which."""
+        """Act on a message of the master, the recorder or the operator, which its type tells apart."""
         lab, message, received_ns = self.lab, received.message, received.received_ns
         if isinstance(message, Command):
             if lab.exchange.belongs(message.session):
@@ -100,7 +98,7 @@ class SlaveLoop(RigLoop):
             self._follow(message, received_ns)
 
     def _follow(self, message: Message, received_ns: int) -> None:
-        """Do what the master of this session wants."""
+        """Obey a message of this session's master."""
         lab = self.lab
         match message:
             case Stop():
@@ -125,7 +123,7 @@ class SlaveLoop(RigLoop):
             self._received_ns[command.seq] = received_ns + round(extra * 1e9)
 
     def poll(self) -> None:
-        """Before the first tick: move the handshake on."""
+        """Take the next step of the handshake."""
         self._handshake.poll()
 
     def _stop(self, request: Stop) -> None:
@@ -139,13 +137,13 @@ class SlaveLoop(RigLoop):
     # -- ticks ------------------------------------------------------------------------------------
 
     def tick_ns(self, tick: int) -> int:
-        """Nominal time of a tick on the slave's clock, its drift from the master's followed."""
+        """Nominal time of a tick on the slave's clock, ns, corrected by its drift from the master's."""
         return self.lab.tick_ns(tick) + self._shift_ns
 
     def tick(self, tick: int) -> None:
-        """Play one control interval (contract, section 3); a tick that is a whole interval late keeps the last command.
+        """Run one control interval; a tick that is late by a whole interval keeps the last command.
 
-        Where all laboratories are emulated the tick is made up for with its own command.
+        Where all laboratories are emulated a late tick is caught up with its own command.
         """
         lab, now = self.lab, self.lab.clock.now()
         lab.tick = tick
@@ -167,7 +165,7 @@ class SlaveLoop(RigLoop):
             violation = self._limits.violation(measured, command, wanted)
             if violation:
                 lab.violated(violation, tick)
-                wanted = self._descent.last  # the rig never saw the other one
+                wanted = self._descent.last  # the violating command was not written to the rig
                 self._descent.step(tick, measured)
             else:
                 self._descent.wrote(wanted)
@@ -216,10 +214,10 @@ class SlaveLoop(RigLoop):
             self._sample(tick, measured, wanted, sent_ns)
 
     def _told(self, seq: int, now: int) -> int:
-        """When the command in force came, told once, by the first answer to it; 0 in later ones.
+        """When the command in force came (ns), in the first feedback that answers it; 0 in later ones.
 
-        A delay counts from when a message would be used at best (contract, section 3), so that the stamp of one
-        with a delay of whole intervals can lie a little after its use: it came by then at the latest.
+        A plug-in's delay counts from the earliest use of a message, so that the stamp of one delayed by whole intervals
+        may be slightly after its use; it is then set to the time of its use.
         """
         if seq not in self._received_ns:
             return 0
@@ -255,7 +253,7 @@ class SlaveLoop(RigLoop):
         self.lab.fail(Event.TRIP, InterlockError(reason), code="stop", tick=self.ticks)
 
     def disarm(self) -> None:
-        """Bring the rig to a safe stop; once, before leaving."""
+        """Disarm the rig and record the counts of messages; called once, before leaving."""
         self.disarm_rig()
         if self.ticks:
             text = f"{self._feedbacks} feedbacks sent, {self._tally.used} commands used."
@@ -264,7 +262,7 @@ class SlaveLoop(RigLoop):
 
     @property
     def _ends(self) -> bool:
-        """Whether the test has ended here: of its orderly end the master knows, who ends it."""
+        """Whether the test has ended here by an error; the master knows of an orderly end, which it causes."""
         return self.lab.error is not None
 
     def _say_end(self) -> None:
@@ -272,7 +270,10 @@ class SlaveLoop(RigLoop):
             self.lab.say_why()
 
     def leave(self, *, last: bool = False) -> None:
-        """Tell the master and give the recorder the rest; may be called again until `left`, and a `last` time."""
+        """Tell the master of the end and send the recorder the rest.
+
+        Repeated until `left`, and called a `last` time.
+        """
         lab = self.lab
         if not self._due(last=last):
             return
@@ -293,27 +294,27 @@ class SlaveLoop(RigLoop):
 
     @property
     def completed(self) -> bool:
-        """Whether the test had all its ticks, if not here, where this laboratory has fallen behind, at the master."""
+        """Whether the test had all its ticks, here or at the master if this laboratory has fallen behind."""
         return max(self.ticks, self._master_ticks) >= self.lab.plan.ticks
 
     @property
     def needed(self) -> bool:
-        """No other process depends on the session of a slave."""
+        """False: no other process depends on the session of a slave."""
         return False
 
     @property
     def others_rest(self) -> float:
-        """Whether the other laboratories are at rest: a slave waits for none."""
+        """0, because a slave waits for no other laboratory."""
         return 0.0
 
     @property
     def awaited(self) -> str:
-        """The master, until it has called."""
+        """The master until it has called, then empty."""
         return f"the {MASTER}" if self.lab.exchange.state is State.IDLE else ""
 
     @property
     def progress(self) -> dict[str, float]:
-        """What a user watches while it runs."""
+        """No figures: the master reports the progress."""
         return {}
 
     # -- pacing -----------------------------------------------------------------------------------
@@ -323,7 +324,7 @@ class SlaveLoop(RigLoop):
         return self.tick_ns(tick)
 
     def earliest(self, tick: int) -> int:
-        """A tick begins as soon as its command comes, ns."""
+        """The earliest beginning of a tick, ns: an interval before its nominal time, if its command is there."""
         return self.tick_ns(tick - 1)
 
     def latest(self, tick: int) -> int:
@@ -331,9 +332,9 @@ class SlaveLoop(RigLoop):
         return self.tick_ns(tick) + self._wait_ns
 
     def heard(self, tick: int) -> bool:
-        """Whether what the tick waits for has come: its command, or a later one."""
+        """Whether the command of the tick or a later one has come."""
         return self._commands.newest_seen >= tick
 
     def finish(self) -> None:
-        """Bring the rig to rest after the last tick, whether or not the master's message of the end comes in time."""
+        """Begin the ramp to rest after the last tick, even if the master's message of the end has not come."""
         self.lab.safety.follow(Turn.END)

@@ -1,4 +1,4 @@
-"""A slave's computation of one tick: from the target received to the command of its transfer system."""
+"""A slave's computation of a tick, from the target received to the command of its transfer system."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from models.compiled import plain
 
 
 class SlaveStep:
-    """The compensator of a kind's laboratory, as the slave's own plan chooses it, moving on tick by tick."""
+    """The compensator that the slave's plan chooses for a kind; each call computes a tick."""
 
     def __init__(self, plan: Plan, kind: Kind) -> None:
         chosen = kind.compensator(plan)
@@ -20,7 +20,7 @@ class SlaveStep:
         self._target = 0.0  # of t_k
 
     def __call__(self, command: Command, measured: tuple[float, ...]) -> float:
-        """Command (m) for the interval's end, from the target in force and the measurement at t_k."""
+        """Command (m) for the interval's end, from the command in force and the measurement at t_k."""
         present, self._target = self._target, command.target
         result: float = compensators.enter(
             self._built,

@@ -209,6 +209,11 @@ class Inlet:
         return self._ready()
 
     @property
+    def begun(self) -> bool:
+        """Whether any piece or the length of the stream has been received."""
+        return self.next > 0 or bool(self._early) or self.total is not None
+
+    @property
     def complete(self) -> bool:
         """Whether the stream has ended and all items were handed on, except those given up."""
         return self.total is not None and self.next >= self.total

@@ -65,10 +65,16 @@ def other(topic: str, log_ns: int, publish_ns: int, values: Iterable[Any]) -> It
 
 
 def values_of(row: bytes) -> list[Any]:
-    """Log time, publish time and values of a row that is not plain.
+    """Log time, publish time and values of a row that is not plain, as a list.
 
     Raises:
         ValueError, msgpack.UnpackException: it is not msgpack.
     """
     found: list[Any] = msgpack.unpackb(row)
     return found
+
+
+def named_values(signals: Sequence[Signal], row: bytes) -> dict[str, Any]:
+    """The values of a row that is not plain by the names of its topic's `signals`; raises as `values_of`."""
+    _, _, *values = values_of(row)
+    return dict(zip((one.name for one in signals), values, strict=True))

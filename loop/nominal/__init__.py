@@ -1,1 +1,1 @@
-"""What nominal models say of a plan before the test: partition, paths, peaks, stability."""
+"""The analysis of a plan by nominal models before the test: partition, paths, peaks, stability."""

@@ -1,4 +1,4 @@
-"""How much delay the forces of specimens in several storeys bear, all of them late alike."""
+"""The critical delay of the forces of specimens in several storeys, all with the same delay."""
 
 from __future__ import annotations
 
@@ -11,9 +11,15 @@ from common.errors import InputError
 from models.indicators.stability import STILL, companion, shaped
 from models.registry import Array
 
-PER_DECADE = 400  # frequencies searched: a mode of 0.1 % of damping is then resolved to half its width
-REACH = (1e-3, 10.0)  # of the lowest and of the highest frequency of whole and numerical part
-BESIDE = np.linspace(-4.0, 4.0, 81)  # half widths of a resonance that are searched beside its peak
+PER_DECADE = (
+    400  # frequencies searched per decade, steps of 0.6 %; resonances are searched more finely by `BESIDE`
+)
+# Factors on the lowest and the highest natural frequency of whole and numerical part: below and above that range the
+# stiffness or the mass dominates, and |G| no longer crosses 1.
+REACH = (1e-3, 10.0)
+BESIDE = np.linspace(
+    -4.0, 4.0, 81
+)  # searched offsets from a resonance in half widths, with a tenth of one per step
 
 
 def critical_delay(M: Array, C: Array, K: Array, directions: Array, specimens: Array) -> float:
@@ -21,7 +27,7 @@ def critical_delay(M: Array, C: Array, K: Array, directions: Array, specimens: A
 
     `det[M·s² + C·s + K + Eᵀ·diag(m·s² + c·s + k)·E·e^(−s·τ)] = 0` on `s = jω`. M, C, K (n, n) of the numerical part
     in kg, N·s/m, N/m; `directions` E (r, n) take displacements to the specimens'; `specimens` (r, 3) are k N/m, c
-    N·s/m, m kg. With `G = E·D⁻¹·Eᵀ·diag(k + c·s + m·s²)` it can do so where an eigenvalue of G(jω) has the modulus 1.
+    N·s/m, m kg. With `G = E·D⁻¹·Eᵀ·diag(k + c·s + m·s²)` that requires an eigenvalue of G(jω) with the modulus 1.
     Zero where the specimens' mass outweighs the numerical part's.
 
     Raises:
@@ -55,7 +61,7 @@ def critical_delay(M: Array, C: Array, K: Array, directions: Array, specimens: A
 
 
 def frequencies(M: Array, C: Array, stiffnesses: tuple[Array, ...]) -> Array:
-    """Frequencies (rad/s) to be searched, ascending: over the modes' whole range, and densely about every mode."""
+    """The frequencies (rad/s) to be searched, ascending: over the range of all modes, and densely around each."""
     n = M.shape[0]
     modes = np.concatenate([np.linalg.eigvals(companion(M, C, K, 1.0)) for K in stiffnesses])
     sizes = np.abs(modes)

@@ -1,7 +1,7 @@
-"""Whether the whole simulated loop is stable, judged by its free motion after one pulse of the ground.
+"""Judges the stability of the whole simulated loop by its free motion after a pulse of the ground.
 
-Everything takes part that is in the test: integration, both laboratories, compensators, the damper's control. Sensors
-are free of noise and the pulse is small, so that a specimen keeps its first stiffness.
+The simulation includes all that the test has: integration, laboratories, compensators, the damper's control. The
+sensors have no noise, and the pulse is small, so that a specimen keeps its initial stiffness.
 """
 
 from __future__ import annotations
@@ -14,24 +14,27 @@ import numpy as np
 from common.plan.plan import Plan
 from common.plan.tables import SensorsTable
 from laboratories.kinds import kinds_of
-from loop.closed_loop import by_role, simulate
+from loop.closed_loop import simulate
 from loop.nominal.partition import matrices
+from loop.signals import by_role
 from models.indicators.growth import grows
 from models.registry import Array
 from models.structures import shear_building
 
-PERIODS = (
-    40  # of the first mode that are watched: a loop of −0.05 % of damping or less then grows by what counts
+# Periods of the first mode that are simulated. `grows` compares quarters of ten periods: a damping ratio of −0.05 %
+# gives a growth by exp(2π·10·0.0005) = 1.03, above the ratio that counts.
+PERIODS = 40
+PULSE = (
+    0.1  # length of the pulse over the first period: its spectrum reaches about ten times the first frequency
 )
-PULSE = 0.1  # of the first period: its spectrum reaches to about ten times the first frequency
-PUSH = 1e-3  # m/s², of the pulse: so small that a specimen keeps its first stiffness
-MOST_TICKS = 200_000  # of the watched motion: 400 s at 2 ms, computed in some hundredths of a second
+PUSH = 1e-3  # m/s², peak of the pulse: so small that a specimen keeps its initial stiffness
+MOST_TICKS = 200_000  # of the simulated motion: 400 s at 2 ms, which take some hundredths of a second
 METRES = "m"
 SILENT = SensorsTable(*[0.0] * len(SensorsTable.__dataclass_fields__))
 
 
 def unstable(plan: Plan) -> bool:
-    """Whether the free motion of the nominal loop grows; raises InputError where a model or parameter cannot be."""
+    """Whether the free motion of the nominal loop grows; raises InputError where a model or parameter is not valid."""
     period, interval = float(shear_building.modes(*matrices(plan)).periods[0]), plan.test.interval
     ticks = min(math.ceil(PERIODS * period / interval), MOST_TICKS)
     free = replace(plan.with_ticks(ticks), sensors=SILENT)
@@ -42,7 +45,7 @@ def unstable(plan: Plan) -> bool:
 
 
 def moved(plan: Plan, ground: Array) -> list[Array]:
-    """What moves in the loop, by tick; a single row that is not finite where the loop diverges."""
+    """The motions (ticks, n) of the loop; a single one that is not finite where the loop diverges."""
     rollout = simulate(plan, ground)
     if not rollout.finite:
         return [np.full((plan.ticks, 1), math.nan)]

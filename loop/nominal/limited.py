@@ -10,18 +10,18 @@ from common.plan.plan import Plan
 from common.plan.tables import Limits
 from common.roles import MASTER
 from common.signals import OF_STOREYS
+from laboratories.checks import PATIENCE
 from laboratories.kind import Kind
 from laboratories.kinds import kinds_of
 from laboratories.limits import quantities
 from models.registry import Array
 
-PATIENCE = 3  # intervals for which an error must be beyond its limit
-ENERGIES = ("numerical_drift", "error_energy")  # sums over a whole test, which a running test watches
+ENERGIES = ("numerical_drift", "error_energy")  # sums over a whole test, which only the running test checks
 RULES = {name: field.metadata["rule"] for name, field in Limits.__dataclass_fields__.items()}
 
 
 def most(plan: Plan) -> dict[str, float]:
-    """The limits by the names of the quantities that the plan's test has, the least where laboratories differ."""
+    """The limits by the names of the quantities of the plan's test; the smallest where laboratories differ."""
     given = vars(plan.limits)
     found = {name: given[name] for name in OF_STOREYS if name in given}
     for role, kind in kinds_of(plan).items():
@@ -43,7 +43,7 @@ def unit_of(plan: Plan, name: str) -> str:
 def magnitudes(plan: Plan, columns: Mapping[str, Mapping[str, Array]]) -> dict[str, Array]:
     """Magnitude of every limited quantity, the largest of all laboratories and storeys, (ticks,) each.
 
-    `columns` by role and name as `closed_loop.by_role` gives them. The two energies of [limits] are not among them.
+    `columns` by role and name as `loop.signals.by_role` gives them. The two energies of [limits] are not among them.
     """
     found: dict[str, Array] = {}
     with np.errstate(over="ignore", invalid="ignore"):  # a loop that diverged
@@ -61,9 +61,9 @@ def magnitudes(plan: Plan, columns: Mapping[str, Mapping[str, Array]]) -> dict[s
 
 
 def derived(plan: Plan, kind: Kind, columns: Mapping[str, Array], *, own: bool) -> dict[str, Array]:
-    """The limited quantities of a laboratory that are no signals: rates, steps and lasting errors.
+    """The limited quantities of a laboratory that are not signals: rates, steps and lasting errors, (ticks,) each.
 
-    The target of the master's `own` is that of the tick, a slave's that of the interval's end.
+    The recorded target of the master's `own` laboratory is that of the tick, a slave's that of the interval's end.
     """
     interval, limited, channels = plan.test.interval, kind.limited, kind.channels
     command, target = steps(columns[channels.command.name]), columns[channels.target.name]
@@ -94,7 +94,7 @@ def steps(values: Array) -> Array:
 
 
 def lasting(errors: Array) -> Array:
-    """Magnitude that an error has kept for three intervals, at every tick."""
+    """The smallest magnitude of an error within the last `PATIENCE` intervals, at every tick."""
     now = largest(errors)
     for _ in range(PATIENCE - 1):
         now = np.minimum(now, before(now))

@@ -1,10 +1,10 @@
-"""A plan's building cut in two: the numerical part, what its specimens take over, and what their paths can bear.
+"""The partition of a plan's building: the numerical part, the part of its specimens, and the margin of their paths.
 
     M = M_N + Σ m_e·1_s·1_sᵀ,    C = C_N + Σ c_e·e·eᵀ,    K = K_N + Σ k_e·e·eᵀ
 
 with the whole building's matrices on the left and one term for every laboratory that follows a drift: e the drift of
-its storey as a row over the floors and 1_s the floor above it. The kind says what the building feels of its
-specimen: stiffness, dashpot and mass of a column count `represents` times the deformation ratio.
+its storey as a row over the floors and 1_s the floor above it. The kind gives the specimen's stiffness, dashpot and
+mass at the building's scale: those of a column are multiplied by `represents` and the deformation ratio.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Matrices(NamedTuple):
 
 
 class Felt(NamedTuple):
-    """The nominal specimen as its storey feels it."""
+    """The nominal specimen at the building's scale, against its storey's drift."""
 
     stiffness: float  # N/m
     damping: float  # N·s/m
@@ -48,7 +48,7 @@ def matrices(plan: Plan) -> Matrices:
     """The whole building, specimen included; with a damping ratio ζ of all modes `C = M·Φ·diag(2ζω)·Φᵀ·M`.
 
     Raises:
-        InputError: a mass, stiffness or dashpot cannot be.
+        InputError: a mass, stiffness or dashpot is not valid.
     """
     structure = plan.structure
     given = np.array(structure.stiffness)
@@ -68,15 +68,15 @@ def drifts(plan: Plan) -> dict[str, Coupling]:
 
 
 def numerical(plan: Plan) -> Matrices:
-    """The numerical part: the whole building without what the specimens take over; raises InputError as `parts`."""
+    """The numerical part: the whole building without the part of the specimens; raises InputError as `parts`."""
     return parts(plan)[1]
 
 
 def parts(plan: Plan) -> tuple[Matrices, Matrices]:
-    """The whole building and its numerical part.
+    """The whole building and its numerical part, which lacks the part that the specimens take over.
 
     Raises:
-        InputError: a mass, stiffness or dashpot cannot be, a specimen takes over all of the modal damping, or
+        InputError: a mass, stiffness or dashpot is not valid, a specimen takes over all of the modal damping, or
             `[structure.experimental]` does not belong to exactly one specimen.
     """
     found = drifts(plan)
@@ -104,14 +104,14 @@ def check_experimental(plan: Plan, specimens: int) -> None:
 
 
 def check_damping(plan: Plan, whole: Matrices, damping: float, role: str) -> None:
-    """Raise InputError where a dashpot (N·s/m) is not below what the modal damping has against the storey's drift.
+    """Raise InputError where a dashpot (N·s/m) is not below that of the modal damping against the storey's drift.
 
-    That is `1/(eᵀ·C⁻¹·e)`, with `C⁻¹ = Φ·diag(1/(2ζω))·Φᵀ` and Φ of modal mass 1; at or beyond it C_N would not be
-    positive definite.
+    The latter is `1/(eᵀ·C⁻¹·e)`, with `C⁻¹ = Φ·diag(1/(2ζω))·Φᵀ` and Φ of modal mass 1; with a dashpot of that size or
+    more C_N would not be positive definite.
     """
     modes = shear_building.modes(*whole)
     parts = (drift_direction(plan, role) @ modes.shapes) ** 2
-    takes_part = parts > np.finfo(np.float64).eps * parts.sum()  # rigid modes without this drift have no say
+    takes_part = parts > np.finfo(np.float64).eps * parts.sum()  # leaves out rigid modes without this drift
     rate = float(parts[takes_part] @ modes.periods[takes_part]) / (
         4.0 * math.pi * plan.structure.damping_ratio
     )
@@ -125,12 +125,12 @@ def check_damping(plan: Plan, whole: Matrices, damping: float, role: str) -> Non
 
 
 def coupling_of(plan: Plan, role: str) -> Coupling:
-    """The place of a role's laboratory in the building; raises InputError where it has none."""
+    """The coupling of a role's laboratory to the building; raises InputError where the role has no laboratory."""
     return kind_of(plan, role).coupling(plan.of(role))
 
 
 def taken_over(plan: Plan, role: str = MASTER) -> Experimental:
-    """What a role's specimen takes over: as the plan says, else its share of the storey's columns."""
+    """The part that a role's specimen takes over: that of `[structure.experimental]`, else its share of the columns."""
     if plan.structure.experimental is not None:
         return plan.structure.experimental
     share = coupling_of(plan, role).share
@@ -152,8 +152,8 @@ def storey_stiffnesses(plan: Plan) -> Array:
 def storey_stiffness(plan: Plan, role: str = MASTER) -> float:
     """Stiffness (N/m) of the whole building's storey in which a role's specimen stands.
 
-    Of a matrix, what a pair of forces on the storey's two floors finds against its drift, `1/(eᵀ·K⁻¹·e)`: in a shear
-    building the storey's own stiffness.
+    For a stiffness matrix it is that against a pair of forces on the storey's two floors, `1/(eᵀ·K⁻¹·e)`, which in a
+    shear building is the storey's own stiffness.
     """
     value = plan.structure.stiffness[coupling_of(plan, role).place - 1]
     if not isinstance(value, tuple):
@@ -173,13 +173,13 @@ def drift_direction(plan: Plan, role: str = MASTER) -> Array:
 
 
 def felt(plan: Plan, role: str = MASTER) -> Felt:
-    """A role's nominal specimen as its storey feels it."""
+    """A role's nominal specimen at the building's scale."""
     coupling = coupling_of(plan, role)
     return Felt(coupling.stiffness, coupling.damping, coupling.mass)
 
 
 def critical_delay_of(plan: Plan) -> float:
-    """Smallest delay (s) of all specimens' forces alike that makes the linear loop unstable; inf without a specimen.
+    """Smallest common delay (s) of all specimens' forces that makes the linear loop unstable; inf without a specimen.
 
     Raises:
         InputError: no specimen could stabilise the numerical part.
@@ -198,10 +198,10 @@ def critical_delay_of(plan: Plan) -> float:
 def damping_lost(
     plan: Plan, path: indicators.FrequencyEvaluation | TransferPath, role: str = MASTER
 ) -> float:
-    """Damping ratio of the building's first mode that an amplitude and a delay of a specimen's path cost.
+    """Damping ratio that the building's first mode loses by the amplitude and the delay of a specimen's path.
 
-    Of a specimen `k + jω·c − ω²·m` behind a path `A·e^(−jωd)`: what the spring and the mass lose, as damping
-    equivalent, and the share `1 − A·cos(ωd)` of its dashpot.
+    For a specimen `k + jω·c − ω²·m` after a path `A·e^(−jωd)` it consists of the damping equivalent of the spring and
+    the mass, and of the share `1 − A·cos(ωd)` of its dashpot.
     """
     modes = shear_building.modes(*matrices(plan))
     omega = 2.0 * math.pi / float(modes.periods[0])
@@ -220,15 +220,17 @@ class Partition(NamedTuple):
     critical_delay: float  # s, inf where no delay makes the loop unstable
     sensitivity: float  # predictive stability indicator, log10 of it in ms
     amplitude: float  # of that compensated transfer system at that frequency
-    delay: float  # s, there, with the intervals that the force waits; inf where a path is unstable
-    damping_points: float  # damping ratio that the paths cost the first mode, inf where the loop is unstable
-    stable: bool = True  # whether every compensated transfer system comes to rest by itself
-    role: str = MASTER  # whose path is the latest, the first that is unstable where one is
+    delay: float  # s, there, with the intervals by which the force is late; inf where a path is unstable
+    damping_points: (
+        float  # damping ratio that the first mode loses by the paths, inf where the loop is unstable
+    )
+    stable: bool = True  # whether every compensated transfer system comes to rest without the building
+    role: str = MASTER  # the role with the latest path, or the first with an unstable one
     paths: Mapping[str, TransferPath] = {}  # of every laboratory that follows a drift, by role
 
     @property
     def unstable(self) -> bool:
-        """Whether the loop of building and specimens is unstable: a path by itself, or by its delay."""
+        """Whether the loop of building and specimens is unstable, by an unstable path or by its delay."""
         return not self.stable or self.delay >= self.critical_delay
 
 

@@ -1,4 +1,4 @@
-"""A specimen's path: from the building's target to what the compensated nominal transfer system achieves of it."""
+"""A specimen's path: from the building's target to the position that the compensated transfer system achieves."""
 
 from __future__ import annotations
 
@@ -25,24 +25,24 @@ from models.indicators.growth import grows
 from models.registry import Array
 from models.system import System
 
-CYCLES = 12  # of the sine at which amplitude and delay are found
-LEAST_CYCLES = 2.0  # s, as many cycles of it as that where they are more
-AMPLITUDE = 1e-3  # m, of sine and pulse: so small that no limit of the actuator is met
-PULSE = 0.5  # of a period: the pulse's spectrum then has its first zero at four times the frequency
-LEAST_PULSE = 8  # ticks: with fewer the smooth pulse has no shape on the grid
-WATCHED = (
-    50  # of the actuator's own delay after the pulse: ten turns of the slowest loop that it can make unstable
-)
-LEAST_WATCHED, MOST_WATCHED = 2.0, 40.0  # s
-LOWEST = 0.2  # Hz, below which a transfer system is late by as much as there
-FARTHEST = 1e6  # m, from where on the motion has diverged: no laboratory is as large
+CYCLES = 12  # of the sine from which amplitude and delay follow; one at each end is faded
+LEAST_SINE = 2.0  # s, length of that sine at higher frequencies, so that adaptive compensators have settled
+AMPLITUDE = 1e-3  # m, of sine and pulse: so small that no limit of an actuator is reached
+PULSE = 0.5  # length of the pulse in periods, with which the first zero of its spectrum is at four times the frequency
+LEAST_PULSE = 8  # ticks: the shape of a shorter pulse is not resolved
+# Length of the motion watched after the pulse over the actuator's own delay: a feedback loop with that delay is
+# unstable at a period of two to four times the delay at the least, so more than ten periods are seen.
+WATCHED = 50
+LEAST_WATCHED, MOST_WATCHED = 2.0, 40.0  # s: bounds of it, for ideal actuators and against long computation
+LOWEST = 0.2  # Hz: at lower frequencies the delay of a transfer system does not change
+FARTHEST = 1e6  # m: a larger motion has diverged
 
 
 class TransferPath(NamedTuple):
-    """What the path makes of a motion at one frequency."""
+    """Amplitude and delay of a path at one frequency."""
 
     amplitude: float  # achieved over target, –
-    delay: float  # s, negative where it leads; inf where the path is unstable
+    delay: float  # s, negative for a lead; inf where the path is unstable
     stable: bool  # whether the transfer system comes to rest under its compensator, without the building
 
 
@@ -53,9 +53,9 @@ UNSTABLE = TransferPath(math.inf, math.inf, stable=False)
 def path_at(plan: Plan, frequency: float, role: str = MASTER) -> TransferPath:
     """Amplitude and delay of the path of a role's laboratory for a sine of that frequency (Hz).
 
-    The path is the compensated nominal transfer system, the interval that the force of a slave takes to the master, and
-    the one by which `unit_delay` holds back the force. The delay follows the phase continuously from frequency zero, so
-    that it may be longer than half a period.
+    The path consists of the compensated nominal transfer system, the interval by which a slave's force is late at the
+    master, and the interval of `unit_delay`. The phase is unwrapped from frequency zero, so that the delay may be
+    longer than half a period.
     """
     interval, frequency = plan.test.interval, max(frequency, LOWEST)
     waits = (role != MASTER) + kind_of(plan, role).coupling(plan.of(role)).correction.unit_delay
@@ -65,7 +65,7 @@ def path_at(plan: Plan, frequency: float, role: str = MASTER) -> TransferPath:
     if achieved.size != target.size or grows(achieved[begin:]):
         return UNSTABLE
     whole = phase_delay(target, achieved, interval, frequency)
-    cycles = max(CYCLES, round(LEAST_CYCLES * frequency))
+    cycles = max(CYCLES, round(LEAST_SINE * frequency))
     piece = sine(interval, frequency, amplitude=AMPLITUDE, cycles=cycles)
     found = indicators.frequency_evaluation_index(*follow(plan, join([piece], interval), role), interval)
     turns = round((whole - found.delay) * found.frequency)
@@ -74,7 +74,7 @@ def path_at(plan: Plan, frequency: float, role: str = MASTER) -> TransferPath:
 
 
 def watched(plan: Plan, frequency: float) -> float:
-    """Time (s) of watching after a pulse: a stable path comes to rest within it, and an unstable one grows visibly."""
+    """Time (s) to watch after a pulse, in which a stable path comes to rest and an unstable one grows visibly."""
     actuator = plan.actuator
     own = actuator.delay + actuator.time_constant
     if actuator.model == "servo_hydraulic":
@@ -83,16 +83,16 @@ def watched(plan: Plan, frequency: float) -> float:
 
 
 def pulse(interval: float, frequency: float) -> Piece:
-    """One smooth pulse that moves at all frequencies from zero to beyond the given one (Hz)."""
+    """A smooth pulse whose spectrum covers all frequencies from zero to beyond the given one (Hz)."""
     count = max(LEAST_PULSE, round(PULSE / frequency / interval))
     values = AMPLITUDE * np.sin(np.pi * np.arange(count) / count) ** 2
     return Piece("pulse", values, True, {"amplitude": AMPLITUDE})
 
 
 def phase_delay(target: Array, achieved: Array, interval: float, frequency: float) -> float:
-    """Delay (s) at a frequency (Hz) whose phase is followed from frequency zero, where target and answer are in phase.
+    """Delay (s) at a frequency (Hz), with the phase unwrapped from frequency zero, at which it is zero.
 
-    Both are at rest at the end, so that their transforms are those of the whole motion.
+    Target and achieved position (n,) are at rest at the end, so that their transforms are those of the whole motion.
     """
     frequencies = np.fft.rfftfreq(target.size, interval)
     part = frequencies <= 1.5 * frequency
@@ -102,7 +102,10 @@ def phase_delay(target: Array, achieved: Array, interval: float, frequency: floa
 
 
 def follow(plan: Plan, programme: Programme, role: str = MASTER) -> tuple[Array, Array]:
-    """Target and achieved position of the compensated nominal transfer system, m; the latter ends where it diverges."""
+    """Target and achieved position (m) of the compensated nominal transfer system.
+
+    The latter ends where it diverges.
+    """
     kind, seen = kind_of(plan, role), plan.of(role)
     chosen = kind.compensator(seen)
     follower = Follower(

@@ -1,4 +1,4 @@
-"""Risks of a test that nominal models show: too little margin of delay, peaks too near to the limits."""
+"""The risks of a test that nominal models show: too small a margin of delay, peaks too close to the limits."""
 
 from __future__ import annotations
 
@@ -20,32 +20,33 @@ from laboratories.column.kind import COLUMN
 from laboratories.kind import Chosen, Kind
 from laboratories.kinds import kind_of
 from loop import substructure
-from loop.closed_loop import by_role, simulate
+from loop.closed_loop import simulate
 from loop.nominal import free_motion, limited
 from loop.nominal.partition import Partition, assess, drifts
+from loop.signals import by_role
 from models.compensators import COMPENSATORS
 from models.registry import Array
 
-MOST_TICKS = 1_000_000  # of the simulation, which is kept in memory
-AMPLITUDE_ERROR = (
-    0.2  # of the compensated actuator's amplitude: a stiffness wrong by a fifth is another specimen
-)
+MOST_TICKS = 1_000_000  # of the simulation, over all slaves: its signals then take some hundred MB of memory
+# Largest error of the compensated amplitude with which a longer lead is recommended: more of it would be like a
+# specimen whose stiffness is wrong by a fifth.
+AMPLITUDE_ERROR = 0.2
 LIMITS: dict[str, Any] = limited.RULES
 
 
 class Findings(NamedTuple):
-    """What nominal models say of a plan: the partition, the peaks of the simulated test, and both as checks."""
+    """The results of the nominal models: the partition, the peaks of the simulated test, and the checks of both."""
 
     partition: Partition
     peaks: Peaks | None  # None where the simulated loop has no finite command
-    unstable: bool  # whether the simulated loop is, so that no peak means anything
+    unstable: bool  # whether the simulated loop is unstable, so that the peaks have no meaning
     checks: list[PreflightCheck]
 
 
 def findings(plan: Plan) -> Findings:
-    """What nominal models say of a plan; raises InputError where a model or parameter cannot be.
+    """Analyse a plan by its nominal models; raises InputError where a model or parameter is not valid.
 
-    Peaks are judged by the limits that hold beside a rig, also where those of emulated laboratories are larger.
+    Peaks are compared with the limits that hold with a rig, even where those of emulated laboratories are larger.
     """
     plan = patience.strict(plan)
     found = assess(plan)
@@ -54,7 +55,7 @@ def findings(plan: Plan) -> Findings:
 
 
 def checks(plan: Plan) -> list[PreflightCheck]:
-    """Partition and peaks of a plan, for a gate; raises InputError where a model or parameter cannot be."""
+    """The checks of a plan's partition and peaks; raises InputError where a model or parameter is not valid."""
     return findings(plan).checks
 
 
@@ -62,20 +63,20 @@ def checks(plan: Plan) -> list[PreflightCheck]:
 
 
 def expected_delay(plan: Plan, found: Partition) -> float:
-    """Delay (s) to expect in the latest path: the compensated transfer system's, and one interval for a late tick.
+    """Expected delay (s) of the latest path: that of the compensated transfer system, and one interval for a late tick.
 
-    None without a path.
+    It is 0 without a path.
     """
     return found.delay + plan.test.interval if found.paths else 0.0
 
 
 def partition_check(plan: Plan, found: Partition) -> PreflightCheck:
-    """The partition's check, for a gate."""
+    """The check of the partition."""
     return PreflightCheck(partition_text(plan, found), partition_risk(plan, found))
 
 
 def partition_risk(plan: Plan, found: Partition) -> Risk | None:
-    """The risk of a delay too near to what the partition bears; None where the plan's margin is kept."""
+    """The risk of an expected delay too close to the critical one; None where the plan's margin is kept."""
     if not found.stable:
         return Risk("partition", unstable_path(plan, found.role))
     if keeps_margin(plan, found):
@@ -91,13 +92,13 @@ def partition_risk(plan: Plan, found: Partition) -> Risk | None:
 
 
 def keeps_margin(plan: Plan, found: Partition) -> bool:
-    """Whether the partition bears the plan's margin of the delay that is to be expected."""
+    """Whether the critical delay is at least the expected one times the plan's margin."""
     expected = expected_delay(plan, found)
     return expected <= 0.0 or found.critical_delay >= plan.preflight.delay_margin * expected
 
 
 def path_of(plan: Plan, role: str) -> str:
-    """A specimen's path as a sentence names it, with its laboratory where there are several."""
+    """The name of a specimen's path in a sentence, with its laboratory where there are several."""
     kind = kind_of(plan, role)
     if len(drifts(plan)) == 1 and kind is COLUMN:
         return "the column's path"
@@ -105,13 +106,13 @@ def path_of(plan: Plan, role: str) -> str:
 
 
 def chosen_of(plan: Plan, role: str) -> tuple[Chosen, str]:
-    """The compensator of a role's laboratory, and the table of the plan in which it is to be changed."""
+    """The compensator of a role's laboratory, and the table of the plan that holds it."""
     chosen = kind_of(plan, role).compensator(plan.of(role))
     return chosen, f"{role}.{chosen.where}" if name_of(role) and not name_of(chosen.where) else chosen.where
 
 
 def unstable_path(plan: Plan, role: str) -> str:
-    """What is wrong with a transfer system that is unstable under its compensator, and what to change."""
+    """The sentence for a transfer system that is unstable under its compensator, and what to change."""
     (chosen, where), kind = chosen_of(plan, role), kind_of(plan, role)
     gains = ", ".join(f"{name} = {value:g}" for name, value in chosen.parameters.items()) or "its defaults"
     system, late, remedy = transfer_system(plan.of(role), kind)
@@ -123,7 +124,7 @@ def unstable_path(plan: Plan, role: str) -> str:
 
 
 def transfer_system(plan: Plan, kind: Kind) -> tuple[str, str, str]:
-    """What a kind's transfer system is called, its dead time and what to do about it, in words."""
+    """The name of a kind's transfer system, its dead time in words, and the remedy for it."""
     if kind is not COLUMN:
         return kind.says, "", ""
     actuator = plan.actuator
@@ -132,7 +133,7 @@ def transfer_system(plan: Plan, kind: Kind) -> tuple[str, str, str]:
 
 
 def compensation(plan: Plan, left: float, role: str = MASTER) -> str:
-    """What to change in a role's compensator to take away the delay (s) that it leaves; a lead only where it serves."""
+    """What to change in a role's compensator against the remaining delay `left` (s); a lead only where it helps."""
     chosen, where = chosen_of(plan, role)
     system = transfer_system(plan, kind_of(plan, role))[0]
     lead = chosen.parameters.get("lead", 0.0)
@@ -144,16 +145,16 @@ def compensation(plan: Plan, left: float, role: str = MASTER) -> str:
     if not serves(plan, longer, role):
         return (
             f"lower the delay {'in [actuator]' if system == 'actuator' else f'of the {system}'} (no lead in [{where}] "
-            f"makes up for the {left * 1e3:.1f} ms that are left)"
+            f"removes the remaining {left * 1e3:.1f} ms)"
         )
     return (
-        f"raise lead in [{where}] from {lead * 1e3:.1f} ms to {longer * 1e3:.1f} ms, which takes away the "
-        f"{left * 1e3:.1f} ms that are left"
+        f"raise lead in [{where}] from {lead * 1e3:.1f} ms to {longer * 1e3:.1f} ms, which removes the remaining "
+        f"{left * 1e3:.1f} ms"
     )
 
 
 def serves(plan: Plan, lead: float, role: str = MASTER) -> bool:
-    """Whether the compensator of a role's laboratory with that lead (s) keeps margin and amplitude."""
+    """Whether margin and amplitude are kept with that lead (s) in the compensator of a role's laboratory."""
     chosen, _ = chosen_of(plan, role)
     if not COMPENSATORS[chosen.kind].rules["lead"].admits(lead):
         return False
@@ -167,7 +168,7 @@ def serves(plan: Plan, lead: float, role: str = MASTER) -> bool:
 
 
 def led_by(plan: Plan, lead: float, role: str) -> Plan:
-    """The plan with another lead (s) in the compensator of a role's laboratory, wherever its kind has that."""
+    """The plan with another lead (s) in the compensator of a role's laboratory."""
     name = name_of(role)
     lab: Any = plan.slaves[name] if name else plan
     kind = plan.kinds[role]
@@ -184,7 +185,7 @@ def led_by(plan: Plan, lead: float, role: str) -> Plan:
 
 
 def partition_text(plan: Plan, found: Partition) -> str:
-    """What the partition bears and what is to be expected, in words."""
+    """Critical and expected delay of the partition in words."""
     if not found.stable:
         return f"The {transfer_system(plan, kind_of(plan, found.role))[0]} is unstable under its compensator"
     if not found.paths:
@@ -203,7 +204,7 @@ def partition_text(plan: Plan, found: Partition) -> str:
 
 
 def times(ratio: float) -> str:
-    """A margin as a factor, with a digit behind the point where it is small enough to matter."""
+    """A margin as a factor, with one decimal below 10."""
     return f"{ratio:.0f}" if ratio >= 10.0 else f"{ratio:.1f}"
 
 
@@ -211,7 +212,7 @@ def times(ratio: float) -> str:
 
 
 class Peaks(NamedTuple):
-    """How near the simulated test comes to its limits."""
+    """The peaks of the simulated test relative to its limits."""
 
     share: float  # largest peak over its limit
     name: str  # of that quantity
@@ -226,12 +227,14 @@ class Peaks(NamedTuple):
 def simulated_peaks(plan: Plan, *, known_unstable: bool = False) -> tuple[Peaks | None, bool, PreflightCheck]:
     """Peaks of the simulated test, whether its loop is unstable, and the check of both.
 
-    Of a loop that is `known_unstable`, which another check refuses, only peaks beyond their share are refused.
+    For a loop that is `known_unstable`, which another check refuses, only peaks beyond their share are a risk here.
     """
     short = plan.with_ticks(min(plan.ticks, MOST_TICKS // max(len(plan.roles), 1)))
     columns, finite = simulated(short)
     if not columns[MASTER]["displacement"].size:
-        risk = Risk("peaks", "the simulated test has no finite command at all, so look at [structure]")
+        risk = Risk(
+            "peaks", "the simulated test has no finite command at all, so check the values in [structure]"
+        )
         return None, True, PreflightCheck("", risk)
     found = peaks(short, columns)
     grows = not finite or free_motion.unstable(plan)
@@ -272,14 +275,14 @@ def peaks(plan: Plan, columns: Mapping[str, Mapping[str, Array]]) -> Peaks:
 
 
 def unstable_risk(plan: Plan, found: Peaks) -> Risk:
-    """The risk of a loop that is unstable, of which no peak means anything and no limit would help."""
+    """The risk of an unstable loop, whose peaks have no meaning and for which no limit would help."""
     share = plan.preflight.peak_share
     seen = ""
     if found.first:
         limit, unit = found.most[found.first], found.units[found.first]
         seen = (
             f": {found.first} exceeds {share:.0%} of its limit of {limit:g} {unit} at "
-            f"t = {found.tick * plan.test.interval:.3f} s and grows on"
+            f"t = {found.tick * plan.test.interval:.3f} s and keeps growing"
         )
     return Risk(
         "peaks",
@@ -293,8 +296,8 @@ def remedy(plan: Plan) -> str:
     calm = plan.everywhere(control=Control(amd=False, gain=plan.control.gain))
     if carried and not free_motion.unstable(calm):
         return (
-            f"lower gain in [control], {plan.control.gain:g} N·s/m, or quicken the shaking table (delay and frequency "
-            "in [table], its compensator), as the loop is stable without the damper"
+            f"lower gain in [control], {plan.control.gain:g} N·s/m, or make the shaking table faster (delay and "
+            "frequency in [table], its compensator), because the loop is stable without the damper"
         )
     found = assess(plan)
     if not found.stable:
@@ -304,11 +307,11 @@ def remedy(plan: Plan) -> str:
     if found.unstable:
         return compensation(plan, found.delay, found.role)
     tables = dict.fromkeys(chosen_of(plan, role)[1] for role in plan.kinds)
-    return f"look at {' and '.join(f'[{name}]' for name in tables)}, or shorten interval in [test]"
+    return f"check {' and '.join(f'[{name}]' for name in tables)}, or shorten interval in [test]"
 
 
 def peaks_risk(plan: Plan, found: Peaks) -> Risk | None:
-    """The risk of a peak of a stable loop too near to its limit; None where all keep their distance."""
+    """The risk of a peak of a stable loop too close to its limit; None where all peaks are within their share."""
     if not found.first:
         return None
     unit, limit, share = found.units[found.first], found.most[found.first], plan.preflight.peak_share
@@ -317,17 +320,17 @@ def peaks_risk(plan: Plan, found: Peaks) -> Risk | None:
         "peaks",
         f"the simulated {found.first} exceeds {share:.0%} of its limit of {limit:g} {unit} at "
         f"t = {found.tick * plan.test.interval:.3f} s and peaks at {found.peak:.4g} {unit}, so lower scale in "
-        f"[ground_motion], look at {compensated(plan)}, or raise {found.first} in [{limits}] where the laboratory "
+        f"[ground_motion], check {compensated(plan)}, or raise {found.first} in [{limits}] where the laboratory "
         "allows it",
     )
 
 
 def compensated(plan: Plan) -> str:
-    """The table of the compensator that acts first: the master's laboratory's, or the first slave's without one."""
+    """The table of the compensator of the master's laboratory, or without one of the first slave's."""
     return f"[{chosen_of(plan, next(iter(plan.kinds)))[1]}]"
 
 
 def peaks_text(plan: Plan, found: Peaks, ticks: int) -> str:
-    """How near the simulated test comes to its limits, in words."""
+    """The largest simulated peak relative to its limit, in words."""
     part = f" in the first {ticks * plan.test.interval:g} s" if ticks < plan.ticks else ""
     return f"Simulated peaks reach {found.share * 100.0:.0f} % of their limits at most ({found.name}){part}"

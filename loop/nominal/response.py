@@ -1,4 +1,4 @@
-"""The response of the whole building, with no part in a laboratory: what an ideal hybrid test would measure."""
+"""The response of the whole building without a laboratory, which an ideal hybrid test would measure."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ class WholeBuilding(NamedTuple):
 def response(plan: Plan, ground: Array) -> Array:
     """Displacements (ticks, n) m of the floors relative to the ground, from rest, by the plan's integrator.
 
-    `M·ẍ + C·ẋ + K·x = −M·1·z̈` with the whole building's matrices of `[structure]`, in which the specimen is what it
-    takes over. `ground` (2, ticks + 1) as `substructure.ground_rows` gives it.
+    `M·ẍ + C·ẋ + K·x = −M·1·z̈` with the matrices of the whole building, including the part of the specimen. `ground`
+    (2, ticks + 1) is that of `substructure.ground_rows`.
 
     Raises:
         InputError: the method is unknown or would diverge, or the numerical columns are not linear.
@@ -38,8 +38,8 @@ def response(plan: Plan, ground: Array) -> Array:
     structure = plan.structure
     if structure.columns.model != "linear":
         raise InputError(
-            f"The whole building is known with linear columns only, not '{structure.columns.model}': leave "
-            "[structure.columns] linear."
+            f"The response of the whole building needs linear columns, not '{structure.columns.model}': choose "
+            "'linear' in [structure.columns]."
         )
     M, C, K = matrices(plan)
     method = integrators.build(structure.integrator, M, C, K, plan.test.interval, structure.rho_infinity)

@@ -61,7 +61,8 @@ def run(args: argparse.Namespace) -> int:
 def rolled_out(plan: Plan, motion: Any, args: argparse.Namespace) -> tuple[dict[str, Any], str]:
     """Signals of the compiled rollout, which --output also writes, and a sentence on the first value beyond a limit."""
     from loop import substructure
-    from loop.closed_loop import by_role, signals, simulate
+    from loop.closed_loop import simulate
+    from loop.signals import by_role, signals
 
     ground = substructure.ground_rows(plan, motion)
     if args.reality:
@@ -195,7 +196,7 @@ def show(plan: Plan, summary: dict[str, Any], stream: TextIO) -> None:
 
 def write(path: Path, plan: Plan, rollout: Rollout, motion: Any, ground: Any) -> None:
     """The simulation as a recording: the topics of master and slaves."""
-    from loop.closed_loop import rows
+    from loop.signals import rows
     from recorder import files
 
     recording = files.begin(path, plan, motion, ground)

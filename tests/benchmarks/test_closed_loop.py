@@ -12,7 +12,8 @@ from benchmarks import closed_loop, opensees_peer
 from benchmarks.opensees_peer import PYTHON, PeerAnswer, PeerCase
 from common.plan.plan import Plan
 from loop import substructure
-from loop.closed_loop import signals, simulate
+from loop.closed_loop import simulate
+from loop.signals import signals
 
 CASE = PeerCase(160e3, 25e6, 200e3, 0.002, [0.0, 1.0, 0.5, 0.0], repeats=2)
 

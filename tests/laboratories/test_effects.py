@@ -30,7 +30,8 @@ from laboratories.emulated import EmulatedLab
 from laboratories.table import model as table_lab
 from laboratories.table.kind import TABLE
 from loop import substructure
-from loop.closed_loop import Rollout, signals, simulate
+from loop.closed_loop import Rollout, simulate
+from loop.signals import signals
 from models.system import ActuatorEffects, ColumnEffects, DamperEffects, System, TableEffects
 from tests.laboratories.effects.distinct import DISTINCT
 

@@ -14,7 +14,8 @@ from common.recording.run import Run
 from common.safety.modes import Mode
 from laboratories.kinds import topics
 from loop import substructure
-from loop.closed_loop import rows, simulate
+from loop.closed_loop import simulate
+from loop.signals import rows
 from rths.examine.replay import replay_master, replay_slaves
 from simulation import virtual
 from tests.helpers import with_table

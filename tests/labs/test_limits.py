@@ -23,7 +23,8 @@ from common.recording.run import Run
 from common.terminal import cli
 from laboratories.checks import CHANGE, LAST, PATIENCE, take_written
 from loop import substructure
-from loop.closed_loop import signals, simulate
+from loop.closed_loop import simulate
+from loop.signals import signals
 from models import integrators
 from simulation import virtual
 from simulation.virtual import VirtualTest

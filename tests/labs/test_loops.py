@@ -24,7 +24,8 @@ from common.recording.run import Run
 from common.safety.modes import Mode
 from common.signals import TOPICS
 from loop import substructure
-from loop.closed_loop import rows, signals, simulate
+from loop.closed_loop import simulate
+from loop.signals import rows, signals
 from rths.examine.replay import planned, replay_master, replay_slaves
 from simulation import virtual
 from simulation.virtual import VirtualTest

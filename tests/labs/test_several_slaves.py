@@ -25,7 +25,8 @@ from common.recording.reader import read
 from common.recording.run import Run
 from common.terminal import cli
 from loop import substructure
-from loop.closed_loop import signals, simulate
+from loop.closed_loop import simulate
+from loop.signals import signals
 from rths.examine.replay import planned, replay_master, replay_slaves
 from simulation import virtual
 from simulation.virtual import VirtualTest

@@ -15,7 +15,8 @@ from common.roles import SLAVE
 from common.signals import TOPICS
 from laboratories.column.kind import COLUMN
 from loop import substructure
-from loop.closed_loop import MessagesUsed, on_time, rows, signals, simulate
+from loop.closed_loop import MessagesUsed, on_time, simulate
+from loop.signals import rows, signals
 from models.structures import shear_building
 from tests.helpers import largest, with_table
 

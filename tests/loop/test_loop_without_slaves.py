@@ -25,6 +25,7 @@ from loop import closed_loop, site, substructure
 from loop.closed_loop import Rollout
 from loop.nominal import partition
 from loop.nominal.response import response
+from loop.signals import signals as signals_of
 from models.registry import Array
 from models.structures import shear_building
 from models.system import Effects, System
@@ -196,7 +197,7 @@ def test_a_matrix_and_its_storeys_are_the_same_building(integrator: str, p_delta
     for rows in (True, False):
         base = with_table(tower(rows), "structure", integrator=integrator)
         rollout = closed_loop.simulate(base, ground_of(base), effects=Effects(p_delta=p_delta))
-        signals = closed_loop.signals(base, rollout)
+        signals = signals_of(base, rollout)
         found.append((signals["displacement"], signals["numerical_force"]))
     for one, other in zip(*found, strict=True):
         np.testing.assert_allclose(one, other, atol=1e-9 * np.abs(other).max(), rtol=0)

@@ -14,9 +14,10 @@ from common.errors import InputError
 from common.plan.plan import Plan
 from common.plan.read import parse, with_test
 from common.plan.tables import Experimental
-from loop.closed_loop import signals, simulate
+from loop.closed_loop import simulate
 from loop.nominal import partition
 from loop.nominal.preflight import expected_delay, partition_text
+from loop.signals import signals
 from models.indicators import FrequencyEvaluation
 from models.registry import Array
 from models.structures import shear_building

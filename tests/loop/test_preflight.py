@@ -15,10 +15,11 @@ from common.plan.plan import Plan
 from common.roles import MASTER, SLAVE
 from common.terminal import cli
 from loop import substructure
-from loop.closed_loop import signals, simulate
+from loop.closed_loop import simulate
 from loop.nominal import limited, preflight
 from loop.nominal.partition import assess, critical_delay_of
 from loop.nominal.preflight import expected_delay, partition_check, peaks, simulated_peaks
+from loop.signals import signals
 from models.registry import Array
 from tests.helpers import with_table
 
@@ -112,7 +113,7 @@ def test_a_long_delay_is_unstable_and_no_peak_of_it_is_shown(default_plan: Plan)
     assert told.count("unstable") >= 4
     for word in ("points", "peaks at", "raise", "expected -", "inf"):
         assert word not in told
-    assert "column_error exceeds 90% of its limit of 0.01 m at t = 1.492 s and grows on" in told
+    assert "column_error exceeds 90% of its limit of 0.01 m at t = 1.492 s and keeps growing" in told
 
 
 def test_a_lead_is_only_advised_where_it_then_serves(default_plan: Plan) -> None:
@@ -123,7 +124,7 @@ def test_a_lead_is_only_advised_where_it_then_serves(default_plan: Plan) -> None
         return risk.sentence if risk else ""
 
     assert "raise lead in [compensator] from 10.0 ms to 42.8 ms" in advice(0.014, 0.01)
-    assert "no lead in [compensator] makes up for the 218.7 ms that are left" in advice(0.2, 0.01)
+    assert "no lead in [compensator] removes the remaining 218.7 ms" in advice(0.2, 0.01)
 
 
 def test_an_unstable_control_of_the_damper_is_named(default_plan: Plan) -> None:

@@ -21,10 +21,11 @@ from common.signals import TOPICS
 from laboratories.effects import CATALOGUE, lay
 from laboratories.effects.sites import holders
 from loop import substructure
-from loop.closed_loop import MessagesUsed, rows, simulate
+from loop.closed_loop import MessagesUsed, simulate
 from loop.exchange import exchange
 from loop.links import link_model
 from loop.realised import true_slaves, true_system
+from loop.signals import rows
 from models.system import System
 from simulation import virtual
 from tests.laboratories.effects.distinct import DISTINCT
@@ -249,7 +250,7 @@ def test_a_plug_in_of_the_plan_counts_too(plan: Plan) -> None:
     tables = plan.tables()
     tables["slave"] = {"rig": {"class": "somewhere.else:Lab"}}
     planned = from_tables(tables, plan.base)
-    with pytest.raises(InputError, match=r"'table\.gain' cannot be laid over the plug-in in \[slave\.rig\]"):
+    with pytest.raises(InputError, match=r"'table\.gain' cannot be applied to the plug-in in \[slave\.rig\]"):
         true_system(real(planned, effect("table.gain", factor=0.9)))
 
 
@@ -271,7 +272,7 @@ def test_a_plug_in_of_a_named_slave_counts_too() -> None:
     planned = from_tables(tables, Path())
     truth = real(planned, effect("table.gain", factor=0.9))
     for one in (truth, truth.of("slave.east")):
-        with pytest.raises(InputError, match=r"cannot be laid over the plug-in in \[slave\.east\.rig\]"):
+        with pytest.raises(InputError, match=r"cannot be applied to the plug-in in \[slave\.east\.rig\]"):
             true_system(one)
     true_slaves(real(planned, effect("table.gain", factor=0.9, slave="west")))
 

@@ -15,7 +15,8 @@ from laboratories.effects import CATALOGUE, lay
 from laboratories.effects.effect import Effect
 from laboratories.table.kind import TABLE
 from loop import replay, substructure
-from loop.closed_loop import Rollout, signals, simulate
+from loop.closed_loop import Rollout, simulate
+from loop.signals import signals
 from models import indicators
 from models.system import ColumnEffects, Effects, System
 from tests.laboratories.effects.distinct import DISTINCT

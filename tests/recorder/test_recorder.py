@@ -5,12 +5,13 @@ from __future__ import annotations
 import errno
 import re
 import threading
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from common.errors import IncompleteError, InputError, InterlockError, LostError
+from common.errors import EmergencyStopError, IncompleteError, InputError, InterlockError, LostError
 from common.host.clock import MonotonicClock, VirtualClock
 from common.lab.outlet import PIECE
 from common.link.memory_link import MemoryEndpoint
@@ -88,7 +89,7 @@ def test_a_full_disk_stops_the_test_in_order(short_plan: Plan, tmp_path: Path, m
     monkeypatch.setattr(Recording, "flush", failing)
     error = virtual.run(bench, lambda: "")
     assert isinstance(error, InterlockError)
-    assert "recording is lost: the disk does not take it (No space left on device)" in str(error)
+    assert "recording is lost: the disk cannot be written (No space left on device)" in str(error)
     assert 0 < bench.master.ticks < short_plan.ticks
     assert read(tmp_path / "a.mcap").ticks("master") > 0
 
@@ -174,7 +175,7 @@ def test_a_disk_that_hangs_does_not_keep_the_recorder_for_ever(tmp_path: Path, m
     threaded = ThreadedSink(sink)
     threaded.put([item(0)])
     threaded.close({}, {})
-    assert threaded.failure == "the disk has not taken the last 1 samples within 0.2 s."
+    assert threaded.failure == "the disk has not written the last 1 samples within 0.2 s."
     gate.set()
     threaded._thread.join(10.0)
     assert not threaded._thread.is_alive()
@@ -186,10 +187,10 @@ def test_a_recorder_that_lost_its_disk_ends_with_a_sentence(short_plan: Plan, tm
     recorder = bench.recorder
     assert recorder is not None
     assert isinstance(recorder._sink, FileSink)
-    recorder._sink.failure = "the disk does not take it (No space left on device)."
+    recorder._sink.failure = "the disk cannot be written (No space left on device)."
     recorder.close()
     assert isinstance(recorder.error, LostError)
-    assert "the disk does not take it (No space left on device)" in str(recorder.error)
+    assert "the disk cannot be written (No space left on device)" in str(recorder.error)
 
 
 @pytest.mark.parametrize(("first", "last"), [(400, 950), (400, 1_990), (1_300, 1_990)])
@@ -241,8 +242,20 @@ def test_the_end_of_a_stream_that_never_comes_is_said(short_plan: Plan, tmp_path
     assert isinstance(error, LostError)
     lost = [event["text"] for event in read(tmp_path / "a.mcap").events if event["code"] == "rows_lost"]
     assert lost == [
-        f"The end of what the {lab} records did not reach the recorder." for lab in ("master", "slave")
+        f"The end of the stream of the {lab} did not reach the recorder." for lab in ("master", "slave")
     ]
+
+
+def test_a_laboratory_that_took_no_part_has_no_stream_whose_end_is_missing(
+    short_plan: Plan, tmp_path: Path
+) -> None:
+    plan = replace(short_plan, link=replace(short_plan.link, connect_timeout=2.0))
+    bench = virtual.assemble(plan, reality.as_planned(plan), tmp_path / "a.mcap")
+    bench.slave.emergency(EmergencyStopError("pressed."))
+    assert "latched in its safe state" in str(virtual.run(bench, str))
+    assert bench.recorder is not None
+    assert bench.recorder.error is None
+    assert [one["code"] for one in read(tmp_path / "a.mcap").events] == ["begin", "latched", "refused"]
 
 
 def test_samples_that_the_link_loses_are_asked_for_again(
@@ -300,7 +313,7 @@ def test_the_default_name_is_in_the_plans_folder(short_plan: Plan, tmp_path: Pat
         assert re.fullmatch(r"default-\d{8}-\d{6}\.mcap", path.name)
     (tmp_path / "file").write_text("")
     nowhere = with_table(short_plan, "recording", folder=str(tmp_path / "file" / "x"))
-    with pytest.raises(InputError, match="Cannot make the folder"), reserved(None, nowhere):
+    with pytest.raises(InputError, match="Cannot create the folder"), reserved(None, nowhere):
         pass
 
 

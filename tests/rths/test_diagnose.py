@@ -242,15 +242,15 @@ REALITIES = {
     "one table": ("[effect]\nname = 'column.friction'\nforce = 9.0\n", "[[effect]] tables"),
     "over a rig": (
         "[master.rig]\nclass = 'lab.py:Lab'\n[[effect]]\nname = 'column.friction'\nforce = 9.0\n",
-        "cannot be laid over the plug-in in [master.rig]",
+        "cannot be applied to the plug-in in [master.rig]",
     ),
     "over a sensor of a rig": (
         "[slave.rig]\nclass = 'lab.py:Lab'\n[[effect]]\nname = 'sensor.damper_force.gain'\nfactor = 1.1\n",
-        "cannot be laid over the plug-in in [slave.rig]",
+        "cannot be applied to the plug-in in [slave.rig]",
     ),
     "over a link": (
         "[link]\nclass = 'lab.py:Link'\n[[effect]]\nname = 'link.delay'\ndelay = 0.004\n",
-        "cannot be laid over the plug-in in [link]",
+        "cannot be applied to the plug-in in [link]",
     ),
 }
 

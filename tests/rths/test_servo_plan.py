@@ -17,6 +17,7 @@ from common.recording.run import Run
 from diagnosis.recorded import record
 from diagnosis.recorded.parts import Building
 from loop import closed_loop, substructure
+from loop.signals import signals
 from models.system import System
 from simulation import virtual
 from tests.diagnosis.cases import lab_a
@@ -47,7 +48,7 @@ def of_master(run: Run) -> dict[str, Any]:
 def test_a_test_in_virtual_time_is_the_closed_loop_and_replays(call: Call, recording: Path) -> None:
     run, plan = read(recording), parse(BRIEF, Path())
     ground = substructure.ground_rows(plan, substructure.motion(plan))
-    expected = closed_loop.signals(plan, closed_loop.simulate(plan, ground, seed=plan.test.seed))
+    expected = signals(plan, closed_loop.simulate(plan, ground, seed=plan.test.seed))
     for name in ("displacement", "numerical_force", "column_force", "actuator_command"):
         assert np.array_equal(of_master(run)[name], expected[name]), name
     assert call("replay", recording) == 0

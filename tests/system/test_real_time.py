@@ -345,7 +345,7 @@ def test_a_killed_slave_ends_the_test_with_exit_code_4(three: dict[str, Any], tm
     assert "The slave has been silent for 0.5 s." in err
     code, _, err = finish(three["recorder"], 20.0)
     assert code == 1  # the slave took its last rows with it
-    assert "The end of what the slave records did not reach the recorder." in err
+    assert "The end of the stream of the slave did not reach the recorder." in err
     assert read(tmp_path / "a.mcap").finished
 
 
@@ -444,5 +444,5 @@ def test_a_folder_without_permission_is_exit_code_2(tmp_path: Path) -> None:
     (tmp_path / "runs").write_text("a file where the folder should be")
     code, _, err = finish(start("run", "--duration", "1", cwd=tmp_path))
     assert code == 2
-    assert "Cannot make the folder runs" in err
+    assert "Cannot create the folder runs" in err
     assert "Traceback" not in err

@@ -105,7 +105,7 @@ def test_a_full_disk_stops_the_test_in_order_and_leaves_what_was_written(
     code, out, err = finish(start("run", plan, "-o", path, "--rt", "off"))
     assert code == 3, out + err
     assert err.splitlines()[-1] == (
-        "rths: The recording is lost: the disk does not take it (No space left on device)."
+        "rths: The recording is lost: the disk cannot be written (No space left on device)."
     )
     assert "recorder: ends the test (recording_lost)" in err
     assert "Traceback" not in out + err

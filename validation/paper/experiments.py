@@ -20,9 +20,10 @@ from common.recording.run import Run
 from common.terminal import cli
 from common.terminal.telling import Tell
 from loop import substructure
-from loop.closed_loop import signals, simulate
+from loop.closed_loop import simulate
 from loop.nominal import preflight
 from loop.nominal.partition import felt, storey_stiffness
+from loop.signals import signals
 from models import indicators
 from models.registry import Array
 from simulation import benches, virtual

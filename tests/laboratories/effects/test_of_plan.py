@@ -101,8 +101,8 @@ def test_a_named_slave_has_the_effect_that_names_it() -> None:
 @pytest.mark.parametrize(
     ("plan", "given", "words"),
     [
-        (TWO, {"name": "table.gain", "factor": 0.9}, "'table.gain' is of the table, which the plan's test"),
-        (SINGLE, {"name": "link.delay", "delay": 0.1}, "'link.delay' is of the link"),
+        (TWO, {"name": "table.gain", "factor": 0.9}, "'table.gain' acts on the table, which the plan's test"),
+        (SINGLE, {"name": "link.delay", "delay": 0.1}, "'link.delay' acts on the link"),
         (NAMED, {"name": "table.gain", "factor": 0.9, "slave": "north"}, "does not belong to one slave"),
         (
             NAMED,
