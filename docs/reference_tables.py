@@ -19,7 +19,7 @@ from common.udp import packets
 from common.udp.packets import Field
 from diagnosis.report import schema
 from docs.markdown import quantity, table
-from laboratories.effects import of_site
+from laboratories.effects import CATALOGUE
 from laboratories.effects.effect import Effect, Parameter
 from laboratories.effects.reading import SIGNALS
 from laboratories.effects.sites import SITES
@@ -150,6 +150,11 @@ def effects() -> str:
     return "\n".join(
         [*texts, f"## Sensors\n\n`<signal>` is one of {names}.\n\n{effect_table(generic, sized=False)}"]
     )
+
+
+def of_site(site: str) -> list[Effect]:
+    """The effects at one site, in the catalogue's order."""
+    return [effect for effect in CATALOGUE.values() if effect.site == site]
 
 
 def of_any_signal(effect: Effect, signal: str, unit: str) -> Effect:

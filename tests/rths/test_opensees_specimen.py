@@ -19,7 +19,8 @@ from common.recording.reader import read
 from common.recording.run import Run
 from common.rig import ColumnCommand
 from loop import substructure
-from loop.closed_loop import by_role, simulate
+from loop.closed_loop import simulate
+from loop.signals import by_role
 from rths.opensees import Specimen
 from simulation import virtual
 from tests import opensees
