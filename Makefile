@@ -8,7 +8,7 @@ FAULT_TESTS := tests/faults tests/system/faults tests/system/test_recording_faul
 # the tests start hundreds of interpreters, which find this checkout compiled, whatever the user's shell says of bytecode
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: setup run test tested check slow faults soak matrix opensees docs site benchmark blind clean
+.PHONY: setup run test tested check slow faults soak matrix opensees fmi docs site benchmark blind clean
 
 setup: $(READY)
 
@@ -56,6 +56,10 @@ matrix: setup
 # the peer of some tests, which skip without it: it needs Python 3.11 and Debian's libblas3 and liblapack3
 opensees: setup
 	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r opensees.lock
+
+# what loads FMUs, and the peer of their tests, which skip without it
+fmi: setup
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --require-hashes -r fmi.lock
 
 docs: setup
 	$(BIN)/python -m docs.generate

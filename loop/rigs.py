@@ -33,10 +33,18 @@ def hosted(reality: Reality, role: str) -> Kind | None:
     return kinds.own(plan) if role == MASTER else kinds.kind_of(plan, role)
 
 
-def build(reality: Reality, role: str, at_rest: AtRest | None = None, *, paced: bool = False) -> GuardedRig:
+def build(
+    reality: Reality,
+    role: str,
+    at_rest: AtRest | None = None,
+    *,
+    paced: bool = False,
+    seed: int | None = None,
+) -> GuardedRig:
     """A role's rig, whose sensors `at_rest` judges when it is armed; `reality` is that of the slave's role.
 
-    In a test in real time (`paced`) the answers of a rig in another process must come within the plan's time limits.
+    Its seed is that of `rig_seed`, unless one is given. In a test in real time (`paced`) the answers of a rig in
+    another process must come within the plan's time limits.
 
     Raises:
         InputError: it cannot be constructed.
@@ -47,8 +55,7 @@ def build(reality: Reality, role: str, at_rest: AtRest | None = None, *, paced: 
         return GuardedRig(NoRig(), name, NothingMeasurement)
     measurement = measurement_of(kind.channels)
     rig = reality.master if role == MASTER else reality.slave
-    place = noise.LAB_A if role == MASTER else noise.LAB_B + reality.place
-    seed = noise.lab_seed(reality.seed, place)
+    seed = rig_seed(reality, role) if seed is None else seed
     if rig.address:
         terms = exchange(reality, role, seed, paced=paced)
         shown = name if hidden else f"{name} ({rig.address})"
@@ -61,6 +68,12 @@ def build(reality: Reality, role: str, at_rest: AtRest | None = None, *, paced: 
     built = construct(found, arguments | rig.options, where, METHODS)
     shown = name if hidden else f"{name} ({found.__name__})"
     return GuardedRig(built, shown, measurement, hidden=hidden, at_rest=at_rest)
+
+
+def rig_seed(reality: Reality, role: str) -> int:
+    """The seed of a role's rig under that of the reality."""
+    place = noise.LAB_A if role == MASTER else noise.LAB_B + reality.place
+    return noise.lab_seed(reality.seed, place)
 
 
 def exchange(reality: Reality, role: str, seed: int, *, paced: bool) -> Terms:

@@ -42,7 +42,7 @@ VERBS = {
     "faults": "simulate tests with random faults, and check the invariants that must hold in all of them",
     "doctor": "check whether this machine will keep the interval",
     "import": "make a recording from data of your own",
-    "export": "write a recording as CSV, Parquet or MAT",
+    "export": "write a recording as CSV, Parquet or MAT, or a laboratory as an FMU",
     "completion": "write a script that makes the shell complete commands, options and files",
 }
 

@@ -1,4 +1,4 @@
-"""`rths export`: a recording as CSV, Parquet or MAT."""
+"""`rths export`: a recording as CSV, Parquet or MAT, or a plan's emulated laboratory as an FMU."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from common.errors import InputError
+from common.roles import MASTER
 from common.terminal import cli, outputs
 
 if TYPE_CHECKING:
@@ -16,19 +17,28 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `export`."""
-    cli.recording_argument(parser)
-    cli.output_argument(parser, "OUT", "the file to write: .csv, .parquet or .mat", required=True)
+    cli.recording_argument(parser, "; for an FMU the plan of the test")
+    cli.output_argument(parser, "OUT", "the file to write: .csv, .parquet, .mat or .fmu", required=True)
     parser.add_argument(
         "--events",
         action="store_true",
         help="export the events too, as a second table OUT-events.csv (a .mat always holds them, as `events`)",
     )
+    parser.add_argument(
+        "--lab",
+        default=MASTER,
+        metavar="ROLE",
+        help="the laboratory that becomes an FMU: master, slave, or a slave's name (default: master)",
+    )
+    cli.reality_argument(parser)
     cli.force_argument(parser)
     cli.json_argument(parser, "say what was written as JSON on standard output")
 
 
 def run(args: argparse.Namespace) -> int:
     """Export."""
+    if args.output.suffix.lower() == ".fmu":
+        return laboratory(args)
     from common.recording.reader import read
     from report.text import tabular
     from report.text.progress import Progress
@@ -58,6 +68,21 @@ def run(args: argparse.Namespace) -> int:
     else:
         sys.stdout.write(f"{args.output}: {ticks} ticks, {len(columns)} columns, SI units\n")
         sys.stdout.write(f"{apart}: {count} events\n" if apart else "")
+    return 0
+
+
+def laboratory(args: argparse.Namespace) -> int:
+    """Export a laboratory as an FMU."""
+    from rths.fmi.export import export
+
+    with outputs.writing(args.output, args.force) as path:
+        kind = export(args.file, path, args.lab, args.reality)
+    names = {"inputs": list(kind.channels.drives), "outputs": list(kind.channels.names)}
+    if args.json:
+        sys.stdout.write(json.dumps({"file": str(args.output), **names}) + "\n")
+    else:
+        words = "; ".join(f"{name} {', '.join(rows)}" for name, rows in names.items())
+        sys.stdout.write(f"{args.output}: FMI 3.0, co-simulation, {kind.says}; {words}\n")
     return 0
 
 

@@ -1,0 +1,201 @@
+"""An FMU (FMI 3.0, co-simulation) as a rig, or as the specimen under the emulated actuator."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Iterable, Mapping, Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from common.errors import InputError, RigError
+from laboratories.column.under_actuator import Array, UnderActuator
+from laboratories.kinds import KINDS
+
+INSTALL = "`make fmi` installs FMPy"
+
+
+def library(name: str) -> Any:
+    """A module of FMPy; raises InputError where it is not installed."""
+    try:
+        return import_module(name)
+    except ModuleNotFoundError as error:
+        raise InputError(
+            f"An FMU cannot be loaded, because {error.name} is not installed: {INSTALL}."
+        ) from None
+
+
+class Fmu:
+    """An instance of an FMU that is stepped at an interval.
+
+    `inputs` and `outputs` are names of its variables of type Float64, `start` values by name.
+
+    Raises:
+        InputError: the file is no FMU that can be stepped here, or lacks a variable.
+    """
+
+    def __init__(
+        self,
+        file: str,
+        interval: float,
+        inputs: Sequence[str],
+        outputs: Sequence[str],
+        start: Mapping[str, Any],
+    ) -> None:
+        fmpy = library("fmpy")
+        if not Path(file).is_file():
+            raise InputError(f"There is no FMU {file}.")
+        try:
+            self._description = fmpy.read_model_description(file)
+        except Exception as error:  # a damaged archive or description, whatever reads it says
+            raise InputError(f"{file} is no FMU that can be read: {error}") from None
+        if self._description.coSimulation is None or not self._description.fmiVersion.startswith("3."):
+            version = self._description.fmiVersion
+            raise InputError(f"{file} is by FMI {version}, but must be for co-simulation by FMI 3.0.")
+        self._references = {row.name: row.valueReference for row in self._description.modelVariables}
+        inputs, outputs = inputs or self._channels()[0], outputs or self._channels()[1]
+        self._inputs, self._outputs = (self._of(file, names) for names in (inputs, outputs))
+        self._of(file, start)
+        self._file, self._start, self._interval, self._ticks = file, dict(start), interval, 0
+        self._instance: Any = None
+        self._folder = self._said = ""  # unpacked; the last thing that it complained of
+
+    def _channels(self) -> tuple[Sequence[str], Sequence[str]]:
+        """Commands and measurements of the kind of laboratory whose names the FMU's variables have."""
+        for kind in KINDS.values():
+            pair = (kind.channels.drives, kind.channels.names)
+            if set(pair[0]) | set(pair[1]) <= self._references.keys():
+                return pair
+        raise InputError(
+            f"The variables of {self._description.modelName} are none of a kind's channels: give inputs and outputs."
+        )
+
+    def _of(self, file: str, names: Iterable[str]) -> list[int]:
+        for name in names:
+            if name not in self._references:
+                known = ", ".join(list(self._references)[:12])
+                raise InputError(f"{file} has no variable '{name}': it has {known}.")
+        return [self._references[name] for name in names]
+
+    def suggest(self, name: str, value: Any) -> None:
+        """Start a variable with a value where the FMU has it and nothing else was given."""
+        if name in self._references:
+            self._start.setdefault(name, value)
+
+    def begin(self) -> None:
+        """Load and initialize it; raises RigError where it fails."""
+        fmpy, simulation = library("fmpy"), library("fmpy.simulation")
+        self._folder = tempfile.mkdtemp(prefix="rths-fmu-")
+        try:
+            fmpy.extract(self._file, self._folder)
+            self._instance = simulation.instantiate_fmu(
+                self._folder, self._description, "CoSimulation", logger=self._told
+            )
+            simulation.apply_start_values(self._instance, self._description, self._start)
+            self._instance.enterInitializationMode(startTime=0.0)
+            self._instance.exitInitializationMode()
+        except Exception as error:  # an FMU may fail anyhow
+            raise RigError(
+                f"the FMU {Path(self._file).name} cannot be started: {self._said or error}"
+            ) from None
+
+    def _told(self, _environment: Any, status: int, _category: bytes, message: bytes) -> None:
+        if status > 1:  # beyond a warning
+            self._said = message.decode(errors="replace")
+
+    def step(self, values: Sequence[float], share: float = 1.0) -> None:
+        """Set the inputs and go on by a share of the interval; raises RigError where the FMU refuses."""
+        length = share * self._interval
+        try:
+            self._instance.setFloat64(self._inputs, list(values))
+            self._instance.doStep(
+                currentCommunicationPoint=self._ticks * length, communicationStepSize=length
+            )
+        except Exception as error:  # as above
+            raise RigError(f"the FMU {Path(self._file).name} failed: {self._said or error}") from None
+        self._ticks += 1
+
+    def outputs(self) -> list[float]:
+        """Its outputs now."""
+        found: list[float] = self._instance.getFloat64(self._outputs)
+        return found
+
+    def end(self) -> None:
+        """Let it go."""
+        instance, self._instance = self._instance, None
+        try:
+            if instance is not None:
+                instance.terminate()
+                instance.freeInstance()
+        finally:
+            shutil.rmtree(self._folder, ignore_errors=True)
+
+
+class Rig:
+    """A whole laboratory in an FMU: `inputs` take the commands, `outputs` give what is measured, each in its order.
+
+    Without these the variables have the names of the channels of a kind that ships. A parameter `seed` of the FMU is
+    set where it has one, unless `start` gives it.
+    """
+
+    def __init__(
+        self,
+        interval: float,
+        seed: int,
+        file: str,
+        inputs: Sequence[str] = (),
+        outputs: Sequence[str] = (),
+        start: Mapping[str, Any] | None = None,
+    ) -> None:
+        self._fmu = Fmu(file, interval, inputs, outputs, start or {})
+        self._fmu.suggest("seed", seed)
+
+    def arm(self) -> None:
+        """Load and initialize the FMU."""
+        self._fmu.begin()
+
+    def read(self) -> list[float]:
+        """Its outputs."""
+        return self._fmu.outputs()
+
+    def write(self, command: Sequence[float]) -> None:
+        """One interval."""
+        self._fmu.step(command)
+
+    def disarm(self) -> None:
+        """End it."""
+        self._fmu.end()
+
+
+class Specimen(UnderActuator):
+    """A specimen in an FMU under the emulated actuator: `deformation` (m) is its input, `force` (N) its output."""
+
+    def __init__(
+        self,
+        interval: float,
+        seed: int,
+        file: str,
+        deformation: str = "deformation",
+        force: str = "force",
+        start: Mapping[str, Any] | None = None,
+        actuator: Mapping[str, Any] | None = None,
+        sensors: Mapping[str, Any] | None = None,
+        substeps: int = 1,
+    ) -> None:
+        super().__init__(interval, seed, self._forced, actuator, sensors, substeps)
+        self._fmu = Fmu(file, interval, [deformation], [force], start or {})
+        self._share = 1.0 / substeps
+
+    def _forced(self, way: Array) -> float:
+        for place in way.tolist():
+            self._fmu.step([place], self._share)
+        return self._fmu.outputs()[0]
+
+    def arm(self) -> None:
+        """Load and initialize the FMU."""
+        self._fmu.begin()
+
+    def disarm(self) -> None:
+        """The actuator stays where it is, and the FMU ends."""
+        self._fmu.end()
