@@ -1,0 +1,216 @@
+"""The server's side of an element of OpenSees, or of a control of OpenFresco, as a state machine without sockets.
+
+Bytes go in, bytes come out. Whoever drives the laboratories asks for the displacements that are `wanted`, has them
+imposed, and hands back what was measured. Nothing is answered that was not measured: a request for forces waits until
+the laboratories have come to the displacements it belongs to.
+
+A specimen cannot be un-deformed. So within one step, which a commit ends, or an acquisition of OpenFresco, which does
+not commit, displacements may change once, and any further ones are refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from enum import Enum, auto
+from typing import NamedTuple
+
+from common.errors import RemoteProtocolError
+from common.opensees import wire
+from common.opensees.wire import Code, Header, Quantities
+
+FITTING = "NewmarkExplicit, CentralDifference or AlphaOS"
+"""Integrators of OpenSees that impose each displacement once."""
+
+
+class RevisedError(RemoteProtocolError):
+    """A displacement that was imposed already would be revised within its step."""
+
+
+class Phase(Enum):
+    """What is known of the displacements that a client asked for last."""
+
+    GREETING = auto()  # nothing yet: the header has not come
+    MEASURED = auto()  # they were imposed and measured
+    WANTED = auto()  # they have come and are not imposed yet
+    MOVING = auto()  # they are imposed and not measured yet
+    ENDED = auto()  # the client has said that nothing more comes
+
+
+class Measurement(NamedTuple):
+    """What the laboratories give back, one value for each degree of freedom: m, N, and the test's time, s."""
+
+    displacement: tuple[float, ...]
+    force: tuple[float, ...]
+    time: float
+
+
+class ElementServer:
+    """Serves one client; `stiffness` (N/m) is that of each degree of freedom, as its matrices have it.
+
+    Damping and mass are zero, because the forces that are measured have their part in them already: what OpenSees
+    would add for a matrix of damping or mass would count twice.
+    """
+
+    def __init__(self, stiffness: Sequence[float]) -> None:
+        n = len(stiffness)
+        self.phase = Phase.GREETING
+        self.header: Header | None = None
+        self.steps = 0  # displacements that differ from those before them
+        self.commits = 0
+        self.wanted = Quantities(displacement=(0.0,) * n)
+        self._diagonal = [
+            k for row in range(n) for k in (0.0,) * row + (stiffness[row],) + (0.0,) * (n - row - 1)
+        ]
+        self._measured = Measurement((0.0,) * n, (0.0,) * n, 0.0)
+        self._moved = False  # whether displacements have changed in the present step
+        self._asked: Code | None = None  # the request, or the end, that waits for the measurement
+        self._next: bytes = b""  # displacements that wait until those before them are measured
+        self._in = bytearray()
+        self._out = bytearray()
+
+    # -- what comes and goes -------------------------------------------------------------------------
+
+    def take(self, data: bytes) -> None:
+        """Take in bytes of the client.
+
+        Raises:
+            RemoteProtocolError: they are no messages of such a client.
+            RevisedError: displacements would be revised.
+        """
+        self._in += data
+        self._read()
+
+    def outgoing(self) -> bytes:
+        """The bytes to be sent to the client; they are handed out once."""
+        data = bytes(self._out)
+        self._out.clear()
+        return data
+
+    @property
+    def waits(self) -> bool:
+        """Whether the client waits for a measurement, so that nothing more comes from it before that."""
+        return self._asked is not None
+
+    @property
+    def ending(self) -> bool:
+        """Whether the client has said that nothing more comes, be it before its last displacements are measured."""
+        return self.phase is Phase.ENDED or self._asked is Code.END
+
+    @property
+    def full(self) -> bool:
+        """Whether nothing more can be taken in before the laboratories have moved."""
+        return self._asked is not None or bool(self._next)
+
+    # -- what the laboratories do ----------------------------------------------------------------------
+
+    def impose(self) -> Quantities:
+        """The displacements that are wanted; the laboratories move to them from now on."""
+        self.phase = Phase.MOVING
+        return self.wanted
+
+    def measured(self, found: Measurement) -> None:
+        """The laboratories have come to the displacements imposed last; raises as `take`."""
+        self._measured = found
+        self.phase = Phase.MEASURED
+        if (asked := self._asked) is not None:
+            self._asked = None
+            self._answer(asked)
+        if kept := self._next:
+            self._next = b""
+            self._message(kept)
+        self._read()
+
+    # -- messages ----------------------------------------------------------------------------------------
+
+    def _read(self) -> None:
+        if self.header is None:
+            if len(self._in) < wire.HEADER.size:
+                return
+            self._greet(wire.read_header(self._cut(wire.HEADER.size)))
+        assert self.header is not None  # noqa: S101 - `_greet` has set it
+        size = self.header.size
+        while len(self._in) >= size and not self.full and self.phase is not Phase.ENDED:
+            self._message(self._cut(size))
+
+    def _cut(self, size: int) -> bytes:
+        data = bytes(self._in[:size])
+        del self._in[:size]
+        return data
+
+    def _greet(self, header: Header) -> None:
+        """Refuse a client that commands or acquires what there is not."""
+        n, control, acquired = len(self._measured.force), header.control, header.acquired
+        if control.displacement != n:
+            raise RemoteProtocolError(
+                f"it has {control.displacement} degrees of freedom, but {n} of the laboratories answer here: "
+                f"give the element {n} -dof."
+            )
+        if control.force or acquired.velocity or acquired.acceleration or acquired.displacement not in (0, n):
+            raise RemoteProtocolError(
+                "it commands forces or acquires velocities or accelerations, but displacements are imposed here, and "
+                "displacements and forces measured (-daqModes 1 0 0 1 1)."
+            )
+        if acquired.force != n or max(control.time, acquired.time) > 1:
+            raise RemoteProtocolError(f"it acquires {acquired.force} forces of {n} laboratories.")
+        if header.data < n * n:
+            raise RemoteProtocolError(
+                f"its messages of {header.data} numbers hold no matrix of {n} times {n}."
+            )
+        self.header, self.phase = header, Phase.MEASURED
+
+    def _message(self, data: bytes) -> None:
+        code = wire.code_in(data)
+        if code is Code.TRIAL:
+            self._trial(data)
+        elif code is Code.COMMIT:
+            self.commits += 1
+            self._moved = False
+        elif code in wire.MATRICES or self.phase is Phase.MEASURED:
+            self._answer(code)
+        else:
+            self._asked = code
+
+    def _trial(self, data: bytes) -> None:
+        """Take displacements, which may repeat those before them."""
+        assert self.header is not None  # noqa: S101 - messages follow the header
+        values = wire.commanded(self.header, data)
+        if values.displacement == self.wanted.displacement:
+            return
+        if self._moved:
+            raise RevisedError(
+                f"A trial revises displacements that were imposed in the same step ({shown(self.wanted)} to "
+                f"{shown(values)}): choose an integrator that imposes each once, such as {FITTING}, with "
+                "algorithm('Linear')."
+            )
+        if self.phase is not Phase.MEASURED:  # those before them come first
+            self._next = data
+            return
+        self._moved = True
+        self.wanted, self.phase = values, Phase.WANTED
+        self.steps += 1
+
+    def _answer(self, code: Code) -> None:
+        assert self.header is not None  # noqa: S101 - messages follow the header
+        found, header = self._measured, self.header
+        if code is Code.END:
+            self.phase = Phase.ENDED
+            return
+        if code is Code.FORCE:
+            values: Sequence[float] = found.force
+        elif code is Code.ACQUIRE:
+            self._moved = False
+            values = [
+                *found.displacement[: header.acquired.displacement],
+                *found.force,
+                *(found.time,) * header.acquired.time,
+            ]
+        elif code in (Code.STIFFNESS, Code.INITIAL_STIFFNESS):
+            values = self._diagonal
+        else:
+            values = ()
+        self._out += wire.answer(header, values)
+
+
+def shown(values: Quantities) -> str:
+    """Displacements in mm."""
+    return ", ".join(f"{1e3 * value:.6g}" for value in values.displacement) + " mm"

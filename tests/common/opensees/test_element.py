@@ -1,0 +1,189 @@
+"""What a server answers a client of OpenSees or OpenFresco, without sockets."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from common.errors import RemoteProtocolError
+from common.opensees import wire
+from common.opensees.element import ElementServer, Measurement, Phase, RevisedError
+from common.opensees.wire import Code, Header, Quantities, Sizes
+
+HEADER = wire.element(1)
+FRESCO = Header(Sizes(displacement=1), Sizes(displacement=1, force=1, time=1), 256)
+K = 5e6
+
+
+def said(code: Code, x: float = 0.0, header: Header = HEADER) -> bytes:
+    n = header.control
+    return wire.message(
+        header,
+        code,
+        Quantities((x,) * n.displacement, (0.0,) * n.velocity, (0.0,) * n.acceleration, (), (0.0,) * n.time),
+    )
+
+
+def server(header: Header = HEADER, stiffness: Sequence[float] = (K,)) -> ElementServer:
+    found = ElementServer(stiffness)
+    found.take(wire.header_bytes(header))
+    return found
+
+
+def moved(one: ElementServer, force: float) -> None:
+    x = one.impose().displacement
+    one.measured(Measurement(x, (force,), 0.5))
+
+
+def answers(one: ElementServer, header: Header = HEADER, count: int = 1) -> list[tuple[float, ...]]:
+    data = one.outgoing()
+    return [
+        wire.numbers_in(header, data[place : place + header.size], count)
+        for place in range(0, len(data), header.size)
+    ]
+
+
+def test_matrices_are_answered_from_memory() -> None:
+    one = server(wire.element(2), (K, 3.0))
+    for code in (Code.INITIAL_STIFFNESS, Code.STIFFNESS, Code.DAMPING, Code.MASS):
+        one.take(said(code, header=wire.element(2)))
+    diagonal, none = (K, 0.0, 0.0, 3.0), (0.0,) * 4
+    assert answers(one, wire.element(2), 4) == [diagonal, diagonal, none, none]
+
+
+def test_at_rest_the_force_is_zero_and_nothing_is_wanted() -> None:
+    one = server()
+    one.take(said(Code.TRIAL) + said(Code.FORCE))
+    assert answers(one) == [(0.0,)]
+    assert one.phase is Phase.MEASURED
+
+
+def test_a_force_waits_for_its_measurement() -> None:
+    one = server()
+    one.take(said(Code.TRIAL, 1e-3) + said(Code.DAMPING) + said(Code.FORCE))
+    assert one.phase is Phase.WANTED
+    assert one.waits
+    assert answers(one) == [(0.0,)]  # of the damping
+    assert one.impose().displacement == (1e-3,)
+    assert not one.outgoing()
+    one.measured(Measurement((1e-3,), (17.0,), 0.1))
+    assert answers(one) == [(17.0,)]
+    assert not one.waits
+
+
+def test_a_step_of_newmark_explicit_moves_once() -> None:
+    """The trials after the solution repeat the displacement, with other velocities."""
+    one = server()
+    for step in range(1, 4):
+        one.take(said(Code.TRIAL, step * 1e-3) + said(Code.FORCE))
+        moved(one, float(step))
+        one.take(said(Code.TRIAL, step * 1e-3) + said(Code.COMMIT))
+    assert answers(one) == [(1.0,), (2.0,), (3.0,)]
+    assert (one.steps, one.commits) == (3, 3)
+
+
+def test_a_step_of_central_difference_commits_before_it_asks_for_the_force() -> None:
+    one = server()
+    one.take(said(Code.TRIAL, 1e-3) + said(Code.COMMIT) + said(Code.TRIAL, 1e-3) + said(Code.FORCE))
+    moved(one, 4.0)
+    assert answers(one) == [(4.0,)]
+    one.take(said(Code.TRIAL, 2e-3) + said(Code.COMMIT))
+    assert one.phase is Phase.WANTED
+
+
+def test_a_revised_displacement_is_refused_with_integrators_that_fit() -> None:
+    one = server()
+    one.take(said(Code.TRIAL, 1e-3) + said(Code.FORCE))
+    moved(one, 1.0)
+    with pytest.raises(RevisedError, match=r"1 mm to 1\.1 mm.*NewmarkExplicit, CentralDifference or AlphaOS"):
+        one.take(said(Code.TRIAL, 1.1e-3))
+
+
+def test_a_revised_displacement_is_refused_before_it_is_imposed_too() -> None:
+    """Whether the laboratories had the time to move does not decide."""
+    one = server()
+    with pytest.raises(RevisedError):
+        one.take(said(Code.TRIAL, 1e-3) + said(Code.TRIAL, 2e-3))
+
+
+def test_displacements_of_a_client_that_does_not_wait_come_one_after_the_other() -> None:
+    one = server()
+    one.take(b"".join(said(Code.TRIAL, x) + said(Code.COMMIT) for x in (1e-3, 2e-3, 3e-3)) + said(Code.END))
+    found = []
+    while one.phase is Phase.WANTED:
+        found.append(one.wanted.displacement[0])
+        moved(one, 0.0)
+    assert found == [1e-3, 2e-3, 3e-3]
+    assert one.phase is Phase.ENDED
+
+
+def test_openfresco_acquires_all_that_its_header_says_and_commits_nothing() -> None:
+    one = server(FRESCO)
+    one.take(said(Code.TRIAL, 0.0, FRESCO) + said(Code.ACQUIRE, 0.0, FRESCO))
+    for x in (1e-3, 2e-3):
+        one.take(said(Code.TRIAL, x, FRESCO) + said(Code.ACQUIRE, x, FRESCO))
+        one.impose()
+        one.measured(Measurement((x,), (K * x,), 0.25))
+    assert answers(one, FRESCO, 3) == [(0.0, 0.0, 0.0), (1e-3, K * 1e-3, 0.25), (2e-3, K * 2e-3, 0.25)]
+
+
+def test_the_end_is_the_end() -> None:
+    one = server()
+    one.take(said(Code.END) + said(Code.FORCE))
+    assert one.phase is Phase.ENDED
+    assert not one.outgoing()
+
+
+def test_the_last_displacements_are_imposed_before_the_end() -> None:
+    one = server()
+    one.take(said(Code.TRIAL, 1e-3) + said(Code.COMMIT) + said(Code.END))
+    assert one.phase is Phase.WANTED
+    assert one.ending
+    moved(one, 1.0)
+    assert one.phase is Phase.ENDED
+
+
+@pytest.mark.parametrize(
+    ("header", "says"),
+    [
+        (wire.element(2), "2 degrees of freedom, but 1 of the laboratories"),
+        (Header(Sizes(displacement=1, force=1), Sizes(force=1), 256), "commands forces"),
+        (Header(Sizes(displacement=1), Sizes(velocity=1, force=1), 256), "acquires velocities"),
+        (Header(Sizes(displacement=1), Sizes(displacement=1), 256), "acquires 0 forces"),
+        (Header(Sizes(displacement=1, time=2), Sizes(force=1), 256), "acquires 1 forces"),
+    ],
+)
+def test_a_client_that_wants_what_there_is_not_is_refused(header: Header, says: str) -> None:
+    with pytest.raises(RemoteProtocolError, match=says):
+        server(header)
+
+
+def test_messages_too_short_for_a_matrix_are_refused() -> None:
+    header = Header(Sizes(displacement=5), Sizes(force=5), 24)
+    with pytest.raises(RemoteProtocolError, match="5 times 5"):
+        server(header, (K,) * 5)
+
+
+@given(st.lists(st.integers(1, 7), min_size=1, max_size=40))
+def test_how_the_bytes_are_cut_changes_nothing(lengths: list[int]) -> None:
+    data = wire.header_bytes(HEADER) + said(Code.TRIAL, 1e-3) + said(Code.MASS) + said(Code.FORCE)
+    one, place = ElementServer([K]), 0
+    for length in lengths:
+        one.take(data[place : place + 97 * length])
+        place += 97 * length
+    one.take(data[place:])
+    assert one.waits
+    assert one.wanted.displacement == (1e-3,)
+
+
+@given(st.binary(max_size=300))
+def test_no_bytes_do_harm(data: bytes) -> None:
+    one = ElementServer([K])
+    try:
+        one.take(data)
+    except RemoteProtocolError:
+        return
+    assert one.phase in (Phase.GREETING, Phase.MEASURED, Phase.WANTED, Phase.ENDED)
