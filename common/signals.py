@@ -134,6 +134,25 @@ BUILDING = (
     Signal("absolute_acceleration", "m/s²", "absolute acceleration", FieldType.STOREYS),
 )
 
+CLIENT = (
+    SEQ,
+    TIME,
+    Signal("client_step", "", "displacements that the client has asked for so far", FieldType.COUNT),
+    Signal("client_time", "s", "time of the client's analysis at the newest of them"),
+    Signal("client_displacement", "m", "displacement that the client wants, at the end of its step"),
+    Signal("client_force", "N", "force handed to the client at this tick, NaN where none was"),
+    Signal(
+        "client_wait", "s", "from that force handed over to the client's next displacement; NaN where none"
+    ),
+    Signal(
+        "client_late", "", "the client's next displacement had not come in the tick's time", FieldType.FLAG
+    ),
+    Signal("wake_lateness", "s", "start of the tick after its nominal time"),
+)
+"""In place of the building where that is a client's; what the client has a degree of freedom for has a value each."""
+
+OF_DOFS = ("client_displacement", "client_force")
+
 NUMERICAL = Signal(
     "numerical_force",
     "N",
@@ -194,17 +213,19 @@ TICK_TOPICS = ("master", "slave", "latency")
 SENT_ = "sent_"  # prefix of a sent signal where the master's own laboratory has a signal of the same name
 
 
-def topics(laboratories: Mapping[str, Channels]) -> dict[str, tuple[Signal, ...]]:
+def topics(laboratories: Mapping[str, Channels], *, served: bool = False) -> dict[str, tuple[Signal, ...]]:
     """The topics of a recording with their signals; `laboratories` holds the channels of each role with a laboratory.
 
-    The slaves stand in the plan's order. A master without a laboratory of its own is not among the roles.
+    The slaves stand in the plan's order. A master without a laboratory of its own is not among the roles. Where the
+    laboratories are `served` to a client, the building is the client's.
 
     Raises:
         InputError: two signals of one topic have one name.
     """
     own = laboratories.get(MASTER_ROLE)
     slaves = {role: channels for role, channels in laboratories.items() if role != MASTER_ROLE}
-    found = {MASTER_ROLE: _master(own, alike(slaves))}
+    before, after = (_served(tuple(laboratories)), ()) if served else (BUILDING, (NUMERICAL,))
+    found = {MASTER_ROLE: _master(before, after, own, alike(slaves))}
     found |= {role: _slave(channels) for role, channels in slaves.items()}
     found |= dict.fromkeys(map(latency_topic, slaves), LATENCY)
     found |= {ramp_topic(MASTER_ROLE): _ramp(own)} if own else {}
@@ -230,9 +251,19 @@ def alike(slaves: Mapping[str, Channels]) -> dict[Channels, tuple[str, ...]]:
     return found
 
 
-def _master(own: Channels | None, slaves: Mapping[Channels, tuple[str, ...]]) -> tuple[Signal, ...]:
+def _served(roles: tuple[str, ...]) -> tuple[Signal, ...]:
+    """What is recorded of a client, with a value of each laboratory where there are several."""
+    return tuple(row._replace(slaves=roles) if row.name in OF_DOFS else row for row in CLIENT)
+
+
+def _master(
+    before: tuple[Signal, ...],
+    after: tuple[Signal, ...],
+    own: Channels | None,
+    slaves: Mapping[Channels, tuple[str, ...]],
+) -> tuple[Signal, ...]:
     """The signals of the building and of the master's laboratory, and those used from and sent to the slaves."""
-    rows = [*BUILDING, *(_own(own) if own else ()), NUMERICAL]
+    rows = [*before, *(_own(own) if own else ()), *after]
     taken = {row.name for row in rows}
     for channels, roles in slaves.items():
         sent = [row._replace(text=f"{row.text}, as sent") for row in (*_at_end(channels), *_rates(channels))]

@@ -113,7 +113,7 @@ def kinds_of(plan: Plan) -> dict[str, Kind]:
 
 def topics(plan: Plan) -> dict[str, tuple[Signal, ...]]:
     """The topics of a recording of the plan's test; raises InputError as `kind_of`, or as `common.signals.topics`."""
-    return dict(_topics(tuple(plan.kinds.items()), plan.base))
+    return dict(_topics(tuple(plan.kinds.items()), plan.base, plan.served))
 
 
 @cache
@@ -123,9 +123,9 @@ def _hosted(names: tuple[tuple[str, str], ...], base: Path) -> dict[str, Kind]:
 
 
 @cache
-def _topics(names: tuple[tuple[str, str], ...], base: Path) -> dict[str, tuple[Signal, ...]]:
+def _topics(names: tuple[tuple[str, str], ...], base: Path, served: bool) -> dict[str, tuple[Signal, ...]]:
     """The topics of a recording of laboratories whose kinds have these names, by role."""
-    return signals.topics({role: kind.channels for role, kind in _hosted(names, base).items()})
+    return signals.topics({role: kind.channels for role, kind in _hosted(names, base).items()}, served=served)
 
 
 def own(plan: Plan) -> Kind | None:

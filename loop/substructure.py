@@ -121,6 +121,11 @@ def build(plan: Plan, rows: Array, p_delta: float = 0.0, *, slaves: bool = True)
         InputError: a kind, model, method or parameter is unknown, or a laboratory's storey or floor is not in the
             building.
     """
+    if plan.served:
+        raise InputError(
+            "The plan's building is a client's, so there is none to compute: leave out model in [structure], or start "
+            "the test with rths serve."
+        )
     mass, n, interval = np.array(plan.structure.mass), plan.storeys, plan.test.interval
     columns, method = numerical_columns(plan), integration(plan)
     hosted = {role: kind for role, kind in kinds_of(plan).items() if slaves or role == MASTER}
@@ -225,6 +230,18 @@ def ground_rows(plan: Plan, record: GroundMotion, shift: float = 0.0) -> Array:
     interval = plan.test.interval
     rows = ground(record.scaled(plan.ground_motion.scale), interval, plan.ticks * interval)
     return rows if shift == 0.0 else shifted(rows, shift / interval)
+
+
+def recorded_ground(plan: Plan) -> tuple[GroundMotion, Array] | None:
+    """The record of the plan and its rows for a recording, None where the building is a client's with its own motion.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    if plan.served:
+        return None
+    record = motion(plan)
+    return record, ground_rows(plan, record)
 
 
 def shifted(rows: Array, ticks: float) -> Array:

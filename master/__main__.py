@@ -12,6 +12,8 @@ from common.terminal import cli
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the master."""
     cli.plan_arguments(parser)
+    cli.intervals_argument(parser)
+    cli.opensees_argument(parser)
     cli.reality_argument(parser)
     cli.rt_arguments(parser)
     cli.processor_argument(parser)
@@ -29,7 +31,8 @@ def run(args: argparse.Namespace) -> int:
     """Run the master; returns its exit code."""
     from master import assembly
 
-    return process.conduct("master", args, assembly, listen=args.listen)
+    made = assembly.Served(args.opensees) if args.opensees else assembly
+    return process.conduct("master", args, made, listen=args.listen)
 
 
 if __name__ == "__main__":

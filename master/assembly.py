@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import secrets
+from collections.abc import Sequence
 
 from common.host.clock import real, unix_ns
 from common.lab.laboratory import Setting
@@ -11,14 +12,18 @@ from common.plan.plan import Plan
 from common.plan.reality import Reality
 from common.rig import AtRest, GuardedRig
 from common.roles import MASTER
+from laboratories import kinds
 from loop import rigs, substructure
 from loop.links import link_model
 from loop.nominal import preflight as nominal
 from loop.realised import true_system
+from master.building import Building, Outputs
+from master.client import ClientBuilding, Follower, RealTime, compensator
 from master.limits import MasterLimits
 from master.loop import MasterLoop
 from master.own import OwnLaboratory
 from master.step import MasterStep
+from models import compensators
 from models.registry import Array
 from models.system import System
 
@@ -38,7 +43,10 @@ def build_rig(reality: Reality, at_rest: AtRest | None = None, *, paced: bool = 
 
 def check(reality: Reality) -> None:
     """Raise InputError where the laboratory could not be built, without constructing or moving the rig."""
-    master_step(reality)
+    if reality.plan.served:
+        compensator(reality.plan)
+    else:
+        master_step(reality)
     rigs.check(reality, MASTER)
 
 
@@ -66,10 +74,24 @@ def build_loop(
     With a `gate` the sensors of its rig must pass their check.
     """
     warm_up(reality)
+    step = master_step(reality)
+    return serve(setting, reality, building=step, session=session, epoch_ns=epoch_ns, gate=gate)
+
+
+def serve(
+    setting: Setting,
+    reality: Reality,
+    *,
+    building: Building,
+    session: int | None = None,
+    epoch_ns: int | None = None,
+    gate: Gate | None = None,
+) -> MasterLoop:
+    """As `build_loop`, for the `building` that is given, whose kernels are compiled."""
     return MasterLoop(
         setting,
         build_rig(reality, rigs.at_rest(gate, setting, MASTER), paced=real(setting.clock)),
-        master_step(reality),
+        building,
         {role: link_model(reality.of(role)) for role in setting.plan.roles},
         session=session if session is not None else secrets.randbelow(2**62) + 1,
         epoch_ns=epoch_ns if epoch_ns is not None else unix_ns(),
@@ -77,11 +99,45 @@ def build_loop(
     )
 
 
+class Served:
+    """How the master is put together that serves clients of OpenSees at `addresses`, in real time."""
+
+    def __init__(self, addresses: Sequence[str]) -> None:
+        self._addresses = addresses
+
+    def warm_up(self, reality: Reality) -> None:
+        """Compile the kernels."""
+        warm_up_served(reality)
+
+    def preflight(self, _plan: Plan) -> list[PreflightCheck]:
+        """No check: of a client's building nothing is known here."""
+        return []
+
+    def build_loop(self, setting: Setting, reality: Reality, *, gate: Gate | None = None) -> MasterLoop:
+        """The loop, with ports that are open; raises InputError where one cannot be."""
+        plan = setting.plan
+        building = ClientBuilding(plan, self._addresses, RealTime(plan))
+        return serve(setting, reality, building=building, gate=gate)
+
+
+def warm_up_served(reality: Reality) -> None:
+    """Compile what a client's building needs of the master, on arrays that are thrown away."""
+    plan = reality.plan
+    compensators.enter(compensator(plan), *compensators.STILL, plan.test.interval)
+    for kind in kinds.kinds_of(plan).values():
+        Follower(kind.coupling(plan), plan.test.interval, 1).resists(0.0)
+    of_own(reality, Outputs(0.0, 0.0, 0.0, 0.0, [(0.0,) * substructure.SENT_VALUES for _ in plan.roles], []))
+
+
 def warm_up(reality: Reality) -> None:
     """Compile the kernels by calling them once."""
+    of_own(reality, master_step(reality)(0, 0.0, 0.0, [0.0] * len(reality.plan.roles)))
+
+
+def of_own(reality: Reality, outputs: Outputs) -> None:
+    """Compile those of the master's own laboratory and of the limits."""
     plan = reality.plan
     own = OwnLaboratory(plan)
-    outputs = master_step(reality)(0, 0.0, 0.0, [0.0] * len(plan.roles))
     measured = (0.0,) * (len(own.channels.names) if own.channels else 0)
     MasterLimits(plan).violation(measured, own.command(outputs), outputs)
     rigs.warm_up(reality, MASTER)

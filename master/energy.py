@@ -15,7 +15,7 @@ from common.plan.plan import Plan
 from laboratories import kinds
 from laboratories.kind import Follows, Kind
 from loop.nominal.partition import drifts, felt, storey_stiffness
-from master.step import Outputs
+from master.building import Outputs
 from models import energy_balance
 from models.compiled import plain
 from models.energy_balance import DRIFT_SHARE, ERROR_SHARE

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from common.errors import InputError, LostError, RigError
+from common.errors import InputError, InterlockError, LostError, RigError
 from common.lab.laboratory import REPEAT_NS, Laboratory
 from common.lab.preflight import LINK, Gate, RefusedError, link_check
 from common.plan.plan import PROTOCOL_VERSION
@@ -13,6 +13,7 @@ from common.protocol.exchange import Event, State
 from common.protocol.messages import Armed, Message, Refused, Register, Registered, Scheduled, SyncReply
 from common.rig import GuardedRig
 from common.safety.modes import STILL_LATCHED
+from master.building import Building
 from master.partner import Partner
 
 # From the choice of the start to the start: a lost message is repeated twice in that time (REPEAT_NS).
@@ -32,8 +33,10 @@ class MasterHandshake:
         rig: GuardedRig,
         wall_ns: int,
         gate: Gate | None,
+        building: Building,
     ) -> None:
         self._lab = lab
+        self._building = building
         self._partners = partners
         self._rig = rig
         self._wall_ns = wall_ns
@@ -96,13 +99,20 @@ class MasterHandshake:
     def _move_on(self) -> None:
         """Leave the present state if every slave has given the answer that it waits for."""
         state, partners = self._lab.exchange.state, self._partners
-        if state is State.IDLE and all(one.registered for one in partners) and self._recorder_is_here():
-            self._move(Event.REGISTER)
-            self._arm()
+        if state is State.IDLE and self.complete and not self._building.awaited:
+            if self._recorder_is_here():
+                self._move(Event.REGISTER)
+                self._arm()
         elif state is State.REGISTERED and all(one.armed for one in partners):
             self._move(Event.ARM)
         elif state is State.ARMED and self._lab.start_ns and all(one.scheduled for one in partners):
             self._move(Event.SCHEDULE)
+
+    @property
+    def complete(self) -> bool:
+        """Whether all slaves have registered, and a recorder that the test needs is there."""
+        there = self._lab.recorder is not None or not self._lab.plan.recording.required
+        return there and all(one.registered for one in self._partners)
 
     def _move(self, event: Event) -> None:
         self._lab.move(event)
@@ -157,6 +167,8 @@ class MasterHandshake:
         lab = self._lab
         if lab.exchange.ended or lab.exchange.state is State.SCHEDULED:
             return
+        if self._forsaken():
+            return
         now = lab.clock.now()
         if now - lab.heard_ns > lab.plan.link.connect_timeout * 1e9:
             self._nobody()
@@ -172,6 +184,18 @@ class MasterHandshake:
                 self._schedule(now)
         if not self._partners:  # without slaves there is no answer that would call it
             self._move_on()
+
+    def _forsaken(self) -> bool:
+        """Serve whoever is to move the laboratories; whether that has gone, which ends the test."""
+        try:
+            self._building.look_after()
+        except (InterlockError, LostError) as error:
+            event = Event.LOSE if isinstance(error, LostError) else Event.TRIP
+            self._lab.fail(event, error, code="client")
+            return True
+        if self._lab.exchange.state is State.IDLE and self.complete and self._building.awaited:
+            self._lab.heard_ns = self._lab.clock.now()  # nothing is armed: there is no hurry
+        return False
 
     def _nobody(self) -> None:
         if self._lab.exchange.state is not State.IDLE:

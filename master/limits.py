@@ -9,8 +9,8 @@ from common.plan.plan import Plan
 from common.signals import OF_STOREYS
 from laboratories import kinds
 from laboratories.limits import TickLimits, limited, of_commands, of_readings, of_sent
+from master.building import Outputs
 from master.energy import EnergyMonitor
-from master.step import Outputs
 
 
 class MasterLimits:
@@ -23,10 +23,11 @@ class MasterLimits:
         own = kinds.own(plan)
         readings, commands = (of_readings(own, plan), of_commands(own, plan)) if own else ([], [])
         sent = [limit for role in plan.roles for limit in of_sent(kinds.kind_of(plan, role), plan.of(role))]
-        storeys = limited(vars(plan.limits), (name for name in OF_STOREYS for _ in range(plan.storeys)))
+        moved = () if plan.served else OF_STOREYS  # a client's building is unknown here
+        storeys = limited(vars(plan.limits), (name for name in moved for _ in range(plan.storeys)))
         values = [*readings, *commands, *sent, *storeys]
         self._tick = TickLimits(own, plan, values, commands=len(readings))
-        self._energy = EnergyMonitor(plan)
+        self._energy = None if plan.served else EnergyMonitor(plan)
         self.written = self._tick.written
         self.standing = self._tick.standing
 
@@ -36,5 +37,5 @@ class MasterLimits:
         """The first value beyond its limit, None where there is none; `wanted` is the command for its own rig."""
         sent = chain.from_iterable(outputs.sent)
         beyond = self._tick.violation(outputs.target, *measured, *wanted, *sent, *outputs.storeys)
-        energy = self._energy.violation(measured, outputs)
+        energy = self._energy.violation(measured, outputs) if self._energy else None
         return beyond or energy

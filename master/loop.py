@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from itertools import chain
 from typing import Any
 
-from common.errors import InterlockError, RigError
+from common.errors import InterlockError, LostError, RigError
 from common.host import lateness
 from common.lab.descent import Descent
 from common.lab.laboratory import Laboratory, Setting
@@ -34,18 +34,19 @@ from common.protocol.messages import (
     Trip,
     Waiting,
 )
+from common.recording.outcome import COMPLETED
 from common.rig import GuardedRig
-from common.roles import MASTER, RECORDER
+from common.roles import CLIENT, MASTER, RECORDER
 from common.safety.modes import Turn
 from common.safety.watchdog import WatchdogFinding
 from common.signals import alike
 from laboratories import kinds
 from laboratories.longest import resting
+from master.building import Building, Outputs
 from master.handshake import MasterHandshake
 from master.limits import MasterLimits
 from master.own import OwnLaboratory
 from master.partner import Partner
-from master.step import MasterStep, Outputs
 
 
 class MasterLoop(RigLoop):
@@ -55,7 +56,7 @@ class MasterLoop(RigLoop):
         self,
         setting: Setting,
         rig: GuardedRig,
-        step: MasterStep,
+        building: Building,
         links: Mapping[str, LinkModel],
         *,
         session: int,
@@ -72,8 +73,10 @@ class MasterLoop(RigLoop):
         self._groups = [[self.partners[role] for role in roles] for roles in alike(channels).values()]
         lab.endpoint.expect({role: len(one.names) for role, one in channels.items()})
         self._partners = tuple(self.partners.values())
-        self._handshake = MasterHandshake(self.lab, self._partners, rig, epoch_ns - setting.clock.now(), gate)
-        self._step = step
+        self._building = building
+        building.join(lab, self._partners)
+        wall_ns = epoch_ns - setting.clock.now()
+        self._handshake = MasterHandshake(self.lab, self._partners, rig, wall_ns, gate, building)
         self._command = self._own.zero
         self._drift = 0.0
         self._measured: tuple[float, ...] = ()
@@ -153,14 +156,22 @@ class MasterLoop(RigLoop):
             return
         try:
             measured = self._rig.read()
-            outputs = self._step(tick, *self._own.felt(measured), forces)
+            try:
+                outputs = self._building(tick, *self._own.felt(measured), forces)
+            except (InterlockError, LostError) as error:
+                self._left_alone(error, tick, measured)
+                return
+            if self._building.over:
+                self.stop(COMPLETED)
+                self._descent.step(tick, measured)
+                return
             wanted = self._own.command(outputs)
             violation = self._limits.violation(measured, wanted, outputs)
             if violation:
                 lab.violated(violation, tick)
                 self._descent.step(tick, measured)
             else:
-                self._write(wanted, outputs, held=held)
+                self._write(wanted, outputs, held=held or outputs.held)
         except RigError as error:
             self._rig_failed(error, tick)
             return
@@ -171,10 +182,18 @@ class MasterLoop(RigLoop):
         self._drift = self._own.drift(outputs)
         self._measured = measured
         self._watch(tick, wake)
+        if lab.running:
+            self._building.written(tick)
+
+    def _left_alone(self, error: InterlockError | LostError, tick: int, measured: tuple[float, ...]) -> None:
+        """End the test because the building gives no further displacements."""
+        event = Event.LOSE if isinstance(error, LostError) else Event.TRIP
+        self.lab.fail(event, error, code="client", tick=tick)
+        self._descent.step(tick, measured)
 
     def _finding(self, tick: int) -> tuple[WatchdogFinding, str]:
-        """The worst finding of the slaves' watchdogs, and the first slave that has it."""
-        worst, who = WatchdogFinding.FINE, ""
+        """The worst finding of the watchdogs on the building and the slaves, and the first that has it."""
+        worst, who = self._building.look(tick), CLIENT
         for partner in self._partners:
             found = partner.look(tick)
             if found > worst:
@@ -223,13 +242,13 @@ class MasterLoop(RigLoop):
         lab = self.lab
         log_ns = lab.unix_ns(tick)
         publish_ns = lab.epoch_ns + (self._sent_ns or lab.clock.now()) - lab.start_ns
+        before, after = self._building.recorded(outputs)
         values = (
             tick,
             tick * lab.plan.test.interval,
-            outputs.ground_acceleration,
-            *outputs.storeys[: -lab.plan.storeys],
+            *before,
             *self._own.row(outputs, self._command, measured),
-            *outputs.storeys[-lab.plan.storeys :],  # the numerical forces
+            *after,
             *self._exchanged(tick),
         )
         lab.outlet.add("master", log_ns, publish_ns, values)
@@ -298,6 +317,7 @@ class MasterLoop(RigLoop):
     def disarm(self) -> None:
         """Disarm the rig and write the remaining rows of latency; called once, before leaving."""
         self.disarm_rig()
+        self._building.leave()
         if self.ticks:
             for partner in self._partners:
                 partner.account.finish(self.ticks - 1, self.lab.clock.now())
@@ -313,7 +333,8 @@ class MasterLoop(RigLoop):
     @property
     def completed(self) -> bool:
         """Whether the test had all its ticks."""
-        return self.ticks >= self.lab.plan.ticks
+        ended = self.lab.plan.served and self.lab.exchange.cause == COMPLETED  # as its client wants it
+        return ended or self.ticks >= self.lab.plan.ticks
 
     @property
     def needed(self) -> bool:
@@ -328,9 +349,11 @@ class MasterLoop(RigLoop):
 
     @property
     def awaited(self) -> str:
-        """Slaves and recorder that have not joined yet."""
+        """Slaves and recorder that have not joined yet, or else who is to move the laboratories."""
         if self.lab.exchange.state is not State.IDLE:
             return ""
+        if self._handshake.complete:
+            return self._building.awaited
         missing = [partner.title for partner in self._partners if not partner.registered]
         missing += [RECORDER] * (self.lab.recorder is None and self.lab.plan.recording.required)
         return " and ".join(missing)
@@ -382,4 +405,4 @@ class MasterLoop(RigLoop):
 
     def finish(self) -> None:
         """All ticks are done."""
-        self.stop("completed")
+        self.stop(COMPLETED)

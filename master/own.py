@@ -13,7 +13,7 @@ from common.safety.ramp import Ramp
 from common.signals import Channels
 from laboratories import kinds
 from laboratories.kind import Follows
-from master.step import Outputs
+from master.building import Outputs
 
 NOWHERE = (0.0, 0.0)  # position and force for a master without a laboratory
 
@@ -77,10 +77,9 @@ class OwnLaboratory:
         """Drift (m) of the storey in the progress report."""
         if self._ratio:
             return outputs.target / self._ratio
-        moved, storey = (
-            outputs.storeys,
-            self._storey,
-        )  # the displacements are the first of the storeys' values
+        if not outputs.storeys:  # of a client's building, which is not known here
+            return 0.0
+        moved, storey = outputs.storeys, self._storey  # the displacements come first
         return moved[storey - 1] - (moved[storey - 2] if storey > 1 else 0.0)
 
 

@@ -11,8 +11,8 @@ from common.protocol.tally import Tally
 from common.roles import latency_topic, name_of, title
 from common.safety.watchdog import Watchdog, WatchdogFinding
 from common.signals import Channels
+from master.building import Sent
 from master.latency import LatencyAccount
-from master.step import Sent
 
 # Exchanges of clock readings before the start. Most of them wait in no queue, so some of 200 have nearly the shortest
 # round trip; they take less than 0.1 s on a local network.
@@ -61,6 +61,7 @@ class Partner:
         self.commands = 0  # sent
         self.channels = channels
         self._force = channels.names.index(channels.force)
+        self.position = channels.names.index(channels.position)
         self.used = NO_FEEDBACK._replace(measured=(0.0,) * len(channels.names))
         self.sent: Sent = NOTHING_SENT
 

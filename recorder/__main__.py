@@ -25,6 +25,7 @@ WAIT_S = 0.02  # longest wait for a message: a request to stop and the requests 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the recorder."""
     cli.plan_arguments(parser)
+    cli.intervals_argument(parser)
     cli.connect_argument(parser)
     parser.add_argument(
         "-o",
@@ -58,11 +59,10 @@ def record(args: argparse.Namespace, plan: Plan, path: Path) -> int:
     report = cli.reporter(args.json, plan.test.duration)
     gate = Gate(cli.accepted_risks(args))
     gate.judge([space.check(plan, path.parent)])
-    motion = substructure.motion(plan)
-    ground = substructure.ground_rows(plan, motion)
+    ground = substructure.recorded_ground(plan)
     link = process.join(plan, "recorder", stopping, report, connect=args.connect)
     try:
-        recording = files.begin(path, plan, motion, ground, unix_ns(), gate.overruled, clock="real")
+        recording = files.begin(path, plan, ground, unix_ns(), gate.overruled, clock="real")
         setting = Setting(plan, FrameEndpoint(link, plan.digest()), MonotonicClock(), report)
         loop = RecorderLoop(setting, ThreadedSink(FileSink(recording, setting.clock)))
         try:

@@ -62,14 +62,13 @@ def checked(path: Path) -> Path:
 def begin(
     path: Path,
     plan: Plan,
-    record: GroundMotion,
-    ground: Array,
+    ground: tuple[GroundMotion, Array] | None,
     at_ns: int = 0,
     accepted: Sequence[Risk] = (),
     *,
     clock: str = "virtual",
 ) -> Recording:
-    """Begin a recording with schemas, plan, versions, host, ground motion and a first event at `at_ns` (Unix).
+    """Begin a recording with schemas, plan, versions, host, `ground` motion and a first event at `at_ns` (Unix).
 
     `clock` is the test's kind of clock, `virtual` or `real`. The recording is flushed, because the metadata reach the
     file with the first chunk only.
@@ -83,8 +82,10 @@ def begin(
     recording.metadata("versions", {name: metadata.version(name) for name in PACKAGES})
     recording.metadata("host", host() | facts())
     recording.metadata(CLOCK, {"kind": clock})
-    recording.metadata(GROUND, {"record": record.describe(), "scale": repr(plan.ground_motion.scale)})
-    recording.attach(GROUND, ground.astype("<f8").tobytes(), "application/octet-stream")
+    if ground is not None:
+        record, rows = ground
+        recording.metadata(GROUND, {"record": record.describe(), "scale": repr(plan.ground_motion.scale)})
+        recording.attach(GROUND, rows.astype("<f8").tobytes(), "application/octet-stream")
     recording.add("event", at_ns, at_ns, (0.0, "recorder", "info", "begin", "recording begun", {}))
     for risk in accepted:
         text = f"risk '{risk.name}' accepted: {risk.sentence}."

@@ -15,6 +15,7 @@ from common.terminal import cli
 
 VERBS = {
     "run": "run the whole test on this machine",
+    "serve": "serve laboratories to a model of OpenSees, whose elements they are",
     "master": "run laboratory A of a test on several machines",
     "slave": "run laboratory B of a test on several machines",
     "record": "record a test on several machines",
@@ -47,7 +48,7 @@ VERBS = {
 }
 
 FOLDERS = {
-    "rths.perform": ("run", "live", "stop", "reset"),
+    "rths.perform": ("run", "serve", "live", "stop", "reset"),
     "rths.prepare": ("init", "check", "simulate", "bench", "identify", "keys", "doctor"),
     "rths.examine": (
         "inspect",
@@ -102,6 +103,7 @@ def fill(parser: argparse.ArgumentParser, verb: str) -> None:
 
 EXAMPLES = {
     "run": "rths run --duration 10 --scale 0.2",
+    "serve": "rths serve single_site --opensees 127.0.0.1:8090",
     "master": "rths master default --listen tcp/0.0.0.0:7447",
     "slave": "rths slave default --connect tcp/192.0.2.1:7447",
     "record": "rths record default --connect tcp/192.0.2.1:7447 -o test.mcap",

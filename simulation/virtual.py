@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,6 +19,8 @@ from common.roles import MASTER, RECORDER
 from common.terminal.telling import Tell, untold
 from loop import substructure
 from master.assembly import build_loop as build_master
+from master.assembly import serve as serve_master
+from master.building import Building
 from master.loop import MasterLoop
 from recorder import files
 from recorder.loop import CONSEQUENCE, RecorderLoop
@@ -61,12 +64,13 @@ def assemble(
     *,
     gate: Gate | None = None,
     drifts: Mapping[str, Drift] = SAME_CLOCK,
+    building: Building | None = None,
 ) -> VirtualTest:
     """All laboratories over a link in memory, recording into `output` where one is given.
 
     With a master's `gate` all sensors are judged as the rigs are armed, the slaves' with the same risks accepted, and
     the recording is told what was passed and overruled; without one nothing is judged. `drifts` are the roles' clocks
-    where they differ.
+    where they differ; `building` is what has the building where it is not the plan's own.
     """
     world, hub = World(), MemoryHub(plan.roles)
     roles = (MASTER, *plan.roles) if output is None else (MASTER, *plan.roles, RECORDER)
@@ -75,7 +79,8 @@ def assemble(
         process = world.process(role, drifts.get(role, NO_DRIFT))
         settings[role] = Setting(plan, hub.join(role, process), process, report)
     gates = {MASTER: gate} | {role: Gate(gate.accepted) for role in plan.roles} if gate else {}
-    master = build_master(settings[MASTER], reality, session=SESSION, epoch_ns=0, gate=gate)
+    begin = build_master if building is None else partial(serve_master, building=building)
+    master = begin(settings[MASTER], reality, session=SESSION, epoch_ns=0, gate=gate)
     slaves = {
         role: build_slave(settings[role], reality.of(role), gate=gates.get(role)) for role in plan.roles
     }
@@ -86,8 +91,7 @@ def assemble(
 
 def begin_recording(setting: Setting, world: World, output: Path) -> RecorderLoop:
     """The recorder of a new file; its process begins when time does."""
-    motion = substructure.motion(setting.plan)
-    file = files.begin(output, setting.plan, motion, substructure.ground_rows(setting.plan, motion))
+    file = files.begin(output, setting.plan, substructure.recorded_ground(setting.plan))
     recorder = RecorderLoop(setting, FileSink(file, setting.clock, timely=False))
     process = world.process(RECORDER)
     process.start(recording(recorder, setting.endpoint, process, file))

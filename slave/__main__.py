@@ -12,6 +12,7 @@ from common.terminal import cli
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the slave."""
     cli.plan_arguments(parser)
+    cli.intervals_argument(parser)
     cli.reality_argument(parser)
     cli.rt_arguments(parser)
     cli.processor_argument(parser)

@@ -30,6 +30,7 @@ from common.protocol.messages import (
     Trip,
 )
 from common.protocol.tally import Tally
+from common.recording.outcome import COMPLETED
 from common.rig import GuardedRig, command_of
 from common.roles import MASTER, SLAVE
 from common.safety.modes import Turn
@@ -295,7 +296,8 @@ class SlaveLoop(RigLoop):
     @property
     def completed(self) -> bool:
         """Whether the test had all its ticks, here or at the master if this laboratory has fallen behind."""
-        return max(self.ticks, self._master_ticks) >= self.lab.plan.ticks
+        whole = max(self.ticks, self._master_ticks) >= self.lab.plan.ticks
+        return whole or (self.lab.plan.served and self.lab.exchange.cause == COMPLETED)
 
     @property
     def needed(self) -> bool:

@@ -22,8 +22,8 @@ from common.signals import OF_STOREYS, SENT
 from docs import generate
 from laboratories.checks import PATIENCE
 from laboratories.table.kind import TABLE
+from master.building import Outputs
 from master.limits import MasterLimits
-from master.step import Outputs
 from slave.limits import SlaveLimits
 from tests.faults.rows import motion_bound
 from tests.helpers import ROOT

@@ -27,6 +27,7 @@ from common.plan.laboratory_tables import (
 )
 from common.plan.schema import nearest, plain
 from common.plan.tables import (
+    OF_CLIENT,
     GroundMotionTable,
     Limits,
     Link,
@@ -89,6 +90,11 @@ class Plan:
     def makes_good(self) -> bool:
         """Whether late ticks are caught up: for emulated rigs time passes by ticks only."""
         return OVERRUN in self.eased
+
+    @property
+    def served(self) -> bool:
+        """Whether the building is a client's, which asks for displacements and is answered with forces."""
+        return self.structure.model == OF_CLIENT
 
     @property
     def storeys(self) -> int:
@@ -178,6 +184,8 @@ class Plan:
                 del lab["kind"]
         if self.device == DeviceTable():
             del tables["device"]
+        for name in CLIENT if not self.served else ():
+            del tables["structure"][name]
         return tables
 
     def tables_of(self, name: str) -> dict[str, Any]:
@@ -207,6 +215,7 @@ class Plan:
         return hashlib.blake2b(text.encode(), digest_size=8).hexdigest()
 
 
+CLIENT = ("model", "intervals")  # keys of [structure] that say that a client has the building
 BESIDE = ("slaves", "base", "follows_in", "eased")  # fields that are not tables of a file
 TABLES = tuple(name for name in Plan.__dataclass_fields__ if name not in BESIDE)
 INTERFACE = tuple(dict.fromkeys(name for names in TABLES_OF_KIND.values() for name in names))

@@ -14,6 +14,7 @@ from common.plan.laboratory_tables import RigTable, SlaveLaboratory
 from common.plan.plan import INTERFACE, TABLES, Plan
 from common.plan.plugins import checked
 from common.plan.schema import fill, nearest, plain
+from common.plan.tables import OF_CLIENT
 from common.plan.toml_file import tables_in, text_of
 from common.roles import MASTER, slave_role
 
@@ -24,6 +25,7 @@ SLAVE_NAME = re.compile(r"[a-z][a-z0-9_]*")
 NOMINAL = ("structure", "column", "actuator", "table", "damper", "sensors")
 CHOSEN = (
     "structure.rho_infinity",
+    "structure.intervals",
     "structure.columns",
     "structure.experimental",
     "column.storey",
@@ -73,14 +75,24 @@ def from_tables(tables: dict[str, Any], base: Path) -> Plan:
 
 
 def with_test(
-    plan: Plan, *, duration: float | None = None, scale: float | None = None, seed: int | None = None
+    plan: Plan,
+    *,
+    duration: float | None = None,
+    scale: float | None = None,
+    seed: int | None = None,
+    intervals: int | None = None,
 ) -> Plan:
-    """The plan with command-line values in place of its own, checked like those of a file."""
+    """The plan with command-line values in place of its own, checked like those of a file.
+
+    With `intervals` the building is a client's, whose displacements are each imposed in so many.
+    """
     tables = plan.written()
     for table, name, value in (
         ("test", "duration", duration),
         ("ground_motion", "scale", scale),
         ("test", "seed", seed),
+        ("structure", "model", OF_CLIENT if intervals is not None else None),
+        ("structure", "intervals", intervals),
     ):
         if value is not None:
             tables[table][name] = value

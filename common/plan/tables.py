@@ -61,6 +61,9 @@ class Experimental:
     damping: float = key("of the specimen's storey", default=0.0, unit="N·s/m", least=0.0)
 
 
+OF_PLAN, OF_CLIENT = "plan", "client"  # whose model the building is
+
+
 @dataclass(frozen=True)
 class Structure:
     """The building: one value per storey, or one for a single storey."""
@@ -81,6 +84,17 @@ class Structure:
     )
     integrator: str = key("integration method", default="newmark_explicit")
     rho_infinity: float = key("KR-α: spectral radius at infinity", default=0.5, least=0.0, most=1.0)
+    model: str = key(
+        "what computes the building: plan, from these tables; or client, the program that rths serve answers",
+        default=OF_PLAN,
+        choices=(OF_PLAN, OF_CLIENT),
+    )
+    intervals: int = key(
+        "client: control intervals in which each of its displacements is imposed",
+        default=1,
+        least=1,
+        most=100_000,
+    )
     columns: NumericalColumnsTable = inner(NumericalColumnsTable)
     experimental: Experimental | None = field(default=None, metadata={"table": Experimental, "more": False})
 

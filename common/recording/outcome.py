@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 CUT_OFF = "cut off"  # the outcome of a recording without a summary
+COMPLETED = "completed"  # the cause of a test that ended as it was meant to
 
 
 def outcome(summary: Mapping[str, str]) -> str:

@@ -117,7 +117,8 @@ class Recording:
         for topic, rows in topics.items():
             units = {"units": packed({row.name: row.unit for row in rows})}
             named = {"slaves": " ".join(slaves)} if list(slaves) != [SLAVE] else {}
-            each = shared(rows) if len(slaves) > 1 else {}
+            several = len(slaves) > 1 or any(len(row.slaves) > 1 for row in rows)
+            each = shared(rows) if several else {}
             about = units | named | ({SHARED: packed(each)} if each else {})
             self.channels[topic] = self._channel(
                 f"rths/{test}/{topic}", self._described(topic, rows, storeys), about

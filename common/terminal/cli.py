@@ -61,6 +61,28 @@ def plan_arguments(parser: argparse.ArgumentParser, *, optional: bool = False) -
     parser.add_argument("--seed", type=int, metavar="N", help="seed of every random draw")
 
 
+def intervals_argument(parser: argparse.ArgumentParser) -> None:
+    """The option by which a building is a client's, for the processes that `rths serve` starts."""
+    parser.add_argument(
+        "--intervals",
+        type=int,
+        metavar="N",
+        help="the building is that of a client of rths serve, each of whose displacements takes N control intervals",
+    )
+
+
+def opensees_argument(parser: argparse.ArgumentParser, *, required: bool = False) -> None:
+    """The option that says where elements of OpenSees are served."""
+    parser.add_argument(
+        "--opensees",
+        action="append",
+        default=[],
+        required=required,
+        metavar="HOST:PORT",
+        help="where an element of OpenSees is served: once for all laboratories, or once for each in the plan's order",
+    )
+
+
 def reality_argument(parser: argparse.ArgumentParser) -> None:
     """The option for the file of the reality."""
     parser.add_argument(
@@ -144,7 +166,11 @@ def accepted_risks(args: argparse.Namespace) -> tuple[str, ...]:
 def load_plan(args: argparse.Namespace) -> Plan:
     """The plan of the command line with its options; raises PlanError."""
     return plans.with_test(
-        plans.load(plan_path(args.plan)), duration=args.duration, scale=args.scale, seed=args.seed
+        plans.load(plan_path(args.plan)),
+        duration=args.duration,
+        scale=args.scale,
+        seed=args.seed,
+        intervals=getattr(args, "intervals", None),
     )
 
 

@@ -102,7 +102,9 @@ def peaks(run: Run) -> dict[str, dict[str, Any]]:
             if values is None or not values.size:
                 continue
             magnitude = np.abs(values).reshape(len(values), -1).max(axis=1)
-            place = int(np.argmax(magnitude))
+            if np.isnan(magnitude).all():  # a client that was handed no force yet
+                continue
+            place = int(np.nanargmax(magnitude))
             at = float(t[place]) if t is not None else None
             result[f"{topic}/{name}"] = {"peak": float(magnitude[place]), "t": at, "unit": unit}
     return result

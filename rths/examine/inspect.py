@@ -7,7 +7,7 @@ import json
 import sys
 from typing import Any
 
-from common.recording.outcome import CUT_OFF, outcome
+from common.recording.outcome import COMPLETED, CUT_OFF, outcome
 from common.terminal import cli
 from common.terminal.printable import all_shown
 from report.text.formats import apart, fixed, milliseconds, modes, reading, storey_rows, tracked
@@ -99,6 +99,8 @@ def stopped(summary: dict[str, Any]) -> str:
         return ""
     if outcome(summary["recorder"]) == CUT_OFF:
         return f"recorded until tick {expected} of {planned}; the rest of the test is not in the file"
+    if outcome(summary["recorder"]) == COMPLETED:
+        return f"ended by its client at tick {expected}, of {planned} at most"
     return f"stopped at tick {expected} of {planned}"
 
 

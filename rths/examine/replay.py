@@ -19,7 +19,7 @@ from report.text.progress import Progress
 if TYPE_CHECKING:
     from common.plan.plan import Plan
     from common.recording.run import Run
-    from master.step import Outputs
+    from master.building import Outputs
 
 NOWHERE = (0.0, 0.0)  # position and force where the master has no laboratory
 

@@ -6,7 +6,7 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -29,7 +29,9 @@ if TYPE_CHECKING:
     from rths.perform.ending import Ending
     from rths.perform.live_child import View
     from rths.perform.processes import Processes, Said
+    from simulation.virtual import VirtualTest
 
+VirtualTime = Callable[[Plan, Reality, Path, Stopper, Gate], RthsError | None]
 POLL_S = 0.1  # s between two looks at the processes: a user does not notice the delay
 AGREED = State.SCHEDULED.value  # state in which the master reports that all processes know the start
 # Codes of events that go into the recording only: the terminal shows them before the start or in the summary.
@@ -39,6 +41,11 @@ UNSAID = ("patience", "machine", "bare_loop", "mode", "exchange", PASSED)
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `run`."""
     cli.plan_arguments(parser, optional=True)
+    test_arguments(parser)
+
+
+def test_arguments(parser: argparse.ArgumentParser) -> None:
+    """What is said of any test on this machine, beside its plan."""
     cli.reality_argument(parser)
     cli.rt_arguments(parser)
     cli.accept_argument(parser)
@@ -63,6 +70,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run a test; its exit code."""
+    plan = cli.load_plan(args)
+    if plan.served:
+        raise InputError(
+            "The plan's building is a client's: start it with rths serve, or leave out model in [structure]."
+        )
+    return carry_out(args, plan, in_virtual_time)
+
+
+def carry_out(args: argparse.Namespace, plan: Plan, virtually: VirtualTime) -> int:
+    """Run a test in real time, or in virtual time `virtually`, and show its summary; its exit code.
+
+    Raises:
+        RthsError: what ended it.
+    """
     from recorder.files import reserved
 
     gate = Gate(cli.accepted_risks(args))
@@ -72,12 +93,11 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(
             "--live shows a test in real time: leave out --virtual, or give its recording to rths live."
         )
-    plan = cli.load_plan(args)
     reality = cli.load_reality(args.reality, plan)
     stopping = Stopper()
     with reserved(args.output, plan, force=args.force) as output:
         error = (
-            in_virtual_time(plan, reality, output, stopping, gate)
+            virtually(plan, reality, output, stopping, gate)
             if args.virtual
             else in_real_time(args, plan, reality, output, stopping, gate)
         )
@@ -98,13 +118,25 @@ def in_virtual_time(
     with Working("running") as working:
         bench = virtual.assemble(plan, reality, output, partial(virtual_report, working), gate=gate)
         sys.stderr.writelines(f"{line}\n" for line in said)
-        freeze()
-        started = time.monotonic()
-        error = virtual.run(bench, stopping, working.tell)
-    seconds = time.monotonic() - started
-    played = bench.master.ticks * plan.test.interval
-    sys.stderr.write(f"{played:g} s of test in {seconds:.1f} s of computing\n")
+        error, seconds = played(bench, stopping, working)
+    say_speed(bench, seconds)
     return error
+
+
+def played(bench: VirtualTest, stopping: Stopper, working: Working) -> tuple[RthsError | None, float]:
+    """Play a test in virtual time: the error that ended it, and the seconds that it took."""
+    from simulation import virtual
+
+    freeze()
+    started = time.monotonic()
+    error = virtual.run(bench, stopping, working.tell)
+    return error, time.monotonic() - started
+
+
+def say_speed(bench: VirtualTest, seconds: float) -> None:
+    """Say how much of a test was played in some seconds."""
+    length = bench.master.ticks * bench.master.lab.plan.test.interval
+    sys.stderr.write(f"{length:g} s of test in {seconds:.1f} s of computing\n")
 
 
 def before_the_start(plan: Plan, output: Path, gate: Gate) -> list[str]:
@@ -125,7 +157,8 @@ def checks(plan: Plan, output: Path) -> list[PreflightCheck]:
     from loop.nominal import preflight
     from recorder import space
 
-    return [*preflight.checks(plan), space.check(plan, output.parent)]
+    nominal = [] if plan.served else preflight.checks(plan)
+    return [*nominal, space.check(plan, output.parent)]
 
 
 def virtual_report(working: Working, kind: str, data: Any) -> None:
@@ -156,7 +189,8 @@ def in_real_time(
             warm_up(progress)
             for line in before_the_start(plan, output, gate):
                 progress.say(line)
-            progress.say(f"{plan.test.name}: {plan.test.duration:g} s, starting {crew(plan)}")
+            length = f"{plan.test.duration:g} s{' at most' * plan.served}"
+            progress.say(f"{plan.test.name}: {length}, starting {crew(plan)}")
             start_all(processes, args, plan.roles, endpoint, output)
             view = shown(output, args.live_port) if args.live else None
             follow(processes, ending, progress, stopping, view)
@@ -225,13 +259,20 @@ def start_all(
             words += [f"--{option}", repr(value)]
     for name in cli.accepted_risks(args):
         words += ["--accept-risk", name]
+    served = [word for address in addresses(args) for word in ("--opensees", address)]
+    words += ["--intervals", str(args.intervals)] if served else []
     secret = ["--reality", str(args.reality)] if args.reality else []
     places = [real_time_words(args.rt, processor) for processor in assign(1 + len(roles))]
-    processes.start("master", [*words, *secret, *places[0], "--listen", endpoint])
+    processes.start("master", [*words, *secret, *places[0], *served, "--listen", endpoint])
     for role, place in zip(roles, places[1:], strict=True):
         processes.start(role, [*words, *secret, *place, "--connect", endpoint])
     # --force: this command has reserved the file, which is empty or may be replaced
     processes.start("recorder", [*words, "--connect", endpoint, "-o", str(output), "--force"])
+
+
+def addresses(args: argparse.Namespace) -> list[str]:
+    """Where elements of OpenSees are served, none where the building is the plan's."""
+    return list(getattr(args, "opensees", []))
 
 
 def real_time_words(mode: str, processor: int | None) -> list[str]:

@@ -199,7 +199,7 @@ def write(path: Path, plan: Plan, rollout: Rollout, motion: Any, ground: Any) ->
     from loop.signals import rows
     from recorder import files
 
-    recording = files.begin(path, plan, motion, ground)
+    recording = files.begin(path, plan, (motion, ground))
     for topic, values in rows(plan, rollout):
         at = plan.tick_ns(values[0])
         recording.add(topic, at, at, values)

@@ -18,8 +18,8 @@ from common.recording.run import Run
 from common.rig import ColumnMeasurement
 from common.terminal import cli
 from loop.nominal.partition import matrices
+from master.building import Outputs
 from master.energy import EnergyMonitor, floor
-from master.step import Outputs
 from models import indicators
 from models.energy_balance import ERROR
 from simulation import virtual

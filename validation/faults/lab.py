@@ -118,8 +118,7 @@ class Simulation:
 
     def _add_recorder(self, path: Path) -> None:
         process, setting = self._process(RECORDER)
-        motion = substructure.motion(self.plan)
-        file = files.begin(path, self.plan, motion, substructure.ground_rows(self.plan, motion))
+        file = files.begin(path, self.plan, substructure.recorded_ground(self.plan))
         loop = self.recorder = RecorderLoop(setting, FileSink(file, process))
         process.start(recording(loop, setting.endpoint, process, file))
 

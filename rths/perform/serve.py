@@ -1,0 +1,95 @@
+"""`rths serve`: laboratories as elements of a user's OpenSees model, in real time or as fast as it goes."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from common.errors import InterlockError, RthsError
+from common.host.stopping import Stopper
+from common.lab.preflight import Gate
+from common.opensees import port
+from common.plan.plan import Plan
+from common.plan.reality import Reality
+from common.terminal import cli
+from report.text.progress import Progress as Working
+from rths.perform import run as tests
+
+if TYPE_CHECKING:
+    from master.client import ClientBuilding
+
+PATIENCE_S = 60.0  # for a client's next displacement in virtual time: a step of a large model takes seconds
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of `serve`."""
+    cli.plan_arguments(parser)
+    cli.opensees_argument(parser, required=True)
+    parser.add_argument(
+        "--intervals",
+        type=int,
+        metavar="N",
+        help="control intervals in which each displacement of OpenSees is imposed (default: the plan's, or 1)",
+    )
+    tests.test_arguments(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Serve a client; its exit code."""
+    if args.intervals is None:
+        args.intervals = cli.load_plan(args).structure.intervals
+    plan = cli.load_plan(args)
+    checked(plan, args.opensees)
+    return tests.carry_out(args, plan, partial(in_virtual_time, args.opensees))
+
+
+def checked(plan: Plan, addresses: Sequence[str]) -> None:
+    """Raise InputError where elements cannot be served at these addresses, before anything starts."""
+    from master.client import couplings_of, ports
+
+    for one in ports(addresses, list(couplings_of(plan).values()), say=print):
+        one.close()
+    for text in addresses:
+        host, number = port.address_of(text)
+        if port.is_open(host):
+            sys.stderr.write(
+                f"warning: {host}:{number} is open: anybody who reaches it can move the rigs; OpenSees knows neither "
+                "keys nor passwords.\n"
+            )
+
+
+def in_virtual_time(
+    addresses: Sequence[str], plan: Plan, reality: Reality, output: Path, stopping: Stopper, gate: Gate
+) -> RthsError | None:
+    """The test in this process, as fast as the client asks; the error that ended it."""
+    from master.assembly import warm_up_served
+    from master.client import AsFastAsItGoes, ClientBuilding
+    from simulation import virtual
+
+    said = tests.before_the_start(plan, output, gate)
+    warm_up_served(reality)
+    building = ClientBuilding(plan, addresses, AsFastAsItGoes(PATIENCE_S, stopping))
+    sys.stderr.writelines(f"{line}\n" for line in said)
+    if not came(building, stopping):
+        building.leave()
+        return InterlockError(stopping())
+    with Working("running") as working:
+        report = partial(tests.virtual_report, working)
+        bench = virtual.assemble(plan, reality, output, report, gate=gate, building=building)
+        error, seconds = tests.played(bench, stopping, working)
+    tests.say_speed(bench, seconds)
+    return error
+
+
+def came(building: ClientBuilding, stopping: Stopper) -> bool:
+    """Wait until OpenSees moves the laboratories, which it does before any time passes; not where somebody stops."""
+    sys.stderr.write(f"waits for {building.awaited}\n")
+    while building.awaited:
+        building.look_after()
+        if stopping():
+            return False
+    return True
