@@ -14,8 +14,9 @@ from common.plan.plan import Plan
 from common.plan.read import parse
 from common.plan.tables import Limits, Preflight, SafetyTable
 from common.rig import ColumnMeasurement, TableCommand, TableMeasurement
+from common.roles import MASTER
 from common.safety.modes import MEANING, TURNS, Mode, mermaid
-from common.signals import OF_STOREYS, SENT, TOPICS
+from common.signals import CLIENT, OF_STOREYS, SENT, TOPICS
 from common.udp import packets
 from diagnosis.report import schema
 from docs import reference_tables
@@ -135,9 +136,10 @@ def motion(plan: Plan) -> str:
 def topics() -> str:
     """Every topic with its signals."""
     texts = []
-    for topic, signals in TOPICS.items():
+    served = {f"{MASTER}` of `rths serve`, in place of the building's": CLIENT}
+    for topic, signals in (TOPICS | served).items():
         rows = ((f"`{signal.name}`", signal.unit, signal.text) for signal in signals)
-        texts.append(f"## `{topic}`\n\n{table(('signal', 'unit', 'meaning'), rows)}")
+        texts.append(f"## `{topic}{'`' * (topic in TOPICS)}\n\n{table(('signal', 'unit', 'meaning'), rows)}")
     return "\n".join(texts)
 
 

@@ -21,6 +21,7 @@ from common.lab.laboratory import Laboratory
 from common.opensees.element import Measurement, Phase, RevisedError
 from common.opensees.port import ClientError, Port, Ports
 from common.plan.plan import Plan
+from common.reporting import Report, silent
 from common.roles import MASTER
 from common.safety.watchdog import Watchdog, WatchdogFinding
 from laboratories import kinds
@@ -133,7 +134,7 @@ class ClientBuilding(Building):
         InputError: an address cannot be used, or their number fits neither.
     """
 
-    def __init__(self, plan: Plan, addresses: Sequence[str], pace: Pace) -> None:
+    def __init__(self, plan: Plan, addresses: Sequence[str], pace: Pace, report: Report = silent) -> None:
         interval, self._intervals = plan.test.interval, plan.structure.intervals
         couplings = couplings_of(plan)
         self._labs = [Follower(one, interval, self._intervals) for one in couplings.values()]
@@ -142,7 +143,8 @@ class ClientBuilding(Building):
         self._compensator = compensator(plan)
         self._interval, self._pace = interval, pace
         self._watchdog = Watchdog(plan.safety, interval)
-        self._early: list[str] = []  # what is to be said before the master is there to say it
+        self._report = report
+        self._early: list[str] = []  # what was said before the start, from which on times are known
         self._lab: Laboratory | None = None
         self._partners: Sequence[Answering] = ()
         self._ports = Ports(ports(addresses, list(couplings.values()), self._say))
@@ -160,15 +162,16 @@ class ClientBuilding(Building):
 
     def join(self, lab: Laboratory, partners: Sequence[Answering]) -> None:
         """Know the master's clock and the slaves."""
-        self._lab, self._partners = lab, partners
-        for text in self._early:
-            self._say(text)
+        self._lab, self._partners, self._report = lab, partners, lab.report
 
     def _say(self, text: str) -> None:
-        if self._lab is None:
-            self._early.append(text)
-        else:
+        """Warn; what is said before the start is recorded as it begins."""
+        if self._lab is not None and self._lab.start_ns:
             self._lab.note("client", text, level="warning", tick=self._lab.tick)
+            return
+        self._early.append(text)
+        event = {"t": 0.0, "lab": MASTER, "level": "warning", "code": "client", "text": text}
+        self._report("event", event)
 
     @property
     def awaited(self) -> str:
@@ -186,6 +189,8 @@ class ClientBuilding(Building):
     def __call__(self, tick: int, position: float, force: float, forces: Sequence[float]) -> Outputs:
         """One tick: hand back what belongs to the displacement before, and take the next."""
         assert self._lab is not None  # noqa: S101 - `join` comes first
+        if self._early:
+            self._record_early(self._lab)
         now = self._lab.clock.now()
         self._lateness = (now - self._lab.tick_ns(tick)) * 1e-9
         self._handed, self._wait = (NOTHING,) * len(self._labs), NOTHING
@@ -201,6 +206,12 @@ class ClientBuilding(Building):
             return self._outputs
         self._heard = tick
         return self._move(position)
+
+    def _record_early(self, lab: Laboratory) -> None:
+        at = lab.unix_ns(0)
+        for text in self._early:
+            lab.outlet.add("event", at, at, (0.0, lab.name, "warning", "client", text, {}))
+        self._early = []
 
     def _hand_back(self, tick: int, position: float, force: float, forces: Sequence[float]) -> None:
         """Give every client the forces that were measured at its displacement."""

@@ -74,7 +74,6 @@ class MasterLoop(RigLoop):
         lab.endpoint.expect({role: len(one.names) for role, one in channels.items()})
         self._partners = tuple(self.partners.values())
         self._building = building
-        building.join(lab, self._partners)
         wall_ns = epoch_ns - setting.clock.now()
         self._handshake = MasterHandshake(self.lab, self._partners, rig, wall_ns, gate, building)
         self._command = self._own.zero
@@ -87,6 +86,7 @@ class MasterLoop(RigLoop):
         self._late = lateness.LateTicks()
         self._others_rest = resting(plan)
         self.lab.enter(session)
+        building.join(lab, self._partners)
 
     # -- messages ---------------------------------------------------------------------------------
 
@@ -159,7 +159,8 @@ class MasterLoop(RigLoop):
             try:
                 outputs = self._building(tick, *self._own.felt(measured), forces)
             except (InterlockError, LostError) as error:
-                self._left_alone(error, tick, measured)
+                self._left_alone(error, tick)
+                self._descent.step(tick, measured)
                 return
             if self._building.over:
                 self.stop(COMPLETED)
@@ -183,13 +184,19 @@ class MasterLoop(RigLoop):
         self._measured = measured
         self._watch(tick, wake)
         if lab.running:
-            self._building.written(tick)
+            self._settle(tick)
 
-    def _left_alone(self, error: InterlockError | LostError, tick: int, measured: tuple[float, ...]) -> None:
+    def _settle(self, tick: int) -> None:
+        """Let the building use the time behind the commands; where it fails, the ramp begins with the next tick."""
+        try:
+            self._building.written(tick)
+        except (InterlockError, LostError) as error:
+            self._left_alone(error, tick)
+
+    def _left_alone(self, error: InterlockError | LostError, tick: int) -> None:
         """End the test because the building gives no further displacements."""
         event = Event.LOSE if isinstance(error, LostError) else Event.TRIP
         self.lab.fail(event, error, code="client", tick=tick)
-        self._descent.step(tick, measured)
 
     def _finding(self, tick: int) -> tuple[WatchdogFinding, str]:
         """The worst finding of the watchdogs on the building and the slaves, and the first that has it."""

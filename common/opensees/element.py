@@ -65,6 +65,7 @@ class ElementServer:
         self._moved = False  # whether displacements have changed in the present step
         self._asked: Code | None = None  # the request, or the end, that waits for the measurement
         self._next: bytes = b""  # displacements that wait until those before them are measured
+        self._heard = False
         self._in = bytearray()
         self._out = bytearray()
 
@@ -77,6 +78,7 @@ class ElementServer:
             RemoteProtocolError: they are no messages of such a client.
             RevisedError: displacements would be revised.
         """
+        self._heard = True
         self._in += data
         self._read()
 
@@ -95,6 +97,11 @@ class ElementServer:
     def ending(self) -> bool:
         """Whether the client has said that nothing more comes, be it before its last displacements are measured."""
         return self.phase is Phase.ENDED or self._asked is Code.END
+
+    @property
+    def untouched(self) -> bool:
+        """Whether nothing has come from the client."""
+        return not self._heard
 
     @property
     def full(self) -> bool:

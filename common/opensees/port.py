@@ -20,6 +20,7 @@ ADDRESS = re.compile(r"(?:(.+):)?(\d+)")
 LOOPBACK = "127.0.0.1"
 BYTES = 1 << 16  # taken from a socket at once: 32 messages of the default size
 QUICKACK = getattr(socket, "TCP_QUICKACK", None)  # on Linux alone
+LOOKS = 64  # at what the client that is there has sent, before another one is turned away
 TOLD = 10  # clients turned away that are reported, each with an event of its own
 
 Say = Callable[[str], None]
@@ -69,7 +70,7 @@ class Port:
         self.client: socket.socket | None = None
         self.peer = ""
         try:
-            self.listener = socket.create_server((host, port), family=socket.AF_INET, backlog=8)
+            self.listener = socket.create_server((host, port), family=socket.AF_INET, backlog=64)
         except OSError as error:
             raise InputError(
                 f"Cannot serve OpenSees at {self.name}: {error.strerror}; choose another port."
@@ -83,6 +84,9 @@ class Port:
         except OSError:  # it has gone again
             return
         peer = f"{host}:{port}"
+        for _ in range(LOOKS):  # the one that is there may have gone since
+            if self.client is None or self.server.steps or not self.read():
+                break
         if self.client is not None or self.server.ending:
             client.close()
             self._turned_away += 1
@@ -155,9 +159,10 @@ class Port:
 
     def _gone(self, how: str) -> None:
         """The client is served no more; before it has moved anything the next one may come."""
-        ending, moved = self.server.ending, self.server.steps > 0
+        server = self.server
+        silent, moved = server.ending or server.untouched, server.steps > 0
         self.leave()
-        if ending:
+        if silent:  # it has said that it ends, or has only looked whether somebody is there
             return
         text = f"The client at {self.peer} {how.rstrip('.')}."
         if moved:
@@ -201,10 +206,10 @@ class Ports:
         if not ready:
             return False
         for port in self.ports:
+            if port.client is not None and port.client.fileno() in ready:
+                port.read()  # one that has gone makes room for the one that calls
             if port.listener.fileno() in ready:
                 port.accept()
-            if port.client is not None and port.client.fileno() in ready:
-                port.read()
         return True
 
     def _ready(self, seconds: float) -> set[int]:

@@ -72,7 +72,7 @@ def in_virtual_time(
 
     said = tests.before_the_start(plan, output, gate)
     warm_up_served(reality)
-    building = ClientBuilding(plan, addresses, AsFastAsItGoes(PATIENCE_S, stopping))
+    building = ClientBuilding(plan, addresses, AsFastAsItGoes(PATIENCE_S, stopping), cli.text_report)
     sys.stderr.writelines(f"{line}\n" for line in said)
     if not came(building, stopping):
         building.leave()

@@ -140,7 +140,7 @@ def test_the_end_is_the_end() -> None:
 def test_the_last_displacements_are_imposed_before_the_end() -> None:
     one = server()
     one.take(said(Code.TRIAL, 1e-3) + said(Code.COMMIT) + said(Code.END))
-    assert one.phase is Phase.WANTED
+    assert one.wanted.displacement == (1e-3,)
     assert one.ending
     moved(one, 1.0)
     assert one.phase is Phase.ENDED

@@ -1,0 +1,124 @@
+"""OpenSees itself, in another process, with laboratories as its elements, beside its own springs."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from benchmarks.opensees_peer import PYTHON
+from common.errors import InterlockError
+from common.plan.plan import Plan
+from common.plan.read import with_test
+from common.plan.reality import as_planned
+from common.recording.reader import read
+from master.client import AsFastAsItGoes, ClientBuilding
+from simulation import virtual
+from tests.opensees.client import PATIENCE_S, free_port
+from tests.opensees.serving import ALONE, plan_of
+
+MODEL = Path(__file__).with_name("model.py")
+STEPS = 400
+EXPLICIT = ("NewmarkExplicit", "CentralDifference", "AlphaOS")
+TWICE = '[slave.east]\nkind = "column"\n'
+YIELDING = (
+    ALONE + '[column]\nmodel = "bilinear"\nparameters = { yield_displacement = 2e-4, hardening = 0.1 }\n'
+)
+
+
+def opensees(*words: object) -> subprocess.Popen[str]:
+    """OpenSees on the model, in the interpreter that has it."""
+    return subprocess.Popen(
+        [os.environ.get(PYTHON) or sys.executable, str(MODEL), *map(str, words)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def answered(process: subprocess.Popen[str]) -> Any:
+    """Displacements (steps, laboratories) m; skips where there is no OpenSees."""
+    said, complaint = process.communicate(timeout=60.0)
+    lines = [line for line in said.splitlines() if line.startswith("{")]
+    if not lines and ("ModuleNotFoundError" in complaint or "ImportError" in complaint):
+        pytest.skip("OpenSeesPy is not installed: make opensees")
+    assert lines, complaint
+    return np.array(json.loads(lines[-1])["found"])
+
+
+@pytest.fixture(scope="module", autouse=True)
+def installed() -> None:
+    """OpenSees is there, or these tests are skipped with the reason."""
+    answered(opensees("NewmarkExplicit", "Linear", 1, 1))
+
+
+def served(
+    folder: Path, plan: Plan, integrator: str, algorithm: str = "Linear", *, elements: int = 1
+) -> tuple[Any, Any, Any]:
+    """The error that ended the test, what OpenSees found, and the recording."""
+    ports, laboratories = [free_port() for _ in range(elements)], len(plan.kinds)
+    addresses = [f"127.0.0.1:{port}" for port in ports]
+    building = ClientBuilding(plan, addresses, AsFastAsItGoes(PATIENCE_S, str))
+    with opensees(integrator, algorithm, STEPS, laboratories, *ports) as process:
+        end = time.monotonic() + PATIENCE_S
+        while building.awaited and process.poll() is None and time.monotonic() < end:
+            building.look_after()
+        assert not building.awaited
+        bench = virtual.assemble(plan, as_planned(plan), folder / "test.mcap", building=building)
+        error = virtual.run(bench, str)
+        found = answered(process)
+    return error, found, read(folder / "test.mcap")
+
+
+def springs(integrator: str, laboratories: int = 1, algorithm: str = "Linear") -> Any:
+    """The same model with springs of its own."""
+    return answered(opensees(integrator, algorithm, STEPS, laboratories))
+
+
+def same(found: Any, expected: Any) -> None:
+    """Equal to twelve digits of the largest displacement, at every step."""
+    assert found.shape == expected.shape == (STEPS, found.shape[1])
+    assert np.max(np.abs(found - expected)) <= 1e-12 * np.max(np.abs(expected))
+
+
+@pytest.mark.parametrize("integrator", [*EXPLICIT, "Newmark"])
+def test_a_laboratory_is_the_spring_that_it_stands_for(integrator: str, tmp_path: Path) -> None:
+    error, found, run = served(tmp_path, plan_of(), integrator)
+    assert error is None
+    same(found, springs(integrator))
+    moved = run.columns["master"]["client_displacement"]
+    assert integrator == "AlphaOS" or np.isin(moved, found).all()  # AlphaOS corrects what it imposes
+    assert not run.columns["master"]["client_late"].any()
+
+
+@pytest.mark.parametrize("elements", [1, 2])
+@pytest.mark.parametrize("integrator", EXPLICIT)
+def test_two_laboratories_are_one_element_or_two(integrator: str, elements: int, tmp_path: Path) -> None:
+    """Over two intervals each, so that the slave's force belongs to its displacement."""
+    plan = with_test(plan_of(TWICE), intervals=2)
+    error, found, run = served(tmp_path, plan, integrator, elements=elements)
+    assert error is None
+    same(found, springs(integrator, 2))
+    assert run.columns["master"]["client_displacement"].shape[1] == 2
+    assert run.shared["client_force"] == ("master", "slave.east")
+
+
+def test_newton_on_linear_laboratories_imposes_each_displacement_once(tmp_path: Path) -> None:
+    error, found, _ = served(tmp_path, plan_of(), "Newmark", "Newton")
+    assert error is None
+    same(found, springs("Newmark", algorithm="Newton"))
+
+
+def test_newton_on_a_specimen_that_yields_is_refused_with_integrators_that_fit(tmp_path: Path) -> None:
+    error, found, run = served(tmp_path, plan_of(YIELDING), "Newmark", "Newton")
+    assert isinstance(error, InterlockError)
+    assert "NewmarkExplicit, CentralDifference or AlphaOS" in str(error)
+    assert len(found) < STEPS
+    assert run.ramps["master"]["mode"][-1] == "safe"
