@@ -16,7 +16,7 @@ from common.recording.reader import read
 from common.recording.run import Run
 from master.client import AsFastAsItGoes, ClientBuilding, Pace
 from simulation import virtual
-from tests.opensees.client import PATIENCE_S, Script, free_port
+from tests.serve.client import PATIENCE_S, Script, free_port
 
 IDEAL = """
 [test]

@@ -24,8 +24,8 @@ import pytest
 from common.opensees import wire
 from common.opensees.wire import Code, Header, Sizes
 from tests.helpers import ROOT
-from tests.opensees.client import FRESCO, HOST, Element
-from tests.opensees.serving import Served, Ticking, serve
+from tests.serve.client import FRESCO, HOST, Element
+from tests.serve.serving import Served, Ticking, serve
 
 SAFE_S = 0.010
 STEPS = 12
@@ -72,7 +72,7 @@ def resets(port: int) -> None:
 
 
 def is_killed(port: int) -> None:
-    text = f"from tests.opensees.client import Element; one = Element({port}); one.steps({STEPS}); "
+    text = f"from tests.serve.client import Element; one = Element({port}); one.steps({STEPS}); "
     process = subprocess.Popen(
         [sys.executable, "-c", f"{text}print(1, flush=True); input()"],
         cwd=ROOT,

@@ -13,19 +13,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.opensees_peer import PYTHON
 from common.errors import InterlockError
+from common.opensees.process import INTERPRETER
 from common.plan.plan import Plan
 from common.plan.read import with_test
 from common.plan.reality import as_planned
 from common.recording.reader import read
 from master.client import AsFastAsItGoes, ClientBuilding
 from simulation import virtual
-from tests.opensees.client import PATIENCE_S, free_port
-from tests.opensees.serving import ALONE, plan_of
+from tests.opensees import lacking
+from tests.serve.client import PATIENCE_S, free_port
+from tests.serve.serving import ALONE, plan_of
 
 MODEL = Path(__file__).with_name("model.py")
 STEPS = 400
+pytestmark = pytest.mark.skipif(bool(lacking()), reason=lacking())
 EXPLICIT = ("NewmarkExplicit", "CentralDifference", "AlphaOS")
 TWICE = '[slave.east]\nkind = "column"\n'
 YIELDING = (
@@ -36,7 +38,7 @@ YIELDING = (
 def opensees(*words: object) -> subprocess.Popen[str]:
     """OpenSees on the model, in the interpreter that has it."""
     return subprocess.Popen(
-        [os.environ.get(PYTHON) or sys.executable, str(MODEL), *map(str, words)],
+        [os.environ.get(INTERPRETER) or sys.executable, str(MODEL), *map(str, words)],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -44,19 +46,11 @@ def opensees(*words: object) -> subprocess.Popen[str]:
 
 
 def answered(process: subprocess.Popen[str]) -> Any:
-    """Displacements (steps, laboratories) m; skips where there is no OpenSees."""
+    """Displacements (steps, laboratories) m."""
     said, complaint = process.communicate(timeout=60.0)
     lines = [line for line in said.splitlines() if line.startswith("{")]
-    if not lines and ("ModuleNotFoundError" in complaint or "ImportError" in complaint):
-        pytest.skip("OpenSeesPy is not installed: make opensees")
     assert lines, complaint
     return np.array(json.loads(lines[-1])["found"])
-
-
-@pytest.fixture(scope="module", autouse=True)
-def installed() -> None:
-    """OpenSees is there, or these tests are skipped with the reason."""
-    answered(opensees("NewmarkExplicit", "Linear", 1, 1))
 
 
 def served(
