@@ -143,7 +143,7 @@ def test_the_rig_in_c_gives_the_bits_of_the_rig_in_python(compiled: Path, tmp_pa
 def test_a_rig_that_falls_silent_is_held_for_and_then_the_test_comes_to_rest(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(udp, "FREE_NS", 20_000_000)
+    monkeypatch.setattr(udp, "FREE_NS", 100_000_000)
 
     def answers(kind: int, count: int, _packet: bytes, answer: bytes) -> list[bytes]:
         return [] if kind == Asked.COMMAND and 100 <= count < 110 else [answer]
@@ -169,7 +169,7 @@ def test_a_rig_that_falls_silent_is_held_for_and_then_the_test_comes_to_rest(
 def test_a_rig_that_answers_again_in_time_lets_the_test_go_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(udp, "FREE_NS", 20_000_000)
+    monkeypatch.setattr(udp, "FREE_NS", 100_000_000)
     modes: list[int] = []
 
     def answers(kind: int, count: int, packet: bytes, answer: bytes) -> list[bytes]:
