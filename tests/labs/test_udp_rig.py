@@ -14,16 +14,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from common.lab.preflight import Gate
 from common.plan.laboratory_tables import LaboratoryTable, RigTable
+from common.plan.patience import strict
 from common.plan.plan import Plan
-from common.plan.read import load
+from common.plan.read import load, parse
 from common.plan.reality import as_planned, from_reality
 from common.recording.reader import read
 from common.recording.run import Run
 from common.roles import MASTER
 from common.safety.modes import Mode
+from common.udp import probe
 from common.udp import rig as udp
 from common.udp.packets import Asked
+from common.udp.rig import Terms
 from laboratories import kinds
 from laboratories.emulated import EmulatedLab
 from laboratories.sensors import noise
@@ -193,3 +197,26 @@ def test_the_column_of_the_example_is_the_one_that_is_served(tmp_path: Path) -> 
         _, found, error = played(plan, tmp_path / "a.mcap")
     assert error is None
     same(in_process(tmp_path / "b.mcap"), found)
+
+
+def test_of_a_rig_of_a_reality_nothing_is_told(tmp_path: Path) -> None:
+    gate = Gate()
+    plan = parse("[test]\nduration = 0.2\n", tmp_path)
+    with served(example.Column, example.CHANNELS) as address:
+        reality = from_reality({"master": {"rig": {"address": address}}}, plan, tmp_path)
+        bench = virtual.assemble(plan, reality, tmp_path / "a.mcap", gate=gate)
+        assert virtual.run(bench, str) is None
+    assert address not in (tmp_path / "a.mcap").read_bytes().decode("latin-1")
+    assert not [event for event in read(tmp_path / "a.mcap").events if event["code"] == "rig_exchange"]
+
+
+@pytest.mark.parametrize("late", [False, True])
+def test_a_rig_whose_answers_are_too_slow_for_real_time_is_refused_by_name(late: bool) -> None:
+    plan = parse("", Path())
+    terms = Terms("udp/9100", "[master.rig]", 0.002, 1, 0.5e-3, 1.0, 0.02, 5, paced=True)
+    trips = [2e-4] * 40 + [1e-3 if late else 3e-4] * 10
+    risk = probe.slow(terms, trips, 0, strict(plan))
+    assert (risk is not None) is late
+    lost = probe.slow(terms._replace(paced=False), trips, 3, strict(plan))
+    assert lost is not None
+    assert "of 53 exchanges with the rig at udp/9100 3 were lost and 0 took longer" in lost.sentence

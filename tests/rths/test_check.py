@@ -13,6 +13,7 @@ from common.terminal import cli
 from loop.nominal import preflight
 from report.plan import classes
 from rths.perform.run import checks
+from tests.common.udp.server import example, served
 from tests.helpers import ROOT
 
 SHORT = "[test]\nduration = 4.0\n[control]\namd = false\n"
@@ -176,3 +177,54 @@ def test_the_file_of_a_module_is_found_without_importing_its_package(
     assert classes.file_of("package7.lab:Lab", tmp_path) == str(tmp_path / "package7" / "lab.py")
     assert classes.file_of("package7.none:Lab", tmp_path) == ""
     assert classes.file_of("none7.lab:Lab", tmp_path) == ""
+
+
+def test_a_rig_in_another_process_is_asked_whether_it_is_there(
+    call: Any, capsys: Any, tmp_path: Path
+) -> None:
+    path = tmp_path / "p.toml"
+    with served(example.Column, example.CHANNELS) as address:
+        path.write_text(f'{SHORT}[master.rig]\naddress = "{address}"\n')
+        code, facts = checked(call, capsys, path)
+        assert call("check", path) == 0
+    text = capsys.readouterr().out
+    (rig,) = facts["rigs"]
+    assert (code, rig["where"], rig["address"], rig["there"]) == (0, "master.rig", address, True)
+    assert (rig["exchanges"], rig["lost"], rig["channels"]) == (50, 0, "0xf348fb44")
+    assert 0.0 < rig["round_trip_p50"] <= rig["round_trip_p99"]
+    assert f"master.rig        {address}, channels 0xf348fb44: 50 of 50 exchanges, round trip p50 " in text
+    assert "its rigs are in other processes." in text
+
+
+def test_a_rig_that_is_not_there_or_another_kinds_would_be_refused(
+    call: Any, capsys: Any, tmp_path: Path
+) -> None:
+    path = tmp_path / "p.toml"
+    path.write_text(f'{SHORT}[master.rig]\naddress = "udp/9"\n')
+    code, facts = checked(call, capsys, path)
+    assert (code, facts["ready"], facts["rigs"][0]["there"]) == (1, False, False)
+    assert facts["refused"][-1]["name"] == "rig"
+    assert facts["refused"][-1]["sentence"].startswith("nothing answers at udp/9: start the rig's program")
+    with served(example.Column, example.CHANNELS) as address:
+        path.write_text(f'{SHORT}[slave.rig]\naddress = "{address}"\n')
+        code, facts = checked(call, capsys, path)
+    assert code == 1
+    assert "it is the rig of another kind of laboratory" in facts["refused"][-1]["sentence"]
+
+
+@pytest.mark.parametrize(
+    ("rig", "text"),
+    [
+        ('class = "a.py:B"\naddress = "udp/9100"', "[master.rig] gives a class and an address"),
+        ('options = { a = 1 }\naddress = "udp/9100"', "options in [master.rig] are for a class"),
+        ('address = "tcp/9100"', "address in [master.rig] is 'tcp/9100', but must be udp/HOST:PORT"),
+        ('address = "udp/9100"\nanswer_share = 1.5', "answer_share in [master.rig]"),
+    ],
+)
+def test_keys_of_a_rig_that_do_not_fit_are_refused(
+    rig: str, text: str, call: Any, capsys: Any, tmp_path: Path
+) -> None:
+    path = tmp_path / "p.toml"
+    path.write_text(f"{SHORT}[master.rig]\n{rig}\n")
+    assert call("check", path) == 2
+    assert text in capsys.readouterr().err
