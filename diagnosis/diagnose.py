@@ -15,7 +15,7 @@ from common.recording.imported import exchange_known
 from common.terminal.telling import Tell, untold
 from diagnosis.findings import readings, report
 from diagnosis.findings.found import Diagnosis
-from diagnosis.findings.verdict import PartVerdict, heard, judge, seen_in
+from diagnosis.findings.verdict import PartVerdict, heard, judge, seen_in, sharpest
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data
 from diagnosis.fits.scales import Scales
@@ -26,7 +26,7 @@ from diagnosis.recorded.ground import Ground
 from diagnosis.recorded.joined import joined, refuse_others
 from diagnosis.recorded.laboratory import RecordedLaboratory
 from diagnosis.recorded.link import LinkFinding
-from diagnosis.recorded.parts import Building, ColumnAlone, LaboratoryPart, Part
+from diagnosis.recorded.parts import Building, ColumnAlone, LaboratoryPart, LoggedBuilding, Part
 from diagnosis.recorded.record import LEAST_TICKS, Record
 from models.system import System
 
@@ -34,6 +34,10 @@ from models.system import System
 SHORTEST = 0.5
 BUILDING = ("ground_acceleration", "displacement")
 UNNAMED = ("partly", "unknown")  # outcomes of a part in which some of the gap has no named cause
+# Noise of a balance of forces over that of the forces used, from which on it is a logger's: a wrong mass leaves less.
+OTHERS = 0.7
+# Share of a balance's rms below which what it has at the highest frequencies is the motion's own, not noise.
+SMOOTH = 1e-5
 # Correlation of a reading with its prediction below which its sign is doubted. It is that of two sines 135° apart,
 # which no delay of a stable test reaches: the compensated loop is unstable long before.
 AGAINST = -0.7
@@ -93,48 +97,59 @@ def examine(record: Record, tell: Tell = untold, more: Sequence[Record] = ()) ->
         )
     further = [part for other in more for part in parts_of(other)]
     rounded = readings.steps(record)
+    steps = readings.resolutions(record, rounded)
     datas, verdicts = [], []
     # s, delay that a logger added to the forces from which the building was computed.
     late: float | None = None
     for number, given in enumerate(parts, 1):
         part = given if late is None or not isinstance(given, LaboratoryPart) else given.logged(late)
         tell(part.name, number, len(parts))
-        resolutions = readings.resolutions(record, rounded)
-        datas.append(fitting.prepare(part, record, resolutions))
+        datas.append(fitting.prepare(part, record, steps))
         scales = Scales(record, part.shift() if isinstance(part, Ground) else 0.0)
         whole = joined(part, further, datas[-1].group)
-        data = datas[-1] if whole is part else fitting.prepare(whole, record, resolutions)
-        verdicts.append(seen_in(datas[-1], judged(data, scales)))
+        data = datas[-1] if whole is part else fitting.prepare(whole, record, steps)
+        verdicts.append(seen_in(datas[-1], judged(data, scales, other_view(part, record, steps))))
         found = verdicts[-1].search
-        if isinstance(found.data.part, Building) and not found.data.part.exact:
+        if isinstance(found.data.part, LoggedBuilding):
             late = found.data.part.late(found.chosen.z)
-    white, held = readings.levels(datas), readings.held(record, rounded)
+    searches = [item.search for item in verdicts]
+    final, held = [item.data for item in searches], readings.held(record, rounded)
+    sharp = readings.levels(final, list(map(sharpest, searches)))
     return Diagnosis(
         record,
         verdicts,
-        readings.findings(record, white, rounded),
+        readings.findings(record, sharp, rounded, logged=late is not None),
         exchanged(record),
         held,
-        readings.levels([item.search.data for item in verdicts], [heard(item.search) for item in verdicts]),
+        readings.levels(final, list(map(heard, searches))),
         [*together(more), *of_plan(record), *not_recorded(record), *reversed_signs(datas), *repeating(held)],
         [law for verdict in verdicts if verdict.outcome in UNNAMED for law in learn(verdict.search.chosen)],
     )
 
 
-def judged(data: Data, scales: Scales) -> PartVerdict:
-    """The verdict on a part.
+def other_view(part: Part, record: Record, steps: Mapping[str, float]) -> Data | None:
+    """A building as one whose forces a logger recorded, None for all else."""
+    logged = part.logged() if isinstance(part, Building) else None
+    return None if logged is None else fitting.prepare(logged, record, logged.rounded(steps))
 
-    Where no effect explains a building exactly, its recorded forces are taken to have passed a logger, and it is
-    judged once more with the logger's delay and gain as unknowns.
+
+def judged(data: Data, scales: Scales, logged: Data | None = None) -> PartVerdict:
+    """The verdict on a part; a building that no effect makes exact is judged as one whose forces a logger recorded.
+
+    It is so from the start where the forces recorded have noise that those used had not.
     """
-    verdict = judge(Searcher(data, scales).run())
-    if isinstance(data.part, Building) and data.part.exact and verdict.outcome in ("partly", "unknown"):
-        part = data.part.logged()
-        again = fitting.measured_by(
-            replace(data, part=part), fitting.noise(part.measured - part.predict(data.system))
-        )
-        return judge(Searcher(again, scales).run())
-    return verdict
+    if logged is None or not own_noise(logged):
+        verdict = judge(Searcher(data, scales).run())
+        if logged is None or verdict.outcome not in UNNAMED:
+            return verdict
+    return judge(Searcher(logged, scales).run())
+
+
+def own_noise(data: Data) -> bool:
+    """Whether the balance of a building's forces has noise that its motion, and so the forces used, had not."""
+    used = fitting.noise(data.part.measured)
+    least = SMOOTH * np.sqrt(np.mean(np.square(data.part.measured), axis=0))
+    return bool(np.any(data.white > np.maximum(OTHERS * used, least)))
 
 
 def exchanged(record: Record) -> list[LinkFinding]:

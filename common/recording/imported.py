@@ -82,6 +82,14 @@ class ImportedChannel:
     rate: float = 0.0  # sampling rate of the data, Hz; 0 where times have no meaning
     known: bool = False  # whether it was given as a constant rather than measured
 
+    @property
+    def late(self) -> float:
+        """By how much the channel comes late, s: its delay and what its filter delays slow motion by."""
+        if self.filter is None:
+            return self.delay
+        above, below = (np.append(0.0, row)[-2:] / row[-1] for row in self.filter.transfer)
+        return self.delay + float(below[0] - above[0])
+
     def through(self, values: Samples, interval: float) -> Samples:
         """True values (ticks,) as the logger would have recorded them without noise: after its filter and delay."""
         seen = self.filter.filtered(values, interval) if self.filter else values

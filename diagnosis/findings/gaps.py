@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from diagnosis.findings.found import Diagnosis
 from diagnosis.fits import fitting
+from diagnosis.fits.search import SEEN
 from diagnosis.recorded import link
 from diagnosis.recorded.loop import RecordedLoop
 from diagnosis.recorded.record import Record
@@ -78,6 +79,11 @@ class RecordingGaps:
         """Whether a signal stands well out of its noise."""
         level = float(np.sqrt(np.mean(self.record.signals[name] ** 2)))
         return level > 0.0 and self.found.white.get(name, 0.0) < QUIET * level
+
+    def changes(self, name: str, known: Sequence[Mapping[str, Array]]) -> bool:
+        """Whether two predictions of a signal differ by more than its noise hides."""
+        apart = (known[1][name] - known[0][name])[self.mask]
+        return float(np.sqrt(np.mean(apart**2))) > SEEN * self.found.white.get(name, 0.0)
 
     def floor(self) -> dict[str, float]:
         """Gap that noise alone makes."""

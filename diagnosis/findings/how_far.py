@@ -27,6 +27,8 @@ PLAYERS = 6
 # Machines to which a search ascribes the residual of a sensor that misses samples.
 LIKE_MISSED = ("damper", "column", "table", "device")
 INTERLEAVED, OTHERS = "interleaved (interpolation)", "other recordings"  # data on which the gap was judged
+# Share of the gap that an explanation must close: what closes less leaves the larger part of the gap open.
+SHRUNK = 0.5
 # Share of the noise floor by which the response must exceed it to show an effect: the floor rests on two noisy
 # simulations, so that a smaller excess may be chance.
 ROOM = 0.1
@@ -99,6 +101,12 @@ def hardly_shown(found: Diagnosis, summary: HowFar) -> bool:
     return any(verdict.effects for verdict in found.verdicts) and before - floor < ROOM * floor
 
 
+def shrinks(found: Diagnosis, far: HowFar) -> bool:
+    """Whether the effects of the parts really close the gap; noise of a sensor and a link alone need not."""
+    named = any(verdict.effects for verdict in found.verdicts)
+    return not named or far.closed is None or far.closed >= SHRUNK
+
+
 def by_readings(own: RecordingGaps, summary: HowFar) -> HowFar:
     """How far the gap of the readings closes in the parts with effects, each replayed by itself."""
     plans = own.record.plans
@@ -110,6 +118,7 @@ def by_readings(own: RecordingGaps, summary: HowFar) -> HowFar:
         for name in verdict.search.data.part.signals
         if name in known[0] and own.record.has(name) and own.moves(name)
     ]
+    names = [name for name in names if own.changes(name, known)] or names
     if not names:
         return summary
     rows = []

@@ -11,7 +11,7 @@ from diagnosis.findings.gaps import QUIET
 from diagnosis.findings.verdict import PartVerdict, heard
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data
-from diagnosis.recorded.parts import ColumnAlone, LaboratoryPart
+from diagnosis.recorded.parts import BALANCE, ColumnAlone, LaboratoryPart
 from diagnosis.recorded.record import Record
 from diagnosis.report.records import NoiseEntry, PartOfGap
 from diagnosis.signals.noise_model import NoiseModel
@@ -100,7 +100,7 @@ def noises(data: Data, record: Record) -> dict[str, NoiseEntry]:
             kind=known.kind,
             order=known.order,
             rms=known.rms,
-            unit=record.unit(name),
+            unit="N" if name == BALANCE else record.unit(name),
             from_=known.source,
             lines=known.lines,
             resolution=known.resolution or None,

@@ -15,6 +15,9 @@ from models.registry import Array
 # A sensor counts as too noisy from LOUDER times the noise that the plan and the other sensors make expected, and from
 # LEAST times the plan's own: a plan rarely knows a sensor's noise better than within a factor of two.
 LOUDER, LEAST = 2.5, 2.0
+# Noise over a reading's peak that a logger's converter makes: 12 bits of a range five times the peak, whose steps are
+# hidden once the reading is interpolated.
+CONVERTER = 7e-4
 # Share of the planned noise that the others make expected at least, so that a quiet set does not alarm.
 QUIETEST = 0.4
 # Relative error, 95 % of the noise levels found in white noise: 2.3 % in 40 s at 2 ms, 3.5 % in 10 s.
@@ -108,18 +111,32 @@ def levels(datas: list[Data], noises: list[Array] | None = None) -> dict[str, fl
 def coarsest(record: Record, rounded: dict[str, float]) -> dict[str, float]:
     """Largest step that the logger's own rounding explains, by signal; empty unless most readings are rounded.
 
-    A converter or a text rounds all channels to about as many digits, while a sensor with coarse steps stands alone.
+    A converter or a text rounds all channels to about as many digits, or all of a unit to one decimal, while a sensor
+    with coarse steps stands alone.
     """
     read = [name for name in read_by(record) if record.has(name) and np.ptp(record.signals[name]) > 0.0]
     if len(rounded) < 2 or len(rounded) <= len(read) / 2:
         return {}
     shares = {name: step / float(np.ptp(record.signals[name])) for name, step in rounded.items()}
     usual = float(np.median(list(shares.values())))
-    return {name: UNLIKE * usual * float(np.ptp(record.signals[name])) for name in rounded}
+    result = {}
+    for name in rounded:
+        alike = [
+            step
+            for other, step in rounded.items()
+            if other != name and record.unit(other) == record.unit(name)
+        ]
+        result[name] = max([UNLIKE * usual * float(np.ptp(record.signals[name])), *alike])
+    return result
 
 
-def findings(record: Record, white: dict[str, float], rounded: dict[str, float]) -> list[SensorFinding]:
-    """Sensors that round coarsely, and sensors that are far noisier than planned and than the other ones."""
+def findings(
+    record: Record, white: dict[str, float], rounded: dict[str, float], *, logged: bool = False
+) -> list[SensorFinding]:
+    """Sensors that round coarsely, and sensors that are far noisier than planned and than the other ones.
+
+    Where a logger recorded (`logged`), noise as small as that of its converter is the logger's.
+    """
     planned = {name: level for lab in record.labs for name, level in lab.noise.items() if level > 0.0}
     plain = [name for name in white if name in planned and name not in rounded]
     ratios = {name: white[name] / planned[name] for name in plain}
@@ -138,6 +155,8 @@ def findings(record: Record, white: dict[str, float], rounded: dict[str, float])
     for name, ratio in ratios.items():
         others = [value for key, value in ratios.items() if key != name]
         expected = float(np.median(others)) if others else 1.0
+        if logged and white[name] < CONVERTER * float(np.max(np.abs(record.signals[name]))):
+            continue
         if ratio > LOUDER * max(expected, QUIETEST) and ratio > LEAST:
             value = float(np.sqrt(max(white[name] ** 2 - (expected * planned[name]) ** 2, 0.0)))
             bounds = ((1.0 - NOISE_ERROR) * value, (1.0 + NOISE_ERROR) * value)

@@ -39,6 +39,8 @@ BOTH = 2.0  # solutions with an error of their own: the laboratory's and the rep
 # Share of a gap's rms that may be taken for coloured noise where only the residual itself is evidence: a sixth of its
 # energy.
 OWN = 0.4
+# Standard deviations of Σ z² above its mean from which on the nominal parameters speak against the effects beside them.
+STRAINED = 3.0
 # Distance from the bound, in tolerances, within which a nominal parameter counts as pinned to it.
 PINNED = 1e-3
 
@@ -169,10 +171,14 @@ def beyond_model_error(fit: Fit) -> bool:
 
 def heard(search: Search) -> Array:
     """Rms noise (signals,) of a part's sensors; that of the highest frequencies where the rest of it is doubtful."""
+    white = search.data.white
+    return np.minimum(white, sharpest(search)) if unproven(search) else white
+
+
+def sharpest(search: Search) -> Array:
+    """Rms noise (signals,) of a part's sensors at the highest frequencies, without the lines that they pick up."""
     data, fit = search.data, search.chosen
-    if not unproven(search):
-        return data.white
-    return np.minimum(data.white, fitting.noise(data.residual(fitting.lay(data, fit.z, fit.values))))
+    return fitting.noise(data.residual(fitting.lay(data, fit.z, fit.values)))
 
 
 def unproven(search: Search) -> bool:
@@ -197,10 +203,15 @@ def pinned(fit: Fit) -> tuple[str, ...]:
 
 
 def certainty(search: Search) -> float:
-    """Probability that there is an effect at all: 0.5 at the limit of the search, towards one far above it."""
+    """Probability that there is an effect at all: 0.5 at the limit of the search, towards one far above it.
+
+    It is smaller where nominal parameters that are all far off beside the effects imitate another one.
+    """
     before, after = search.commissioned, search.chosen
     margin = max(before.prior - after.prior, 0.0) / PRIOR_GAIN + max(before.chi - after.chi, 0.0) / DATA_GAIN
-    return 1.0 - 0.5 * math.exp(-(margin - 1.0))
+    usual = after.z.size + STRAINED * math.sqrt(2.0 * after.z.size)
+    strain = max(after.prior - usual, 0.0) / (2.0 * TEMPERATURE)
+    return (1.0 - 0.5 * math.exp(-(margin - 1.0))) * math.exp(-strain)
 
 
 def equivalents(search: Search) -> tuple[tuple[str, ...], ...]:

@@ -26,12 +26,12 @@ class Named(NamedTuple):
     warnings: tuple[str, ...]
 
 
-def which(found: Diagnosis) -> Named:
-    """The candidates, and warnings on the verdict's parameters."""
+def which(found: Diagnosis, sure: float = 1.0) -> Named:
+    """The candidates, the verdict's with the probability `sure` at most, and warnings on the verdict's parameters."""
     named = [verdict for verdict in found.verdicts if verdict.effects]
     effects = [name for verdict in named for name in verdict.effects]
     effects += [reading.effect for reading in found.readings] + [item.effect for item in found.link]
-    probability = float(np.prod([verdict.probability for verdict in found.verdicts]))
+    probability = min(sure, float(np.prod([verdict.probability for verdict in found.verdicts])))
     if not effects:
         probability = min(probability, nothing(found))
     fits = {name: values for verdict in named for name, values in intervals(verdict.fitted).items()}

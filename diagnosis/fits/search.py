@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from diagnosis.fits import contact, fitting, laws, sensor_noise
+from diagnosis.fits import contact, evidence, fitting, laws, sensor_noise
 from diagnosis.fits.fitting import Data, Fit, Values, excess
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.screening import WORKERS, ScreenedEffect, screen
@@ -52,6 +52,7 @@ SMALL = (
 UNEVEN = 3.0  # times what the energy of normal noise varies by: such noise comes and goes, as a motion does
 POLISHED = 12  # steps of a fit that leaves something, before that counts
 HALVINGS = 20  # by which a value is found beyond which the system is the same
+RIVALS = 3  # candidates of the projection that are fitted in the place of coloured noise
 SETTLING = 4  # rounds in which a fit and the noise that it leaves are found in turn
 SUSPICIOUS = 8.0  # of Σ z²: nominal parameters that are all off together imitate an effect
 NEAR = 1.0  # tolerances within which fits begin: a parameter that is further away imitates an effect
@@ -140,9 +141,10 @@ class Searcher:
     def run(self) -> Search:
         """Commission, select, exchange, prune, and fit what else might be."""
         commissioned = self.settled(fitting.fit(self.data, {}))
-        if not self.is_gap(commissioned):
-            return Search(self.data, commissioned, commissioned, ())
-        first = self.in_best_laws(self.extended(commissioned))
+        if self.is_gap(commissioned):
+            first = self.in_best_laws(self.extended(commissioned))
+        else:
+            commissioned, first = self.instead_of_colour(commissioned)
         chosen, better = commissioned, first
         while better and self.worth(commissioned, chosen, better[0]):
             before = self.data
@@ -161,6 +163,40 @@ class Searcher:
         others = tuple(map(trimmed, self.alternatives(chosen, first)))
         return physical(Search(self.data, commissioned, trimmed(chosen), others))
 
+    def instead_of_colour(self, bare: Fit) -> tuple[Fit, list[Fit]]:
+        """The fit without effects, and those with one, best first, under the noise that the best of these leaves.
+
+        What is taken for coloured noise may be an effect, at rest as in motion: effects are fitted under white noise,
+        and the best is taken if the data are far more probable under it and the noise that it leaves. Without such an
+        effect the list is empty.
+        """
+        if not sensor_noise.coloured(self.data):
+            return bare, []
+        fits = self.in_white_noise(bare)
+        if not fits or not self.far_likelier(fits[0], bare):
+            return bare, []
+        self.data = fits[0].data
+        best = self.settled(fits[0])
+        return self.again(bare), [best, *map(self.again, fits[1:])]
+
+    def in_white_noise(self, bare: Fit) -> list[Fit]:
+        """Fits with one effect over a beginning under white noise, held against the whole test, best first."""
+        white = fitting.at(sensor_noise.whitened(bare), {}, bare.z)
+        near = self.start(white, white.data)
+        slopes = near.jacobian[:, : bare.z.size]
+        found = screen(near, self.data.part.candidates, self.scales)[:RIVALS]
+        fits = [
+            fitting.fit(near.data, {item.effect.name: item.values}, near.z, ROUGH, slopes, rounds=1)
+            for item in found
+        ]
+        whole = [fitting.at(white.data, item.values, item.z) for item in fits]
+        return sorted(whole, key=lambda item: item.cost)
+
+    def far_likelier(self, fit: Fit, bare: Fit) -> bool:
+        """Whether the data are far more probable under a fit and the noise that it leaves than without effects."""
+        found = fitting.at(sensor_noise.remodelled(fit), fit.values, fit.z)
+        return evidence.surprise(found) < evidence.surprise(bare) - evidence.BEYOND
+
     def settled(self, fit: Fit) -> Fit:
         """The fit under the noise that it leaves, which the search goes on with.
 
@@ -171,7 +207,7 @@ class Searcher:
             return fit
         found, data = fit, sensor_noise.remodelled(fit)
         for _ in range(SETTLING):
-            if all(item.density is None for item in data.noise):
+            if not sensor_noise.coloured(data):
                 break
             found = self.again(found, data)
             better = sensor_noise.remodelled(found)
@@ -180,7 +216,7 @@ class Searcher:
             data = better
         else:
             found = self.again(found, data)
-        if any(item.density is not None for item in data.noise):
+        if sensor_noise.coloured(data):
             if not hidden(found):
                 self.data = data
                 return found
@@ -209,7 +245,7 @@ class Searcher:
     def again(self, fit: Fit, data: Data | None = None) -> Fit:
         """A fit moved to the best parameters under another noise, that of the search where none is given."""
         data = data or self.data
-        if any(item.density is not None for item in data.noise):
+        if sensor_noise.coloured(data):
             return fitting.fit(data, fit.values, fit.z, STEPS, rounds=1)
         return fitting.at(data, fit.values, fit.z)
 
@@ -252,14 +288,14 @@ class Searcher:
         gap = max(float(np.max(np.mean(np.square(bare.reduced), axis=0))), 1.0)
         return any(float(np.max(size)) > CANCELLED**2 * gap for size in self.changes(fit))
 
-    def start(self, fit: Fit) -> Fit:
+    def start(self, fit: Fit, data: Data | None = None) -> Fit:
         """A fit over the beginning of the test that holds most of what it leaves, nominal parameters moved back.
 
         Parameters that are far away stand in for an effect that is missing.
         """
         missed = float(np.max(np.mean(np.square(fit.reduced), axis=0)))
         z = np.zeros(fit.z.size) if missed > LOST else np.clip(fit.z, -NEAR, NEAR)
-        return fitting.at(fitting.beginning(self.data, fit, MOSTLY), fit.values, z)
+        return fitting.at(fitting.beginning(data or self.data, fit, MOSTLY), fit.values, z)
 
     def extended(self, fit: Fit, count: int = FITTED) -> list[Fit]:
         """Fits with one effect more, best first: all a few steps over a beginning, the best of them to their end."""
@@ -348,7 +384,7 @@ def leaves(fit: Fit, allowed: Array | None = None) -> bool:
     found: list[tuple[SystematicGap | Foreseen, float]] = [
         *zip(gaps(fit, fit.data.group), least, strict=True)
     ]
-    if any(item.density is not None for item in fit.data.noise):
+    if sensor_noise.coloured(fit.data):
         found += zip(sensor_noise.foreseen(fit), least, strict=True)
     return any(item.ratio > limit and item.significance > SIGNIFICANT for item, limit in found)
 
@@ -365,8 +401,9 @@ def hidden(fit: Fit) -> bool:
     seen = any(
         item.ratio > MATERIAL and item.significance > SIGNIFICANT for item in sensor_noise.foreseen(fit)
     )
-    uneven = any(item.tails > UNEVEN for item in fit.data.noise)
-    return seen or (sensor_noise.loudest(fit) > LOUDEST and (uneven or leaves(fit)))
+    loud = sensor_noise.loudest(fit) > LOUDEST
+    uneven = np.array([item.tails > UNEVEN for item in fit.data.noise])
+    return seen or bool(np.any(loud & uneven)) or (bool(np.any(loud)) and leaves(fit))
 
 
 def trimmed(fit: Fit) -> Fit:

@@ -12,11 +12,12 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy import signal
 
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Data, Fit
 from diagnosis.recorded.joined import JoinedPart
-from diagnosis.recorded.parts import Building, ColumnAlone, LaboratoryPart, Part
+from diagnosis.recorded.parts import ColumnAlone, LaboratoryPart, LoggedBuilding, Part
 from diagnosis.signals import colour, pickup
 from diagnosis.signals.ceiling import Crosswise
 from diagnosis.signals.features import features
@@ -75,27 +76,27 @@ def modelled(data: Data, system: System) -> Data:
 
 
 def remainder(data: Data, system: System) -> Remainder:
-    """Lines, spikes and what inputs predict taken away from the residuals of a hypothesis."""
+    """Lines, spikes and what inputs predict taken away from the residuals of a hypothesis.
+
+    Lines that something moving makes are no noise, but no pickup either: a hypothesis has to explain them.
+    """
     part, interval = data.part, data.system.plan.test.interval
     raw = part.measured - part.predict(system)
     there = part.present & np.isfinite(raw)
     spiky, lines = np.zeros_like(there), np.zeros_like(raw)
-    found: list[tuple[pickup.Pickup, ...]] = []
+    found: list[tuple[pickup.Pickup, ...]] = [()] * raw.shape[1]
+    seen = there.mean(axis=0) >= 0.5
     for place in range(raw.shape[1]):
-        seen = there[:, place]
-        if seen.mean() < 0.5:
+        if not seen[place]:
             raw[:, place] = 0.0
-            found.append(())
             continue
-        whole = fitting.filled(raw[:, place], seen)
-        spiky[:, place] = spikes(whole) & seen
-        whole = fitting.filled(whole, ~spiky[:, place])
-        picked = [tuple(pickup.pickups(whole[span], interval)) for span in spans(part)]
-        for span, waves in zip(spans(part), picked, strict=True):
-            if waves:
-                lines[span, place] = pickup.waves(whole[span], waves, interval)
-        found.append(picked[0])
-        raw[:, place] = whole - lines[:, place]
+        whole = fitting.filled(raw[:, place], there[:, place])
+        spiky[:, place] = spikes(whole) & there[:, place]
+        raw[:, place] = fitting.filled(whole, ~spiky[:, place])
+    for number, span in enumerate(spans(part)):
+        lines[span], picked, kept = picked_up(raw[span], interval)
+        raw[span] -= lines[span] + kept
+        found = picked if number == 0 else found
     averaged = data.averaged(raw)
     said = predictable(data, averaged)
     single = raw[: data.groups * data.group] - np.repeat(said, data.group, axis=0) / math.sqrt(data.group)
@@ -108,6 +109,21 @@ def spans(part: Part) -> list[slice]:
         return [slice(None)]
     ends = np.cumsum([0, *(len(piece.measured) for piece in part.pieces)])
     return [slice(int(a), int(b)) for a, b in itertools.pairwise(ends)]
+
+
+def picked_up(raw: Array, interval: float) -> tuple[Array, list[tuple[pickup.Pickup, ...]], Array]:
+    """Waves (ticks, signals) that sensors pick up of residuals of that shape, their lines, and waves that move."""
+    found = [pickup.pickups(one, interval, pickup.SLOWEST) for one in raw.T]
+    moving = pickup.moving(found, raw, interval)
+    picked = [
+        tuple(one for one in lines if one not in own and one.frequency > pickup.LOWEST)
+        for lines, own in zip(found, moving, strict=True)
+    ]
+    waves, kept = (
+        np.column_stack([pickup.waves(x, lines, interval) for x, lines in zip(raw.T, those, strict=True)])
+        for those in (picked, moving)
+    )
+    return waves, picked, kept
 
 
 def related(data: Data, system: System) -> Crosswise | None:
@@ -127,6 +143,17 @@ def predictable(data: Data, averaged: Array) -> Array:
     return data.related.predict(averaged / data.sigma) * data.sigma
 
 
+def coloured(data: Data) -> bool:
+    """Whether the noise of any signal is not white."""
+    return any(item.density is not None for item in data.noise)
+
+
+def whitened(fit: Fit) -> Data:
+    """The data of a fit with white noise of the level of the highest frequencies, lines and spikes taken away."""
+    data = replace(fit.data, noise=())
+    return fitting.measured_by(data, fitting.noise(data.residual(fitting.lay(data, fit.z, fit.values))))
+
+
 def share(data: Data) -> float:
     """Largest rms of a coloured noise over that of its reading, of noise that only the residual tells of."""
     level = np.sqrt(np.mean(np.square(data.part.measured), axis=0))
@@ -135,16 +162,14 @@ def share(data: Data) -> float:
     return float(np.max(ratios, initial=0.0))
 
 
-def loudest(fit: Fit) -> float:
-    """Largest rms density of a sensor's noise over that at the highest frequencies."""
+def loudest(fit: Fit) -> Array:
+    """Largest rms density (signals,) of each sensor's noise over that at the highest frequencies; one if white."""
     white = fitting.noise(fit.data.residual(fitting.lay(fit.data, fit.z, fit.values)))
-    pairs = zip(fit.data.noise, white, strict=True)
-    ratios = (
-        math.sqrt(float(item.density.max())) / max(flat, 1e-300)
-        for item, flat in pairs
-        if item.density is not None
-    )
-    return max(ratios, default=1.0)
+    result = np.ones(white.size)
+    for place, item in enumerate(fit.data.noise):
+        if item.density is not None:
+            result[place] = math.sqrt(float(item.density.max())) / max(float(white[place]), 1e-300)
+    return result
 
 
 class Foreseen(NamedTuple):
@@ -176,8 +201,7 @@ def inputs(part: Part, system: System) -> Array:
     """What a part's residuals may depend on, (ticks, inputs): its commands and its readings as predicted.
 
     Where the targets were recorded, they stand in for the commands: these hold noise that a controller fed back. A
-    building that was not computed from the very forces recorded is predicted from these forces' noise as well: its own
-    motion stands in for the prediction.
+    building's own motion stands in for what is predicted from the noise of the forces.
     """
     columns = dependencies(part, system)
     return columns[:, np.ptp(columns, axis=0) > 0.0]
@@ -187,8 +211,8 @@ def dependencies(part: Part, system: System) -> Array:
     """The inputs with those that stand still."""
     if isinstance(part, JoinedPart):
         return np.concatenate([dependencies(piece, system) for piece in part.pieces])
-    if isinstance(part, Building):
-        return np.column_stack([part.ground, part.measured])
+    if isinstance(part, LoggedBuilding):
+        return np.column_stack([part.ground, part.motion])
     if isinstance(part, LaboratoryPart):
         part = part.replaced(inputs=part.wanted)
         columns = list(part.wanted.values())
@@ -242,16 +266,31 @@ def model(data: Data, rest: Remainder, quiet: Mask, source: Source, place: int) 
 def alike(noise: Array, quiet: Mask) -> bool:
     """Whether noise (groups,) is no louder where the part moves more: all of it then tells its colour.
 
-    The variances of its sums over time are held against each other; that of slow sums is known least.
+    The variances of its sums over time are held against each other; that of slow sums, and of noise that is correlated,
+    is known least.
     """
     for size in SLOWER:
         still, loud = (summed(stretches(noise, mask), size) for mask in (quiet, ~quiet))
         if min(still.size, loud.size) < 8:
             continue
         more = float(np.var(loud)) / max(float(np.var(still)), 1e-300) - 1.0
-        if more > SURE * math.sqrt(2.0 / still.size + 2.0 / loud.size):
+        one = 2.0 * repeated(summed([noise], size))
+        if more > SURE * math.sqrt(one / still.size + one / loud.size):
             return False
     return True
+
+
+def repeated(noise: Array) -> float:
+    """How many samples of noise (n,) tell as much of its variance as one of white noise: Σρ² over all lags.
+
+    Source: M. S. Bartlett, Journal of the Royal Statistical Society, Supplement 8 (1946).
+    """
+    apart = noise - noise.mean()
+    reach = noise.size // 4
+    along = signal.correlate(apart, apart, method="fft")[noise.size - 1 : noise.size + reach]
+    if along[0] <= 0.0:
+        return 1.0
+    return float(2.0 * np.sum((along / along[0]) ** 2) - 1.0)
 
 
 def summed(segments: list[Array], size: int) -> Array:

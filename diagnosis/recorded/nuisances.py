@@ -70,28 +70,35 @@ class LoggedForce(Nuisance):
 
     of_record = True
     signal: str = ""  # of the force's reading
+    about: float = 0.0  # s, the delay at z = 0
 
     def moved(self, system: System, z: float) -> System:
         """The system whose reading of that force has the logger's delay or gain."""
         value = z * self.tolerance
         return system.sensed(
-            self.signal, **({"delay": value} if self.parameter == "delay" else {"gain": 1.0 + value})
+            self.signal,
+            **({"delay": self.about + value} if self.parameter == "delay" else {"gain": 1.0 + value}),
         )
 
 
 @dataclass(frozen=True)
 class LoggedReadings(Nuisance):
-    """Delay (s) with which a logger recorded all readings of a laboratory, about the one that was found elsewhere."""
+    """Delay (s), about the one found elsewhere, or gain with which a logger recorded readings of a laboratory."""
 
     of_record = True
     signals: tuple[str, ...] = ()  # of the readings in their laboratory
     about: float = 0.0  # s, the delay at z = 0
 
     def moved(self, system: System, z: float) -> System:
-        """The system whose readings have that delay, which is never negative."""
-        delay = max(0.0, self.about + z * self.tolerance)
-        for name in self.signals if delay > 0.0 else ():
-            system = system.sensed(name, delay=delay)
+        """The system whose readings have that gain, or that delay, which is never negative."""
+        if self.parameter == "gain":
+            values = {"gain": 1.0 + z * self.tolerance}
+        else:
+            values = {"delay": max(0.0, self.about + z * self.tolerance)}
+        if values in ({"gain": 1.0}, {"delay": 0.0}):
+            return system
+        for name in self.signals:
+            system = system.sensed(name, **values)
         return system
 
 

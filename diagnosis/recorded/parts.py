@@ -7,12 +7,13 @@ readings by the sensors' noise alone, and a gap in one part does not enter anoth
 from __future__ import annotations
 
 import copy
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from typing import Any, Protocol
 
 import numpy as np
 
 from common.plan.plan import Plan
+from common.recording.imported import NOTHING_STATED
 from common.roles import MASTER
 from diagnosis.recorded.laboratory import RecordedLaboratory
 from diagnosis.recorded.nuisances import (
@@ -29,9 +30,12 @@ from diagnosis.signals.mask import Mask
 from laboratories.effects.effect import Effect
 from laboratories.kind import Machine
 from loop import replay
+from loop.nominal import partition
 from models.registry import Array
+from models.structures import shear_building
 from models.system import System
 
+BALANCE = "force_balance"  # signal of a building that is judged by the balance of its forces, N
 # Share of a computed signal's rms below which a difference is rounding of the recording: four digits of a text file.
 EXACT = 1e-4
 UNREST = 0.05  # first value over the largest one from which on a record does not begin at rest
@@ -190,14 +194,24 @@ class LaboratoryPart:
     def logged(self, delay: float) -> LaboratoryPart:
         """The same laboratory with readings from a logger that delayed the forces in use by `delay` s.
 
-        A logger mostly delays all its channels alike. Where a delay or filter is stated for a channel, nothing changes.
+        What a logger does to one channel it mostly does to all, to forces as to the others, which have amplifiers of
+        their own. Where a delay, a filter or a calibration is stated for a channel, that is not changed.
         """
-        if any(channel.filter is not None or channel.delay != 0.0 for channel in self.channels):
-            return self
-        about = max(0.0, delay)
-        tolerance = max(ALIKE, UNLIKE * about)
-        late = LoggedReadings("delay", tolerance, self.lab, self.lab.kind.channels.names, about)
-        return self.replaced(nuisances=(*self.nuisances, late))
+        names, about = self.lab.kind.channels.names, max(0.0, delay)
+        late: tuple[LoggedReadings, ...] = ()
+        if not any(channel.filter is not None or channel.delay != 0.0 for channel in self.channels):
+            tolerance = max(ALIKE, UNLIKE * about)
+            rows = self.lab.kind.channels.measured
+            late = tuple(
+                LoggedReadings("delay", tolerance, self.lab, those, about)
+                for those in (
+                    tuple(row.name for row in rows if (row.unit == "N") == force) for force in (True, False)
+                )
+                if those
+            )
+        if not any(channel.calibration > 0.0 for channel in self.channels):
+            late = (*late, LoggedReadings("gain", CALIBRATED, self.lab, names))
+        return self.replaced(nuisances=(*self.nuisances, *late))
 
     def replaced(self, **fields: Any) -> LaboratoryPart:
         """The same laboratory in another test: other inputs, or other readings."""
@@ -255,6 +269,11 @@ class Building:
         read = [record.signals[name] for name in names] or [none, none]
         self._inputs = (read[0], read[1], used)
         self._force = own.kind.channels.force if own else ""
+        self._plan, self._whole = plan, record.has(*type(self).signals)
+        self._stated = (
+            channels(record, own)[own.kind.channels.names.index(self._force)] if own else NOTHING_STATED
+        )
+        self._scale = own.kind.coupling(own.plan).scale if own else 1.0
         self._interval = record.plan.test.interval
         here = record.signals["ground_acceleration"]
         self._ground = np.zeros((2, record.ticks + 1))
@@ -283,32 +302,93 @@ class Building:
 
     def forces(self, system: System) -> tuple[Array, Array, Array]:
         """Position and force of the master's laboratory and the forces of the others, as the master used them."""
-        position, force, used = self._inputs
-        logger = None if self.exact else system.effects.sensors.get(self._force)
-        if logger is None:
-            return position, force, used
-        ticks = np.arange(force.size)
-        return position, np.interp(ticks + logger.delay / self._interval, ticks, force) / logger.gain, used
+        return self._inputs
 
-    def logged(self) -> Building:
-        """The same building, whose recorded forces have the delay, gain and noise of a logger."""
-        logger = tuple(
-            LoggedForce(name, tolerance, None, self._force)
-            for name, tolerance in (("delay", LATE), ("gain", CALIBRATED))
-            if self._force
-        )
-        result: Building = with_fields(self, {"exact": False, "nuisances": (*self.nuisances, *logger)})
-        return result
+    def logged(self) -> LoggedBuilding | None:
+        """The same building, of which the forces used are known up to a logger's noise; None without its motion."""
+        return LoggedBuilding(self) if self._whole else None
+
+    def first(self, ticks: int) -> Building:
+        """The whole of it, because it is computed and cheap."""
+        return self
+
+
+def earlier(x: Array, ticks: float) -> Array:
+    """Series (n, …) that come earlier by so many ticks, by the phases of their spectra: white noise keeps its level.
+
+    On straight lines between samples noise is smaller, and a delay would be found where there is none. Before the first
+    and after the last sample the series turn back.
+    """
+    if ticks == 0.0:
+        return x
+    lines = np.fft.rfft(np.concatenate([x, x[::-1]]), axis=0)
+    turns = np.exp(2j * np.pi * np.fft.rfftfreq(2 * len(x)) * ticks)
+    moved = np.fft.irfft(lines * turns.reshape(-1, *[1] * (x.ndim - 1)), 2 * len(x), axis=0)
+    return np.asarray(moved[: len(x)])
+
+
+class LoggedBuilding(Building):
+    """The numerical substructure whose forces came through a logger, by the balance of its forces.
+
+    The motion is the master's own and free of noise, so what the equation of motion says of it differs from the forces
+    recorded by their logger's noise alone, sample by sample. In the displacement that noise would have gone through
+    the building, and would look like a motion. The logger's delay and gain join the nominal parameters; what it does to
+    one force it mostly does to all.
+    """
+
+    exact = False
+
+    def __init__(self, of: Building) -> None:
+        self.__dict__.update(of.__dict__)
+        self.motion = of.measured
+        plan = self._plan
+        self._nominal = System(plan)
+        self.signals = (BALANCE,) * plan.storeys
+        self.measured = self.balance(self._nominal, self.motion)
+        self.present = of.present[:, : plan.storeys]
+        self.about = self._stated.late
+        late = LATE if self.about == 0.0 else max(ALIKE, UNLIKE * self.about)
+        rows = (("delay", late, self.about), ("gain", self._stated.calibration or CALIBRATED, 0.0))
+        logger = tuple(LoggedForce(name, by, None, self._force, at) for name, by, at in rows if self._force)
+        self.nuisances = (*of.nuisances, *logger)
+
+    def balance(self, system: System, motion: Array) -> Array:
+        """M·ẍ + C·ẋ + K·x of the numerical part, (ticks, storeys) N, for displacement, velocity and acceleration."""
+        M, C, K = partition.numerical(system.plan)
+        gravity = shear_building.tridiagonal(np.full(len(M), system.effects.p_delta))
+        x, v, a = np.split(motion, 3, axis=1)
+        return np.asarray(a @ M.T + v @ C.T + x @ (K + gravity).T)
+
+    def predict(self, system: System) -> Array:
+        """The balance as the nominal building has it, less what the hypothesis leaves of its own.
+
+        What it leaves is at the time and in the unit of the reading, so that neither delay nor gain changes its noise.
+        """
+        delay, gain = self.logger(system)
+        apart = self.balance(system, self.motion - super().predict(system))
+        return self.measured - gain * earlier(apart, -delay / self._interval)
+
+    def forces(self, system: System) -> tuple[Array, Array, Array]:
+        """Position and force of the master's laboratory and the forces of the others, as the master used them."""
+        position, force, used = self._inputs
+        delay, gain = self.logger(system)
+        ticks = delay / self._interval
+        return position, earlier(force, ticks) / gain, earlier(used, ticks) / gain
+
+    def logger(self, system: System) -> tuple[float, float]:
+        """Delay (s) and gain of the logger in a hypothesis."""
+        made = system.effects.sensors.get(self._force)
+        return (made.delay, made.gain) if made else (self.about, 1.0)
+
+    def rounded(self, steps: Mapping[str, float]) -> dict[str, float]:
+        """The step of the balance where the force is rounded to one of `steps`, by signal."""
+        return {BALANCE: self._scale * steps[self._force]} if self._force in steps else {}
 
     def late(self, z: Array) -> float:
         """Delay (s) of the logger that recorded the force, at values z (nuisances,) of a fit."""
         rows = zip(self.nuisances, z, strict=True)
         return sum(
-            float(x) * one.tolerance
+            one.about + float(x) * one.tolerance
             for one, x in rows
             if isinstance(one, LoggedForce) and one.parameter == "delay"
         )
-
-    def first(self, ticks: int) -> Building:
-        """The whole part, since computing it takes little time."""
-        return self

@@ -102,6 +102,17 @@ def test_lines_of_constant_amplitude_are_pickup_and_those_of_a_motion_are_not() 
     assert pickup.pickups(white(9, TICKS) + 3.0 * burst, INTERVAL) == []
 
 
+def test_lines_that_several_readings_show_are_a_motion_but_for_those_of_the_mains() -> None:
+    t = np.arange(TICKS) * INTERVAL
+    line, hum = np.sin(2.0 * np.pi * 12.4 * t), np.sin(2.0 * np.pi * 50.0 * t)
+    both = np.column_stack([white(31, TICKS) + line + hum, white(32, TICKS) + 0.4 * line + hum])
+    alone = np.column_stack([white(31, TICKS) + line, white(32, TICKS)])
+    for readings, expected in ((both, [12.4]), (alone, [])):
+        found = [pickup.pickups(one, INTERVAL) for one in readings.T]
+        moving = pickup.moving(found, readings, INTERVAL)[0]
+        assert [round(item.frequency, 1) for item in moving] == expected
+
+
 def test_single_samples_are_spikes_and_what_moves_is_none() -> None:
     noise = white(10, 3000)
     struck = noise.copy()

@@ -63,6 +63,23 @@ def test_sensors_that_are_all_noisier_than_planned_are_not_blamed(cases: Cases) 
     assert readings.findings(whole, loud, {}) == []
 
 
+def test_decimals_that_readings_of_a_unit_share_are_the_logger_s(cases: Cases) -> None:
+    effects = {f"sensor.{name}.quantization": {"step": 1.0} for name in ("column_force", "damper_force")}
+    more = {
+        f"sensor.{name}.quantization": {"step": 1e-6}
+        for name in ("column_displacement", "table_displacement", "damper_stroke")
+    }
+    assert found_in(cases.record({**effects, **more}, duration=8.0)) == []
+
+
+def test_noise_of_a_converter_is_the_logger_s(cases: Cases) -> None:
+    whole = cases.record(duration=8.0)
+    levels = readings.levels([fitting.prepare(kind(whole), whole) for kind in (lab_a, lab_b)])
+    loud = levels | {"damper_stroke": 6e-4 * float(np.max(np.abs(whole.signals["damper_stroke"])))}
+    assert [item.effect for item in readings.findings(whole, loud, {})] == ["sensor.damper_stroke.noise"]
+    assert readings.findings(whole, loud, {}, logged=True) == []
+
+
 def test_repeated_samples_are_counted(cases: Cases) -> None:
     run = read(cases.file(duration=8.0))
     force = run.columns["slave"]["damper_force"].copy()
