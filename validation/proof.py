@@ -1,4 +1,4 @@
-"""What the pages of the proofs have in common: pictures drawn into a folder that stand inside the page too."""
+"""Common parts of the proofs' pages: pictures that are drawn into a folder and embedded in the page."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from report.pictures.figure import SINGLE, figure, save
 
 
 class ProofFigure(NamedTuple):
-    """One picture of the evidence and what stands below it."""
+    """One picture of the evidence, and its caption."""
 
     file: str
     caption: str
@@ -20,7 +20,7 @@ class ProofFigure(NamedTuple):
 
 
 def draw_all(figures: Iterable[ProofFigure], evidence: Any, folder: Path) -> list[Photo]:
-    """Draw figures into a folder; they come back as they stand inside a page."""
+    """Draw figures into a folder, and return them as they are embedded in a page."""
     photos = []
     for item in figures:
         canvas = figure(SINGLE, item.height)

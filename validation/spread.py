@@ -1,4 +1,4 @@
-"""The same work on many items: one after the other, over processes, or over the machines of a Dask cluster."""
+"""The same work on many items: one after the other, by several processes, or by the machines of a Dask cluster."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ Result = TypeVar("Result")
 def spread(
     function: Callable[[Item], Result], items: Sequence[Item], jobs: int = 1, dask: str = ""
 ) -> Iterator[Result]:
-    """Results as they come, in no order; `dask` is the address of a scheduler.
+    """Results in the order in which they are ready; `dask` is the address of a scheduler.
 
     Raises:
-        InputError: a package that this needs is not there, or the scheduler cannot be reached.
+        InputError: a needed package is not installed, or the scheduler cannot be reached.
     """
     if jobs == 1 and not dask:
         yield from map(function, items)
@@ -37,7 +37,7 @@ def spread(
 
 @contextlib.contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Ctrl-C waits for the end of the block; a process that starts within ignores it and is ended by this one."""
+    """Delay Ctrl-C until the block ends; a process that starts within ignores it, and this process ends it."""
     if not hasattr(signal, "pthread_sigmask"):  # not POSIX
         yield
         return
@@ -49,12 +49,12 @@ def uninterrupted() -> Iterator[None]:
 
 
 def needed(package: str, option: str) -> Any:
-    """A package that only an option needs."""
+    """Import a package that only an option needs."""
     try:
         return importlib.import_module(package)
     except ImportError:
         name = package.partition(".")[0]
-        raise InputError(f"{option} needs the package {name}: install it, or leave the option out.") from None
+        raise InputError(f"{option} needs the package {name}: install it, or omit the option.") from None
 
 
 @contextlib.contextmanager
@@ -67,7 +67,7 @@ def _backend(joblib: Any, jobs: int, dask: str) -> Iterator[None]:
             with joblib.parallel_config(backend="loky", n_jobs=jobs, inner_max_num_threads=1):
                 yield
             done = True
-        finally:  # it would wait for more work, and for work whose result is not needed
+        finally:  # the pool would otherwise wait for more work, and for work whose result is not needed
             loky.get_reusable_executor().shutdown(wait=True, kill_workers=not done)
         return
     distributed = needed("dask.distributed", "--dask")

@@ -8,7 +8,7 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ ROOT = Path(__file__).resolve().parents[2]
 # s, beyond the time of the measurement: both processes import numpy and zenoh first, which takes a second on an idle
 # machine and many on a loaded one, and they find each other within `exchange.PATIENCE`.
 GRACE = 45.0
+LOOK = 0.05  # s, between two looks whether a process has ended: the processor stays free for the measurement
 
 
 @contextlib.contextmanager
@@ -56,18 +57,37 @@ def exchange(interval_ns: int, length: float, mode: str) -> tuple[dict[str, Any]
     places = [[] if processor is None else ["--processor", str(processor)] for processor in processors]
     with (
         child("master", *words, *places[0]) as master,
-        child("slave", *words, *places[1]),
+        child("slave", *words, *places[1]) as slave,
         contextlib.suppress(subprocess.TimeoutExpired, ValueError),
     ):
         # Not `communicate`, which would end the child's standard input; its few lines fit into the pipes.
-        master.wait(timeout=length + GRACE)
-        said, complaint = (pipe.read() if pipe else "" for pipe in (master.stdout, master.stderr))
+        ended = first_ended((master, slave), length + GRACE)
+        master.kill()  # where the slave has failed, nobody would answer it
+        said = master.stdout.read() if master.stdout else ""
+        complaint = ended.stderr.read() if ended.stderr else ""
         granted, *found = map(json.loads, said.splitlines()) if said else [{}]
         if found:
             return granted, found[0]
-        reason = complaint.strip().splitlines()[-1:] or ["it said nothing"]
+        reason = complaint.strip().splitlines()[-1:] or ["it ended without a message"]
         return granted, {"error": reason[0].removeprefix("rths: ")}
-    return {}, {"error": "the process did not end in time"}
+    return {}, {
+        "error": f"the exchange did not end within {length + GRACE:.0f} s: end other programs, and repeat"
+    }
+
+
+def first_ended(processes: Sequence[subprocess.Popen[str]], timeout: float) -> subprocess.Popen[str]:
+    """The process that ends first.
+
+    Raises:
+        TimeoutExpired: none has ended within `timeout` s.
+    """
+    deadline = time.monotonic() + timeout
+    while time.monotonic() < deadline:
+        for process in processes:
+            if process.poll() is not None:
+                return process
+        time.sleep(LOOK)
+    raise subprocess.TimeoutExpired(processes[0].args, timeout)
 
 
 def wake_ups(interval_ns: int, length: float, priority: int, processor: int) -> dict[str, dict[str, float]]:

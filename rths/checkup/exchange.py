@@ -74,7 +74,7 @@ def unwanted() -> str:
     return "The doctor has ended." if ready and not os.read(0, 4096) else ""
 
 
-def filled(message: type[Any], **values: int) -> Any:
+def filled(message: type[Any], **values: Any) -> Any:
     """A message with these fields, the others at zero."""
     zeros = {name: hint() for name, hint in get_type_hints(message).items()}
     return message(**zeros | values)
@@ -92,7 +92,9 @@ def answer(endpoint: FrameEndpoint) -> None:
 
 
 COMMAND = filled(Command, session=1)
-FEEDBACK = filled(Feedback, session=1)
+FEEDBACK = filled(
+    Feedback, session=1, measured=(0.0,) * 4
+)  # as many channels as a shaking table with a damper has
 
 
 class Master:

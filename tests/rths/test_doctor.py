@@ -15,8 +15,9 @@ from typing import Any
 import pytest
 
 from common.errors import InputError
+from common.protocol import codec
 from common.protocol.messages import Command, Feedback
-from rths.checkup import clock, disk, exchange, rivals, verdict
+from rths.checkup import children, clock, disk, exchange, rivals, verdict
 from tests.helpers import ROOT
 
 RTHS = [sys.executable, "-m", "rths", "doctor"]
@@ -116,6 +117,20 @@ def test_messages_are_filled_whatever_their_fields_are() -> None:
         filled = exchange.filled(message, session=1)
         assert filled.session == 1
         assert not any(value for name, value in filled._asdict().items() if name != "session")
+
+
+def test_messages_of_the_exchange_can_be_sent() -> None:
+    key = codec.session_key(1, exchange.TEST)
+    for message in (exchange.COMMAND, exchange.FEEDBACK):
+        assert codec.decode(codec.encode(message, key), key) == message
+
+
+def test_a_slave_that_fails_ends_the_exchange_with_its_message(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(children.realtime, "assign", lambda _count: [None, 10**6])
+    began = time.monotonic()
+    _, found = children.exchange(2_000_000, 1.0, "on")
+    assert "error" in found
+    assert time.monotonic() - began < exchange.PATIENCE
 
 
 def test_percentiles_are_those_of_the_nearest_rank() -> None:

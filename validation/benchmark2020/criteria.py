@@ -1,10 +1,10 @@
 """The nine criteria of the 2020 benchmark, in the order of its Table 3.
 
-The paper's text and its table order J5 to J9 differently. Here it is the table's, which is what its numbers fit: the
-peak of floor 1, the rms of floors 2 and 3, then their peaks. Floor 1 is the measured specimen, noise included, in J4
-and J5: its computed displacement misses the table's J5 by up to four points. As in the published program "rms" takes
-the mean away first, and the delay is sought among 0 to 49 intervals of lag only, so that a measurement ahead of its
-target reads 0. `indicators.correlation_delay` looks both ways.
+The paper's text and its table order J5 to J9 differently. The order here is the table's, because the published numbers
+fit it: the peak of floor 1, the rms of floors 2 and 3, then their peaks. In J4 and J5 floor 1 is the measured
+displacement of the specimen, noise included; with the computed displacement J5 differs from the table by up to four
+points. As in the published program, "rms" is taken about the mean, and the delay is searched among lags of 0 to 49
+intervals only, so that a measurement that leads its target reads 0. `indicators.correlation_delay` finds either sign.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ class Criteria(NamedTuple):
     j1: float  # delay of the measurement behind its target
     j2: float  # rms of the tracking error
     j3: float  # peak of the tracking error
-    j4: float  # rms of floor 1 as measured, beside the reference
+    j4: float  # rms of the difference of measured floor 1 and the reference
     j5: float  # peak of floor 1 as measured
     j6: float  # rms of floor 2
     j7: float  # rms of floor 3
@@ -35,8 +35,8 @@ MEANINGS = {
     "J1": "delay of the measured behind the target displacement, by correlation",
     "J2": "tracking error, rms",
     "J3": "tracking error, peak",
-    "J4": "error of floor 1 as measured beside the reference, rms",
-    "J5": "error of floor 1 as measured beside the reference, peak",
+    "J4": "error of floor 1, measured against the reference, rms",
+    "J5": "error of floor 1, measured against the reference, peak",
     "J6": "error of floor 2, rms",
     "J7": "error of floor 3, rms",
     "J8": "error of floor 2, peak",

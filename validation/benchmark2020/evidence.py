@@ -1,4 +1,4 @@
-"""Everything that the command computes, and how it judges it."""
+"""Results of the benchmark, and the goals by which they are judged."""
 
 from __future__ import annotations
 
@@ -16,10 +16,15 @@ from validation.benchmark2020.published import CRITICAL_DELAYS, TABLE_3
 from validation.benchmark2020.runs import NOMINAL, CellResult, Stage, on_el_centro, stage, sweep
 
 SAMPLE = "sample"
-CELL, DELAY_CELL = 0.01, 0.3e-3  # by which a cell may differ: a point, s
-NOMINAL_GOAL, PLANTS_GOAL = 0.05, 0.06  # of J4
-CRITICAL_GOAL = 0.01
-JUDGED_DELAY, DELAY_GOAL = 2e-3, 0.2e-3  # s, of the late force
+# By which a cell may differ from the published one, whose sensor noise was another draw: one point, and for J1 (s) one
+# interval of 1/4096 s and half of the last digit of 0.1 ms.
+CELL, DELAY_CELL = 0.01, 0.3e-3
+# Of J4. The sample controller of the benchmark reaches 33 to 73 %; the noise of the displacement sensor is part of J4.
+NOMINAL_GOAL, PLANTS_GOAL = 0.05, 0.06
+CRITICAL_GOAL = 0.01  # the published delays have three or four digits
+# Late force, s: the delay is a seventh to a quarter of the critical ones, so that every loop is stable; the goal is one
+# interval, below which a sampled signal cannot be later.
+JUDGED_DELAY, DELAY_GOAL = 2e-3, 0.2e-3
 
 
 class SettingSummary(NamedTuple):
@@ -37,12 +42,12 @@ class SettingSummary(NamedTuple):
 
     @property
     def order(self) -> tuple[float, float, int]:
-        """By which settings stand in tables and pictures, the best first."""
+        """Key that sorts settings in tables and pictures, the best first."""
         return self.nominal, self.plants, self.unstable
 
     @property
     def meets(self) -> bool:
-        """Whether it reaches the goals: stable, near the reference on plants drawn too, within the limit of force."""
+        """Whether it reaches the goals: stable, near the reference on drawn plants too, within the limit of force."""
         near = self.nominal <= NOMINAL_GOAL and self.plants <= PLANTS_GOAL
         return not self.unstable and near and self.force <= FORCE
 
@@ -57,7 +62,7 @@ class GoalCheck(NamedTuple):
 
 
 class BenchmarkEvidence(NamedTuple):
-    """What the tables, the page and the verdict are made of."""
+    """The results from which tables, page and verdict are made."""
 
     plants: int
     seed: int
@@ -112,7 +117,7 @@ def summary(name: str, kind: str, results: list[CellResult], stages: Iterable[St
 
 
 def checks(evidence: BenchmarkEvidence) -> list[GoalCheck]:
-    """The goals that the tests made can be held to."""
+    """The goals that the tests of this call can be judged by."""
     found = [critical_check(evidence.critical), late_check(evidence.late)]
     if cells := sample_cells(evidence):
         met = sum(abs(difference) <= most for difference, most in cells)
@@ -131,12 +136,12 @@ def checks(evidence: BenchmarkEvidence) -> list[GoalCheck]:
 
 
 def compensator_check(summaries: list[SettingSummary]) -> GoalCheck:
-    """One compensator at least reaches all goals; for all settings together, not for a choice of them."""
+    """At least one compensator reaches all goals; judged only where all settings were tested."""
     best = [item.setting for item in summaries if item.meets]
     return GoalCheck(
         f"a compensator with J4 ≤ {percent(NOMINAL_GOAL)} in all cases and motions, "
         f"≤ {percent(PLANTS_GOAL)} on every plant, "
-        f"none unstable, force ≤ {FORCE:g} N where the reference's is",
+        f"none unstable, force ≤ {FORCE:g} N where the reference needs no more",
         ", ".join(best) or "none",
         "at least one",
         bool(best),
@@ -177,7 +182,7 @@ def late_check(found: list[LateForceTest]) -> GoalCheck:
     near = len(seen) == len(judged) and all(abs(value - JUDGED_DELAY) <= DELAY_GOAL for value in seen)
     read = ", ".join(f"{value * 1e3:.2f}" for value in seen) or "nothing"
     return GoalCheck(
-        f"a force {JUDGED_DELAY * 1e3:g} ms late ({SETTING}): J1 reads 0, the indicator of the force's path that delay",
+        f"a force {JUDGED_DELAY * 1e3:g} ms late ({SETTING}): J1 reads 0, the indicator of the force path that delay",
         f"J1 {'0' if quiet else 'not 0'}, force path {read} ms",
         f"J1 0, force path within {DELAY_GOAL * 1e3:g} ms",
         quiet and near,

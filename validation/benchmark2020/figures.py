@@ -20,16 +20,16 @@ from validation.benchmark2020.evidence import (
 from validation.benchmark2020.runs import NOMINAL
 from validation.proof import ProofFigure
 
-MOST = 300.0  # per cent, of the axis: beyond it a test tells no more than that it failed
+MOST = 300.0  # %, end of the axis: an error of three times the response is a failed test, however large it is
 
 
 def compensators(evidence: BenchmarkEvidence, canvas: Any) -> None:
-    """J4 of every test of every setting, the unstable ones at the axis' end."""
+    """J4 of every test of every setting; unstable ones are drawn at the end of the axis."""
     order = sorted(evidence.summaries, key=lambda item: item.order, reverse=True)
     places = {item.setting: place for place, item in enumerate(order)}
     axis = canvas.subplots()
     for drawn, label, marker, size, below in (
-        (True, "plants drawn", "|", 5, 0.25),
+        (True, "drawn plants", "|", 5, 0.25),
         (False, "nominal plant", "o", 3, 0.0),
     ):
         some = [item for item in evidence.results if (item.plant != NOMINAL) == drawn]
@@ -89,7 +89,7 @@ def table_3(evidence: BenchmarkEvidence, canvas: Any) -> None:
         axis.axhline(bound, color=REFERENCE, linestyle="--", linewidth=0.8)
     axis.set(
         xticks=range(width),
-        ylabel=f"deviation over what is allowed\n({percent(CELL)}, {DELAY_CELL * 1e3:g} ms)",
+        ylabel=f"deviation / allowed deviation\n({percent(CELL)}, {DELAY_CELL * 1e3:g} ms)",
     )
     axis.set_xticklabels(list(MEANINGS))
     if any(not math.isfinite(difference) for difference, _ in found):
@@ -100,21 +100,21 @@ def table_3(evidence: BenchmarkEvidence, canvas: Any) -> None:
 FIGURES = (
     ProofFigure(
         "compensators.png",
-        "J4 of every test of every setting, log scale: 4 cases × 3 motions on the nominal plant and on those drawn; "
-        "dashed and dotted the goals, 5 and 6 %",
+        "J4 of every test of every setting, log scale: 4 cases × 3 motions on the nominal plant and on drawn plants; "
+        "the goals, 5 and 6 %, are dashed and dotted",
         compensators,
         3.4,
     ),
     ProofFigure(
         "late_force.png",
-        "A force that comes late, with the adaptive model-based compensator: J1 and J2 hardly change, J4 grows; the "
-        "indicator of the force's path reads the delay",
+        "A force that arrives late, with the adaptive model-based compensator: J1 and J2 hardly change, J4 grows; the "
+        "indicator of the force path reads the delay",
         late_force,
         4.2,
     ),
     ProofFigure(
         "table3.png",
-        "Deviation of the 36 cells from the published Table 3, over what is allowed",
+        "Deviation of the 36 cells from the published Table 3, over the allowed deviation",
         table_3,
         2.6,
     ),

@@ -1,4 +1,4 @@
-"""A force that comes late: what the tracking criteria say of it, and what the indicator of the force's path says."""
+"""A force that arrives late: what the tracking criteria and the indicator of the force path show."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ from models.system import Effects, SensorEffects
 from validation.benchmark2020.problem import EL_CENTRO, SETTINGS, with_compensator
 from validation.benchmark2020.runs import CellResult, Stage, play
 
-DELAYS = (0.0, 0.5e-3, 1e-3, 2e-3, 3e-3, 5e-3, 7e-3, 10e-3)  # s
-SETTING = "amb"
+# S, from below the period of a loop to above a critical delay.
+DELAYS = (0.0, 0.5e-3, 1e-3, 2e-3, 3e-3, 5e-3, 7e-3, 10e-3)
+SETTING = "amb"  # an adaptive compensator that tracks well, so that the late force causes most of the error
 
 
 class LateForceTest(NamedTuple):
@@ -22,7 +23,7 @@ class LateForceTest(NamedTuple):
 
     delay: float
     result: CellResult
-    path: ForcePath | None  # None where the loop is unstable or nothing can be said
+    path: ForcePath | None  # None where the loop is unstable or the path cannot be estimated
 
 
 def late_forces(stages: Sequence[Stage], tell: Tell = untold) -> list[LateForceTest]:

@@ -14,7 +14,7 @@ TITLE = "The 2020 benchmark of real-time hybrid simulation"
 
 
 def page(evidence: BenchmarkEvidence, checks: Sequence[GoalCheck], images: Sequence[Photo]) -> str:
-    """The page's text; pictures stand inside."""
+    """The HTML text with the pictures embedded."""
     body = render(
         "benchmark2020.html",
         title=TITLE,

@@ -1,4 +1,4 @@
-"""The benchmark as plans of this system: its four cases, the motions at hand, the settings compared, other plants."""
+"""The benchmark as plans of this system: four cases, the available motions, the compared settings, drawn plants."""
 
 from __future__ import annotations
 
@@ -14,17 +14,18 @@ from common.plan.read import load
 from loop import substructure
 
 PLAN = Path(__file__).resolve().parents[2] / "rths" / "plans" / "benchmark2020.toml"
-REST = 10.0  # s of still ground after the record
-FORCE = 8900.0  # N, limit of the transfer system
-DELAY = 0.0251  # s, of the transfer system at low frequency
-# the transfer system inverted: –, s, s², s³; and a lag with dead time of the same first three coefficients
+REST = 10.0  # s of still ground after the record, in which the floors come to rest
+FORCE = 8900.0  # N, limit of the transfer system as published
+DELAY = 0.0251  # s, of the transfer system at low frequency: a1/a0 below
+# Coefficients (–, s, s², s³) of the inverse of the published transfer system at low frequency, and the lag with dead
+# time whose first three coefficients are the same.
 INVERSE = {"a0": 0.99254, "a1": 0.024889, "a2": 1.0662e-4, "a3": 3.8564e-7}
 LAG = {"delay": 0.00472, "time_constant": 0.02017, "gain": 1.0 / 0.99254, "order": 3.0}
 
 
 @dataclass(frozen=True)
 class PartitionCase:
-    """A partition: the reference building's floors and damping; the specimen is the same in all."""
+    """A published partition: floors and damping of the reference building; the specimen is the same in all."""
 
     number: int
     mass: float  # kg, of each floor
@@ -32,7 +33,7 @@ class PartitionCase:
 
     @property
     def name(self) -> str:
-        """As tables say it."""
+        """The name in tables."""
         return f"case {self.number}"
 
 
@@ -86,7 +87,7 @@ SETTINGS = {
 
 
 def planned(case: PartitionCase, motion: Motion) -> Plan:
-    """The plan of one test with the sample controller: the record, then ten seconds of still ground."""
+    """The plan of one test with the sample controller: the record, then `REST` of still ground."""
     base = load(PLAN)
     plan = replace(
         base,
@@ -99,7 +100,7 @@ def planned(case: PartitionCase, motion: Motion) -> Plan:
 
 
 def with_compensator(plan: Plan, chosen: CompensatorTable) -> Plan:
-    """The plan with another compensator of the actuator; what is done to the measured force stays."""
+    """The plan with another compensator of the actuator; the compensation of the measured force stays."""
     compensator = replace(plan.compensator, kind=chosen.kind, parameters=dict(chosen.parameters))
     return replace(plan, compensator=compensator)
 
@@ -113,11 +114,11 @@ class DrawnSystem(NamedTuple):
     stiffness: float  # N/m, of the specimen
 
 
-SPREAD = DrawnSystem(1.3, 3.3, 3.3e3, 5e4)  # standard deviations
+SPREAD = DrawnSystem(1.3, 3.3, 3.3e3, 5e4)  # standard deviations as published
 
 
 def draw(plan: Plan, count: int, seed: int) -> list[DrawnSystem]:
-    """`count` plants, normally distributed about the plan's; a draw that is not positive is drawn again."""
+    """`count` plants, normally distributed about the plan's; draws with a value that is not positive are repeated."""
     servo = plan.actuator.servo
     middle = np.array([servo.leakage, servo.valve_damping, servo.valve_stiffness, plan.column.stiffness])
     generator = np.random.default_rng(seed)
@@ -130,7 +131,7 @@ def draw(plan: Plan, count: int, seed: int) -> list[DrawnSystem]:
 
 
 def with_plant(plan: Plan, plant: DrawnSystem) -> Plan:
-    """The plan on another plant; the whole building stays, so that the numerical part leaves out what was drawn."""
+    """The plan on another plant; the whole building stays, so the numerical part is without the drawn specimen."""
     servo = replace(
         plan.actuator.servo,
         leakage=plant.leakage,
@@ -139,7 +140,9 @@ def with_plant(plan: Plan, plant: DrawnSystem) -> Plan:
     )
     own = plan.structure.experimental
     if own is None:
-        raise ValueError("The plan does not say what the specimen takes over of the building.")
+        raise ValueError(
+            "The plan has no [structure.experimental], the specimen's share of the building: add it."
+        )
     experimental = replace(own, stiffness=plant.stiffness)
     return replace(
         plan,

@@ -34,25 +34,27 @@ from validation.benchmark2020.problem import (
     with_plant,
 )
 
-RUNAWAY, ASTRAY = 10.0, 100.0  # times the reference's peak: targets and commands beyond are of unstable loops
+# Times the reference's peak: larger targets and commands belong to unstable loops (ADR 0026). A stable loop's target is
+# near the reference; its commands may be far larger, because compensators amplify noise.
+RUNAWAY, ASTRAY = 10.0, 100.0
 NOMINAL = 0  # the plant of the plan; 1, 2, … are drawn about it
-LEAD_MOST = 0.05  # s, of the two-sided delay
+LEAD_MOST = 0.05  # s, largest two-sided delay: twice that of the uncompensated transfer system
 
 
 class Stage(NamedTuple):
-    """What all tests of one case under one motion share."""
+    """Data that all tests of one case under one motion share."""
 
     case: PartitionCase
     motion: Motion
     plants: Sequence[Plan]  # the nominal one first; with the sample controller
     ground: Array
-    reference: Array  # (ticks, floors) m: the whole building computed
+    reference: Array  # (ticks, floors) m: response of the whole building, computed
     noise: Array  # (ticks, 2) of the readings
-    needed: Sequence[float]  # N, largest force that the reference's motion asks of each plant's specimen
+    needed: Sequence[float]  # N, largest force of each plant's specimen under the reference's motion
 
 
 class CellResult(NamedTuple):
-    """One test: how near the reference it came, and the peaks that have limits; inf where the loop is unstable."""
+    """Errors of one test against the reference, and the peaks that have limits; inf where the loop is unstable."""
 
     setting: str
     case: int
@@ -68,7 +70,7 @@ class CellResult(NamedTuple):
 
 
 def stage(case: PartitionCase, motion: Motion, plants: int, seed: int) -> Stage:
-    """A case under a motion, its reference computed, its plants and its noise drawn."""
+    """Compute the reference of a case under a motion, and draw its plants and its noise."""
     plan = planned(case, motion)
     ground = substructure.ground_rows(plan, substructure.motion(plan))
     levels = COLUMN.noise(plan)
@@ -141,7 +143,7 @@ def sweep(
     tell: Tell = untold,
     total: int = 0,
 ) -> list[CellResult]:
-    """Every setting on every plant of every stage, `jobs` at once: kernels release the interpreter's lock."""
+    """Test every setting on every plant of every stage, `jobs` at once: kernels release the interpreter's lock."""
     results: list[CellResult] = []
     with threadpool_limits(1), ThreadPoolExecutor(jobs) as pool:
         for on in stages:
@@ -153,7 +155,7 @@ def sweep(
 
 
 def one_of(on: Stage, settings: Mapping[str, CompensatorTable]) -> Callable[[tuple[str, int]], CellResult]:
-    """What plays a setting by name on a plant by number."""
+    """A function that tests a setting, given by name, on a plant, given by number."""
 
     def test(asked: tuple[str, int]) -> CellResult:
         name, plant = asked

@@ -1,4 +1,4 @@
-"""The tables of the benchmark, as heads and rows of text, for the terminal and the page alike."""
+"""The tables of the benchmark as heads and rows of text, for the terminal and the page."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MISSING, UNSTABLE = "–", "unstable"
 
 
 def tables(evidence: BenchmarkEvidence) -> list[TitledTable]:
-    """All of them; those without rows are left out."""
+    """All tables that have rows."""
     found = (
         table_3(evidence),
         compensators(evidence),
@@ -57,7 +57,7 @@ def cells(values: tuple[float, ...]) -> list[str]:
 
 
 def compensators(evidence: BenchmarkEvidence) -> TitledTable:
-    """Every setting at its worst, the best first."""
+    """The worst results of every setting, the best setting first."""
     rows = [
         [
             item.setting,
@@ -83,7 +83,7 @@ def compensators(evidence: BenchmarkEvidence) -> TitledTable:
         "force, N",
     ]
     return TitledTable(
-        f"Compensators: the worst of 4 cases × 3 motions, nominal and of {drawn} drawn",
+        f"Compensators: worst of 4 cases × 3 motions, on the nominal plant and on {drawn} drawn",
         head,
         rows,
     )
@@ -104,7 +104,7 @@ def by_motion(evidence: BenchmarkEvidence) -> TitledTable:
 
 
 def late(evidence: BenchmarkEvidence) -> TitledTable:
-    """What the criteria and the indicator say of a force that comes late."""
+    """The criteria and the indicator of the force path where the force arrives late."""
     rows = []
     for item in evidence.late:
         found, path = item.result.found, item.path
@@ -123,7 +123,7 @@ def late(evidence: BenchmarkEvidence) -> TitledTable:
             ]
         )
     head = ["", "force late by, ms", "J1, ms", "J2, %", "J4, %", "force path, ms", "± (95 %), ms"]
-    return TitledTable("A late force (amb, El Centro): J1 and J2 do not see it", head, rows)
+    return TitledTable("A late force (amb, El Centro): J1 and J2 do not show it", head, rows)
 
 
 def critical(evidence: BenchmarkEvidence) -> TitledTable:

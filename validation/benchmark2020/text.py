@@ -24,7 +24,7 @@ def show(evidence: BenchmarkEvidence, checks: list[GoalCheck]) -> None:
 
 
 def as_json(evidence: BenchmarkEvidence, checks: list[GoalCheck]) -> dict[str, Any]:
-    """Everything as plain values in SI units; what is no finite number is null."""
+    """All results as plain values in SI units; values that are not finite become null."""
     return {
         "plants": evidence.plants,
         "seed": evidence.seed,
@@ -54,5 +54,5 @@ def values_of(result: CellResult) -> dict[str, Any]:
 
 
 def plain(value: Any) -> Any:
-    """A value that JSON has."""
+    """A value that JSON can hold."""
     return None if isinstance(value, float) and not math.isfinite(value) else value

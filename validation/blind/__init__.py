@@ -1,1 +1,1 @@
-"""The blind trial: cases whose effect is withheld, diagnosed by a process that sees recordings only, and scored."""
+"""The blind trial: cases with a hidden effect, diagnosed by a process that sees the recordings only, and scored."""

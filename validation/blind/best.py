@@ -1,4 +1,4 @@
-"""How far the true effects close the gap of a case: what a diagnosis that found everything would reach."""
+"""How far the true effects close the gap of a case: the most that a diagnosis can reach."""
 
 from __future__ import annotations
 
@@ -16,17 +16,19 @@ from diagnosis.report.records import Report
 from laboratories import kinds
 from simulation import virtual
 
-LEAST = 0.1  # share of the gap that the truth closes: below it the gap is one of chance, which nobody closes
+# Share of the gap that the truth closes. Where it is smaller, nine tenths of the gap are a chance difference of two
+# draws of noise, and a share of the rest would divide by almost nothing.
+LEAST = 0.1
 
 
 def silent_run(plan: Plan, reality: Reality, path: Path) -> Run:
-    """The test with the true laboratories and silent sensors; its recording is written to `path`."""
+    """The test with the true laboratories and sensors without noise; its recording is written to `path`."""
     virtual.run(virtual.assemble(plan, reality, path), lambda: "")
     return read(path)
 
 
 def gaps(recorded: Run, true: Run, plan: Plan) -> dict[str, float]:
-    """rms(recorded - true)/rms(recorded) of every measured signal; of names at several roles, of the first."""
+    """rms(recorded - true)/rms(recorded) of every measured signal; of a name at several roles, that of the first."""
     found: dict[str, float] = {}
     for role, kind in kinds.kinds_of(plan).items():
         for name in kind.channels.names:
@@ -40,10 +42,10 @@ def gaps(recorded: Run, true: Run, plan: Plan) -> dict[str, float]:
 
 
 def best_closed(reports: Sequence[Report], left: Mapping[str, float]) -> float:
-    """Share of the gap above the noise that the true effects close; NaN where the gap is one of chance.
+    """Share of the gap above the noise that the true effects close; NaN where chance makes the gap.
 
-    `left` are the gaps of the true laboratories by signal. Of several reports the one in which they close most counts;
-    where no report tells its gap, all of it.
+    `left` are the gaps of the true laboratories by signal. Of several reports the largest share counts; where no report
+    has a gap, it is 1.
     """
     shares = [share for report in reports if not math.isnan(share := share_closed(report, left))]
     best = max(shares, default=1.0)

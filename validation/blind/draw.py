@@ -27,9 +27,10 @@ from validation.blind.lots import Lot
 from validation.blind.sets import MILD, SETS, SHARES
 
 KINDS = (*SHARES, "many", MATERIAL)
-TWO_TOLERANCES = 2.0  # that normal parameters stay within in 95 of 100 cases
-
-PATIENCE = 200_000  # draws without a case that was asked for
+TWO_TOLERANCES = 2.0  # standard deviations: 95 of 100 normal parameters are within
+# Draws after which a wanted case is taken not to exist. A single effect comes at least once in about 600 cases, a given
+# pair once in some ten thousand; the draws take about two minutes.
+PATIENCE = 200_000
 
 
 def draw(
@@ -43,8 +44,8 @@ def draw(
 ) -> list[Case]:
     """The first `count` cases of a set, of the kinds in `only` and with no effects but those in `effects`.
 
-    Case k is the same whatever else is asked for; what is not asked for is passed over. With `effects`,
-    clean laboratories are passed over too. Without a `trial` they are of the default test.
+    Case k is the same for any choice; other cases are skipped. With `effects`, clean laboratories are skipped too.
+    Without a `trial` the cases are of the default test.
 
     Raises:
         InputError: an unknown kind or effect, or no such case is found.
@@ -80,7 +81,9 @@ def _asked_for(
             yield begun
         index += 1
     wanted = ", ".join(sorted(effects)) or "any effect"
-    raise InputError(f"There is no case of kind {', '.join(sorted(kinds))} with {wanted}: ask for others.")
+    raise InputError(
+        f"There is no case of kind {', '.join(sorted(kinds))} with {wanted}: choose another kind or effect."
+    )
 
 
 def begin(index: int, seed: int, set_: str, library: Library) -> Beginning:
@@ -119,7 +122,7 @@ def several(library: Library, lot: Lot) -> tuple[str, ...]:
 
 
 def of_catalogue(library: Library, *lot: str | int, among: Collection[str] = ()) -> str:
-    """An effect of the catalogue; each family as likely as any other, whatever its number of signals."""
+    """An effect of the catalogue; all families are equally likely, whatever their number of signals."""
     effects = [effect for effect in library.catalogue.values() if not among or effect.name in among]
     family = lots.chosen({effect.family for effect in effects}, *lot)
     return lots.chosen((effect.name for effect in effects if effect.family == family), *lot)
@@ -142,10 +145,9 @@ def drawn(begun: Beginning, trial: TrialBasis) -> Case:
 
 
 def draw_effect(lot: Lot, kind: str, name: str, library: Library, *, own: bool = False) -> Laid:
-    """An effect with its parameters, each a draw of its own; one of a pair is of good size, one of many is mild.
+    """An effect with its parameters, each a draw of its own; effects of a pair are strong, one of many is mild.
 
-    Where several laboratories can have it, one of them is chosen by name as well. With `own` it lies in an
-    independent laboratory.
+    Where several laboratories can have it, one of them is drawn, too. With `own` it is in an independent laboratory.
     """
     if kind == MATERIAL:
         return draw_material(lot, name)
@@ -171,7 +173,7 @@ def draw_effect(lot: Lot, kind: str, name: str, library: Library, *, own: bool =
 
 
 def draw_material(lot: Lot, name: str) -> Laid:
-    """A material of OpenSees with its numbers, in the place of the master's column."""
+    """A material of OpenSees with its parameters, in the place of the master's column."""
     from validation.blind.labs.materials import BENDS, MATERIALS
 
     ranges = {"d": BENDS, **MATERIALS[name.removeprefix("opensees.")].ranges}
@@ -180,9 +182,9 @@ def draw_material(lot: Lot, name: str) -> Laid:
 
 
 def draw_parameter(generator: np.random.Generator, item: Parameter, part: str = "") -> float:
-    """A value between the weakest and the strongest of a parameter's sizes, log-uniform; a factor on both sides.
+    """A log-uniform value between the weakest and the strongest of a parameter's sizes; of a factor, on either side.
 
-    Of that range `part` takes the "strong" half, the "mild" half, or all.
+    `part` limits it to the "strong" or the "mild" half of that range.
     """
     if item.shape or not np.isfinite(item.null):
         weak, full = item.sizes[0], item.sizes[-1]

@@ -1,4 +1,4 @@
-"""Diagnoses by another process, which is given a folder of recordings and nothing else."""
+"""Diagnoses by another process, which is given nothing but a folder of recordings."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 class DiagnosisAnswer(NamedTuple):
-    """What a diagnosis said of one recording, and how long it took."""
+    """The reports of a diagnosis on one recording, and how long it took."""
 
     reports: Mapping[str, Report]  # by the slave's name, empty for the one without; none where it failed
     seconds: float
     error: str = ""
 
 
-GRACE = 3.0  # s, in which an interrupted process may end those that it started
+GRACE = 3.0  # s, in which an interrupted process may end its own workers; nobody waits longer after Ctrl-C
 NONE = DiagnosisAnswer({}, float("nan"), "the diagnosis gave no answer")
 
 
@@ -43,10 +43,10 @@ def diagnose_all(
     diagnosis: str = DIAGNOSIS,
     done: Callable[[str], None] = lambda _name: None,
 ) -> dict[str, DiagnosisAnswer]:
-    """Answers by the name of the recording; `done` hears of every one that is finished.
+    """Answers by the name of the recording; `done` is called with the name of each finished one.
 
     Raises:
-        InputError: the process could not do its work.
+        InputError: the process failed.
     """
     with tempfile.TemporaryDirectory(prefix="rths-blind-") as place:
         out = Path(place) / "reports"
@@ -77,12 +77,12 @@ def _work(words: list[str], place: Path, jobs: int, done: Callable[[str], None])
                 _end(process)
                 raise
     if process.returncode:
-        said = complaints.read_text(encoding="utf-8").strip().splitlines() or ["it ended without a word"]
+        said = complaints.read_text(encoding="utf-8").strip().splitlines() or ["it ended without a message"]
         raise InputError(f"The process that diagnoses failed: {said[-1].removeprefix('rths: ')}")
 
 
 def _end(process: subprocess.Popen[str]) -> None:
-    """End the process with those that it started; Ctrl-C on a terminal has told it already."""
+    """End the process and those that it started; after Ctrl-C on a terminal it has had the signal already."""
     for word in (None, signal.SIGINT, signal.SIGKILL):
         if word is not None:
             process.send_signal(word)
@@ -92,7 +92,7 @@ def _end(process: subprocess.Popen[str]) -> None:
 
 
 def environment(jobs: int) -> dict[str, str]:
-    """What the diagnosing process may know of this one's environment: where programs are, no more."""
+    """Environment of the diagnosing process: where programs are, and nothing that could tell it the truth."""
     kept = {name: os.environ[name] for name in KEPT if name in os.environ}
     threads = dict.fromkeys(THREADS, "1") if jobs != 1 else {}
     return kept | threads | {"PYTHONPATH": str(HOME), "PYTHONHASHSEED": "0"}
@@ -100,6 +100,6 @@ def environment(jobs: int) -> dict[str, str]:
 
 def _answer(path: Path) -> DiagnosisAnswer:
     data = json.loads(path.read_text(encoding="utf-8"))
-    where = f"What the diagnosis said of {path.stem}"
+    where = f"The report on {path.stem}"
     reports = {name: read.report(said, where) for name, said in data.get("reports", {}).items()}
     return DiagnosisAnswer(reports, float(data["seconds"]), data.get("error", ""))

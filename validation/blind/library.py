@@ -1,4 +1,4 @@
-"""What a case of the blind trial may hide: the catalogue, other formulas of it, and effects outside it."""
+"""The effects that a case of the blind trial may hide: the catalogue, other formulas of it, and effects outside it."""
 
 from __future__ import annotations
 
@@ -24,20 +24,16 @@ PARTS = {
     TABLE: ("table", "damper", "sensors"),
     OWN: TABLES_OF_KIND[OWN],
 }
-OWN_KERNEL = "own kernel"  # in place of a formula: nobody has written this laboratory a second time
+OWN_KERNEL = "own kernel"  # in place of a formula: there is no second implementation of this laboratory
 MATERIAL = "material"  # kind of case whose column is a material of OpenSees
 MATERIAL_LAB = "validation.blind.labs.material_lab:MaterialLab"
-REPLACED = (
-    "formula",
-    "unknown",
-    MATERIAL,
-)  # kinds of cases in which a rig stands in for the emulated laboratory
+REPLACED = ("formula", "unknown", MATERIAL)  # kinds of cases in which a rig replaces the emulated laboratory
 
 Reached = Mapping[str, Mapping[str, float]]  # largest magnitudes by role and signal
 
 
 class Stranger(NamedTuple):
-    """An effect that the catalogue does not hold."""
+    """An effect that is not in the catalogue."""
 
     site: str
     ranges: Mapping[str, tuple[float, float]]  # weakest and strongest value by parameter
@@ -53,11 +49,11 @@ class Library:
     places: Mapping[str, tuple[str, ...]] = field(
         default_factory=dict
     )  # roles by effect, none for the building's
-    rigs: tuple[str, ...] = ()  # roles in whose place a rig of the trial can stand
+    rigs: tuple[str, ...] = ()  # roles that a rig of the trial can replace
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Every effect there is."""
+        """All effects."""
         return (*self.catalogue, *self.strangers)
 
     def independent(self) -> tuple[str, ...]:
@@ -68,25 +64,25 @@ class Library:
         return tuple(name for name in self.catalogue if name in known and self.roles(name, replaced=True))
 
     def roles(self, name: str, *, replaced: bool) -> tuple[str, ...]:
-        """The roles that can have an effect, of those with `replaced` that a rig of the trial can stand in for."""
+        """The roles that can have an effect; with `replaced` those of them that a rig of the trial can replace."""
         return tuple(role for role in self.places.get(name, ()) if role in self.rigs or not replaced)
 
 
 def parts_of(kind: str) -> tuple[str, ...]:
-    """The tables of a plan that the rig in the place of a laboratory takes as options, by the kind's text."""
+    """The tables of a plan that the rig for a kind of laboratory takes as options; `kind` as in the plan."""
     return PARTS[known_kind(kind)]
 
 
 def rig_of(kind: str, options: Mapping[str, Any]) -> dict[str, Any]:
-    """The table of the rig that stands in for a laboratory of a kind; one of a user's kind is told which."""
+    """The table of the rig that replaces a laboratory of a kind; for a user's kind its options name that kind."""
     told = {"kind": kind} if known_kind(kind) == OWN else {}
     return {"class": LABS[known_kind(kind)], "options": {**told, **options}}
 
 
 def of_plan(plan: Plan, reached: Callable[[], Reached]) -> Library:
-    """What the catalogue and the laboratories of the trial let the cases of a plan hide.
+    """The effects that the cases of a plan may hide, by the catalogue and the laboratories of the trial.
 
-    `reached` computes what the signals of the plan's own test reach, by which effects on users' kinds are sized.
+    `reached` computes the peaks of the signals in the plan's own test, which give the sizes of effects on users' kinds.
 
     Raises:
         InputError: a kind of the plan cannot be loaded.
@@ -122,7 +118,7 @@ def having(name: str, held: Mapping[str, set[str]]) -> tuple[str, ...]:
 def of_rigs(
     plan: Plan, reached: Callable[[], Reached]
 ) -> tuple[dict[str, tuple[str, ...]], dict[str, Stranger]]:
-    """Formulas by effect, and effects of no catalogue, of all rigs that can stand in for a laboratory of the plan."""
+    """Formulas by effect, and effects in no catalogue, of all rigs that can replace a laboratory of the plan."""
     from validation.blind.labs import FORMULAS, UNCATALOGUED, device_lab
 
     formulas = dict(FORMULAS)
@@ -141,12 +137,12 @@ def of_rigs(
 
 
 def own_kernels(plan: Plan) -> tuple[str, ...]:
-    """The roles with a laboratory of a user's kind, which the trial plays by that kind's own kernel."""
+    """The roles with a laboratory of a user's kind, which the trial computes by that kind's own kernel."""
     return tuple(role for role, kind in plan.kinds.items() if known_kind(kind) == OWN)
 
 
 def replaceable(plan: Plan, role: str) -> bool:
-    """Whether a rig of the trial can stand in for a role's laboratory: it knows the models that the plan chooses."""
+    """Whether a rig of the trial can replace a role's laboratory, because it has the models that the plan chooses."""
     from validation.blind.labs import column_lab, table_lab
 
     seen = plan.of(role)

@@ -1,6 +1,6 @@
-"""Draws by name: what is drawn depends on the names of the draw alone, not on how many draws came before it.
+"""Draws by name: a draw depends on its names alone, not on the number of draws before it.
 
-So a catalogue that grows, or an effect that gets a further parameter, leaves all other draws as they were.
+So a catalogue that grows, or an effect that gets a further parameter, does not change any other draw.
 """
 
 from __future__ import annotations
@@ -10,11 +10,11 @@ from collections.abc import Iterable
 
 import numpy as np
 
-Lot = tuple[str | int, ...]  # seed, set and number of a case: what all of its draws are named by
+Lot = tuple[str | int, ...]  # seed, set and number of a case: the beginning of the names of all its draws
 
 
 def number(*words: str | int) -> int:
-    """A number of 128 bits: the same for the same words on every machine, without relation for any others."""
+    """A number of 128 bits: the same for the same words on every machine, unrelated for any others."""
     text = "\0".join(map(str, words))
     return int.from_bytes(hashlib.blake2b(text.encode(), digest_size=16).digest(), "big")
 
@@ -25,9 +25,9 @@ def generator(*words: str | int) -> np.random.Generator:
 
 
 def chosen(names: Iterable[str], *words: str | int) -> str:
-    """One of the names, each as likely as any other: the one with the largest number behind the words.
+    """One of the names, all equally likely: the one with the largest number for the words and the name.
 
-    A further name wins its share of the draws; the winner of every other draw stays (rendezvous hashing: Thaler,
+    A further name takes its share of the draws; all other draws stay the same (rendezvous hashing: Thaler,
     Ravishankar, IEEE/ACM Trans. Networking 6 (1998) 1-14).
     """
     return max(names, key=lambda name: number(*words, name))

@@ -1,9 +1,9 @@
-"""What somebody could see who knows everything but the nominal parameters: how far a case's effects stand out.
+"""The separation of a case's effects from noise and tolerances, by a test that knows everything else: the oracle.
 
-The oracle knows which effects a case hides, how large they are, the noise of every sensor with its colour and what the
-logger does; of the laboratories' parameters it knows, as everybody does, the nominal values and their tolerances. With
-d the change of all readings that the effects make on the recorded commands, and J their changes with each parameter by
-one standard deviation of its tolerance, both whitened with the noise, the most powerful test has the separation
+The oracle knows which effects a case hides and how large they are, the noise of every sensor with its colour and what
+the logger does; of the laboratories' parameters it knows only the nominal values and their tolerances. With d the
+change of all readings by the effects under the recorded commands, and J their changes with each parameter by one
+standard deviation of its tolerance, both whitened with the noise, the most powerful test has the separation
 
     s² = dᵀ (I + J Jᵀ)⁻¹ d
 
@@ -35,9 +35,9 @@ from validation.blind.logger.loggers import LOGGERS, Logger
 from validation.blind.size import levels, messages, play, play_building
 
 SEEN = 6.18  # twice the 99.9 % point of the normal distribution
-FLOOR = 1e-4  # of white noise, in amplitude: where coloured noise fades, two solutions of one model differ by so much
-WIDTH = 1.0  # Hz, to each side of the mains that hum hides
-RANDOM = (".noise", ".missing")  # effects without a waveform of their own: only their energy is seen
+FLOOR = 1e-4  # of white noise, in amplitude: where coloured noise fades, two solutions of one model differ by this much
+WIDTH = 1.0  # Hz, to each side of the mains, which hum hides: where the leakage of a line in 30 s has fallen to 1 %
+RANDOM = (".noise", ".missing")  # effects without a waveform of their own: only their energy can be tested
 UNIFORM = math.sqrt(3.0)  # half the width of a uniform distribution over its standard deviation
 Signals = Mapping[str, Array]
 Played = Callable[[Case, tuple[Laid, ...]], Signals]
@@ -81,7 +81,7 @@ def less(one: Signals, other: Signals) -> dict[str, Array]:
 
 
 def noise_at(case: Case, role: str) -> dict[str, tuple[float, str]]:
-    """Rms and unit of the noise that each signal of a role is compared with, of the building's those of positions."""
+    """Rms and unit of the noise of each signal of a role; for the building that of the laboratories' positions."""
     plan = plans.from_tables(case.plan, Path())
     if role:
         noise = levels(case, role)
@@ -143,7 +143,7 @@ def whitening(
 
 
 def amplitude(logger: Logger, level: float, unit: str, values: Array, interval: float) -> Array:
-    """Rms of the noise at each frequency above zero, of rms `level`, with what the logger adds to it."""
+    """Noise amplitude at each frequency above zero, for noise of rms `level`, including that of the logger."""
     frequency: Array = np.asarray(np.fft.rfftfreq(values.size, interval)[1:], dtype=np.float64)
     shape = colour_shape(logger.colour, frequency, 1.0 / interval)
     power = level**2 * (shape**2 + FLOOR**2)
@@ -158,6 +158,6 @@ def amplitude(logger: Logger, level: float, unit: str, values: Array, interval: 
 
 
 def at_link(case: Case, role: str, run: Run) -> float:
-    """The square of the separation of what messages of a slave's link changed."""
+    """The square of the separation of a link's effects, from the changed messages of a slave."""
     changed = messages(case, run, role)
     return sum(float(np.sum((values / level) ** 2)) for values, level in changed if level > 0.0)

@@ -1,4 +1,4 @@
-"""Recording a case: what it hides stays in the memory of the process that asked."""
+"""Recording a case; its truth stays in the memory of the calling process."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from validation.spread import spread
 
 @dataclass(frozen=True)
 class RecordedCase:
-    """Where a case was recorded, and how large what it hides is."""
+    """The recording of a case, and the sizes of its hidden effects."""
 
     index: int
     name: str  # of the file; drawn at random, so that it reveals nothing
@@ -82,5 +82,5 @@ def play_other(case: Case, path: Path) -> None:
 
 
 def truth(case: Case) -> str:
-    """What a case hides, in words."""
+    """The hidden effects of a case in words."""
     return " and ".join(item.name for item in case.laid) or "clean"

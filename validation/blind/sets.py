@@ -1,7 +1,7 @@
-"""The sets of cases: what each draws its laboratories from.
+"""The sets of cases, each with its own distribution of laboratories.
 
-Sets share no draw. The thresholds of the diagnosis are set on "tune"; "judge" is for judging only. The others ask what
-"judge" does not: each says so in its text.
+Sets share no draw. The thresholds of the diagnosis are set on "tune"; "judge" is for judging only. Each other set tests
+something that "judge" does not; its text says what.
 """
 
 from __future__ import annotations
@@ -17,8 +17,10 @@ from validation.blind.logger.loggers import LOGGERS
 if TYPE_CHECKING:
     from validation.blind.lots import Lot
 
-# what may be wrong in a laboratory, and in how many of all cases it is
-MILD = 9  # faults at most in a laboratory of the kind "many"
+# Largest number of effects of a case of the kind "many": three times what a diagnosis names together.
+MILD = 9
+# Share of the kinds of case. Half are of the catalogue, which has most effects to cover; of the others 300 cases
+# contain 30 or more, so that a rate of 90 % is known to ±11 points.
 SHARES = {"catalogue": 0.50, "formula": 0.15, "unknown": 0.10, "pair": 0.10, "clean": 0.15}
 
 
@@ -26,7 +28,7 @@ SHARES = {"catalogue": 0.50, "formula": 0.15, "unknown": 0.10, "pair": 0.10, "cl
 class CaseSet:
     """How the cases of a set are drawn."""
 
-    text: str  # what it asks, for the help
+    text: str  # for --help
     shares: Mapping[str, float] = field(default_factory=lambda: SHARES)  # of kinds of case
     turns: tuple[str, ...] = ()  # kinds that take turns instead, a round of loggers each
     loggers: tuple[
@@ -34,7 +36,7 @@ class CaseSet:
     ] = ()  # taken in turn by the number of the case, none for the test's own recording
     # True parameters are normal about the nominal ones, by tolerances as standard deviations.
     normal: bool = False
-    own: bool = False  # every laboratory that has one is played by its independent code
+    own: bool = False  # every laboratory that has independent code is played by it
     materials: tuple[str, ...] = ()  # OpenSees' materials in the column's place, taken in turn
     # A second motion is recorded, on which the diagnosis judges what it found on the first.
     twice: bool = False
@@ -63,7 +65,7 @@ class CaseSet:
 
 SETS = {
     "judge": CaseSet("for judging only"),
-    "tune": CaseSet("where thresholds are set"),
+    "tune": CaseSet("for setting thresholds"),
     "loggers": CaseSet(
         "clean laboratories and single effects through data loggers",
         turns=("clean", "catalogue"),
@@ -72,7 +74,7 @@ SETS = {
     "normal": CaseSet("true parameters normal about the nominal ones", normal=True),
     "many": CaseSet("up to nine mild faults at once", {"clean": 0.1, "many": 0.9}),
     "independent": CaseSet(
-        "clean laboratories, single effects and pairs in code of their own",
+        "clean laboratories, single effects and pairs in independent code",
         {"clean": 0.35, "formula": 0.3, "pair": 0.35},
         own=True,
     ),

@@ -1,8 +1,8 @@
-"""How large an effect is on its own: what it does to a part that is given the recorded inputs, over the noise.
+"""The size of a single effect: its change of a part's outputs under the recorded inputs, over the noise.
 
-The laboratory that has it, or the building, is played with and without the effect, sensors silent, on the inputs
-that the recording holds. Of each signal the rms of the difference is divided by the rms of its true
-noise; the largest counts. The size of an effect of the link is measured by the messages that it changed.
+The laboratory that has the effect, or the building, is simulated with and without it under the recorded inputs,
+without noise. The rms of each signal's difference is divided by the rms of its true noise; the largest ratio counts.
+The size of an effect of the link is measured by the messages that it changed.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from laboratories.kinds import kind_of, kinds_of
 from loop.names import sent_names
 from validation.blind.cases.case import Case, Laid, of_role, reality
 
-Differences = list[tuple[Values, float]]  # each with the rms noise that it is compared with
+Differences = list[tuple[Values, float]]  # each with the rms noise to compare with
 
 
 def sizes(case: Case, path: Path) -> tuple[float, ...]:
@@ -57,14 +57,14 @@ def levels(case: Case, role: str) -> dict[str, float]:
 
 
 def of_laboratory(case: Case, item: Laid, run: Run) -> Differences:
-    """What an effect does to the readings of the laboratory that has it, on the recorded commands."""
+    """Changes of the readings of the laboratory that has an effect, under the recorded commands."""
     with_effect, without = (play(case, laid, run, item.role) for laid in ((item,), ()))
     noise = levels(case, item.role)
     return [(values - without[name], noise[name]) for name, values in with_effect.items()]
 
 
 def play(case: Case, laid: tuple[Laid, ...], run: Run, role: str) -> dict[str, Values]:
-    """A laboratory's readings on the recorded commands."""
+    """A laboratory's readings under the recorded commands."""
     from loop import rigs
 
     kind = kind_of(plans.from_tables(case.plan, Path()), role)
@@ -81,9 +81,9 @@ def play(case: Case, laid: tuple[Laid, ...], run: Run, role: str) -> dict[str, V
 
 
 def of_building(case: Case, item: Laid, run: Run) -> Differences:
-    """What an effect does to what the building wants, on the recorded measurements.
+    """Changes of the building's targets by an effect, under the recorded measurements.
 
-    A target is computed, not read, so it is compared with the noise of the position beside it.
+    A target is computed and has no noise, so it is compared with the noise of the measured position.
     """
     with_effect, without = (play_building(case, laid, run) for laid in ((item,), ()))
     kinds = kinds_of(plans.from_tables(case.plan, Path()))
@@ -93,7 +93,7 @@ def of_building(case: Case, item: Laid, run: Run) -> Differences:
 
 
 def play_building(case: Case, laid: tuple[Laid, ...], run: Run) -> dict[str, Values]:
-    """What the building wants of each role's laboratory, and the ground's acceleration (no role)."""
+    """The building's targets for each role's laboratory, and the ground acceleration (no role)."""
     from master.assembly import master_step
 
     plan = plans.from_tables(case.plan, Path())
@@ -122,7 +122,7 @@ def share_of(run: Run, role: str, name: str) -> Values:
 
 
 def messages(case: Case, run: Run, role: str) -> Differences:
-    """The messages of a link that arrived minus those that would have arrived in time."""
+    """Values of the messages that were used minus those of messages without delay or loss."""
     plan = plans.from_tables(case.plan, Path())
     channels, noise, slave = kind_of(plan, role).channels, levels(case, role), run.columns[role]
     ticks = min(run.ticks(MASTER), run.ticks(role))

@@ -1,7 +1,7 @@
-"""The process that diagnoses: `python -m validation.blind.worker FOLDER OUT`. It knows recordings, nothing else.
+"""The process that diagnoses: `python -m validation.blind.worker FOLDER OUT`. It has nothing but the recordings.
 
-For every recording it leaves `OUT/<name>.json`: the reports by slave or the error, and the seconds it took. One line
-per recording on standard output says that it is done.
+For every recording it writes `OUT/<name>.json`: the reports by slave or the error, and the seconds that it took. After
+each recording it prints its name on standard output.
 """
 
 from __future__ import annotations
@@ -22,21 +22,23 @@ from common.terminal import cli
 from diagnosis.report.records import Report
 from validation.spread import spread
 
-OTHER = ".other"  # suffix of a recording of the same laboratories, on which what was found is judged
+OTHER = ".other"  # suffix of a recording of the same laboratories, on which the finding is judged
 DIAGNOSIS = "rths.examine.diagnose:diagnose_recording"
 
 
 def find(reference: str) -> Any:
-    """The diagnosing function 'module:function': the path of a recording in, the `Report` or reports by slave out."""
+    """The diagnosing function 'module:function'; it takes a recording's path and returns a `Report` or one by slave."""
     module, _, name = reference.partition(":")
     try:
         return getattr(importlib.import_module(module), name)
     except (ImportError, AttributeError, ValueError) as error:
-        raise InputError(f"There is no diagnosis '{reference}': {error}.") from None
+        raise InputError(
+            f"There is no diagnosis '{reference}' ({error}): give it as module:function."
+        ) from None
 
 
 def diagnose(path: Path, reference: str, out: Path) -> str:
-    """Diagnose one recording into `out`; its name. A diagnosis that fails leaves its error in the report's place."""
+    """Diagnose one recording into `out`, and return its name. Where a diagnosis fails, the file has its error."""
     function = find(reference)
     started = time.perf_counter()
     try:
@@ -47,7 +49,7 @@ def diagnose(path: Path, reference: str, out: Path) -> str:
         answer: dict[str, Any] = {"reports": {name: report.plain() for name, report in reports.items()}}
     except RthsError as error:
         answer = {"error": str(error)}
-    except Exception as error:  # one failure must not take the other cases with it
+    except Exception as error:  # one failure must not end the other cases
         traceback.print_exc()
         answer = {"error": f"{type(error).__name__}: {error}"}
     answer["seconds"] = time.perf_counter() - started

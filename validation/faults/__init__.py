@@ -1,1 +1,1 @@
-"""Whole tests simulated with faults drawn from seeds, and what must hold in all of them."""
+"""Whole tests simulated with faults drawn from seeds, and the invariants that must hold in all of them."""

@@ -1,4 +1,4 @@
-"""A schedule's faults laid into a simulated test."""
+"""A schedule's faults put into a simulated test."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ STATES = {"outage": DROPS, "backlog": QUEUES}
 
 
 def plan_of(schedule: Schedule) -> Plan:
-    """The plan of a scheduled test, which waits for a recorder where it is recorded; its figures are those of rigs."""
+    """The plan of a scheduled test, which requires a recorder where it is recorded; its timeouts are those of rigs."""
     plan = strict(plans.with_test(plans.load(cli.plan_path(schedule.plan)), duration=schedule.duration))
     tables = plan.tables()
     tables["recording"]["required"] = schedule.recorded
@@ -33,7 +33,7 @@ def plan_of(schedule: Schedule) -> Plan:
 
 
 def simulation_of(schedule: Schedule, recording: Path | None = None) -> Simulation:
-    """The test of a schedule with all faults in wait; recorded there where the schedule is."""
+    """The test of a schedule with all its faults prepared; recorded into `recording` if the schedule is recorded."""
     drifts = {
         fault.where: Drift(round(fault.parameters["offset"] * 1e9), round(fault.parameters["ppm"] * 1e3))
         for fault in schedule.faults
@@ -50,7 +50,7 @@ def simulation_of(schedule: Schedule, recording: Path | None = None) -> Simulati
 
 
 def lay(simulation: Simulation, fault: InjectedFault, seed: int, place: int) -> None:
-    """Let a fault happen; `place` tells faults of one schedule apart."""
+    """Prepare a fault; `place` distinguishes the faults of one schedule."""
     where = KINDS[fault.kind].where
     if where == PROCESS:
         _befall_process(simulation, fault)
@@ -104,7 +104,7 @@ def _impair(simulation: Simulation, direction: WireRoute, fault: InjectedFault, 
 
 
 def _intrude(simulation: Simulation, direction: WireRoute, fault: InjectedFault, seed: int) -> None:
-    """Frames that no loop has sent now."""
+    """Put frames on a route that no loop sends at this time."""
     plan, count = simulation.plan, int(fault.parameters.get("count", 0))
     match fault.kind:
         case "replay":

@@ -15,9 +15,9 @@ from common.roles import MASTER
 from laboratories.kinds import kind_of
 from validation.faults.wire import INSIDER, Letter, WireRoute
 
-LONGEST = 300  # bytes of noise
-OTHER_SESSION = 77
-FAR = 100_000  # numbers ahead
+LONGEST = 300  # bytes of noise, so that frames shorter and longer than real messages are tried
+OTHER_SESSION = 77  # any number but the session's
+FAR = 100_000  # numbers ahead: more than the ticks of any test here, so that a loop that believed it would hear no more
 
 
 def letter(message: Message, key: codec.Key, origin: str) -> Letter:
@@ -40,7 +40,7 @@ def forged(direction: WireRoute, plan: Plan, session: int, count: int) -> list[L
 
 
 def foreign(direction: WireRoute, plan: Plan, count: int) -> list[Letter]:
-    """Messages of another session, as of a test that ran before."""
+    """Messages of another session, like those of a test that ran before."""
     key = codec.session_key(OTHER_SESSION, plan.digest())
     return [
         letter(tick_message(direction, plan, OTHER_SESSION, FAR + seq), key, "injected")
@@ -66,28 +66,25 @@ def farthest(direction: WireRoute, plan: Plan) -> float:
 
 
 def command(session: int, seq: int, target: float, force: float = 0.0) -> Command:
-    """A command of a target (m) and a motor's force (N), all else zero."""
+    """A command with a target (m) and a motor's force (N), all else zero."""
     given = {"session": session, "seq": seq, "target": target, "effort": force}
     return Command(**blank(Command) | given)
 
 
 def feedback(session: int, seq: int, *measured: float, channels: int = 4) -> Feedback:
-    """A feedback that answers the command of its tick, with so many channels, of which the first are given.
-
-    All else is zero.
-    """
+    """A feedback that answers the command of its tick; its first channels are given, all else is zero."""
     numbers = {"session": session, "seq": seq, "command_seq": seq, "heard_seq": seq}
     values = (*measured, *[0.0] * (channels - len(measured)))
     return Feedback(**blank(Feedback) | numbers | {"measured": values})
 
 
 def blank(kind: type[Any]) -> dict[str, Any]:
-    """Fields of a message with the zero of their types."""
+    """Fields of a message, each with the zero value of its type."""
     return {name: hint() for name, hint in get_type_hints(kind).items()}
 
 
 def insider(direction: WireRoute, plan: Plan, session: int, what: int) -> Letter | None:
-    """One message of a peer who knows session and keys, as it goes on this route; None where it has no such."""
+    """One message of a peer who knows session and keys; None where this route does not carry its kind."""
     role, on_tick = direction.route.role, direction.route.channel == TICK
     newest = max(direction.ledger.numbers["sent"], default=0)
     ticks: dict[int, Callable[[], Message]] = {
@@ -96,7 +93,7 @@ def insider(direction: WireRoute, plan: Plan, session: int, what: int) -> Letter
         2: lambda: tick_message(direction, plan, session, newest + FAR),
     }
     words: dict[int, Callable[[], Message]] = {
-        3: lambda: Stop(session, newest, "an insider's wish."),
+        3: lambda: Stop(session, newest, "an insider's stop."),
         4: lambda: Trip(session, role, "insider", "an insider's trip."),
         5: lambda: Register(OTHER_SESSION, PROTOCOL_VERSION, plan.digest()),
         6: lambda: Start(session, 0, 0),

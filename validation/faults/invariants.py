@@ -1,7 +1,7 @@
-"""What must hold in every simulated test, whatever fault was played: one small function each, named by what it checks.
+"""Invariants of every simulated test with any faults: one small function each, named by what it checks.
 
-They look at the rigs' probes, the wire's ledgers, the reported events and the recording; of the laboratories' own state
-they know the mode at each write (`rigs.mode_of`) and the cause of a stop alone.
+They use the rigs' probes, the wire's ledgers, the reported events and the recording; of the laboratories' own state
+they use only the mode at each write (`rigs.mode_of`) and the cause of a stop.
 """
 
 from __future__ import annotations
@@ -28,14 +28,13 @@ from validation.faults.wire import CABLE, WireRoute
 MOTOR = 1  # place of a motor's force among the commands
 MOVING = ("RUNNING", "HOLDING")
 LATCHED = ("RAMPING", "SAFE", "EMERGENCY_STOP")
-PATH = (
-    round((CABLE.minimum + 10.0 * CABLE.mean) * 1e9) + COMPUTED
-)  # ns of a message, and of the tick that uses it
-ROUNDING = 1.0 + 1e-9
+# ns from sending a message to its use: a delay that one frame in 20 000 exceeds, and the computation of a tick
+PATH = round((CABLE.minimum + 10.0 * CABLE.mean) * 1e9) + COMPUTED
+ROUNDING = 1.0 + 1e-9  # of sums of a few thousand floating-point steps
 
 
 class Drive(NamedTuple):
-    """What a rig is told: largest value, largest change in an interval, largest speed; inf without a limit."""
+    """A commanded quantity: largest value, largest change in an interval, largest speed; inf without a limit."""
 
     name: str
     most: float
@@ -44,7 +43,7 @@ class Drive(NamedTuple):
 
 
 def drives(plan: Plan, role: str) -> tuple[Drive, ...]:
-    """What the rig of a role is told, in the order of its commands; nothing where it has none."""
+    """The commanded quantities of a role's rig, in the order of its commands; empty where it has none."""
     if role not in plan.kinds:
         return ()
     kind = kind_of(plan, role)
@@ -57,29 +56,29 @@ def drives(plan: Plan, role: str) -> tuple[Drive, ...]:
 
 
 class InvariantViolation(NamedTuple):
-    """An invariant that does not hold, and what was seen."""
+    """An invariant that does not hold, and a description of the violation."""
 
     invariant: str
     text: str
 
 
-# -- what is looked at ----------------------------------------------------------------------------
+# -- observations ---------------------------------------------------------------------------------
 
 
 class RigHistory(NamedTuple):
-    """What a rig was told: world times (ns), a row of values each, names of the modes."""
+    """The commands of a rig: world times (ns), a row of values each, names of the modes."""
 
     times: Array
     commands: Array
     modes: list[str]
 
     def until(self, time: int) -> int:
-        """How many writes there were by a time."""
+        """Number of writes until a time."""
         return int(np.searchsorted(self.times, time, side="right"))
 
 
 def seen(simulation: Simulation, role: str) -> RigHistory:
-    """What the rig of a role was told."""
+    """The commands of a role's rig."""
     log = simulation.probes[role].log
     width = len(drives(simulation.plan, role))
     names = {mode: named(mode) for mode in set(log.modes)}
@@ -100,7 +99,7 @@ def tick_routes(simulation: Simulation, role: str) -> list[WireRoute]:
 
 
 def fresh(simulation: Simulation, direction: WireRoute) -> list[int]:
-    """When messages came that were intact, newer than all before and not too old, ns; a stranger's count too."""
+    """Arrival times (ns) of intact messages that were newer than all before and not too old; a stranger's count too."""
     oldest = simulation.plan.safety.message_age * 1e9
     times, newest = [], -1
     for time, number, sent, _, intact in direction.ledger.arrivals:
@@ -123,7 +122,7 @@ def last_valid(simulation: Simulation, role: str, told: RigHistory) -> int:
 
 
 def noticed(simulation: Simulation, told: RigHistory, valid: int) -> int:
-    """The latest time at which a laboratory could know that messages stay away; later where it was held up itself."""
+    """The latest time at which a laboratory must notice missing messages; later where its process was stalled."""
     time = valid + round(simulation.plan.safety.ramp_after * interval(simulation))
     place = told.until(time)
     return int(told.times[place]) if place < told.times.size else time
@@ -154,9 +153,9 @@ def everybody_ends(simulation: Simulation) -> Iterator[str]:
     """Every process ends, and every rig is disarmed."""
     for name, process in simulation.world.processes.items():
         if not process.ended:
-            yield f"{name} still goes on at {simulation.world.time * 1e-9:.3f} s."
+            yield f"{name} still runs at {simulation.world.time * 1e-9:.3f} s."
         elif name in simulation.plan.kinds and not process.killed and not simulation.probes[name].disarmed:
-            yield f"{name} has ended and its rig was not disarmed."
+            yield f"{name} ended, and its rig was not disarmed."
 
 
 # -- rigs -----------------------------------------------------------------------------------------
@@ -185,7 +184,7 @@ def steps_within_limits(simulation: Simulation) -> Iterator[str]:
 
 
 def at(told: RigHistory, place: int) -> str:
-    """The time of a write, as sentences give it."""
+    """The time of a write as text."""
     return f"{told.times[place] * 1e-9:.4f} s"
 
 
@@ -193,10 +192,10 @@ def at(told: RigHistory, place: int) -> str:
 
 
 def nobody_runs_unheard(simulation: Simulation) -> Iterator[str]:
-    """A laboratory without a fresh message for too long neither runs nor holds.
+    """A laboratory that has had no fresh message for too long neither runs nor holds.
 
     The first message is due an interval after the first tick (the master's is the answer to that tick), and may be as
-    late as a message may be old: the delay of a link is not silence.
+    late as a message may be old, because a link with a delay is not silent.
     """
     safety = simulation.plan.safety
     watched = safety.ramp_after * interval(simulation)
@@ -261,7 +260,7 @@ def damper_is_released(simulation: Simulation) -> Iterator[str]:
 
 
 def latched_stays(simulation: Simulation) -> Iterator[str]:
-    """A laboratory that has begun to come to rest does not run again, since these tests contain no reset."""
+    """A laboratory that ramps to rest does not run again, because these tests contain no reset."""
     for role, probe in simulation.probes.items():
         modes = [named(mode) for mode in [*probe.log.modes, mode_of(simulation.loops[role].lab)]]
         first = next((place for place, mode in enumerate(modes) if mode in LATCHED), len(modes))
@@ -303,7 +302,7 @@ def frames_add_up(simulation: Simulation) -> Iterator[str]:
 
 
 def numbers_add_up(simulation: Simulation) -> Iterator[str]:
-    """Sent = used + lost + rejected + superseded, by number: the newest message that came in time was used."""
+    """Sent = used + lost + rejected + superseded, by number: the newest message that arrived in time was used."""
     for role in simulation.loops:
         if role in simulation.strangers:
             continue
@@ -328,12 +327,12 @@ def numbers_add_up(simulation: Simulation) -> Iterator[str]:
 
 
 def not_old(simulation: Simulation, age: int) -> bool:
-    """Whether a message of this age is certainly fresh: its round trip was within the bound."""
+    """Whether a message of this age is certainly fresh: a quarter of the bound leaves room for its way and a tick."""
     return age < 0.25 * simulation.plan.safety.message_age * 1e9
 
 
 def used_numbers(simulation: Simulation, role: str, direction: WireRoute) -> list[int]:
-    """Numbers of the messages of a route that were in force, tick by tick."""
+    """Numbers of a route's messages that were used, tick by tick."""
     if role != MASTER:
         return [command for _, command in simulation.ports[role].answers]
     place = simulation.plan.roles.index(direction.route.role)
@@ -341,7 +340,7 @@ def used_numbers(simulation: Simulation, role: str, direction: WireRoute) -> lis
 
 
 def numbers_never_go_back(simulation: Simulation) -> Iterator[str]:
-    """A message in force is followed by newer ones only."""
+    """After a message only newer ones are used."""
     for role in simulation.loops:
         for direction in tick_routes(simulation, role):
             used = np.array(used_numbers(simulation, role, direction))
@@ -354,7 +353,7 @@ def numbers_never_go_back(simulation: Simulation) -> Iterator[str]:
 
 
 def recording_is_whole(simulation: Simulation) -> Iterator[str]:
-    """What was recorded can be read; to its last record where the recorder was not killed."""
+    """The recording can be read; it is complete where the recorder was not killed."""
     if simulation.recording is None:
         return
     try:
@@ -368,7 +367,7 @@ def recording_is_whole(simulation: Simulation) -> Iterator[str]:
 
 Invariant = Callable[[Simulation], Iterator[str]]
 
-SAFETY: tuple[Invariant, ...] = (  # those that ask for the watchdog, the safe ramp and limits on rates
+SAFETY: tuple[Invariant, ...] = (  # those that need the watchdog, the safe ramp and limits on rates
     steps_within_limits,
     nobody_runs_unheard,
     motion_is_bounded,
@@ -389,7 +388,7 @@ INVARIANTS: tuple[Invariant, ...] = (
 
 
 def judge(simulation: Simulation, invariants: tuple[Invariant, ...] = INVARIANTS) -> list[InvariantViolation]:
-    """What does not hold after a run."""
+    """The violated invariants of a run."""
     return [
         InvariantViolation(invariant.__name__, text)
         for invariant in invariants

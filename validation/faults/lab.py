@@ -29,13 +29,14 @@ from slave.loop import SlaveLoop
 from validation.faults.rigs import Probe, ProbedRig
 from validation.faults.wire import CABLE, Conditions, Port, Wire, WireEndpoint
 
-SESSION = 1  # simulated time knows one test, and the same test gives the same bits
+SESSION = 1  # always the same, so that the same test gives the same bits
 PROBED = RigTable(class_=f"{ProbedRig.__module__}:{ProbedRig.__name__}")
-MASTER_STARTS = 1_000_000  # ns after the others
+# Ns after the others, so that they hear its first message: many times the link's delay.
+MASTER_STARTS = 1_000_000
 
 
 class Surrounding(NamedTuple):
-    """What a test runs on: the seed of the link's draws, its condition at best, the clocks, a recording."""
+    """Surroundings of a test: the seed of the link's draws, its undisturbed condition, the clocks, a recording."""
 
     seed: int = 0
     base: Conditions = CABLE
@@ -125,7 +126,7 @@ class Simulation:
     # -- course -----------------------------------------------------------------------------------
 
     def run(self) -> None:
-        """Play the test to its end; what comes out is in probes, events, ports and the wire's ledgers."""
+        """Play the test to its end; the results are in probes, events, ports and the wire's ledgers."""
         self.world.run()
 
     def digest(self) -> str:

@@ -1,4 +1,4 @@
-"""Rigs behind a probe, which keeps their commands with the world time and can falsify their readings."""
+"""Rigs with a probe, which stores their commands with the world time and can falsify their readings."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from common.protocol.exchange import State
 from common.rig import GuardedRig
 from simulation.world import Process
 
-COMPUTED = 100_000  # ns that a tick takes between reading and writing
+COMPUTED = 100_000  # ns that a tick takes between reading and writing: more than the loops need, less than an interval
 PRESENT = {
     State.IDLE: "IDLE",
     State.REGISTERED: "CONFIGURED",
@@ -25,21 +25,21 @@ PRESENT = {
 
 
 def mode_of(lab: Laboratory) -> Enum:
-    """In which mode a laboratory is; its place in the protocol where it has no state machine of its own."""
+    """The mode of a laboratory; its state of the protocol where it has no state machine of its own."""
     safety: Any = getattr(lab, "safety", None)
     mode: Enum = lab.exchange.state if safety is None else safety.mode
     return mode
 
 
 def named(mode: Enum) -> str:
-    """The name of a mode; of a place in the protocol the name of the mode that it stands for."""
+    """The name of a mode; of a state of the protocol the name of the corresponding mode."""
     return PRESENT.get(mode, "SAFE") if isinstance(mode, State) else mode.name
 
 
 class Log:
-    """What reached a rig at each write: world time (ns), command, mode.
+    """World time (ns), command and mode at each write of a rig.
 
-    Of the master also what feedbacks it then used, and the storey drift of the tick before (m).
+    Of the master also the numbers of the used feedbacks, and the storey drift of the tick before (m).
     """
 
     def __init__(self) -> None:
@@ -65,14 +65,14 @@ class Probe:
         self.inner = inner
         self.process = process
         self.loop: DrivenLoop | None = None
-        self.partners: list[Any] = []  # of the master: what it knows of its slaves
+        self.partners: list[Any] = []  # of the master: its side of each slave
         self.log = Log()
         self.wrong: dict[object, Wrong] = {}
         self.disarmed: list[int] = []
         self._frozen: dict[int, float] = {}
 
     def read(self) -> Iterable[float]:
-        """Readings of the rig behind it, with what is wrong with them."""
+        """Readings of the rig, falsified by the present faults."""
         self.process.spend(COMPUTED)
         readings: Iterable[float] = self.inner.read()
         return self._falsified(list(readings)) if self.wrong else readings
@@ -90,11 +90,11 @@ class Probe:
                 case "beyond":
                     values[place] = by
                 case _:
-                    raise RigError("the rig does not answer.")
+                    raise RigError("the simulated rig does not answer.")
         return values
 
     def write(self, command: tuple[float, ...]) -> None:
-        """Keep a command and hand it on."""
+        """Store a command and pass it to the rig."""
         loop = self.loop
         assert loop is not None  # noqa: S101 - rigs move after their loop is built
         log = self.log
@@ -107,32 +107,32 @@ class Probe:
         self.inner.write(command)
 
     def disarm(self) -> None:
-        """Note when, and hand on."""
+        """Store the time, and disarm the rig."""
         self.disarmed.append(self.process.time)
         self.inner.disarm()
 
     def set_wrong(self, key: object, wrong: Wrong) -> None:
-        """From now on readings are wrong."""
+        """Begin a fault of the readings."""
         self._frozen.clear()
         self.wrong[key] = wrong
 
     def set_right(self, key: object) -> None:
-        """A sensor works again."""
+        """End a fault of the readings."""
         self.wrong.pop(key, None)
 
 
 class ProbedRig:
-    """The rig that a reality names, which is the one behind a probe."""
+    """The rig that a reality names; it passes everything to a probe."""
 
     def __init__(self, interval: float, seed: int, probe: Probe) -> None:
         self._probe = probe
 
     def arm(self) -> None:
-        """Arm the rig behind it."""
+        """Arm the probe's rig."""
         self._probe.inner.arm()
 
     def read(self) -> Iterable[float]:
-        """Readings as the probe gives them."""
+        """Readings of the probe."""
         return self._probe.read()
 
     def write(self, command: Any) -> None:

@@ -13,20 +13,20 @@ from common.errors import InputError
 from common.plan.schema import nearest
 from common.roles import MASTER, RECORDER, SLAVE
 
-SHORTEST, LONGEST = 10.0, 60.0  # s of a drawn test
-MOST_FAULTS = 6
-QUIET = 0.1  # share of schedules in which nothing goes wrong, so that an alarm without a cause is found too
-SEVERAL = 0.15  # share with two slaves
-ONE_WAY = 0.6  # share of a route's faults in one direction
+SHORTEST, LONGEST = 10.0, 60.0  # s of a drawn test: room for several faults, within seconds of computation
+MOST_FAULTS = 6  # of a schedule: enough that several overlap, few enough to find the cause of a violation
+QUIET = 0.1  # share of schedules without a fault, so that an alarm without a cause is found too
+SEVERAL = 0.15  # share with two slaves, which take twice the time to simulate
+ONE_WAY = 0.6  # share of a route's faults in one direction; these are harder to notice for the sender
 PLANS = {1: "default", 2: "two_dampers"}
 ROLES = {1: (SLAVE,), 2: ("slave.roof", "slave.middle")}
-READINGS = 4  # of the laboratory that has most
+READINGS = 4  # of the laboratory with the most readings
 
 ROUTE, PROCESS, RIG = "route", "process", "rig"
 
 
 class DrawRange(NamedTuple):
-    """Where a parameter lies; drawn by its logarithm, as a whole number or evenly."""
+    """The range of a parameter; drawn log-uniform, as a whole number or uniform."""
 
     low: float
     high: float
@@ -34,18 +34,20 @@ class DrawRange(NamedTuple):
 
 
 class FaultKind(NamedTuple):
-    """A kind of fault: what it befalls, how long it lasts (s, None for no time at all), what describes it."""
+    """A kind of fault: the place that it affects, its range of durations (s, None for an instant), its parameters."""
 
     where: str
     lasts: tuple[float, float] | None
     parameters: Mapping[str, DrawRange] = {}
 
 
-SHARE = DrawRange(0.002, 0.3)
-COUNT = DrawRange(1, 1000)
+# The ranges of all faults reach from values that must not matter, as those of a loaded network or machine, to values
+# that must stop a test: watchdogs and limits of the plans lie in between.
+SHARE = DrawRange(0.002, 0.3)  # of frames
+COUNT = DrawRange(1, 1000)  # frames
 PLACE = DrawRange(0, READINGS - 1, "whole")
 SECONDS = (0.01, 10.0)
-MOMENT = (0.002, 5.0)
+MOMENT = (0.002, 5.0)  # from one interval on
 
 KINDS: dict[str, FaultKind] = {
     "delay": FaultKind(ROUTE, SECONDS, {"minimum": DrawRange(1e-4, 0.03), "mean": DrawRange(1e-5, 0.01)}),
@@ -78,9 +80,9 @@ KINDS: dict[str, FaultKind] = {
 
 @dataclass(frozen=True)
 class InjectedFault:
-    """One fault at a world time (s), for a while; `where` is a role, `A>B` or `A<>B`.
+    """One fault from a world time (s) for a duration; `where` is a role, `A>B` or `A<>B`.
 
-    A kind without a duration happens at once. A clock differs from the beginning, whatever `at` says.
+    A kind without a duration is instantaneous. A clock differs from the beginning, whatever `at` is.
     """
 
     kind: str
@@ -111,7 +113,7 @@ class Schedule:
 
     @property
     def plan(self) -> str:
-        """The plan that ships with so many slaves."""
+        """The plan of the package with this number of slaves."""
         return PLANS[self.slaves]
 
 
@@ -119,7 +121,7 @@ class Schedule:
 
 
 def draw(seed: int, duration: float | None = None, *, recorded: bool = False) -> Schedule:
-    """The schedule of a seed; of the length given, or of a drawn one."""
+    """The schedule of a seed, of the given or a drawn length."""
     chance = np.random.default_rng([seed, 20])
     drawn = round(float(chance.uniform(SHORTEST, LONGEST)), 1)
     slaves = 2 if chance.random() < SEVERAL else 1
@@ -151,7 +153,7 @@ def _where(chance: np.random.Generator, what: str, slaves: tuple[str, ...], *, r
 
 
 def value_of(chance: np.random.Generator, span: DrawRange) -> float:
-    """A value of a range, short enough to be written and read without loss."""
+    """A value of a range, rounded so that it is written and read without loss."""
     match span.how:
         case "whole":
             return float(chance.integers(int(span.low), int(span.high) + 1))
@@ -177,10 +179,10 @@ HEAD = {"seed": int, "duration": float, "slaves": int, "recorded": int}
 
 
 def parse(line: str) -> Schedule:
-    """The schedule in a line as `str` of one writes it.
+    """The schedule in a line, in the form that `str(schedule)` has.
 
     Raises:
-        InputError: the line is none.
+        InputError: the line is not a schedule.
     """
     head: dict[str, float] = {"duration": SHORTEST, "slaves": 1, "recorded": 0}
     faults: list[InjectedFault] = []
@@ -191,9 +193,9 @@ def parse(line: str) -> Schedule:
         else:
             faults.append(parse_fault(word))
     if "seed" not in head:
-        raise InputError("The schedule names no seed: begin with seed=N.")
+        raise InputError("The schedule has no seed: begin it with seed=N.")
     if head["slaves"] not in PLANS or not 0.0 < head["duration"] <= 7200.0:
-        raise InputError("A schedule has 1 or 2 slaves and a duration above 0 s, of at most 7200 s.")
+        raise InputError("Give the schedule 1 or 2 slaves, and a duration above 0 s and of at most 7200 s.")
     return checked(
         Schedule(
             int(head["seed"]), head["duration"], int(head["slaves"]), bool(head["recorded"]), tuple(faults)
@@ -202,7 +204,7 @@ def parse(line: str) -> Schedule:
 
 
 def parse_fault(word: str) -> InjectedFault:
-    """The fault in a word; raises InputError where it is none."""
+    """The fault in a word; raises InputError where the word is not a fault."""
     found = FAULT.fullmatch(word)
     if found is None:
         raise InputError(f"'{word}' is not a fault: write kind@at[+duration]:where[(name=value,…)].")
@@ -213,14 +215,14 @@ def parse_fault(word: str) -> InjectedFault:
     values = {name: number(value, word) for name, _, value in pairs}
     wanted = KINDS[kind].parameters
     if set(values) != set(wanted):
-        raise InputError(f"'{word}' must give {', '.join(wanted) or 'no values'}.")
+        raise InputError(f"Give '{word}' the values {', '.join(wanted) or 'none'}, and no others.")
     return InjectedFault(
         kind, found["where"], number(found["at"], word), number(found["duration"] or "0", word), values
     )
 
 
 def checked(schedule: Schedule) -> Schedule:
-    """The schedule itself; raises InputError where a fault befalls what is not there."""
+    """The schedule itself; raises InputError where the place of a fault does not exist."""
     labs = (MASTER, *ROLES[schedule.slaves])
     roles = (*labs, RECORDER) if schedule.recorded else labs
     for fault in schedule.faults:
@@ -239,5 +241,5 @@ def number(text: str, where: str) -> float:
     except ValueError:
         value = float("nan")
     if not abs(value) < 1e12:
-        raise InputError(f"'{text}' in '{where}' is not a number that a schedule may have.")
+        raise InputError(f"'{text}' in '{where}' is not a number of less than 1e12.")
     return value

@@ -20,11 +20,11 @@ class TrialResult(NamedTuple):
     virtual_time: float  # s
     digest: str  # of every command at every rig
     ends: dict[str, str]
-    course: list[str]  # what the laboratories told, a line each
+    course: list[str]  # the laboratories' events, a line each
 
 
 def play(schedule: Schedule) -> TrialResult:
-    """Simulate a schedule and judge it; a recording is read and thrown away."""
+    """Simulate a schedule and judge it; a recording is read and deleted."""
     with tempfile.TemporaryDirectory(prefix="rths-faults-") as folder:
         simulation = simulation_of(schedule, Path(folder) / "test.mcap")
         simulation.run()
@@ -39,7 +39,7 @@ def play(schedule: Schedule) -> TrialResult:
 
 
 def end_of(simulation: Simulation, role: str) -> str:
-    """How a laboratory ended."""
+    """The state in which a laboratory ended."""
     if simulation.world.processes[role].killed:
         return "killed"
     return simulation.loops[role].lab.exchange.state.value

@@ -2,10 +2,10 @@
 
     delay of a frame = minimum + e,    e ~ Exponential(mean)
 
-on every route from one role to another, each with random draws of its own that depend on the seed and the route's name
-alone. Losses that come in runs follow the two-state chain of Gilbert (Bell Syst. Tech. J. 39 (1960) 1253-1265). Frames
-of a route keep their order, as zenoh and TCP keep it, but for those that `reorder` holds back. What became of every
-frame is counted here, by kind of message and by number: the truth with which the loops' own accounts are compared.
+on every route from one role to another, each with random draws of its own that depend only on the seed and the route's
+name. Losses in runs follow the two-state chain of Gilbert (Bell Syst. Tech. J. 39 (1960) 1253-1265). Frames of a route
+keep their order, as with zenoh and TCP, except those that `reorder` holds back. The fate of every frame is counted
+here, by kind of message and by number; the loops' own accounts are compared with these true numbers.
 """
 
 from __future__ import annotations
@@ -22,27 +22,31 @@ from common.link.transport import Packet, Route, heard, said
 from common.protocol.messages import Command, Feedback, Message
 from simulation.world import Process, World
 
-DRAWN = 512  # random numbers drawn at once
-KEPT = 4096  # frames of a route that can be sent again
-SOCKET = 500  # frames that wait for a process that stands still: 212 992 bytes of them, as Linux keeps
-BACKLOG = 4000  # frames that wait in a sender for a link that has fallen silent
+DRAWN = 512  # random numbers drawn at once, because one call costs as much as a hundred draws
+KEPT = 4096  # frames of a route that can be replayed: four times the largest number of a fault
+SOCKET = 500  # frames that wait for a stalled process: 212 992 bytes, the default receive buffer of Linux
+BACKLOG = 4000  # frames that wait in a sender for a silent link: 8 s of the default test, longer than a backlog lasts
 NUMBERED = (Command, Feedback)
 SEQ = Command._fields.index("seq")  # of a feedback too
-INSIDER = "insider"  # origin of what a stranger who has the keys sends
-OPEN, DROPS, QUEUES = "open", "drops", "queues"  # a route: works, loses all, keeps all until it works again
+INSIDER = "insider"  # origin of frames of a stranger who has the keys
+OPEN, DROPS, QUEUES = (
+    "open",
+    "drops",
+    "queues",
+)  # a route works, loses all frames, or keeps them until it works again
 
 
 class Conditions(NamedTuple):
     """State of a route; times in s, the others are probabilities of a frame but for `run`, in frames."""
 
     minimum: float = 0.0
-    mean: float = 0.0  # of what comes on top of the minimum
+    mean: float = 0.0  # of the delay above the minimum
     loss: float = 0.0  # each frame by itself
     burst: float = 0.0  # share of frames lost in runs
     run: float = 1.0  # mean length of such a run
     duplicate: float = 0.0
-    reorder: float = 0.0  # held back, so that later ones overtake
-    hold: float = 0.0  # for so long
+    reorder: float = 0.0  # held back, so that later frames overtake
+    hold: float = 0.0  # time for which a frame is held back
     corrupt: float = 0.0  # one bit flipped
     state: str = OPEN
 
@@ -63,13 +67,13 @@ class Conditions(NamedTuple):
 
     @property
     def quiet(self) -> bool:
-        """Whether nothing but delay happens to a frame."""
+        """Whether frames are only delayed."""
         return self.state == OPEN and not (
             self.loss or self.burst or self.duplicate or self.reorder or self.corrupt
         )
 
 
-CABLE = Conditions(minimum=60e-6, mean=20e-6)  # two machines at one switch
+CABLE = Conditions(minimum=60e-6, mean=20e-6)  # two machines at one switch: usual delays of an idle Ethernet
 
 
 class Letter(NamedTuple):
@@ -84,22 +88,22 @@ class Letter(NamedTuple):
 
 
 class Ledger:
-    """What became of the frames of a route: counts by kind, and numbers of the tick's messages."""
+    """The fates of a route's frames: counts by kind, and numbers of the tick's messages."""
 
     def __init__(self) -> None:
         self.counts: dict[str, Counter[str]] = defaultdict(Counter)
         self.numbers: dict[str, list[int]] = defaultdict(list)  # by fate: sent, lost, corrupted, overflow
         self.arrivals: list[tuple[int, int, int, str, bool]] = []  # time, number, sent, origin, intact
-        self.strangers: list[int] = []  # when messages came of a stranger who has the keys
+        self.strangers: list[int] = []  # arrival times of messages of a stranger who has the keys
 
     def enter(self, fate: str, letter: Letter) -> None:
-        """Note what became of a frame."""
+        """Count the fate of a frame."""
         self.counts[letter.kind][fate] += 1
         if letter.number >= 0 and not letter.origin:
             self.numbers[fate].append(letter.number)
 
     def arrived(self, time: int, letter: Letter) -> None:
-        """A frame was handed to its hearer's process."""
+        """Count a frame that was delivered to its hearer's process."""
         self.counts[letter.kind]["delivered"] += 1
         if letter.origin == INSIDER:
             self.strangers.append(time)
@@ -143,7 +147,7 @@ class WireRoute:
         self._settle()
 
     def lift(self, key: object) -> None:
-        """End an impairment; what has queued up goes out where nothing else keeps it."""
+        """End an impairment; waiting frames go out unless another impairment keeps them."""
         self._laid.pop(key, None)
         self._settle()
         if self._now.state != QUEUES:
@@ -215,13 +219,13 @@ class WireRoute:
         return bytes(damaged)
 
     def put(self, letters: Iterable[Letter]) -> None:
-        """A stranger puts frames onto the route; they arrive as they are."""
+        """Put a stranger's frames onto the route; they arrive unchanged."""
         for letter in letters:
             self.ledger.enter(letter.origin, letter)
             self._world.at(self._world.time + self._delay(), self.arrive, letter)
 
     def again(self, count: int) -> None:
-        """Send the oldest frames that are still known once more."""
+        """Send the oldest stored frames again."""
         self.put([letter._replace(origin="replayed") for letter in list(self.history)[:count]])
 
     def arrive(self, letter: Letter) -> None:
@@ -272,10 +276,10 @@ class Port:
         self.heard = heard
 
     def close(self) -> None:
-        """Nothing to leave."""
+        """Do nothing: a port holds no resource."""
 
     def keep(self, direction: WireRoute, letter: Letter) -> None:
-        """Hold a frame for a process that stands still."""
+        """Keep a frame for a stalled process."""
         if len(self._waiting) < SOCKET:
             self._waiting.append((direction, letter))
         else:
@@ -288,7 +292,7 @@ class Port:
 
 
 class Wire:
-    """All routes between the roles of a test; every port must be there before the first frame."""
+    """All routes between the roles of a test; every port must exist before the first frame."""
 
     def __init__(self, world: World, slaves: tuple[str, ...], base: Conditions, seed: int) -> None:
         self.directions: list[WireRoute] = []
@@ -299,7 +303,7 @@ class Wire:
         self._ports: dict[str, Port] = {}
 
     def join(self, process: Process) -> Port:
-        """The access of one role, connected with all that are there."""
+        """The access of one role, connected with all existing ones."""
         port = Port(self, process)
         for other in self._ports.values():
             self._connect(other, port)
@@ -325,7 +329,7 @@ class Wire:
 
 
 class WireEndpoint(FrameEndpoint):
-    """The loops' own endpoint at a port: waiting hands over to the world."""
+    """The loops' own endpoint at a port; while it waits, the world's time goes on."""
 
     def __init__(self, port: Port, plan_digest: str) -> None:
         super().__init__(port, plan_digest, port.process)
@@ -333,7 +337,7 @@ class WireEndpoint(FrameEndpoint):
         self._process = port.process
 
     def send(self, message: Message, to: str = "") -> int:
-        """Hand a message to the link; when it was encoded, ns."""
+        """Send a message; return the time at which it was encoded, ns."""
         self._port.message = message
         if type(message) is Feedback:
             self._port.answers.append((message.seq, message.command_seq))
@@ -341,11 +345,11 @@ class WireEndpoint(FrameEndpoint):
 
     @property
     def unread(self) -> int:
-        """Messages that the loop has not taken; they are gone with that."""
+        """Number of messages that the loop has not taken; counting removes them."""
         return sum(1 for _ in iter(super().receive, None))
 
     def receive(self, timeout: float = 0.0) -> Received | None:
-        """The next valid message, waiting at most `timeout` s for it; None where there is none."""
+        """The next valid message, after waiting at most `timeout` s; None if there is none."""
         self._process.settle()
         received = super().receive(0.0)
         if received is None and timeout > 0.0:

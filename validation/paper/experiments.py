@@ -1,4 +1,4 @@
-"""The paper's experiments, run on the emulated laboratories in virtual time, each left as a recording."""
+"""The paper's experiments, run on the emulated laboratories in virtual time and recorded."""
 
 from __future__ import annotations
 
@@ -29,18 +29,23 @@ from models.registry import Array
 from simulation import benches, virtual
 from simulation.benches import Order
 
-GAINS = {"proportional": 1.93, "integral": 0.047, "derivative": 0.0}
+GAINS = {"proportional": 1.93, "integral": 0.047, "derivative": 0.0}  # as printed in the paper
 PID = CompensatorTable("pid", GAINS)
-BEYOND = CompensatorTable("pid_inverse", {**GAINS, "delay": 0.014, "time_constant": 0.030})
+BEYOND = CompensatorTable(
+    "pid_inverse", {**GAINS, "delay": 0.014, "time_constant": 0.030}
+)  # the paper's L and T
+# The table's lag at low frequency: 2ζ/ω of its loop and its dead time.
 TABLE_LEAD = TableCompensator("taylor", {"lead": 0.01885, "order": 2.0})
-PULSE = 0.1  # s, length of the pulse that starts a free vibration
-UNSTABLE = "uncompensated"  # run on purpose, until its limits stop it
-DELAYS = np.array([0.0, 2.0, 4.0, 8.0, 12.0, 16.0]) * 1e-3
+PULSE = 0.1  # s, length of the pulse that starts a free vibration: a fifth of the building's period
+UNSTABLE = "uncompensated"  # unstable on purpose; its limits stop it
+DELAYS = (
+    np.array([0.0, 2.0, 4.0, 8.0, 12.0, 16.0]) * 1e-3
+)  # s, up to the paper's residual of 16 ms with PID alone
 
 
 @dataclass
 class PaperEvidence:
-    """What the experiments left."""
+    """Results of the experiments."""
 
     default: Plan
     paper: Plan
@@ -72,7 +77,7 @@ def without_amd(plan: Plan) -> Plan:
 
 
 def unwatched(plan: Plan) -> Plan:
-    """The plan without the limits that see an unstable loop coming: the paper's diverged until it was stopped."""
+    """The plan without the limits that recognise an unstable loop early: the paper's diverged until it was stopped."""
     return replace(plan, limits=replace(plan.limits, error_energy=math.inf, column_error=math.inf))
 
 
@@ -87,12 +92,12 @@ def compensated_by(plan: Plan, compensator: CompensatorTable) -> Plan:
 
 
 def beyond(plan: Plan) -> Plan:
-    """The plan with actuator and table compensated as well as this package can with constant parameters."""
+    """The plan with the best compensation of actuator and table by this package with constant parameters."""
     return replace(plan, compensator=BEYOND, table=replace(plan.table, compensator=TABLE_LEAD))
 
 
 def run_benches(evidence: PaperEvidence, folder: Path, tell: Tell) -> None:
-    """Characterisation tests; noise on."""
+    """Run the characterisation tests, with noise."""
     default, paper = evidence.default, evidence.paper
     realistic = plans.load(cli.plan_path("rc_column"))
     orders = {
@@ -114,7 +119,7 @@ def run_benches(evidence: PaperEvidence, folder: Path, tell: Tell) -> None:
 
 
 def run_tests(evidence: PaperEvidence, folder: Path, tell: Tell) -> None:
-    """Closed-loop tests of both laboratories through the real loops; an unstable one is stopped by its limits."""
+    """Run closed-loop tests of both laboratories with the real loops; the unstable one is stopped by its limits."""
     default, paper = evidence.default, evidence.paper
     cases = {
         UNSTABLE: unwatched(without_amd(compensated_by(default, CompensatorTable("none", {})))),
@@ -135,19 +140,19 @@ def run_tests(evidence: PaperEvidence, folder: Path, tell: Tell) -> None:
 
 
 def gate_of(name: str, plan: Plan) -> Gate:
-    """What a case must pass; the risks of the unstable one are taken by name."""
+    """The gate that a case must pass; the unstable one accepts the risks by name."""
     gate = Gate(("partition", "peaks") if name == UNSTABLE else ())
     gate.judge(preflight.checks(plan))
     return gate
 
 
 def never() -> str:
-    """An experiment is never stopped by a user."""
+    """No reason to stop: no user stops an experiment."""
     return ""
 
 
 def run_simulations(evidence: PaperEvidence) -> None:
-    """The pure simulation, and the same with what the paper's residual delay costs put into the building."""
+    """The pure simulation, and the same with the damping lost by the residual delay subtracted from the building's."""
     plan = evidence.default
     ground = substructure.ground_rows(plan, substructure.motion(plan))
     evidence.simulations["ideal"] = simulated(ideal(plan), ground)
@@ -165,7 +170,7 @@ def simulated(plan: Plan, ground: Array) -> dict[str, Array]:
 
 
 def with_path(plan: Plan, path: Any) -> Plan:
-    """The building that an amplitude and a delay in the column's path make of it (damping equivalent)."""
+    """The building with stiffness and damping equivalent to an amplitude and a delay in the column's path."""
     column, structure = plan.column, plan.structure
     omega = float(np.sqrt(storey_stiffness(plan) / structure.mass[0]))
     lost, _ = indicators.damping_equivalent(felt(plan).stiffness, path.amplitude, path.delay, omega)
@@ -178,7 +183,7 @@ def with_path(plan: Plan, path: Any) -> Plan:
 
 
 def pulse(plan: Plan) -> Array:
-    """Ground rows of one short pulse of acceleration, the ground itself at rest for the table."""
+    """Ground rows of one short pulse of acceleration; for the table the ground stays at rest."""
     t = np.arange(plan.ticks + 1) * plan.test.interval
     rows = np.zeros((2, t.size))
     rows[0] = np.where(t < PULSE, np.sin(2.0 * np.pi * t / PULSE), 0.0)
@@ -194,7 +199,7 @@ def free_damping(plan: Plan, *, noise: bool = True) -> tuple[float, float]:
 
 
 def delayed(plan: Plan, delay: float) -> Plan:
-    """The plan with nothing but a dead time in the column's path, and no damper."""
+    """The plan with only a dead time in the column's path, and no damper."""
     return without_amd(replace(ideal(plan), actuator=Actuator(gain=1.0, delay=delay, time_constant=0.0)))
 
 
@@ -218,7 +223,7 @@ def free_vibrations(evidence: PaperEvidence) -> None:
 
 
 def bisect(plan: Plan) -> tuple[float, float]:
-    """Delays (s) between which the closed loop turns unstable, at most 0.1 ms apart."""
+    """Two delays (s), at most 0.1 ms apart, between which the closed loop becomes unstable."""
     low, high, width = 0.01, 0.1, 1e-4
     while high - low > width:
         middle = 0.5 * (low + high)

@@ -13,7 +13,7 @@ from validation.proof import ProofFigure
 
 
 def window(run: Run, word: str, begin: float, end: float, interval: float) -> tuple[Any, dict[str, Any]]:
-    """Times (s) from a piece's beginning, and the master's columns, between `begin` and `end` s of it."""
+    """Times (s) since the beginning of a segment, and the master's columns, between `begin` and `end` s of it."""
     start = next(segment.begin for segment in segments(run) if segment.name.startswith(word))
     part = slice(start + round(begin / interval), start + round(end / interval))
     columns = {name: values[part] for name, values in run.columns["master"].items()}
@@ -133,7 +133,7 @@ def instability(evidence: PaperEvidence, canvas: Any) -> None:
 
 
 def damping(evidence: PaperEvidence, canvas: Any) -> None:
-    """What a delay costs."""
+    """Loss of damping by a delay."""
     axis = canvas.subplots()
     axis.plot(DELAYS * 1e3, evidence.damping_by_delay * 100.0, "o-", label="closed loop, free vibration")
     axis.plot(DELAYS * 1e3, 5.0 - 0.156 * DELAYS * 1e3, "k:", label="5.0 − 0.156 points per ms")
@@ -162,9 +162,7 @@ FIGURES = (
         "Counterpart of Fig. 10: sine of 1 Hz, with PID + Taylor (τ = 8.8 ms) and without compensation.",
         sine,
     ),
-    ProofFigure(
-        "fig11-random.png", "Counterpart of Fig. 11: random wave below 3 Hz behind PID.", random_wave
-    ),
+    ProofFigure("fig11-random.png", "Counterpart of Fig. 11: random wave below 3 Hz with PID.", random_wave),
     ProofFigure(
         "fig12-test-simulation.png",
         "Counterpart of Fig. 12: test and pure simulation, El Centro 10 %, AMD on, τ = 8.8 ms.",

@@ -10,6 +10,6 @@ TITLE = "The seed paper, reproduced"
 
 
 def page(rows: list[PaperRow], images: list[Photo]) -> str:
-    """The page's text; pictures stand inside."""
+    """The HTML text with the pictures embedded."""
     passed = sum(row.passed for row in rows)
     return frame(TITLE, render("reproduction.html", title=TITLE, rows=rows, passed=passed, images=images))

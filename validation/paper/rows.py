@@ -1,4 +1,8 @@
-"""The table: what the paper says, what came out, within which tolerance."""
+"""The table: numbers of the paper, computed numbers, and tolerances.
+
+Tolerances of numbers that the paper prints cover its rounding and the spread over noise; those of computed numbers
+cover the spread over noise.
+"""
 
 from __future__ import annotations
 
@@ -59,7 +63,7 @@ def within(value: float, middle: float, half: float) -> bool:
 
 
 def building(evidence: PaperEvidence) -> list[PaperRow]:
-    """Period and damping from free vibration of the pure simulation, sensors' noise on."""
+    """Period and damping from free vibration of the pure simulation, with the sensors' noise."""
     period, damping = evidence.period, evidence.damping["ideal"] * POINT
     return [
         PaperRow(
@@ -103,14 +107,14 @@ def step_response(evidence: PaperEvidence) -> list[PaperRow]:
                 text,
                 "within 1 ms",
                 within(value, paper, 1e-3),
-                "mean of 8 steps of 5 mm, noise on",
+                "mean of 8 steps of 5 mm, with noise",
             )
         )
     return result
 
 
 def pieces(run: Run, word: str) -> dict[str, tuple[Array, Array]]:
-    """Target and measurement of every piece of a bench recording whose name begins with a word."""
+    """Target and measurement of every segment of a bench recording whose name begins with a word."""
     columns = run.columns["master"]
     return {
         segment.name: (
@@ -123,7 +127,7 @@ def pieces(run: Run, word: str) -> dict[str, tuple[Array, Array]]:
 
 
 def delays(run: Run, word: str, interval: float) -> dict[str, float]:
-    """Delay (s) of every such piece by the frequency evaluation index."""
+    """Delay (s) of every such segment by the frequency evaluation index."""
     return {
         name: indicators.frequency_evaluation_index(target, measured, interval).delay
         for name, (target, measured) in pieces(run, word).items()
@@ -141,23 +145,21 @@ def sine_uncompensated(evidence: PaperEvidence) -> list[PaperRow]:
     """Delay of the bare actuator."""
     found = delays(evidence.benches["actuator"], "sine", evidence.default.test.interval)
     passed = all(0.041 <= delay <= 0.045 for delay in found.values())
-    note = "L + atan(ωT)/ω falls with frequency"
+    note = "L + atan(ωT)/ω decreases with frequency"
     return [PaperRow("delay, sine, uncompensated", "0.044 s", listing(found), "41–45 ms", passed, note)]
 
 
 def sine_compensated(evidence: PaperEvidence) -> list[PaperRow]:
-    """Delay behind PID and Taylor."""
+    """Delay with PID and Taylor."""
     found = delays(evidence.benches["actuator-paper"], "sine", evidence.default.test.interval)
     passed = all(0.010 <= delay <= 0.014 for delay in found.values())
     lead = evidence.paper.compensator.parameters["lead"] * 1e3
-    note = (
-        f"τ = {lead:g} ms: the paper prints none; this one is chosen so that (L + T − τ)/(1 + P) is its 12 ms"
-    )
+    note = f"τ = {lead:g} ms: the paper does not print τ; it is chosen so that (L + T − τ)/(1 + P) is the paper's 12 ms"
     return [PaperRow("delay, sine, compensated", "0.012 s", listing(found), "10–14 ms", passed, note)]
 
 
 def random_compensated(evidence: PaperEvidence) -> list[PaperRow]:
-    """Delay behind PID alone for a random wave."""
+    """Delay with PID alone for a random wave."""
     interval = evidence.default.test.interval
     ((target, measured),) = pieces(evidence.benches["actuator-pid"], "random").values()
     delay = indicators.correlation_delay(target, measured, interval)
@@ -175,7 +177,7 @@ def random_compensated(evidence: PaperEvidence) -> list[PaperRow]:
 
 
 def reduction(evidence: PaperEvidence) -> list[PaperRow]:
-    """What is left of the delay."""
+    """The share of the delay that is left."""
     interval = evidence.default.test.interval
     before = delays(evidence.benches["actuator"], "sine", interval)
     after = delays(evidence.benches["actuator-paper"], "sine", interval)
@@ -195,13 +197,13 @@ def instability(evidence: PaperEvidence) -> list[PaperRow]:
     run = evidence.tests["uncompensated"]
     stopped = [event for event in run.events if event["level"] == "error"]
     t = float(run.columns["master"]["t"][-1])
-    text = f"stopped at {t:.1f} s: {stopped[0]['text']}" if stopped else "ran to its end"
-    note = "share 1/4, no AMD: with the AMD's damping it is just stable"
+    text = f"stopped at {t:.1f} s: {stopped[0]['text']}" if stopped else "completed"
+    note = "share 1/4, no AMD: with the AMD's damping it is barely stable"
     return [PaperRow("uncompensated closed loop", "unstable", text, "diverges", bool(stopped), note)]
 
 
 def critical_delay(evidence: PaperEvidence) -> list[PaperRow]:
-    """The delay from which the closed loop is unstable, found in the loop, beside theory."""
+    """The delay from which the closed loop is unstable, by simulation and by theory."""
     low, high = evidence.critical_delay
     middle = 500.0 * (low + high)
     theory = critical_delay_of(evidence.default) * 1e3
@@ -212,7 +214,7 @@ def critical_delay(evidence: PaperEvidence) -> list[PaperRow]:
 
 
 def apparent_damping(evidence: PaperEvidence) -> list[PaperRow]:
-    """What the paper's residual delay leaves of the damping."""
+    """The damping that remains with the paper's residual delay."""
     value = evidence.damping["paper"] * POINT
     note = "free vibration of the paper's plan, AMD off"
     return [
@@ -279,9 +281,9 @@ def agreement(evidence: PaperEvidence) -> list[PaperRow]:
                 evidence.simulations[f"{name}-equivalent"]["displacement"],
                 run.columns["master"]["displacement"],
             )
-            passed, wanted = left <= 0.10, "drift ≤ 0.10 where the damping lost is simulated too"
+            passed, wanted = left <= 0.10, "drift ≤ 0.10 with the lost damping in the simulation"
             note = (
-                f"NRMSE (delay, amplitude); the path's {cost(run, evidence.default)} of damping lost: with them in "
+                f"NRMSE (delay, amplitude); {cost(run, evidence.default)} of lost damping: with this loss in "
                 f"the pure simulation the drift's NRMSE is {left:.3f}"
             )
         result.append(
@@ -296,7 +298,7 @@ def cost(run: Run, plan: Plan) -> str:
     path = indicators.frequency_evaluation_index(
         columns["column_target"], columns["column_displacement"], plan.test.interval
     )
-    return f"{path.delay * 1e3:.1f} ms of delay are {damping_lost(plan, path) * POINT:.2f} points"
+    return f"{path.delay * 1e3:.1f} ms of delay cause {damping_lost(plan, path) * POINT:.2f} points"
 
 
 def amd_damping(evidence: PaperEvidence) -> list[PaperRow]:

@@ -46,14 +46,14 @@ def test_a_line_may_be_written_by_hand() -> None:
 @pytest.mark.parametrize(
     ("line", "part"),
     [
-        ("duration=2", "names no seed"),
+        ("duration=2", "has no seed"),
         ("seed=1 nonsense", "is not a fault"),
         ("seed=1 stal@1+1:slave", "did you mean stall"),
         ("seed=1 stall@1+1:roof", "names no place"),
         ("seed=1 stall@1+1:recorder", "names no place"),
         ("seed=1 recorded=1 nan@1+1:recorder(place=1)", "names no place"),
         ("seed=1 outage@1+1:slave", "names no place"),
-        ("seed=1 loss@1+1:master>slave", "must give loss"),
+        ("seed=1 loss@1+1:master>slave", "the values loss, and no others"),
         ("seed=1 loss@1+1:master>slave(loss=nan)", "is not a number"),
         ("seed=1 slaves=3", "1 or 2 slaves"),
         ("seed=x", "is not a number"),

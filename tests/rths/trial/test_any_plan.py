@@ -158,7 +158,7 @@ def test_an_effect_must_be_named_in_its_own_laboratory() -> None:
     assert not outcome.named
     assert outcome.surplus
     assert outcome.why == (
-        "says master.column.stiffness, not slave.east.column.stiffness; looks at master.column, not slave.east.column"
+        "reports master.column.stiffness, not slave.east.column.stiffness; first site is master.column, not slave.east.column"
     )
 
 
@@ -181,5 +181,5 @@ def test_of_several_slaves_the_report_on_the_one_with_the_effect_counts() -> Non
 
 def test_a_plan_with_a_rig_of_its_own_is_refused() -> None:
     plan = plans.parse('[master.rig]\nclass = "my_lab.py:Lab"\n', ROOT)
-    with pytest.raises(InputError, match="The plan names a rig of its own"):
+    with pytest.raises(InputError, match="The plan names a rig: remove"):
         basis(plan)

@@ -199,7 +199,7 @@ def test_a_missing_package_is_one_sentence(
     monkeypatch.setattr("validation.spread.importlib.import_module", without(package))
     assert command(*words, "-o", str(tmp_path)) == 2
     assert capsys.readouterr().err == (
-        f"rths: {words[0]} needs the package {package}: install it, or leave the option out.\n"
+        f"rths: {words[0]} needs the package {package}: install it, or omit the option.\n"
     )
 
 

@@ -94,7 +94,7 @@ def test_another_effect_is_wrong_and_the_reason_is_told() -> None:
     assert not outcome.right
     assert outcome.surplus
     assert outcome.why == (
-        "says column.slip, not damper.friction; looks at column, not damper; residual to noise below 2"
+        "reports column.slip, not damper.friction; first site is column, not damper; residual to noise below 2"
     )
 
 
@@ -121,7 +121,7 @@ def test_both_of_a_pair_must_stand_in_the_verdict() -> None:
     assert judged(case("pair", RUB, SLIP), both, 5.0, 3.0).size == 3.0
     one = judged(case("pair", RUB, SLIP), said("explained", "damper.friction", site="damper"))
     assert not one.right
-    assert one.why == "says damper.friction, not damper.friction and column.slip"
+    assert one.why == "reports damper.friction, not damper.friction and column.slip"
 
 
 def test_a_clean_laboratory_has_no_gap() -> None:
@@ -129,7 +129,7 @@ def test_a_clean_laboratory_has_no_gap() -> None:
     alarm = judged(case("clean"), said("explained", "column.slip", site="column"))
     assert not alarm.right
     assert alarm.surplus
-    assert alarm.why == "says column.slip, not no_gap"
+    assert alarm.why == "reports column.slip, not no_gap"
 
 
 def test_an_effect_inside_the_tolerances_may_be_no_gap() -> None:
@@ -255,7 +255,7 @@ def test_results_are_json_and_the_page_stands_alone() -> None:
     shown = page(some(), "Made <here>.")
     assert shown.count("data:image/png;base64,") == 4
     assert "Made &lt;here&gt;." in shown
-    assert "says column.slip, not damper.friction and column.slip" in shown
+    assert "reports column.slip, not damper.friction and column.slip" in shown
     assert "http" not in shown
     text = check_alone(shown).text
     assert "21 of 24 cases right." in text

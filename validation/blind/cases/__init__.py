@@ -1,1 +1,1 @@
-"""What a case of the blind trial is made of: the plan, true parameters, effects in laboratories and their names."""
+"""A case of the blind trial: the plan, true parameters, effects in laboratories and their names."""

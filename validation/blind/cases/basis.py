@@ -1,4 +1,4 @@
-"""What all cases of a trial have in common: the plan, what it lets them hide, and the tests that they play."""
+"""What all cases of a trial have in common: the plan, the effects that they may hide, and the tests."""
 
 from __future__ import annotations
 
@@ -23,16 +23,17 @@ from validation.blind import lots
 from validation.blind.library import Library
 from validation.blind.lots import Lot
 
-PEAK_DRIFT = (
-    3e-3,
-    10e-3,
-)  # m, of the default test's linear building; of other plans in proportion to their own test
-WITH_DAMPER = 0.75  # share of the cases, where the plan has an active mass damper
+# m, of the default test's linear building; of other plans in proportion to their own test. The smallest still is
+# hundreds of times the noise of a displacement sensor (5 µm); the largest keeps the actuator well within its limit of
+# 30 mm.
+PEAK_DRIFT = (3e-3, 10e-3)
+# Share of the cases whose damper is active, where the plan has one: most, because effects of the motor show only then.
+WITH_DAMPER = 0.75
 
 
 @dataclass(frozen=True)
 class TrialBasis:
-    """The plan of a trial, the length of its tests (s), and what its cases may hide."""
+    """The plan of a trial, the length of its tests (s), and the effects that its cases may hide."""
 
     plan: Plan
     duration: float
@@ -40,7 +41,7 @@ class TrialBasis:
     _drifts: dict[tuple[str, bool], float] = field(default_factory=dict, compare=False)
 
     def drift(self, record: str, *, damper: bool) -> float:
-        """Peak drift (m) of the plan's linear building under an unscaled record that ships."""
+        """Peak drift (m) of the plan's linear building under an unscaled record of the package."""
         if (record, damper) not in self._drifts:
             self._drifts[record, damper] = peak_drift(self.plan, record, damper=damper)
         return self._drifts[record, damper]
@@ -57,7 +58,7 @@ def default() -> Plan:
 
 
 def basis(plan: Plan | None = None, duration: float = 30.0, library: Library | None = None) -> TrialBasis:
-    """What the cases of a trial of a plan, of the default test where none is given, have in common.
+    """What the cases of a trial of a plan have in common; without a plan, of the default test.
 
     Raises:
         InputError: the plan names rigs, or a kind that cannot be loaded.
@@ -65,13 +66,13 @@ def basis(plan: Plan | None = None, duration: float = 30.0, library: Library | N
     plan = anywhere(plan or default())
     if not plan.emulated:
         raise InputError(
-            "The plan names a rig of its own: leave it out, because the trial emulates all laboratories."
+            "The plan names a rig: remove `rig` from [master] and [slave], because the trial emulates all laboratories."
         )
     return TrialBasis(plan, duration, library or libraries.of_plan(plan, lambda: reached(plan)))
 
 
 def anywhere(plan: Plan) -> Plan:
-    """The plan with the files of users' kinds named in full: a case is recorded and diagnosed in other folders."""
+    """The plan with full paths of the files of users' kinds: a case is recorded and diagnosed in other folders."""
 
     def full(kind: str) -> str:
         file, _, name = kind.rpartition(":")
@@ -83,7 +84,7 @@ def anywhere(plan: Plan) -> Plan:
 
 
 def reached(plan: Plan) -> dict[str, dict[str, float]]:
-    """What the signals of a plan's own test reach by its nominal models, by role and name.
+    """Peaks of the signals in a plan's own test by its nominal models, by role and name.
 
     Raises:
         InputError: the test cannot be simulated, or diverges.
@@ -92,7 +93,9 @@ def reached(plan: Plan) -> dict[str, dict[str, float]]:
 
     columns, finite = preflight.simulated(plan)
     if not finite:
-        raise InputError("The plan's own test diverges by its nominal models: look at rths check.")
+        raise InputError(
+            "The plan's own test diverges with its nominal models: run rths check, and mend the plan."
+        )
     return {
         role: {name: float(np.max(np.abs(values))) for name, values in signals.items()}
         for role, signals in columns.items()
@@ -100,7 +103,7 @@ def reached(plan: Plan) -> dict[str, dict[str, float]]:
 
 
 def draw_plan(lot: Lot, trial: TrialBasis) -> Plan:
-    """The trial's test with another motion, scaled to a sensible drift, with the damper or without."""
+    """The trial's test with another motion, scaled to a drawn drift, with the damper or without."""
     generator = lots.generator(*lot, "plan")
     record = lots.chosen(MOTIONS, *lot, "motion")
     damper = bool(generator.random() < WITH_DAMPER)
@@ -109,7 +112,7 @@ def draw_plan(lot: Lot, trial: TrialBasis) -> Plan:
     tables["test"] |= {"name": "blind", "duration": trial.duration, "seed": int(generator.integers(2**31))}
     for control in controls(tables):
         control["amd"] = damper
-    tables["limits"]["error_energy"] = math.inf  # what an effect does to the loop is what is asked for
+    tables["limits"]["error_energy"] = math.inf  # an effect that disturbs the loop must not end the test
     scale = round(peak / trial.drift(record, damper=damper), 4)
     tables["ground_motion"] = {"record": record, "scale": scale}
     return plans.from_tables(tables, trial.plan.base)
@@ -171,9 +174,7 @@ def linear(plan: Plan, *, damper: bool) -> tuple[Array, Array, Array, Array]:
             seen = plan.of(role)
             C[seen.damper.floor - 1, seen.damper.floor - 1] += seen.control.gain
     A = np.block([[-C / mass, -K / mass], [np.eye(n), np.zeros((n, n))]])
-    B = np.concatenate(
-        [np.ones((n, 1)), np.zeros((n, 1))]
-    )  # displacements against the motion, as their peaks count
+    B = np.concatenate([np.ones((n, 1)), np.zeros((n, 1))])  # the sign is reversed: only peaks are used
     drifts = np.eye(n) - np.eye(n, k=-1)
     return A, B, np.hstack([np.zeros((n, n)), -drifts]), np.zeros((n, 1))
 

@@ -1,4 +1,4 @@
-"""A case of the blind trial: the plan that everybody knows, and what its laboratories really are."""
+"""A case of the blind trial: the plan that everybody knows, and the true laboratories."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ class Laid:
     name: str
     site: str
     parameters: dict[str, float]
-    nulls: dict[str, float]  # of the parameters that say how strong it is, where it has a null value
+    nulls: dict[str, float]  # null values of the parameters that say how strong it is
     formula: str = ""  # of the independent laboratory, empty for the catalogue's own
-    role: str = ""  # in whose laboratory, or over which slave's link, it is; empty for the building
+    role: str = ""  # of the laboratory or the slave whose link has it; empty for the building
     alone: bool = False  # whether other laboratories of the test could have it too
 
 
 @dataclass(frozen=True)
 class Case:
-    """One laboratory: the plan that everybody knows, and the truth that is withheld."""
+    """One test: the plan that everybody knows, and the hidden truth."""
 
     index: int
     kind: str
@@ -39,8 +39,8 @@ class Case:
     seed: int
     laid: tuple[Laid, ...] = ()
     inside: bool = False  # with its effect every parameter is still inside its tolerance: there is no gap
-    logger: str = ""  # through which it is recorded, empty where the controllers' own readings are
-    own: bool = False  # every laboratory of a kind that ships is played by its independent code
+    logger: str = ""  # through which it is recorded; empty where the controllers' own readings are recorded
+    own: bool = False  # every laboratory of a kind of the package is played by its independent code
     normal: bool = False  # tolerances are standard deviations
     other: dict[str, Any] = field(
         default_factory=dict
@@ -61,14 +61,14 @@ class Case:
         return {"seed": self.seed, **tables, **({"effect": effects} if effects else {})}
 
     def replaced(self) -> tuple[str, ...]:
-        """The roles in the place of whose laboratories rigs of the trial stand."""
+        """The roles whose laboratories are replaced by rigs of the trial."""
         if self.own:
             kinds = plans.from_tables(self.plan, Path()).kinds
             return tuple(role for role, kind in kinds.items() if kind in (COLUMN, TABLE))
         return (self.laid[0].role,) if self.kind in REPLACED else ()
 
     def _rig(self, tables: Mapping[str, Any], role: str, laid: Sequence[Laid]) -> dict[str, Any]:
-        """The table of the rig that stands in for a laboratory, with the true parameters among its options."""
+        """The table of the rig that replaces a laboratory, with the true parameters among its options."""
         kind = plans.from_tables(self.plan, Path()).kinds[role]
         planned, true = of_role(self.plan, role), of_role(tables, role)
         options: dict[str, Any] = {
@@ -82,7 +82,7 @@ class Case:
 
 
 def written(item: Laid) -> dict[str, Any]:
-    """An effect of the catalogue as a reality has it, with its laboratory where others could have it too."""
+    """An effect of the catalogue in the form of a reality, with its laboratory where others could have it too."""
     return {
         "name": item.name,
         **item.parameters,
@@ -91,7 +91,7 @@ def written(item: Laid) -> dict[str, Any]:
 
 
 def of_role(tables: Mapping[str, Any], role: str) -> dict[str, Any]:
-    """The tables that hold for a role's laboratory: the plan's or the reality's own, or before them a named slave's."""
+    """The tables of a role's laboratory: those of a named slave, and otherwise the plan's or the reality's own."""
     name = name_of(role)
     return dict(tables) | (tables.get(SLAVE, {}).get(name, {}) if name else {})
 
@@ -106,7 +106,7 @@ def with_rig(tables: Mapping[str, Any], role: str, rig: dict[str, Any]) -> dict[
 
 
 def quiet(truths: Mapping[str, Any]) -> dict[str, Any]:
-    """True parameters with sensors that have no noise."""
+    """The true parameters, with sensors without noise."""
     tables = dict(truths)
     for key, table in truths.items():
         if key == "sensors":

@@ -1,7 +1,7 @@
-"""What the effects and sites of a test are called where several laboratories have them.
+"""Names of effects and sites of a test where several laboratories have them.
 
-A name then begins with the role of the one meant, as in a diagnosis of two laboratories of one kind:
-`master.column`, `slave.east.column.stiffness`. Elsewhere it stands alone, as in the catalogue.
+A name then begins with the role of its laboratory, as in a diagnosis of two laboratories of one kind:
+`master.column`, `slave.east.column.stiffness`. Elsewhere it is that of the catalogue.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ NAMING = ("explained", "partly_explained", "ambiguous")
 
 @dataclass(frozen=True)
 class Heard:
-    """What one report of a diagnosis says, in names that hold for the whole test."""
+    """What one report of a diagnosis says, in names that are unique in the whole test."""
 
     role: str  # of the slave that it shows beside the master
     status: str
-    names: tuple[str, ...]  # of the effects in the verdict; none where the status denies them
+    names: tuple[str, ...]  # of the effects in the verdict; none where the status names no cause
     probability: float | None
-    parameters: Mapping[str, Mapping[str, Value]]  # of these
-    sets: tuple[frozenset[str], ...]  # of effects that cannot be told apart
+    parameters: Mapping[str, Mapping[str, Value]]  # of these effects
+    sets: tuple[frozenset[str], ...]  # of effects that cannot be separated
     site: str  # the first, empty for none
     closed: float | None
 
@@ -42,7 +42,7 @@ class CaseNames:
         self._kinds = kinds_of(plan)
         self._slaves = plan.roles
         self._site_of = {name: effect.site for name, effect in effects.of_plan(plan).items()}
-        # site and fault of a reading by effect, all in names that hold for the whole test
+        # site and fault of a reading by effect, all in names that are unique in the whole test
         self.sites: dict[str, str] = {}
         self.faults: dict[str, str] = {}
         for role in (MASTER, *plan.roles):

@@ -1,4 +1,4 @@
-"""True parameters of a case: inside the plan's tolerances, as noisy as it happens, and what an effect makes of them."""
+"""True parameters of a case: drawn inside the plan's tolerances, with a drawn noise, and changed by effects."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from validation.blind.cases.case import Laid
 from validation.blind.library import Library
 from validation.blind.lots import Lot
 
-# drawn one after the other from one generator, as the published cases were; every other parameter has one of its own
+# Drawn one after the other from one generator, because the published cases were; every other parameter has its own.
 UNCERTAIN = {
     "structure": ("mass", "stiffness", "damping"),
     "column": ("stiffness",),
@@ -29,9 +29,11 @@ UNCERTAIN = {
     "table": ("frequency", "damping_ratio", "delay"),
     "damper": ("mass", "stiffness", "damping", "motor_time_constant"),
 }
-NOISE = (0.5, 3.0)  # factor on the plan's noise, all sensors alike
-ROUNDING = 1e-12
-MOST_MOVED = 4.0  # tolerances: a move that one normal draw in fifteen thousand passes
+# Factor on the plan's noise, the same for all sensors: from sensors twice as good as stated to those in a noisy hall.
+NOISE = (0.5, 3.0)
+ROUNDING = 1e-12  # relative, of products of a few factors
+# Tolerances: one normal draw in fifteen thousand is larger, and would have the wrong sign at 25 %.
+MOST_MOVED = 4.0
 Move = Callable[[np.random.Generator], float]
 
 
@@ -66,21 +68,21 @@ def draw_truths(lot: Lot, plan: Plan, *, normal: bool = False) -> dict[str, Any]
 
 
 def inside(generator: np.random.Generator) -> float:
-    """A move in tolerances, anywhere inside."""
+    """A move in tolerances, uniform between -1 and 1."""
     return float(generator.uniform(-1.0, 1.0))
 
 
 def about(generator: np.random.Generator) -> float:
-    """A move in tolerances that are standard deviations."""
+    """A normal move, with the tolerance as standard deviation."""
     return float(np.clip(generator.standard_normal(), -MOST_MOVED, MOST_MOVED))
 
 
 def of_laboratory(
     lot: Lot, plan: Plan, whose: tuple[str, Kind], factors: Mapping[str, float], noise: float, move: Move
 ) -> dict[str, Any]:
-    """The tables of a laboratory whose parameters differ in truth, each by a factor.
+    """The tables of a laboratory whose true parameters differ from the nominal ones, each by a factor.
 
-    `factors` are those of the plan's own tables that are drawn for all laboratories together.
+    `factors` are those of the plan's own tables, which are drawn for all laboratories together.
     """
     role, kind = whose
     seen = plan.of(role)
@@ -102,7 +104,7 @@ def of_laboratory(
 
 
 def changed(before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Any]:
-    """The entries of a table that are not what they were."""
+    """The entries of a table that have changed."""
     found = {}
     for name, value in after.items():
         new = changed(before.get(name, {}), value) if isinstance(value, dict) else value
@@ -119,7 +121,7 @@ def of_building(plan: Plan) -> Sequence[str]:
 
 
 def parameters(kind: Kind, plan: Plan) -> list[str]:
-    """The uncertain parameters of a laboratory that are there at all; `plan` as its role sees it."""
+    """The uncertain parameters of a laboratory that are not zero; `plan` as its role sees it."""
     names = (name for machine in kind.machines(plan) for name in machine.parameters)
     return [name for name in names if kind.planned(plan, name) != 0.0]
 
@@ -135,7 +137,7 @@ def varied(value: Any, width: float, generator: np.random.Generator, move: Move)
 
 
 def tolerance(plan: Plan, table: str, name: str) -> float:
-    """How well a nominal parameter of one of the plan's own tables is known, relative."""
+    """Relative tolerance of a nominal parameter of one of the plan's own tables."""
     return plan.tolerances.parameters.get(f"{table}.{name}", plan.tolerances.default)
 
 
@@ -155,7 +157,7 @@ def is_inside(
 
 
 def stays_inside(plan: Plan, role: str, true: Plan, moved: System, most: float) -> bool:
-    """Whether what effects make of a role's true plan is within tolerances, times `most`, of the whole plan's."""
+    """Whether a role's true plan with its effects is within `most` tolerances of the whole plan."""
     if moved.effects != Effects():
         return False
     nominal, there = plan.of(role), moved.plan.tables()

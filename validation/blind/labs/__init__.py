@@ -1,7 +1,7 @@
 """Laboratories written independently of the diagnosis' models, as plug-in rigs.
 
-They share no model with `models`: time is cut into steps of 0.1 ms with Runge-Kutta, and the effects of the
-catalogue have other formulas here. Effects whose names begin with `x.` are in no catalogue.
+They share no model with `models`: they integrate with Runge-Kutta in steps of at most 0.1 ms, and have other formulas
+of the catalogue's effects. Effects whose names begin with `x.` are in no catalogue.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ FORMULAS: dict[str, tuple[str, ...]] = {
     "damper.stroke_stop": ("hertz", "linear"),
     **{f"sensor.{signal}.lag": ("butterworth",) for signal in SIGNALS},
 }
-"""Formulas by effect of the catalogue, where they are others than the catalogue's."""
+"""Formulas by effect of the catalogue, where they differ from the catalogue's."""
 
 PLAIN: tuple[str, ...] = (
     "actuator.time_constant",
@@ -82,4 +82,7 @@ UNCATALOGUED: dict[str, tuple[str, tuple[str, ...], tuple[tuple[float, float], .
     "x.sensor.column_force.missing": ("sensor.column_force", ("probability",), ((0.01, 0.3),)),
     "x.sensor.damper_force.missing": ("sensor.damper_force", ("probability",), ((0.01, 0.3),)),
 }
-"""Effects in no catalogue: site, parameters, and for each of these its weak and strong value."""
+"""Effects in no catalogue: site, parameters, and for each of these its weak and strong value.
+
+The ranges are chosen for the default test: from an effect that noise may hide to one that no diagnosis should miss.
+"""

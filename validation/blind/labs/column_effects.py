@@ -7,7 +7,7 @@ from validation.blind.labs.parts import delay, friction, specimen, valve, yieldi
 
 
 def servo_delay(values: Values, *, delay: float) -> None:
-    """Dead time beside the plan's; a rational approximation takes what is added, or all that is left."""
+    """Dead time in addition to the plan's; where it is shorter, all that is left is a rational approximation."""
     lengthen(values, delay)
 
 
@@ -37,17 +37,17 @@ def velocity_limit(values: Values, *, velocity: float) -> None:
 
 
 def backlash(values: Values, *, width: float) -> None:
-    """Whole play of the clevis."""
+    """Full width of the clevis' backlash."""
     values["backlash"] = width
 
 
 def compliance(values: Values, *, compliance: float) -> None:
-    """Displacement that the load takes, m/N."""
+    """Displacement per load, m/N."""
     values["compliance"] = compliance
 
 
 def deadband(values: Values, *, width: float) -> None:
-    """Whole dead band of the valve, on the loop's error."""
+    """Full width of the valve's dead band, on the loop's error."""
     values["deadband"] = width
 
 
@@ -59,17 +59,17 @@ def stiffness(values: Values, *, factor: float) -> None:
 def yields(
     values: Values, *, yield_displacement: float, hardening: float = 0.05, exponent: float = 2.0
 ) -> None:
-    """Yielding from a deformation on; the exponent is how sharply, where the formula is smooth."""
+    """Yielding beyond a deformation; the exponent is the sharpness of smooth formulas."""
     values |= {"yield_displacement": yield_displacement, "hardening": hardening, "sharpness": exponent}
 
 
 def degradation(values: Values, *, rate: float) -> None:
-    """Share of the stiffness lost in the end."""
+    """Largest share of the stiffness that is lost."""
     values["degradation"] = rate
 
 
 def pinching(values: Values, *, factor: float, hardening: float = 0.0, width: float = 1e-3) -> None:
-    """Share of the force missing at the origin, share added far out, m between the two."""
+    """Share of the force missing at the origin, share added far from it, and the deformation (m) between the two."""
     values |= {"pinched": factor, "pinched_hardening": hardening, "pinched_width": width}
 
 
@@ -89,22 +89,22 @@ def inertia(values: Values, *, mass: float) -> None:
 
 
 def slip(values: Values, *, gap: float) -> None:
-    """Whole gap without force."""
+    """Full width of the gap without force."""
     values["slip"] = gap
 
 
 def ripple(values: Values, *, amplitude: float, frequency: float) -> None:
-    """Pulsation of the pump: the oil flow swings so that the piston does by `amplitude`."""
+    """Pulsation of the pump: the oil flow makes the piston vibrate by `amplitude`."""
     values |= {"ripple": amplitude, "ripple_frequency": frequency}
 
 
 def droop(values: Values, *, loss: float) -> None:
-    """Share of the flow gain lost while the accumulator is empty."""
+    """Share of the flow gain that is lost with an empty accumulator."""
     values["droop"] = loss
 
 
 def valve_hysteresis(values: Values, *, width: float) -> None:
-    """Whole play of a spool that rubs, on the loop's error."""
+    """Full width of the hysteresis of a spool with friction, on the loop's error."""
     values["hysteresis"] = width
 
 
@@ -114,7 +114,7 @@ def hardening(values: Values, *, stiffness: float) -> None:
 
 
 def creep(values: Values, *, share: float, relaxation_time: float) -> None:
-    """Maxwell element beside the column: its stiffness over k, its time constant."""
+    """Maxwell element parallel to the column: its stiffness over k, its time constant."""
     values |= {"creep": share, "relaxation": relaxation_time}
 
 

@@ -12,8 +12,8 @@ from validation.blind.labs.parts import delay, filters, specimen, valve
 from validation.blind.labs.parts.compiled import Array, jit
 from validation.blind.labs.parts.specimen import TrueSpecimen
 
-CONTACT = 1e4  # stiffness of the clevis over the specimen's
-GREASE = 5e-3  # s, dashpot of the clevis over the specimen's stiffness
+CONTACT = 1e4  # stiffness of the clevis over the specimen's: it takes 0.01 % of the motion, less than the sensor sees
+GREASE = 5e-3  # s, dashpot of the clevis over the specimen's stiffness: the specimen returns through the gap in 5 ms
 
 # places in `state`
 COMMAND, PISTON, SPOOL, USED, TIME, DEFORMATION, FORCE, READING = range(8)
@@ -41,7 +41,7 @@ class Servo(NamedTuple):
 
 
 class ColumnMemory(NamedTuple):
-    """What the laboratory remembers, which `advance` moves on."""
+    """State of the laboratory, which `advance` moves on."""
 
     state: Array
     past: Array  # commands within the dead time

@@ -19,14 +19,14 @@ from validation.blind.labs.column_kernel import ColumnMemory, Servo
 from validation.blind.labs.parts import delay, filters, specimen
 from validation.blind.labs.parts.specimen import TrueSpecimen
 
-STEP = 0.1e-3  # s, longest
+STEP = 0.1e-3  # s, longest: a loop of 30 Hz, faster than any here, turns by 0.02 rad in it
 SIGNALS = ColumnMeasurement._fields
 
 
 class TrueColumnLab:
     """Servo loop, clevis and column in short steps; options are tables of true parameters, and effects.
 
-    An effect is `{name, formula, parameters}`; without a formula it is the first that the effect has.
+    An effect is `{name, formula, parameters}`; without a formula it has its first one.
     """
 
     def __init__(
@@ -81,19 +81,19 @@ def true_values(actuator: Actuator, column: Column) -> laying.Values:
     """The kernel's values without effects; raises InputError where this laboratory has no such part."""
     if column.model != "linear":
         raise InputError(
-            f"the column of this laboratory is linear, not '{column.model}': lay an effect over it."
+            f"The column of this laboratory is linear, not '{column.model}': give the law as an effect."
         )
     if column.mass or column.damping:
         raise InputError(
-            "the column of this laboratory has no mass or damping of its own: lay an effect over it."
+            "The column of this laboratory has no mass or damping of its own: give them as effects."
         )
     if actuator.model != "fopdt" or actuator.command != "ramp":
         raise InputError(
-            f"this laboratory has the actuator 'fopdt' on a ramped command, not '{actuator.model}' on one that is "
-            f"'{actuator.command}': give those in [actuator]."
+            f"This laboratory has the actuator 'fopdt' with a ramped command, not '{actuator.model}' with the command "
+            f'\'{actuator.command}\': set model = "fopdt" and command = "ramp" in [actuator].'
         )
     if actuator.time_constant <= 0.0:
-        raise InputError("time_constant in [actuator] must be above 0 s in this laboratory.")
+        raise InputError("time_constant in [actuator] must be greater than 0 s in this laboratory.")
     return {
         "gain": actuator.gain,
         "delay": actuator.delay,
@@ -112,7 +112,7 @@ def readings(
     effects: object,
     known: Mapping[str, laying.KnownEffect],
 ) -> tuple[sensors.TrueSensors, Any]:
-    """The sensors of a laboratory and their filters; the effects are laid over `values`, too."""
+    """The sensors of a laboratory and their filters; the effects are applied to `values`, too."""
     values |= sensors.true_values(names, levels)
     laying.lay(values, laying.check(effects), {**known, **sensors.known(names)})
     read = sensors.TrueSensors(names, values, interval, seed)

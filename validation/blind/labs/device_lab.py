@@ -1,7 +1,7 @@
 """A laboratory of a user's kind: its own kernel, with sensors and effects that are not of the diagnosis' models.
 
-Nobody has written such a laboratory a second time, so what moves is the kind's own `step` with the true parameters.
-Its readings, and what no catalogue knows of it, are those of the other laboratories of the trial.
+There is no second implementation of such a laboratory, so it moves by the kind's own `step` with the true parameters.
+Its sensors, and its effects in no catalogue, are those of the other laboratories of the trial.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from validation.blind.labs import laying, sensors
 from validation.blind.labs.laying import PLAIN, KnownEffect, Values
 from validation.blind.labs.parts import filters, mechanics
 
-PARTS = 20  # of an interval, in which a filter of a reading moves on
+PARTS = 20  # of an interval, in which a filter of a reading moves on: 0.1 ms at the default interval
 NONE = {"ripple": 0.0, "ripple_frequency": 10.0, "cam": 0.0, "cam_period": 1.0, "cubic": 0.0}
 
 
 def ripple(values: Values, *, amplitude: float, frequency: float) -> None:
-    """Pulsation of the pump: the command swings by `amplitude` m."""
+    """Pulsation of the pump: a vibration of `amplitude` m is added to the command."""
     values |= {"ripple": amplitude, "ripple_frequency": frequency}
 
 
@@ -39,7 +39,7 @@ def cam(values: Values, *, amplitude: float, period: float) -> None:
 
 
 def hardening(values: Values, *, stiffness: float) -> None:
-    """Cubic force `stiffness·x³`, N/m³, beside the device's."""
+    """Cubic force `stiffness·x³`, N/m³, added to the device's."""
     values["cubic"] = stiffness
 
 
@@ -52,7 +52,7 @@ AROUND = {
 
 
 def formulas(channels: Channels) -> dict[str, tuple[str, ...]]:
-    """Formulas by effect of the catalogue on the readings of a device, where they are others than the catalogue's."""
+    """Formulas by effect of the catalogue on the readings of a device, where they differ from the catalogue's."""
     return {f"sensor.{name}.lag": ("butterworth",) for name in channels.names}
 
 
@@ -61,7 +61,7 @@ def uncatalogued(
 ) -> dict[str, tuple[str, dict[str, tuple[float, float]]]]:
     """Effects in no catalogue by name: site, and weak and strong value of each parameter.
 
-    They are as large beside what the signals reach as those of the other laboratories are in the default test.
+    Relative to the peaks of the signals they are as large as those of the other laboratories in the default test.
     """
     motion, force = reached[channels.position], reached[channels.force]
     stiffness = force / motion**3
@@ -120,7 +120,7 @@ class OwnKernelLab:
         return tuple(self._sensors.read(self._true))
 
     def write(self, command: tuple[float, ...]) -> None:
-        """Move on by one interval, to the command as its transfer system is told it."""
+        """Move on by one interval, with the command that reaches the transfer system."""
         transfer, *motor = command
         self._ticks += 1
         truth = list(self._enter(self._lab, self._told(float(transfer)), *map(float, motor)))

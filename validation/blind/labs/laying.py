@@ -1,4 +1,4 @@
-"""Effects as options: names, formulas and parameters laid over a laboratory's true values."""
+"""Effects as options: names, formulas and parameters that change a laboratory's true values."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ class KnownEffect(NamedTuple):
     """An effect that a laboratory knows."""
 
     apply: Callable[..., None]  # takes the values to change and the parameters by name
-    formulas: Mapping[str, int]  # its codes, the first is used where none is given
-    place: str = ""  # the value that takes the code
+    formulas: Mapping[str, int]  # codes by formula; the first is used where none is given
+    place: str = ""  # name of the value that is set to the code
 
 
 PLAIN = {"plain": 0}
@@ -29,7 +29,7 @@ def check(effects: object) -> list[dict[str, Any]]:
         raise InputError("effects must be a list of tables with name, formula and parameters.")
     for item in effects:
         if not isinstance(item.get("name"), str):
-            raise InputError(f"an effect has the name {item.get('name')!r}, but must have a text.")
+            raise InputError(f"The name of an effect is {item.get('name')!r}, but must be a text.")
         for key in item:
             if key not in ("name", "formula", "parameters"):
                 hint = nearest(str(key), ("name", "formula", "parameters"))
@@ -63,7 +63,7 @@ def names(apply: Callable[..., None]) -> tuple[str, ...]:
 
 
 def parameters(name: str, given: object, apply: Callable[..., None]) -> Values:
-    """The numbers of an effect, all there and none too many."""
+    """The parameters of an effect, checked to be complete and known."""
     if not isinstance(given, Mapping):
         raise InputError(f"parameters of '{name}' must be a table.")
     known = names(apply)

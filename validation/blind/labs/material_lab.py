@@ -17,13 +17,13 @@ from validation.blind.labs import materials
 from validation.blind.labs.column_lab import SIGNALS, TrueColumnLab
 from validation.blind.labs.sensors import TrueSensors, true_values
 
-SUBSTEPS = 4  # deformations that a material is led through in an interval
+SUBSTEPS = 4  # deformations of a material in an interval, so that the event points of its law are met closely
 
 
 class MaterialLab:
-    """Servo loop, and a material of OpenSees in the column's place; effects name one as `opensees.NAME`.
+    """Servo loop, and a material of OpenSees in the column's place; an effect names it as `opensees.NAME`.
 
-    Without an effect the column is elastic. The servo does not feel the force.
+    Without an effect the column is elastic. The force does not act back on the servo.
     """
 
     def __init__(
@@ -50,7 +50,7 @@ class MaterialLab:
         return ColumnMeasurement(*self._sensors.read(self._true))
 
     def write(self, command: ColumnCommand) -> None:
-        """Move on by one interval, ramping to the command; the material follows in straight lines."""
+        """Move on by one interval, ramping to the command; the deformation of the material is linear in between."""
         self._servo.write(command)
         place, _ = self._servo.read()
         way = np.linspace(self._true[0], place, SUBSTEPS + 1)[1:]

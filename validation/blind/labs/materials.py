@@ -1,7 +1,8 @@
-"""OpenSees' uniaxial materials as columns: what each is, its parameters, and which effects of the catalogue name it.
+"""OpenSees' uniaxial materials as columns: calls, ranges of the parameters, and the effects that are right names.
 
-A material takes the deformation (m) as strain and gives the force (N) as stress. Its numbers are drawn in multiples of
-the plan's stiffness k and of a deformation d at which it bends, so that the default test's drifts work it hard.
+A material takes the deformation (m) as strain and gives the force (N) as stress. Its parameters are drawn in multiples
+of the plan's stiffness k and of a deformation d at which it yields, so that the default test's drifts take it far into
+its inelastic range. Fixed numbers give each law its usual form; Steel02's are those of the OpenSees manual.
 """
 
 from __future__ import annotations
@@ -12,7 +13,10 @@ from typing import NamedTuple
 Values = Mapping[str, float]
 Rows = list[list[str | float]]  # calls of `uniaxialMaterial`; the last is the column
 
-BENDS = (0.7e-3, 2.0e-3)  # m, deformation at which a column bends
+BENDS = (
+    0.7e-3,
+    2.0e-3,
+)  # m, deformation at which a column yields: below the peaks of most of the trial's columns
 YIELDING = ("column.yielding",)
 PINCHED = ("column.pinching", "column.yielding", "column.degradation", "column.slip")
 WORN = ("column.yielding", "column.degradation")
@@ -27,7 +31,7 @@ class Material(NamedTuple):
 
 
 def backbone(v: Values) -> list[float]:
-    """Three points (force, deformation) of an envelope that bends at d."""
+    """Three points (force, deformation) of an envelope that yields about d."""
     k, d = v["k"], v["d"]
     return [0.7 * k * d, 0.7 * d, 1.2 * k * d, 1.7 * d, 1.2 * k * d + v["b"] * k * 8.0 * d, 9.7 * d]
 
@@ -38,18 +42,10 @@ def mirrored(points: list[float]) -> list[float]:
 
 
 def peak_oriented(name: str, v: Values, *more: float) -> Rows:
-    """Ibarra, Medina and Krawinkler's hinge without strength lost."""
+    """Ibarra, Medina and Krawinkler's hinge, whose cap lies beyond every drift of the trial."""
     k, force = v["k"], v["k"] * v["d"]
-    plastic = [
-        0.04,
-        0.04,
-        0.1,
-        0.1,
-        0.2,
-        0.2,
-        0.3,
-        0.3,
-    ]  # m to the cap, beyond it, residual share, m to the end
+    # m to the cap, m beyond it, residual share, m to failure; each in both directions
+    plastic = [0.04, 0.04, 0.1, 0.1, 0.2, 0.2, 0.3, 0.3]
     lasting = [v["life"]] * 4 + [1.0] * 4
     return [[name, 1, k, v["b"], v["b"], force, -force, *more, *lasting, *plastic, 1.0, 1.0]]
 
@@ -179,13 +175,13 @@ def saws(v: Values) -> list[float]:
 
 
 def gaps(v: Values) -> Rows:
-    """Two springs that begin to carry behind a gap on either side."""
+    """Two springs that carry load beyond a gap, one on either side."""
     k, share, gap = v["k"], v["share"], v["gap"] * v["d"]
     return [["ElasticPPGap", tag, share * k, sign * 1e9, sign * gap] for tag, sign in ((2, 1.0), (3, -1.0))]
 
 
 def elastic(v: Values) -> tuple[list[float], list[float]]:
-    """Strains and stresses of a curve that softens at d and at 3d, the same both ways."""
+    """Strains and stresses of a curve that softens at d and at 3d, in both directions."""
     k, d, b = v["k"], v["d"], v["b"]
     forces = [k * d, k * d * (1.0 + 2.0 * b), k * d * (1.0 + 2.0 * b + 17.0 * b * b)]
     strains = [d, 3.0 * d, 20.0 * d]
@@ -193,7 +189,7 @@ def elastic(v: Values) -> tuple[list[float], list[float]]:
 
 
 def concrete(v: Values) -> Rows:
-    """Concrete that crushes slowly and cracks, beside half of the stiffness."""
+    """Concrete that crushes slowly and cracks, parallel to an elastic half of the stiffness."""
     k, d = v["k"], v["d"]
     return [
         [

@@ -1,6 +1,6 @@
 """The readings of a laboratory: `gain·value`, saturated, plus bias, drift and noise; held, rounded.
 
-Noise is white, from `default_rng(seed)`; samples get lost by a generator of their own.
+Noise is white, from `default_rng(seed)`; lost samples are drawn from another generator.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 from validation.blind.labs.laying import PLAIN, KnownEffect, Values
 
-BLOCK = 512  # rows of noise drawn at once
+BLOCK = 512  # rows of noise drawn at once, because one call costs as much as a hundred draws
 LAGS = {"butterworth": 2, "first_order": 1}
 
 
@@ -45,7 +45,7 @@ def drift(values: Values, *, signal: str, rate: float) -> None:
 
 
 def lag(values: Values, *, signal: str, time_constant: float) -> None:
-    """Low-pass whose slow signals lag by the time constant."""
+    """Low-pass filter that delays slow signals by the time constant."""
     values[f"{signal}.lag"] = time_constant
 
 
@@ -55,7 +55,7 @@ def quantization(values: Values, *, signal: str, step: float) -> None:
 
 
 def noise(values: Values, *, signal: str, rms: float) -> None:
-    """White noise beside the sensor's own."""
+    """White noise in addition to the sensor's own."""
     values[f"{signal}.noise"] = math.hypot(values[f"{signal}.noise"], rms)
 
 
@@ -141,7 +141,7 @@ class TrueSensors:
 
 
 def keys(name: str, values: Values) -> list[str]:
-    """What is known of one sensor."""
+    """Names of the values of one sensor."""
     return [key.rpartition(".")[2] for key in values if key.startswith(f"{name}.")]
 
 

@@ -10,7 +10,7 @@ from validation.blind.labs.parts import friction, mechanics
 
 
 def table_delay(values: Values, *, delay: float) -> None:
-    """Dead time beside the plan's; a rational approximation takes what is added, or all that is left."""
+    """Dead time in addition to the plan's; where it is shorter, all that is left is a rational approximation."""
     lengthen(values, delay)
 
 
@@ -25,17 +25,17 @@ def table_gain(values: Values, *, factor: float) -> None:
 
 
 def oil_column(values: Values, *, frequency: float, damping: float = 0.1) -> None:
-    """Resonance of the platform over the loop, Hz and ratio."""
+    """Resonance of the platform on the loop, frequency (Hz) and damping ratio."""
     values |= {"oil": 2.0 * math.pi * frequency, "oil_damping": damping}
 
 
 def payload(values: Values, *, compliance: float) -> None:
-    """Damper's force over the table's own mass and stiffness: `ÿ = … + ω²·c·F`."""
+    """Force of the damper on the table's compliance: `ÿ = … + ω²·c·F`."""
     values["compliance"] = compliance
 
 
 def table_backlash(values: Values, *, width: float) -> None:
-    """Whole play between loop and platform."""
+    """Full width of the backlash between loop and platform."""
     values["play"] = width
 
 
@@ -70,7 +70,7 @@ def motor_gain(values: Values, *, factor: float) -> None:
 
 
 def motor_lag(values: Values, *, time_constant: float) -> None:
-    """Lag of the motor's force beside the plan's."""
+    """Lag of the motor's force in addition to the plan's."""
     values["motor_lag"] = max(values["motor_lag"] + time_constant, 0.0)
 
 
@@ -80,12 +80,12 @@ def force_limit(values: Values, *, force: float) -> None:
 
 
 def stroke_stop(values: Values, *, stroke: float, stiffness: float = 2000.0) -> None:
-    """Stops from the middle on, and their stiffness (at 2 mm of depth)."""
+    """Distance of the stops from the centre, and their stiffness (at 2 mm of depth)."""
     values |= {"stop_stroke": stroke, "stop_stiffness": stiffness}
 
 
 def pitch(values: Values, *, coupling: float, frequency: float) -> None:
-    """Rocking of the platform, felt by the accelerometer: `r̈ + 0.1·ω·ṙ + ω²·r = −coupling·ÿ`."""
+    """Rocking of the platform, measured by the accelerometer: `r̈ + 0.1·ω·ṙ + ω²·r = −coupling·ÿ`."""
     values |= {"pitch": coupling, "pitch_omega": 2.0 * math.pi * frequency}
 
 
@@ -100,7 +100,7 @@ def cable_drag(values: Values, *, coefficient: float) -> None:
 
 
 def motor_constant(values: Values, *, rise: float) -> None:
-    """Share that the motor's force gains at a stroke of 50 mm."""
+    """Relative increase of the motor's force at a stroke of 50 mm."""
     values["motor_rise"] = rise
 
 

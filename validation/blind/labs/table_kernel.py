@@ -11,11 +11,14 @@ from typing import NamedTuple
 from validation.blind.labs.parts import delay, filters, friction, mechanics
 from validation.blind.labs.parts.compiled import Array, jit
 
-RUBBING = 1e-3  # m/s, scale of the regularised friction, of rail and table
-STICKING = 5e-3  # m/s, scale of the rail's Stribeck effect
-PRESLIDING = 20e-6  # m, of the rail
-MICRO = 0.5e-3  # s, damping of the bristles over Coulomb friction, times their presliding
-PITCH_DAMPING, APPENDAGE_DAMPING = 0.05, 0.03  # ratios
+# m/s; the mass moves at up to some 0.5 m/s, so that friction is Coulomb's but near a reversal.
+RUBBING = 1e-3  # scale of the regularised friction, of rail and table
+STICKING = 5e-3  # scale of the rail's Stribeck effect
+# m, deflection of the rail's contact before it slides: tens of micrometres in rolling guides.
+PRESLIDING = 20e-6
+# S, damping of the bristles over Coulomb friction, times their presliding: damped within a fraction of an interval.
+MICRO = 0.5e-3
+PITCH_DAMPING, APPENDAGE_DAMPING = 0.05, 0.03  # ratios of bolted and of loose steel parts
 
 # places in `state`: table loop, stroke, motor, platform, pitch, appendage; each with its rate
 LOOP, LOOP_RATE, STROKE, STROKE_RATE, MOTOR, PLATE, PLATE_RATE = range(7)
@@ -27,7 +30,7 @@ DISPLACEMENT, ACCELERATION, STROKE_OUT, FORCE = range(4)  # places of the readin
 
 
 class TableMemory(NamedTuple):
-    """What the laboratory remembers, which `advance` moves on."""
+    """State of the laboratory, which `advance` moves on."""
 
     state: Array
     past: Array  # commands within the dead time
@@ -75,7 +78,7 @@ class TrueTable(NamedTuple):
 
 @jit
 def rail(p: TrueTable, x: Array, bristle: float) -> float:
-    """Force (N) that guide rail, cable, spring and stops put between mass and table."""
+    """Force (N) of guide rail, cable, spring and stops between mass and table."""
     s, w = x[STROKE], x[STROKE_RATE]
     result = p.stiffness * s + p.dashpot * w + p.cubic * s**3 + p.drag * w * abs(w)
     if p.friction > 0.0:
@@ -86,7 +89,7 @@ def rail(p: TrueTable, x: Array, bristle: float) -> float:
 
 @jit
 def asked(p: TrueTable, command: float) -> float:
-    """Force (N) the motor settles at under a command."""
+    """Steady force (N) of the motor under a command."""
     wanted = p.motor_gain * command
     return mechanics.saturated(wanted, p.force_limit) if p.force_limit > 0.0 else wanted
 
@@ -109,7 +112,7 @@ def bent(p: TrueTable, bristle: float, moved: float, velocity: float) -> float:
 
 @jit
 def platform(p: TrueTable, x: Array, loop: float) -> float:
-    """Acceleration (m/s²) of the platform over the loop's, that of the loop itself where nothing is between."""
+    """Acceleration (m/s²) of the platform; without oil spring or backlash that of the loop."""
     if p.oil > 0.0:
         return mechanics.oil_column(p.oil, p.oil_damping, x[LOOP], x[PLATE], x[PLATE_RATE])
     if p.play > 0.0:
@@ -164,7 +167,7 @@ def move(
 
 @jit
 def observe(p: TrueTable, state: Array, work: Array, out: Array, wanted: float, push: float) -> None:
-    """What the sensors stand before."""
+    """Write the true values at the sensors into `out`."""
     rates(p, state, work[0], wanted, push, state[STROKE], state[BRISTLE])
     out[DISPLACEMENT] = state[PLATE]
     out[ACCELERATION] = work[0, PLATE_RATE] + work[0, PITCH_RATE]

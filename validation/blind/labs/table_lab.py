@@ -25,7 +25,7 @@ SIGNALS = TableMeasurement._fields
 class TrueTableLab:
     """Table loop, platform, damper and motor in short steps; options are tables of true parameters, and effects.
 
-    An effect is `{name, formula, parameters}`; without a formula it is the first that the effect has.
+    An effect is `{name, formula, parameters}`; without a formula it has its first one.
     """
 
     def __init__(

@@ -1,1 +1,1 @@
-"""Data loggers of the blind trial: what each makes of a channel, and the recording that it leaves."""
+"""Data loggers of the blind trial: how each changes a channel, and the recording that it writes."""

@@ -1,4 +1,4 @@
-"""What a data logger of the blind trial makes of a channel.
+"""How a data logger of the blind trial changes a channel.
 
 A channel passes its logger in this order: calibration, hum of the mains, noise of the sensor, anti-alias filter,
 converter, late channels, printed decimals, and the linear interpolation with which an import puts a logger of another
@@ -19,22 +19,22 @@ from models.registry import Array
 from validation.blind.logger.loggers import Logger
 
 MAINS = 50.0  # Hz
-ORDER = 4  # of the anti-alias filter and of the filters that colour noise
-CORRELATION = 0.95  # of neighbouring samples of the noise "ar1"
-FREEDOM = 3  # degrees of freedom of Student's t: the fewest whole number that has a variance
-# Hz, below which pink noise is flat: ten seconds are the longest wave that half a minute shows well.
-DEEPEST = 0.1
-RANGE = (1.5, 5.0)  # range of a converter over the peak of its channel: nobody fits it better, or wastes more
+ORDER = 4  # of the anti-alias filter and of the filters that colour noise: usual in amplifiers
+CORRELATION = 0.95  # of neighbouring samples of the noise "ar1": it is correlated over some 20 samples
+FREEDOM = 3  # degrees of freedom of Student's t: the smallest whole number that has a variance
+DEEPEST = 0.1  # Hz, below which pink noise is flat: a test of 30 s shows less than three longer periods
+RANGE = (1.5, 5.0)  # range of a converter over the peak of its channel: from a tight to a generous setting
 DECIMALS = {"m": 1e-6, "N": 1.0, "m/s²": 1e-3}  # 3 decimals of mm, of kN, of m/s²
-SETTLING = 4096  # samples before the first, in which coloured noise becomes stationary
+# Samples before the first: the slowest filter here has forgotten its start after some hundred.
+SETTLING = 4096
 
 
 def logged(
     logger: Logger, row: Signal, values: Array, level: float, interval: float, generator: np.random.Generator
 ) -> Array:
-    """What a recording holds of a channel whose true values (ticks,) stand every `interval` s; SI units.
+    """The recorded values of a channel with the true values (ticks,), one per `interval` s; SI units.
 
-    `level` is the rms of the sensor's noise, drawn from `generator` with the hum's phase and the range.
+    `level` is the rms of the sensor's noise. Noise, phase of the hum and range are drawn from `generator`.
     """
     ticks: Array = np.arange(values.size, dtype=np.float64) * interval
     rate = logger.rate or 1.0 / interval
@@ -64,7 +64,7 @@ def resampled(ticks: Array, values: Array, times: Array) -> Array:
 
 
 def filtered(values: Array, cutoff: float, rate: float) -> Array:
-    """Behind an analogue Butterworth filter of order 4 that stood at the first value before, the input ramped."""
+    """Behind an analogue Butterworth filter of order 4 that starts in its steady state, with a ramped input."""
     analogue = signal.butter(ORDER, 2.0 * math.pi * cutoff, analog=True, output="ba")
     above, below, _ = signal.cont2discrete(analogue, 1.0 / rate, method="foh")
     return np.asarray(signal.lfilter(above[0], below, values - values[0]) + values[0])
@@ -82,7 +82,7 @@ def rounded(values: Array, step: float) -> Array:
 
 
 def white(generator: np.random.Generator, count: int, _rate: float) -> Array:
-    """Normal and without memory; as all colours of rms 1."""
+    """Normal and uncorrelated; of rms 1, as all colours."""
     return generator.standard_normal(count)
 
 
@@ -98,7 +98,7 @@ def low_pass(rate: float, cutoff: float) -> tuple[Array, Array]:
 
 
 def ar1(_rate: float) -> tuple[Array, Array]:
-    """Each sample 0.95 of the one before, and something new."""
+    """First-order autoregressive noise: 0.95 of the sample before, and white noise."""
     return np.ones(1), np.array([1.0, -CORRELATION])
 
 
@@ -121,7 +121,7 @@ def coloured(generator: np.random.Generator, count: int, rate: float, colour: st
 
 def pink(generator: np.random.Generator, count: int, rate: float) -> Array:
     """Power per hertz as 1/f down to 0.1 Hz, and flat below."""
-    size = 2 * count  # a stretch out of a longer record, because the transform makes a record that repeats
+    size = 2 * count  # half of a longer record, because the record of an inverse transform is periodic
     frequency: Array = np.asarray(np.fft.rfftfreq(size, 1.0 / rate), dtype=np.float64)
     shape = pink_shape(frequency)
     noise = np.fft.irfft(np.fft.rfft(generator.standard_normal(size)) * shape, size)[:count]

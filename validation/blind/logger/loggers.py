@@ -1,4 +1,4 @@
-"""The data loggers of the blind trial, which stand between what a sensor sees and what a recording holds."""
+"""The data loggers of the blind trial, between true values and recorded readings."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Logger:
-    """A data logger; a number that is zero means that it does not do this."""
+    """A data logger; a number that is zero turns its part off."""
 
     text: str  # for a table
     colour: str = "white"  # of the sensors' noise
@@ -15,13 +15,13 @@ class Logger:
     cutoff: float = 0.0  # Hz, of the anti-alias filter
     bits: int = 0  # of the converter
     rate: float = 0.0  # Hz, where it is not the plan's
-    late: int = 0  # samples by which forces come late
+    late: int = 0  # delay of forces, samples
     gain: float = 1.0  # of all channels
     printed: bool = False  # with three decimals of mm and of kN
 
     @property
     def distortions(self) -> tuple[str, ...]:
-        """Effects on a reading that say what it does to the signal: naming one is no false alarm."""
+        """Effects on a reading that describe what the logger does to the signal: naming one is no false alarm."""
         lags = ("lag", "delay") if self.cutoff or self.late or self.rate else ()
         gains = ("gain",) if self.gain != 1.0 else ()
         return lags + gains
@@ -54,4 +54,4 @@ LOGGERS = {
         printed=True,
     ),
 }
-"""The loggers of the set "loggers", by name."""
+"""The loggers of the set "loggers" by name: each has one property of real loggers at a usual size, the last all."""

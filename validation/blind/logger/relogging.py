@@ -1,8 +1,8 @@
-"""A recording as a data logger of its own would hold it, beside the controllers that ran the test.
+"""A recording as a separate data logger would write it, beside the controllers that ran the test.
 
-The controllers see true values; the recording holds what the logger made of them, with noise of its own for every
-sensor. The force of a slave that the master used is read from the same log, by the number of its message. Nothing in
-the file says which logger it was: it is an import.
+The controllers see true values; the recording has those of the logger, with noise of its own for every sensor. The
+force of a slave that the master used is read from the same log, by the number of its message. Nothing in the file says
+which logger it was: it is an import.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ Columns = dict[str, dict[str, Values]]  # by topic and name
 def relog(
     path: Path, output: Path, plan: Plan, logger: Logger, levels: Mapping[str, float], seed: int
 ) -> None:
-    """Write into `output` what a logger makes of a recording with silent sensors.
+    """Write into `output` what a logger records of a test with sensors without noise.
 
-    `levels` are the sensors' rms by signal; each draws its noise from a generator named after `seed` and its signal.
+    `levels` are the sensors' rms by signal; the noise of each is drawn from a generator named by `seed` and signal.
     """
     run = read(path)
     rewrite(run, output, plan, relogged(run, plan, logger, levels, seed))
@@ -56,7 +56,7 @@ def relogged(run: Run, plan: Plan, logger: Logger, levels: Mapping[str, float], 
 
 
 def use(run: Run, columns: Columns, role: str, force: str) -> None:
-    """Put the logged force of a slave in place of what the master used, by the number of the message."""
+    """Replace the force that the master used by the logged force of the slave, by the number of the message."""
     used, numbers = f"{force}_used", f"{force}_seq"
     if used not in columns.get(MASTER, {}):
         return
@@ -71,7 +71,7 @@ def use(run: Run, columns: Columns, role: str, force: str) -> None:
 
 
 def rewrite(run: Run, output: Path, plan: Plan, columns: Columns) -> None:
-    """A recording with other columns; its plan, events and stamps stay, the ramps to rest do not."""
+    """A recording with other columns; plan, events and time stamps are kept, the ramps to rest are not."""
     recording = Recording(output, run.test, plan.storeys, kinds.topics(plan), plan.roles)
     for name, values in run.metadata.items():
         if name not in WRITTEN_ANEW:

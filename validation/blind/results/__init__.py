@@ -1,1 +1,1 @@
-"""What a blind trial found: answers scored against the truth, rates with their intervals, tables and the page."""
+"""Results of a blind trial: answers scored against the truth, rates with their intervals, tables and the page."""

@@ -20,12 +20,12 @@ from validation.blind.results.scoring import JudgedEstimate, Outcome
 from validation.blind.results.stated import brier_score, in_columns, stated_verdicts
 
 ABSTAINING = ("unknown_effect", "not_enough_data", "ambiguous")
-GOALS = 9  # judged at once
+GOALS = 9  # judged at once; their thresholds are those of ADR 0012
 LEVEL = (
     1.0 - 0.05 / GOALS
-)  # of each interval, so that all verdicts of a trial together are right in 95 % of trials
+)  # of each interval, so that all verdicts together are right in 95 % of trials (Bonferroni)
 UNDECIDED = "too few cases to say"
-EDGES = (0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, math.inf)
+EDGES = (0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, math.inf)  # octaves about `VISIBLE`
 
 
 @dataclass(frozen=True)
@@ -105,9 +105,9 @@ def quantile(
     unit: str = "",
     share: bool = False,
 ) -> Measure:
-    """A quantile of values with the range of their middle 80 %; one that is not there is the worst there is.
+    """A quantile of values with the range of their middle 80 %; a missing value counts as the worst.
 
-    It is within its goal where the share of the values that are is at least that of the quantile.
+    The goal is met where the share of values that meet it is at least that of the quantile.
     """
     worst = -math.inf if least is not None else math.inf
     known = np.sort([worst if math.isnan(value) else value for value in values])
@@ -125,12 +125,12 @@ def quantile(
 
 
 def measures(outcomes: Sequence[Outcome]) -> list[Measure]:
-    """The table: measures with a goal first, then what explains them."""
+    """The table: measures with a goal first, then further ones."""
     return [*with_goal(outcomes), *further(outcomes)]
 
 
 def with_goal(outcomes: Sequence[Outcome]) -> list[Measure]:
-    """The measures that are passed or missed."""
+    """The measures that have a goal."""
     seen = [item for item in outcomes if item.single and item.visible]
     right = [one for item in seen if item.kind == "catalogue" for one in item.estimates]
     explained = [
@@ -143,7 +143,9 @@ def with_goal(outcomes: Sequence[Outcome]) -> list[Measure]:
         rate("right site first", seen, lambda item: item.located, 0.98),
         rate("both of a pair", kind(outcomes, "pair"), lambda item: item.named, 0.85),
         rate("clean laboratory: no gap", kind(outcomes, "clean"), lambda item: item.named, 0.98),
-        rate("unknown effect: said so, site right", kind(outcomes, "unknown"), lambda item: item.right, 0.90),
+        rate(
+            "unknown effect: reported, site right", kind(outcomes, "unknown"), lambda item: item.right, 0.90
+        ),
         quantile("parameter error, median", (one.error for one in right), most=0.05, share=True),
         quantile("shrinkage over the best possible, median", (i.shrinkage for i in explained), least=0.95),
         calibration_error(outcomes),
@@ -174,18 +176,18 @@ def further(outcomes: Sequence[Outcome]) -> list[Measure]:
     pairs = [item for item in kind(outcomes, "pair") if item.visible]
     noticed = [item for item in kind(outcomes, "unknown") if item.seen]
     return [
-        rate("unknown effect that is visible: said so, site right", strange, lambda item: item.right),
-        rate("unknown effect that an oracle sees: said so, site right", noticed, lambda item: item.right),
+        rate("visible unknown effect: reported, site right", strange, lambda item: item.right),
+        rate("unknown effect that an oracle sees: reported, site right", noticed, lambda item: item.right),
         rate("both of a pair whose strongest is visible", pairs, lambda item: item.named),
         *closed_on_another_motion(outcomes),
-        rate("an oracle sees that something is there", gaps, lambda item: item.seen),
+        rate("an oracle sees an effect", gaps, lambda item: item.seen),
         *by_kind,
         rate("right effect first, all sizes", singles, lambda item: item.named),
         rate("right site first, all sizes", singles, lambda item: item.located),
-        rate("an effect named that is not there", outcomes, lambda item: item.surplus > 0),
+        rate("an effect named that is not present", outcomes, lambda item: item.surplus > 0),
         rate("false alarm in a clean laboratory", kind(outcomes, "clean"), lambda item: not item.named),
         rate("a known effect named for an unknown one", kind(outcomes, "unknown"), lambda i: bool(i.verdict)),
-        rate("inside the tolerances: no gap or its name", inside, lambda item: item.named),
+        rate("inside the tolerances: no gap or the effect named", inside, lambda item: item.named),
         rate("abstention where there is an effect", visible, lambda item: item.status in ABSTAINING),
         rate("missed: no gap where there is an effect", visible, lambda item: item.status == "no_gap"),
         quantile("parameter error relative to the value, median", (i.plain_error for i in right), share=True),
@@ -195,7 +197,7 @@ def further(outcomes: Sequence[Outcome]) -> list[Measure]:
 
 
 def closed_on_another_motion(outcomes: Sequence[Outcome]) -> list[Measure]:
-    """Median and worst share of the gap that is closed on a second motion; nothing where a report does not say it."""
+    """Median and worst share of the gap that is closed on a second motion; empty where no report states it."""
     shares = sorted(0.0 if math.isnan(item.closed) else item.closed for item in outcomes if item.twice)
     if not shares:
         return []
@@ -251,7 +253,7 @@ class Bin:
     share: float
     share_low: float
     share_high: float
-    middle: float  # median of what the bins are made by
+    middle: float  # median of the size or probability
 
 
 def by_size(outcomes: Iterable[Outcome]) -> list[Bin]:
@@ -261,7 +263,7 @@ def by_size(outcomes: Iterable[Outcome]) -> list[Bin]:
 
 
 def reliability(outcomes: Iterable[Outcome]) -> list[Bin]:
-    """Share of right verdicts against the probability they state."""
+    """Share of right verdicts against their stated probability."""
     return binned(stated_verdicts(outcomes), tuple(np.linspace(0.0, 1.0, 11)))
 
 
@@ -283,7 +285,7 @@ Matrix = dict[str, dict[str, int]]
 
 
 def confusion(outcomes: Iterable[Outcome]) -> Matrix:
-    """How often each truth was given each verdict; a pair's effects stand apart."""
+    """Number of verdicts by truth; pairs are left out, because they have two truths."""
     matrix: Matrix = {}
     for item in outcomes:
         if item.kind == "pair":
@@ -304,7 +306,7 @@ def said(item: Outcome, true: str) -> str:
 
 
 def confusion_by_site(outcomes: Iterable[Outcome]) -> Matrix:
-    """How often each true site was given each first site; a clean laboratory's is "none"."""
+    """Number of first sites by true site; a clean laboratory's is "none"."""
     matrix: Matrix = {}
     for item in outcomes:
         if item.kind == "pair":
@@ -321,7 +323,7 @@ def _count(matrix: Matrix, true: str, verdict: str) -> None:
 
 
 def as_plain(value: Any) -> Any:
-    """A result as values of JSON, in which what is no number is null."""
+    """A result as values of JSON; numbers that are not finite become null."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, Mapping):

@@ -28,7 +28,7 @@ INCH = 96  # CSS pixels
 
 
 class Image(NamedTuple):
-    """A figure of the page: an address that holds it, CSS pixels, caption."""
+    """A figure of the page: its data URI, its size in CSS pixels, its caption."""
 
     source: str
     size: tuple[int, int]
@@ -36,7 +36,7 @@ class Image(NamedTuple):
 
 
 def page(outcomes: Sequence[Outcome], about: str) -> str:
-    """The page's text; `about` says how the cases were made."""
+    """The HTML text; `about` says how the cases were made."""
     wrong = [item for item in outcomes if not item.right]
     body = render(
         "blind.html",
@@ -69,7 +69,7 @@ def case(item: Outcome) -> tuple[str, ...]:
 
 
 def hidden(item: Outcome) -> str:
-    """What a case hid, with its parameters."""
+    """The hidden effects of a case, with their parameters."""
     parts = []
     for name, formula in zip(item.truth, item.formulas, strict=True):
         values = ", ".join(f"{key} {value:.4g}" for key, value in item.parameters[name].items())
@@ -83,7 +83,7 @@ def number(value: float) -> str:
 
 
 def matrices(outcomes: Sequence[Outcome]) -> list[Image]:
-    """What the diagnosis said against what was hidden."""
+    """Confusion matrices of sites and effects."""
     sites = draw_matrix(confusion_by_site(outcomes))
     effects = draw_matrix(confusion(outcomes))
     return [
@@ -93,7 +93,7 @@ def matrices(outcomes: Sequence[Outcome]) -> list[Image]:
 
 
 def curves(outcomes: Sequence[Outcome]) -> list[Image]:
-    """How often the diagnosis is right."""
+    """Share of right verdicts against size and probability."""
     sizes, stated = draw_sizes(by_size(outcomes)), draw_reliability(reliability(outcomes))
     return [
         image(sizes, "Right verdicts on single effects against residual to noise."),
@@ -102,7 +102,7 @@ def curves(outcomes: Sequence[Outcome]) -> list[Image]:
 
 
 def image(canvas: Any, caption: str) -> Image:
-    """A figure as it stands inside the page, in the size in which it was drawn."""
+    """A figure embedded in the page, in the size in which it was drawn."""
     buffer = io.BytesIO()
     canvas.savefig(buffer, format="png")
     width, height = (round(INCH * inches) for inches in canvas.get_size_inches())

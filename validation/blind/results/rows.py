@@ -1,4 +1,4 @@
-"""The table by logger, by material or by kind of case: each row's cases, and how the diagnosis did on them."""
+"""The table by logger, by material or by kind of case: the results of the diagnosis on each row's cases."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ HEAD = (
 
 @dataclass(frozen=True)
 class Hits:
-    """A share of cases, as its two numbers."""
+    """A share of cases as two numbers."""
 
     hits: int
     count: int
@@ -45,12 +45,12 @@ class CaseRow:
     name: str
     cases: int
     clean: Hits  # clean laboratories that are called clean
-    first: Hits  # single effects that can be seen: the verdict's first name is a right one
-    listed: Hits  # effects that can be seen, of any case of the catalogue: the verdict names them
-    extra: float  # names per case of what is not there, what the logger did apart
+    first: Hits  # visible single effects: the verdict's first name is right
+    listed: Hits  # visible effects of any case of the catalogue: the verdict names them
+    extra: float  # named effects per case that are not present; distortions of the logger do not count
     skill: float  # of the stated probabilities, over a constant
     inside: Hits  # stated intervals that hold the true parameter
-    seen: Hits  # cases with an effect of which an oracle sees that something is there
+    seen: Hits  # cases with an effect that an oracle sees
 
     @property
     def cells(self) -> tuple[str, ...]:

@@ -1,9 +1,9 @@
 """Every case judged against its truth.
 
-Naming any one effect of a set that the report calls equivalent counts as naming the set. An effect counts
-as named where the status says so much (`NAMING`); a laboratory whose parameters are all inside their
-tolerances, effect included, has no gap, and saying so is right. What a data logger did to the signals may be named
-beside the effect, or where there is none: it is really there.
+Naming any one effect of a set that the report calls equivalent counts as naming the set. An effect counts as named
+where the status names causes (`NAMING`). A laboratory whose parameters are all inside their tolerances, effect
+included, has no gap, and a report that says so is right. Distortions by a data logger may be named beside the effect,
+or without one, because they are real.
 """
 
 from __future__ import annotations
@@ -26,10 +26,12 @@ from validation.blind.oracle import SEEN
 from validation.blind.record import RecordedCase
 
 QUIET = ("no_gap", "within_tolerances")
-UNKNOWN = ("unknown_effect", "partly_explained")  # the second without a name that is said surely
-SURE = 0.5  # probability from which on a name is said surely: more likely than not
+UNKNOWN = ("unknown_effect", "partly_explained")  # the second without a name that the report is sure of
+SURE = 0.5  # probability from which a report is sure of a name: more likely than not
 VISIBLE = 2.0  # residual to noise from which an effect must be found: below it noise may hide an effect
-AS_MUCH = {"butterworth": "delay"}  # a maximally flat low-pass is as much a delay as the catalogue's lag
+AS_MUCH = {
+    "butterworth": "delay"
+}  # a Butterworth low-pass resembles a pure delay as much as the catalogue's lag
 STANDARD_LENGTH = 30.0  # s of test that the time of a diagnosis is scaled to
 
 
@@ -56,7 +58,7 @@ class Outcome:
     sites: list[str]
     laboratories: list[str]  # the role that has each effect, empty for the building's
     parameters: dict[str, dict[str, float]]
-    size: float  # residual to noise, of a pair the smaller one's; NaN for a clean laboratory
+    size: float  # residual to noise, of several effects the smallest; NaN for a clean laboratory
     inside: bool
     stopped: str
     recording: str
@@ -64,17 +66,18 @@ class Outcome:
     verdict: list[str]
     verdict_site: str
     probability: float  # NaN where nothing is named
-    named: bool  # every true effect is named, or, where there is none or an unknown one, that is said
+    named: bool  # every true effect is named; a clean laboratory or an unknown effect is reported as such
     located: bool  # the true site stands first
-    surplus: int  # effects named that are not there
+    surplus: int  # effects named that are not present
     right: bool
     why: str
     logger: str = ""  # through which it was recorded
-    first: bool = False  # the first name of the verdict, the logger's doing apart, says a true effect
-    asked: int = 0  # effects that are large enough to be asked for
+    # The first name of the verdict, apart from distortions by the logger, is a true effect.
+    first: bool = False
+    asked: int = 0  # effects that are large enough to be found
     listed: int = 0  # of these, those that the verdict names
     separation: float = math.inf  # of all effects, as an oracle sees them
-    closed: float = math.nan  # share of the gap that the report says it closes
+    closed: float = math.nan  # share of the gap that is closed by the report
     twice: bool = False  # that share is of another motion
     estimates: list[JudgedEstimate] = field(default_factory=list)
     shrinkage: float = math.nan  # closed over what the true effects would close
@@ -87,12 +90,12 @@ class Outcome:
 
     @property
     def visible(self) -> bool:
-        """Whether the effect is large enough to be asked for."""
+        """Whether the effect is large enough to be found."""
         return self.size >= VISIBLE and not self.inside
 
     @property
     def seen(self) -> bool:
-        """Whether an oracle sees that something is there."""
+        """Whether an oracle sees an effect."""
         return self.separation >= SEEN and not self.inside
 
 
@@ -171,24 +174,24 @@ def report_on(item: Laid, heard: Sequence[Heard]) -> Heard | None:
 
 
 def alarmed(heard: Sequence[Heard]) -> list[Heard]:
-    """The reports that see a gap first."""
+    """The reports, those with a gap first."""
     return sorted(heard, key=lambda one: one.status in QUIET)
 
 
 def consulted(case: Case, heard: Sequence[Heard]) -> list[Heard]:
-    """The reports that a case is judged by: those on its effects, of a clean one all."""
+    """The reports by which a case is judged: those on its effects, or all of a clean case."""
     found = [one for item in case.laid if (one := report_on(item, heard))]
     return [one for one in heard if one in found] if case.laid else alarmed(heard)
 
 
 def status_of(case: Case, asked: Sequence[Heard]) -> str:
-    """The status in one word: of several reports the first that names nothing, of a clean case the first alarm."""
+    """One status for the case: of several reports that of the first without a name; of a clean case the first alarm."""
     denied = [one.status for one in asked if case.laid and one.status not in NAMING]
     return next(iter([*denied, *(one.status for one in asked)]), "error")
 
 
 def visible(case: Case, recorded: RecordedCase) -> list[Laid]:
-    """The effects that are large enough to be asked for."""
+    """The effects that are large enough to be found."""
     if case.inside:
         return []
     return [item for item, size in zip(case.laid, recorded.sizes, strict=False) if size >= VISIBLE]
@@ -197,7 +200,7 @@ def visible(case: Case, recorded: RecordedCase) -> list[Laid]:
 def is_named(
     case: Case, status: str, heard: Sequence[Heard], names: CaseNames, asked_for: Sequence[Laid]
 ) -> bool:
-    """Whether the verdict says what there is; of many mild faults those that are large enough."""
+    """Whether the verdict is true; of many mild effects only those that are large enough must be named."""
     if case.kind == "clean":
         return bool(heard) and all(is_quiet(case, one, names) for one in heard)
     if case.kind == "unknown":
@@ -210,13 +213,13 @@ def is_named(
 
 
 def is_quiet(case: Case, one: Heard, names: CaseNames) -> bool:
-    """Whether a report sees no gap but what the case's logger made."""
+    """Whether a report has no gap, or only distortions by the case's logger."""
     logged = bool(one.names) and all(is_distortion(case, name, names) for name in one.names)
     return one.status in QUIET or logged
 
 
 def is_distortion(case: Case, name: str, names: CaseNames) -> bool:
-    """Whether a name says what the case's logger did to a signal."""
+    """Whether a name is a distortion by the case's logger."""
     return bool(case.logger) and names.faults.get(name) in LOGGERS[case.logger].distortions
 
 
@@ -226,7 +229,7 @@ def names_it(item: Laid, one: Heard, names: CaseNames) -> bool:
 
 
 def truths(item: Laid, names: CaseNames) -> set[str]:
-    """Names that are right for an effect: its own, and the fault of the same reading that its formula is as much."""
+    """Right names for an effect: its own, and the fault of the same reading that its formula resembles as much."""
     if item.name.startswith("opensees."):
         mechanism = MATERIALS[item.name.removeprefix("opensees.")].effects
         return {names.effect(replace(item, name=name)) for name in mechanism}
@@ -236,12 +239,12 @@ def truths(item: Laid, names: CaseNames) -> set[str]:
 
 
 def same(true: str, name: str, sets: Iterable[Collection[str]]) -> bool:
-    """Whether a name says the true effect, by itself or by a set of equivalents that holds both."""
+    """Whether a name is the true effect's, or that of an effect in the same set of equivalents."""
     return true == name or any(true in group and name in group for group in sets)
 
 
 def right_sites(item: Laid, one: Heard, names: CaseNames) -> set[str]:
-    """Sites that are right: the effect's own, and that of an equivalent that a report names in its place."""
+    """Right sites: the effect's own, and that of an equivalent effect that a report names instead."""
     true = names.effect(item)
     named = [name for name in one.names if name in names.sites and same(true, name, one.sets)]
     return {names.site(item)} | {names.sites[name] for name in named}
@@ -288,9 +291,9 @@ def why(outcome: Outcome, error: str) -> str:
     elif not outcome.named:
         said = " and ".join(outcome.verdict) or outcome.status
         wanted = {"clean": "no_gap", "unknown": " or ".join(UNKNOWN)}
-        reasons.append(f"says {said}, not {wanted.get(outcome.kind, ' and '.join(outcome.truth))}")
+        reasons.append(f"reports {said}, not {wanted.get(outcome.kind, ' and '.join(outcome.truth))}")
     if outcome.truth and not outcome.located and outcome.status != "error":
-        reasons.append(f"looks at {outcome.verdict_site or 'no site'}, not {' or '.join(outcome.sites)}")
+        reasons.append(f"first site is {outcome.verdict_site or 'none'}, not {' or '.join(outcome.sites)}")
     if outcome.size < VISIBLE:
         reasons.append(f"residual to noise below {VISIBLE:g}")
     if outcome.stopped:

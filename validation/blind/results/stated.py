@@ -1,4 +1,4 @@
-"""What verdicts state of themselves, probabilities and intervals, beside what was true."""
+"""Stated probabilities of verdicts, compared with the truth."""
 
 from __future__ import annotations
 

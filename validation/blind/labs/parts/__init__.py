@@ -1,1 +1,1 @@
-"""The mechanics of the blind trial's laboratories: written apart from `models`, so that none judges itself."""
+"""The mechanics of the blind trial's laboratories, written apart from `models`: no model is judged by itself."""

@@ -1,7 +1,7 @@
 """Compilation of the independent laboratories' kernels.
 
 They share no kernel with `models`. Compiled code is kept in a folder named after the content of this
-package, because Numba looks at a function's own file only.
+package, because Numba compares only a function's own file with its cache.
 """
 
 from __future__ import annotations

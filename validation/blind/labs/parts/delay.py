@@ -13,7 +13,8 @@ from validation.blind.labs.parts.compiled import Array, jit
 from validation.blind.labs.parts.filters import second_order
 
 PADE, PADE_RATE, PADE_INPUT = range(3)  # places in the approximation's state
-SHORTEST = 0.2e-3  # s, below it the approximation is left out: the ring takes the delay
+# s, two steps: a shorter approximation is faster than the grid, and the ring takes the delay.
+SHORTEST = 0.2e-3
 
 
 def ring(delay: float, step: float) -> Array:
@@ -23,7 +24,7 @@ def ring(delay: float, step: float) -> Array:
 
 @jit
 def push(past: Array, value: float) -> None:
-    """Note the newest value."""
+    """Store the newest value."""
     place = int(past[0]) + 1
     if place >= past.size:
         place = 1
@@ -33,7 +34,7 @@ def push(past: Array, value: float) -> None:
 
 @jit
 def before(past: Array, steps: float) -> float:
-    """The value a number of steps ago, on straight lines between the values noted."""
+    """The value a number of steps ago, interpolated linearly between stored values."""
     whole = int(steps)
     share = steps - whole
     later = int(past[0]) - whole
@@ -47,7 +48,7 @@ def before(past: Array, steps: float) -> float:
 
 @jit
 def pade_output(state: Array, delay: float) -> float:
-    """What the approximation gives now."""
+    """Present output of the approximation."""
     return float(state[PADE_INPUT] - delay * state[PADE_RATE])
 
 

@@ -14,7 +14,7 @@ OUTPUT, RATE, INPUT = range(3)  # places in its state
 
 
 def bank(names: Sequence[str], lags: Mapping[str, tuple[float, float]]) -> Array:
-    """One filter per reading; `lags` gives order and low-frequency delay (s) of those that lag."""
+    """One filter per reading; `lags` gives order and low-frequency delay (s) by reading."""
     return np.array([lags.get(name, (0.0, 0.0)) for name in names], dtype=np.float64)
 
 

@@ -7,12 +7,12 @@ import math
 from validation.blind.labs.parts.compiled import jit
 
 NONE, TANH, DAHL, LUGRE = range(4)
-STRIBECK = 0.15  # by how much sticking exceeds sliding
+STRIBECK = 0.15  # excess of static over sliding friction; the paper of LuGre simulates 0.5, lubricated guides have less
 
 
 @jit
 def regularised(velocity: float, scale: float) -> float:
-    """Coulomb friction made smooth: `tanh(v/v0)`; it creeps instead of sticking."""
+    """Smooth Coulomb friction, `tanh(v/v0)`: it creeps under load instead of sticking."""
     return math.tanh(velocity / scale)
 
 

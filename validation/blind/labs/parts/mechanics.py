@@ -1,4 +1,4 @@
-"""What the guide rail, the stops, the motor and the drive of laboratory B do beside the nominal models."""
+"""Mechanics of laboratory B that nominal models leave out: guide rail, stops, motor and drive."""
 
 from __future__ import annotations
 
@@ -7,10 +7,13 @@ import math
 from validation.blind.labs.parts.compiled import jit
 
 LINEAR, HERTZ = 1, 2  # formulas of the end stop
-REFERENCE = 2e-3  # m, depth at which both stops are equally strong
+REFERENCE = 2e-3  # m, depth at which both formulas have the same force: that of a moderate impact
 RESTITUTION = 1.5  # s/m, damping of the contact over its force, as of rubber
-CONTACT_FREQUENCY = 200.0  # Hz, of the platform on the flanks of its play
-FLANK, GUIDE = 0.7, 0.25  # damping ratios in contact and in the play
+CONTACT_FREQUENCY = 200.0  # Hz, of the platform on the flanks of its backlash: far above a table's bandwidth
+FLANK, GUIDE = (
+    0.7,
+    0.25,
+)  # damping ratios in contact (it does not bounce) and inside the backlash (guides slow it down)
 
 
 @jit
@@ -32,22 +35,22 @@ def stop(formula: float, stroke: float, velocity: float, limit: float, stiffness
 
 @jit
 def saturated(wanted: float, most: float) -> float:
-    """Drive whose current bends towards its limit: `F·tanh(u/F)`."""
+    """Drive that saturates smoothly: `F·tanh(u/F)`."""
     return most * math.tanh(wanted / most)
 
 
 @jit
 def motor_constant(rise: float, stroke: float) -> float:
-    """Motor force off centre over that at the centre: `1 + rise·(s/50 mm)²`, twice at most.
+    """Motor force off centre over that at the centre: `1 + rise·(s/50 mm)²`, at most 2.
 
-    A constant that falls off centre would push the mass outwards against a weak spring: a test would run away.
+    A constant that decreases off centre would push the mass outwards against a weak spring: the test would diverge.
     """
     return min(1.0 + rise * (stroke / 0.05) ** 2, 2.0)
 
 
 @jit
 def oil_column(omega: float, damping: float, base: float, place: float, rate: float) -> float:
-    """Acceleration (m/s²) of a platform on an oil spring over the loop's motion.
+    """Acceleration (m/s²) of a platform on an oil spring that is moved by the loop.
 
     H. E. Merritt, Hydraulic Control Systems, Wiley 1967.
     """
@@ -56,7 +59,7 @@ def oil_column(omega: float, damping: float, base: float, place: float, rate: fl
 
 @jit
 def played(width: float, base: float, base_rate: float, place: float, rate: float) -> float:
-    """Acceleration (m/s²) of a platform that hangs in a play of `width` on stiff flanks behind the loop.
+    """Acceleration (m/s²) of a platform that the loop moves through a backlash of `width` with stiff flanks.
 
     M. Nordin, P.-O. Gutman, Controlling mechanical systems with backlash: a survey, Automatica 38 (2002)
     1633-1649.
@@ -70,5 +73,5 @@ def played(width: float, base: float, base_rate: float, place: float, rate: floa
 
 @jit
 def cam(wanted: float, amplitude: float, period: float) -> float:
-    """Place of a drive whose screw errs with each turn: `u + A·sin(2π·u/p)`."""
+    """Position of a drive whose screw has a periodic error: `u + A·sin(2π·u/p)`."""
     return wanted + amplitude * math.sin(2.0 * math.pi * wanted / period)

@@ -1,4 +1,4 @@
-"""The column of the independent laboratory A: what the load cell feels of a deformation."""
+"""The column of the independent laboratory A: the force at the load cell under a deformation."""
 
 from __future__ import annotations
 
@@ -10,13 +10,16 @@ from validation.blind.labs.parts.compiled import Array, jit
 
 LINEAR, EXPONENTIAL = 1, 2  # formulas of the degradation
 LORENTZ, SECH = 1, 2  # formulas of the pinching
-UNDAMAGED = 0.5e-3  # m, deformation up to which nothing is lost
-DESTROYED = 4e-3  # m beyond it where the linear loss is complete
-DAMAGE = 1e-3  # m, scale of the exponential loss
-RUBBING = 0.5e-3  # m/s, scale of the regularised friction
-STICKING = 1e-3  # m/s, scale of the Stribeck effect
-MICRO = 0.5e-3  # s, damping of the bristles over Coulomb friction, times their presliding
-POWER, POWER_AT = 0.8, 0.02  # of the rate-dependent force, and the m/s where it equals the linear one
+# Deformations (m) of the damage, within the peaks of the trial's columns: nothing is lost up to the first; the linear
+# loss is complete at the second beyond it; the third is the scale of the exponential loss.
+UNDAMAGED, DESTROYED, DAMAGE = 0.5e-3, 4e-3, 1e-3
+# m/s; the column moves at up to 0.1 m/s, so that friction is Coulomb's but near a reversal.
+RUBBING = 0.5e-3  # scale of the regularised friction
+STICKING = 1e-3  # scale of the Stribeck effect
+# S, damping of the bristles over Coulomb friction, times their presliding: damped within a fraction of an interval.
+MICRO = 0.5e-3
+POWER = 0.8  # exponent of the rate-dependent force; fluid dampers have 0.3 to 1 (Soong and Dargush)
+POWER_AT = 0.02  # m/s, at which it equals the linear force: a usual speed of the default test's column
 
 # places in `memory`, behind those of the yielding
 LARGEST, BRISTLE, CREEP, INSIDE, DEFORMATION, VELOCITY = range(yielding.SIZE, yielding.SIZE + 6)
@@ -59,7 +62,7 @@ def slipped(deformation: float, gap: float) -> float:
 
 @jit
 def left_over(formula: float, rate: float, largest: float) -> float:
-    """Share of the stiffness left after a largest deformation (m), none lost up to a threshold.
+    """Share of the stiffness left after a largest deformation (m); up to a threshold all of it.
 
         linear:        1 − rate·(δ_max − 0.5 mm)/4 mm, rate at most
         exponential:   1 − rate·(1 − exp(−(δ_max − 0.5 mm)/1 mm))
@@ -76,7 +79,7 @@ def left_over(formula: float, rate: float, largest: float) -> float:
 
 @jit
 def pinch(formula: float, factor: float, hardening: float, width: float, x: float) -> float:
-    """Share of the force while cracks close: `1 − p·w + h·(1 − w)`, its window of other shapes.
+    """Share of the force while cracks close: `1 − p·w + h·(1 − w)` with one of two windows w.
 
     lorentz: w = 1/(1 + (δ/δ_w)²);   sech: w = 1/cosh(δ/δ_w)
     """
@@ -91,7 +94,7 @@ def pinch(formula: float, factor: float, hardening: float, width: float, x: floa
 
 @jit
 def maxwell(force: float, stiffness: float, relaxation: float, moved: float, step: float) -> float:
-    """Force of spring and dashpot in series after a move at even speed: `ḟ = k_m·δ̇ − f/τ`, exact."""
+    """Force of spring and dashpot in series after a move at constant speed: `ḟ = k_m·δ̇ − f/τ`, exact."""
     fade = math.exp(-step / relaxation)
     return fade * force + stiffness * moved * (relaxation / step) * (1.0 - fade)
 

@@ -1,4 +1,4 @@
-"""What a servo valve does to the loop's error on its way to oil, and what the supply does to the oil."""
+"""The servo valve between the loop's error and the oil flow, and the supply of the oil."""
 
 from __future__ import annotations
 
@@ -7,14 +7,16 @@ import math
 from validation.blind.labs.parts.compiled import jit
 
 SMOOTH, ORIFICE = 1, 2
-CAPACITY = 100e3  # N, the supply pressure on the piston
-USED_AT = 0.02  # m of travel that empties the accumulator to one half
-REFILL = 3.0  # s, time constant of the pump's refilling
+# N, supply pressure times piston area: a usual actuator, stronger than the default test's column.
+CAPACITY = 100e3
+USED_AT = 0.02  # m of travel that half empties the accumulator: a few strokes of the trial's columns
+# s, time constant of the pump's refilling: longer than a cycle of the building, shorter than a test.
+REFILL = 3.0
 
 
 @jit
 def overlap(error: float, width: float) -> float:
-    """Error behind a rounded dead band of `width`, both signs together: `e − w/2·tanh(2e/w)`.
+    """Error behind a rounded dead band of full width w: `e − w/2·tanh(2e/w)`.
 
     H. E. Merritt, Hydraulic Control Systems, Wiley 1967, section 5.4 (the band's edges rounded by leakage).
     """
@@ -25,7 +27,7 @@ def overlap(error: float, width: float) -> float:
 
 @jit
 def spool(held: float, error: float, width: float) -> float:
-    """Place of a spool that rubs: it follows the error only when a play of `width` is used up.
+    """Position of a spool with friction: it follows the error with a hysteresis of `width`.
 
     H. E. Merritt, Hydraulic Control Systems, Wiley 1967 (threshold and hysteresis of a servo valve).
     """

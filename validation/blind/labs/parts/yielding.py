@@ -1,7 +1,7 @@
 """Hysteresis of a column that yields: force over deformation, with memory.
 
 Every formula has stiffness k (N/m), yield deformation δ_y (m), hardening b and, where it is smooth,
-a sharpness n; a reversal counts once the motion has gone back by a thousandth of δ_y.
+a sharpness n; a reversal is recognised when the motion has returned by a thousandth of δ_y.
 """
 
 from __future__ import annotations
@@ -11,10 +11,11 @@ import math
 from validation.blind.labs.parts.compiled import Array, jit
 
 NONE, MENEGOTTO_PINTO, TAKEDA, RAMBERG_OSGOOD = range(4)
-BAND = 1e-3  # of δ_y: smaller turns are no reversals
-CURVATURE, CURVATURE_AT = 0.925, 0.15  # loss of sharpness with the plastic excursion
-UNLOADING = 0.4  # exponent of the unloading stiffness
-PLASTIC = 0.3  # share of plastic deformation at the yield force
+BAND = 1e-3  # of δ_y: smaller turns are no reversals; their force is below 0.1 % of the yield force
+# Loss of sharpness with the plastic excursion; usual for steel (OpenSees' Steel02).
+CURVATURE, CURVATURE_AT = 0.925, 0.15
+UNLOADING = 0.4  # exponent of the unloading stiffness, as measured by Takeda, Sozen and Nielsen
+PLASTIC = 0.3  # plastic over elastic deformation at the yield force; Ramberg and Osgood define theirs by 3/7
 
 # places in `memory`
 DIRECTION, TURN, TURN_FORCE, START, START_FORCE, AIM, AIM_FORCE, SHARPNESS, TOP, BOTTOM, LAST, FORCE = range(
@@ -25,7 +26,7 @@ SIZE = 12
 
 @jit
 def turned(memory: Array, x: float, band: float) -> bool:
-    """Whether the motion has just reversed; the farthest point is kept, and becomes the branch's start."""
+    """Whether the motion has just reversed; the farthest point is stored, and the next branch begins there."""
     if memory[DIRECTION] == 0.0:
         memory[DIRECTION] = math.copysign(1.0, x)
     way = memory[DIRECTION]
