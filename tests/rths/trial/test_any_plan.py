@@ -158,7 +158,8 @@ def test_an_effect_must_be_named_in_its_own_laboratory() -> None:
     assert not outcome.named
     assert outcome.surplus
     assert outcome.why == (
-        "reports master.column.stiffness, not slave.east.column.stiffness; first site is master.column, not slave.east.column"
+        "reports master.column.stiffness, not slave.east.column.stiffness; "
+        "first site is master.column, not slave.east.column"
     )
 
 
