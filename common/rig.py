@@ -15,6 +15,7 @@ from typing import Any, NamedTuple, Protocol
 
 from common import blame
 from common.errors import EmergencyStopError, RigError
+from common.named import maker
 from common.rig_time import RigTime
 from common.signals import Channels
 from common.udp.account import Account
@@ -143,7 +144,7 @@ class GuardedRig:
         self,
         rig: Rig,
         name: str,
-        measurement: Callable[..., Any],
+        measurement: type[Any],
         *,
         hidden: bool = False,
         at_rest: AtRest | None = None,
@@ -155,6 +156,7 @@ class GuardedRig:
         self._hidden = hidden
         self._name = name
         self._measurement = measurement
+        self._reading, self._count = maker(measurement), len(measurement._fields)
         self._now: Callable[[], int] = int  # a clock that stands still
         self._time: RigTime | None = None
 
@@ -195,7 +197,7 @@ class GuardedRig:
     def _judge(self, at_rest: AtRest) -> None:
         if isinstance(self._rig, UdpRig):
             at_rest.reach(self._rig, hidden=self._hidden)
-        fields: tuple[str, ...] = self._measurement._fields  # type: ignore[attr-defined]
+        fields: tuple[str, ...] = self._measurement._fields
         if self._twin is not None:
             twin = GuardedRig(self._twin(), self._name, self._measurement, hidden=self._hidden)
             at_rest.judge(twin.read, fields, self._name, hidden=self._hidden, paced=False)
@@ -206,9 +208,10 @@ class GuardedRig:
 
     def read(self) -> Any:
         """The measurements as the NamedTuple; raises RigError where they are no finite numbers of the right count."""
+        begun = 0
         if self._time is not None:
             self._time.tick()
-        begun = self._now()
+            begun = self._now()
         try:
             given = self._rig.read()
             iterable = not isinstance(given, tuple) and isinstance(given, Iterable)
@@ -218,16 +221,18 @@ class GuardedRig:
         if self._time is not None:
             self._time.took("read", self._now() - begun)
         try:
-            reading = self._measurement(*map(float, values))
+            numbers = tuple(map(float, values))
         except (TypeError, ValueError, OverflowError):
             raise RigError(self._complaint(values)) from None
-        if not math.isfinite(sum(reading)):
-            raise RigError(f"{self._name}: read() returned {tuple(reading)}, which is not finite.")
-        return reading
+        if len(numbers) != self._count:
+            raise RigError(self._complaint(values))
+        if not math.isfinite(sum(numbers)):
+            raise RigError(f"{self._name}: read() returned {numbers}, which is not finite.")
+        return self._reading(numbers)
 
     def write(self, command: Any) -> None:
         """Apply a command; raises RigError where the rig fails."""
-        begun = self._now()
+        begun = 0 if self._time is None else self._now()
         try:
             self._rig.write(command)
         except ANYTHING as error:  # the user gets a sentence
@@ -253,7 +258,7 @@ class GuardedRig:
         return RigError(f"{self._name}: {what}() failed: {text}", blame.whole(error))
 
     def _complaint(self, values: Any) -> str:
-        fields: tuple[str, ...] = self._measurement._fields  # type: ignore[attr-defined]
+        fields: tuple[str, ...] = self._measurement._fields
         try:
             count = len(list(map(float, values)))
         except (TypeError, ValueError, OverflowError):

@@ -24,7 +24,7 @@ from common.safety.ramp import Ramp
 from common.signals import Channels, Signal
 from laboratories.descent import HoldRamp
 from laboratories.kind import Chosen, Coupling, Follows, Kind, Limited, Machine, Sensed, usual
-from models.compiled import jit
+from models.compiled import bound, jit
 from models.registry import Array
 from models.system import System
 
@@ -201,11 +201,16 @@ class Device(Kind):
         row = [system.plan.test.interval, *values.values(), *laid]
         return DeviceRecord(self._kernel, np.array(row), np.zeros(self.states))
 
-    def enter(self, lab: tuple[Any, ...], command: float, effort: float = 0.0) -> tuple[float, ...]:
+    def mover(self, lab: DeviceRecord) -> Callable[..., tuple[float, ...]]:
         """The readings of sensors without error one interval later, for a caller outside compiled code."""
         truth = np.empty(len(self.channels.names))
-        enter_device(lab, truth, command, effort)
-        return tuple(truth.tolist())
+        move = bound(enter_device, lab, truth, 0.0, 0.0)
+
+        def moved(command: float, effort: float = 0.0) -> tuple[float, ...]:
+            move(truth, command, effort)
+            return tuple(truth.tolist())
+
+        return moved
 
     def coupling(self, plan: Plan) -> Coupling:
         """The coupling to the storey or floor that `[device]` gives."""

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from operator import add
-from typing import Any
 
-from common.rig import measurement_of
 from laboratories.kind import Kind
 from laboratories.sensors import noise, readings
-from models.compiled import plain
 from models.system import System
 
 
@@ -22,9 +19,7 @@ class EmulatedLab:
     def __init__(self, kind: Kind, system: System, seed: int) -> None:
         names, sensors = kind.channels.names, system.effects.sensors
         interval = system.plan.test.interval
-        self._lab = plain(kind.build(system))
-        self._enter = kind.enter
-        self._measurement = measurement_of(kind.channels)
+        self._move = kind.mover(kind.build(system))
         self._readings = readings.build(interval, names, sensors)
         self._noise = noise.Noise(seed, readings.levels(names, kind.noise(system.plan), sensors))
         self._plain = not any(name in sensors for name in names)  # a reading is value plus noise
@@ -34,20 +29,20 @@ class EmulatedLab:
     def arm(self) -> None:
         """Do nothing: an emulated laboratory is always ready."""
 
-    def read(self) -> Any:
-        """The readings at the present tick, with the sensors' noise."""
+    def read(self) -> tuple[float, ...]:
+        """The readings at the present tick in the order of the channels, with the sensors' noise."""
         error, true, sensors = self._noise.row(), self._true, self._readings
         if self._plain:
-            return self._measurement(*map(add, true, error))
+            return tuple(map(add, true, error))
         t = self._tick * self._interval
         self._tick += 1
-        return self._measurement(
-            *(readings.step(sensors, place, true[place], error[place], t) for place in range(len(true)))
+        return tuple(
+            readings.step(sensors, place, true[place], error[place], t) for place in range(len(true))
         )
 
     def write(self, command: tuple[float, ...]) -> None:
         """Advance by one interval, in which the transfer system follows its command and a motor holds its force."""
-        self._true = self._enter(self._lab, *command)
+        self._true = self._move(*command)
 
     def disarm(self) -> None:
         """Do nothing: an emulated device stays where it is."""

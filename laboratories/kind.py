@@ -133,14 +133,15 @@ class Kind(ABC):
     free: str = ""  # channel of a motion without restoring force, which a replay therefore begins anew
     record: type[Any]  # NamedTuple of the laboratory's state and constants
     advance: Callable[..., None]  # (record, truth, command, effort): one interval, see `kinds.advance`
-    enter: Callable[
-        ..., tuple[float, ...]
-    ]  # (record as `compiled.plain` gives it, commands...): truth afterwards
 
     @property
     def effects(self) -> tuple[Effect, ...]:
         """Its effects in addition to those in the folders of the catalogue."""
         return ()
+
+    @abstractmethod
+    def mover(self, lab: Any) -> Callable[..., tuple[float, ...]]:
+        """`advance` of a laboratory for a caller outside compiled code: takes its commands, gives the truth."""
 
     def machines(self, plan: Plan) -> tuple[Machine, ...]:
         """Its machines, one for each of `sites`."""

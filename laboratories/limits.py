@@ -15,7 +15,7 @@ from common.signals import UNITS_OF_RATES
 from laboratories import checks
 from laboratories.checks import FINE, NONE, Checks, Numbers
 from laboratories.kind import Kind
-from models.compiled import plain
+from models.compiled import bound
 from models.registry import Array
 
 
@@ -100,7 +100,7 @@ class TickLimits:
             watched,
             sensors,
         )
-        self._arrays = plain(self._checks)
+        self._look = bound(checks.enter, self._checks, 0.0)
         self._values, self._written = self._checks.values.data, self._checks.commands.data
         self._fill = struct.Struct(f"{len(values)}d").pack_into
         self._wrote = struct.Struct(f"{drives + 1}d").pack_into
@@ -111,7 +111,7 @@ class TickLimits:
         `target` (m) is the target of the position measured at the tick.
         """
         self._fill(self._values, 0, *values)
-        place = checks.enter(self._arrays, target)
+        place = self._look(target)
         return None if place == FINE else self._found(place)
 
     def _found(self, place: int) -> LimitViolation | Standstill:

@@ -22,7 +22,6 @@ from laboratories.kind import Kind
 from laboratories.limits import TickLimits
 from laboratories.sensors import noise, readings
 from loop.realised import true_system
-from models.compiled import plain
 
 FREE_SILENCE = 10.0  # s without a packet in virtual time: a computation that is held up for longer is dead
 
@@ -143,6 +142,6 @@ def warm_up(reality: Reality, role: str) -> None:
     """Compile the kernels of a role's emulated laboratory and of its limits."""
     kind = hosted(reality, role)
     if kind is not None:
-        kind.enter(plain(kind.build(true_system(reality))), *(0.0 for _ in kind.channels.drives))
+        kind.mover(kind.build(true_system(reality)))(*(0.0 for _ in kind.channels.drives))
     readings.step(readings.build(reality.plan.test.interval, ("any",), {}), 0, 0.0, 0.0, 0.0)
     TickLimits(None, reality.plan, [], commands=0).violation(0.0)

@@ -17,7 +17,7 @@ from laboratories.kind import Follows, Kind
 from loop.nominal.partition import drifts, felt, storey_stiffness
 from master.building import Outputs
 from models import energy_balance
-from models.compiled import plain
+from models.compiled import bound
 from models.energy_balance import DRIFT_SHARE, ERROR_SHARE
 
 # Share of the limit of displacement at which the floor of the energy input is reached: with less motion than 1 % of it,
@@ -43,7 +43,7 @@ class EnergyMonitor:
             np.array(plan.structure.mass),
             np.array([self._limits[name] for name in LIMITED]),
         )
-        self._enter, self._sums = energy_balance.enter, plain(self._balance)
+        self._take = bound(energy_balance.enter, self._balance, 0.0, 0.0, 0.0, 0.0)
         # displacements, velocities and accelerations are the first rows of `motion`
         self._fill, self._motion = struct.Struct(f"{self._motions}d").pack_into, self._balance.motion.data
 
@@ -61,7 +61,7 @@ class EnergyMonitor:
         """Update the sums by one tick; returns the first of them beyond its limit, or None."""
         self._fill(self._motion, 0, *outputs.storeys[: self._motions])
         position, force = self._felt(measured)
-        if self._enter(self._sums, outputs.ground_acceleration, outputs.target, position, force):
+        if self._take(outputs.ground_acceleration, outputs.target, position, force):
             return None
         shares = dict(zip(LIMITED, (self.error_energy, self.numerical_drift), strict=True))
         return violated(self._limits, **shares)

@@ -68,14 +68,15 @@ class LatencyAccount:
         """Take a feedback, which a link plug-in delays by `extra` (s), or loses where it is None."""
         self._compare_clocks(feedback, received_ns)
         self._named = max(self._named, feedback.command_seq)
-        if feedback.heard_seq >= feedback.seq:
-            self._prompt = max(self._prompt, feedback.seq)
+        if feedback.heard_seq >= feedback.seq > self._prompt:
+            self._prompt = feedback.seq
         row = self._rows.get(feedback.command_seq)
         if row is None or not feedback.command_received_ns or extra is None:
             return
         row.feedback, row.extra = feedback, extra
-        row.received_ns = received_ns + round(extra * 1e9)
-        row.decoded_ns = decoded_ns + round(extra * 1e9)
+        delayed_ns = round(extra * 1e9) if extra else 0
+        row.received_ns = received_ns + delayed_ns
+        row.decoded_ns = decoded_ns + delayed_ns
         self.round_trip = (row.received_ns - row.sent_ns) * 1e-9
 
     def _compare_clocks(self, feedback: Feedback, received_ns: int) -> None:
@@ -105,7 +106,7 @@ class LatencyAccount:
         """Whether the tick's own feedback answered its command and arrived before the next tick."""
         if row.feedback is None or row.feedback.seq != row.tick:
             return False
-        return ticks_late(row.extra, self._lab.plan.test.interval) == 0
+        return row.extra == 0.0 or ticks_late(row.extra, self._lab.plan.test.interval) == 0
 
     def _write(self, now: int, *, everything: bool) -> None:
         """Write the rows of past ticks in order, up to the first row that a later feedback may still complete."""

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from operator import itemgetter
 from typing import Any
 
+from common.named import maker
 from common.plan.plan import Plan
 from common.rig import NothingCommand, command_of
 from common.roles import MASTER
@@ -42,14 +43,14 @@ class OwnLaboratory:
         self.command: Callable[[Outputs], Any] = lambda _: self.zero
         self.zero: Any = NothingCommand()
         if self.channels is not None:
-            names, make = self.channels.names, command_of(self.channels)
+            names, make = self.channels.names, maker(command_of(self.channels))
             self.felt = itemgetter(names.index(self.channels.position), names.index(self.channels.force))
             self.command = (
-                (lambda outputs: make(outputs.command, outputs.effort))
+                (lambda outputs: make((outputs.command, outputs.effort)))
                 if self.channels.effort
-                else (lambda outputs: make(outputs.command))
+                else (lambda outputs: make((outputs.command,)))
             )
-            self.zero = make(*(0.0 for _ in self.channels.drives))
+            self.zero = make((0.0,) * len(self.channels.drives))
         self._storey, self._ratio = watched(plan)
 
     def ramp(self, last: tuple[float, ...], before: tuple[float, ...]) -> Ramp:

@@ -6,6 +6,7 @@ from common.host.clock_offset import ClockOffset
 from common.lab.laboratory import REPEAT_NS, Laboratory
 from common.link.mailbox import LinkModel, Mailbox
 from common.link.transport import addressed
+from common.named import maker
 from common.protocol.messages import Arm, Command, Feedback, Start, Sync, SyncReply
 from common.protocol.tally import Tally
 from common.roles import latency_topic, name_of, title
@@ -26,6 +27,8 @@ GIVEN_UP_NS = (
 
 # the feedback before the first one; `Partner.used` has as many channels as the slave's laboratory
 NO_FEEDBACK = Feedback(0, -1, -1, 0, -1, 0, 0, 0, (0.0, 0.0, 0.0, 0.0))
+
+made = maker(Command)
 
 NOTHING_SENT = (0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -184,9 +187,9 @@ class Partner:
         lab = self._lab
         now = lab.clock.now()
         shift = self._offset.at(now) - self._first_offset
-        command = Command(lab.exchange.session, tick, now, shift, self._feedback.newest_seen, *self.sent)
+        fields = (lab.exchange.session, tick, now, shift, self._feedback.newest_seen, *self.sent)
         self.commands += 1
-        return now, lab.endpoint.send(command, self._address)
+        return now, lab.endpoint.send(made(fields), self._address)
 
     def exchanged(self) -> tuple[str, dict[str, float]]:
         """The counts of the messages of both directions that the master knows: a sentence and its values."""

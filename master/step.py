@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from common.named import maker
 from common.plan.plan import Plan
 from loop import substructure
 from master.building import Building, Outputs
-from models.compiled import plain
+from models.compiled import bound
 from models.registry import Array
+
+computed = maker(Outputs)
 
 
 class MasterStep(Building):
@@ -16,24 +19,24 @@ class MasterStep(Building):
 
     def __init__(self, plan: Plan, ground: Array, p_delta: float = 0.0) -> None:
         building = substructure.build(plan, ground, p_delta)
-        self._building, self._output = plain(building), building.output
+        self._output = building.output
         self._forces = substructure.forces(building)
         width, first = substructure.SENT_VALUES, substructure.OF_SLAVES
         end = first + width * len(plan.roles)
         self._sent = [slice(place, place + width) for place in range(first, end, width)]
         self._end = end
-        self._advance = substructure.enter
+        self._advance = bound(substructure.enter, building, 0, 0.0, 0.0)
         self._storeys = plan.storeys
 
     def __call__(self, tick: int, position: float, force: float, forces: Sequence[float]) -> Outputs:
         """Compute a tick from position (m) and force (N) of the master's laboratory and the slaves' `forces` (N)."""
         for place, used in enumerate(forces):
             self._forces[place] = used
-        self._advance(self._building, tick, position, force)
+        self._advance(tick, position, force)
         row = self._output.tolist()
         sent = [tuple(row[place]) for place in self._sent]
         ground, target, command, effort = row[: substructure.OF_SLAVES]
-        return Outputs(ground, target, command, effort, sent, row[self._end :])
+        return computed((ground, target, command, effort, sent, row[self._end :], False))
 
     def recorded(self, outputs: Outputs) -> tuple[Sequence[float], Sequence[float]]:
         """The ground and the storeys' motion, and their numerical forces."""

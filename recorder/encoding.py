@@ -52,18 +52,16 @@ class RowTable:
             for field, row in enumerate(rows):
                 self.fields[place, field] = KINDS[row.kind], row.count(storeys)
 
-    def gathered(self, items: Sequence[Item]) -> tuple[ByteArray, ByteArray]:
-        """The rows of items one after the other, and the index of each item's topic."""
-        topics, rows = zip(*items, strict=True)
+    def gathered(self, topics: Sequence[str], rows: Sequence[bytes]) -> tuple[ByteArray, ByteArray]:
+        """The rows one after the other, and the index of each row's topic."""
         places = bytes(map(self._places.__getitem__, topics))
         return np.frombuffer(b"".join(rows), dtype=np.uint8), np.frombuffer(places, dtype=np.uint8)
 
-    def sound(self, items: Sequence[Item], ticks: int) -> bool:
+    def sound(self, topics: Sequence[str], rows: Sequence[bytes], ticks: int) -> bool:
         """Whether rows of plain topics have the right size, valid stamps, ticks below `ticks`, and flags of 0 or 1."""
-        topics, rows = zip(*items, strict=True)
         if any(map(ne, map(len, rows), map(self.sizes.__getitem__, topics))):
             return False
-        return bool(check(*self.gathered(items), self.fields, ticks))
+        return bool(check(*self.gathered(topics, rows), self.fields, ticks))
 
 
 class RowEncoder:
@@ -91,7 +89,7 @@ class RowEncoder:
         """The encoded messages of items, whose topics must be plain."""
         if len(items) > len(self._entries):
             self._room(2 * len(items))
-        rows, places = self._table.gathered(items)
+        rows, places = self._table.gathered(*zip(*items, strict=True))
         pack(rows, places, self._table.fields, self._numbers, self._records, self._entries, self._size)
         channels = self._channels
         return Block(

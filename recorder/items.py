@@ -36,7 +36,7 @@ class Items:
         self._table = RowTable({topic: topics[topic] for topic in own}, plan.storeys)
         self._others = {topic: checks(topics[topic], plan) for topic in own if topic not in self._table.sizes}
         for topic, size in list(self._table.sizes.items())[:1]:  # loads the kernel before a test begins
-            self._table.sound([(topic, bytes(size))], 1)
+            self._table.sound([topic], [bytes(size)], 1)
 
     def unpack(self, packed: bytes) -> tuple[Item, ...] | None:
         """The items of a piece; None where it holds anything that cannot be recorded."""
@@ -44,16 +44,18 @@ class Items:
             items = pairs(packed)
         except (ValueError, msgpack.UnpackException):
             return None
-        if not is_piece(items):
+        if (piece := columns(items)) is None:
             return None
+        topics, rows = piece
         sizes = self._table.sizes
-        numbers = [item for item in items if item[0] in sizes]
-        if numbers and not self._table.sound(numbers, self._ticks):
-            return None
-        if len(numbers) < len(items):
+        if not all(map(sizes.__contains__, topics)):
             others = [item for item in items if item[0] not in sizes]
-            return items if all(self._admits(topic, row) for topic, row in others) else None
-        return items
+            if not all(self._admits(topic, row) for topic, row in others):
+                return None
+            if len(others) == len(items):
+                return items
+            topics, rows = zip(*(item for item in items if item[0] in sizes), strict=True)
+        return items if self._table.sound(topics, rows, self._ticks) else None
 
     def _admits(self, topic: str, row: bytes) -> bool:
         """Whether a row that is not plain has valid stamps and values; its tick is not checked.
@@ -76,14 +78,14 @@ class Items:
         return all(check(value) for check, value in zip(self._others[topic], values, strict=True))
 
 
-def is_piece(found: Any) -> bool:
-    """Whether a value is a tuple of items, each a topic and a row, at most `PIECE` of them."""
+def columns(found: Any) -> tuple[tuple[str, ...], tuple[bytes, ...]] | None:
+    """The topics and the rows of a tuple of at most `PIECE` items; None where a value is anything else."""
     if type(found) is not tuple or not 0 < len(found) <= PIECE or set(map(type, found)) != {tuple}:
-        return False
+        return None
     if set(map(len, found)) != {2}:
-        return False
+        return None
     topics, rows = zip(*found, strict=True)
-    return set(map(type, topics)) == {str} and set(map(type, rows)) == {bytes}
+    return (topics, rows) if set(map(type, topics)) == {str} and set(map(type, rows)) == {bytes} else None
 
 
 def checks(rows: tuple[Signal, ...], plan: Plan) -> list[Check]:

@@ -131,22 +131,18 @@ class RecorderLoop:
         return ""
 
     def _write(self, items: list[Item]) -> None:
-        for item in items:
-            self._count(item)
+        for topic, row in items:
+            if (seen := self._seen.get(topic)) is not None:
+                log_ns, _, tick = HEAD.unpack_from(row)
+                if tick > self._newest_tick:
+                    self._begun, self._newest_ns, self._newest_tick = True, log_ns, tick
+                seen[tick] = 1  # one byte each, so that memory does not grow with the test
+                if topic in self._latencies:
+                    self._missed += row[MISSED_AT]
+            elif topic == "event":
+                self._take_event(named_values(signals.EVENT, row))
         if items:
             self._sink.put(items)
-
-    def _count(self, item: Item) -> None:
-        topic, row = item
-        if (seen := self._seen.get(topic)) is not None:
-            log_ns, _, tick = HEAD.unpack_from(row)
-            if tick > self._newest_tick:
-                self._begun, self._newest_ns, self._newest_tick = True, log_ns, tick
-            seen[tick] = 1  # one byte each, so that memory does not grow with the test
-            if topic in self._latencies:
-                self._missed += row[MISSED_AT]
-        elif topic == "event":
-            self._take_event(named_values(signals.EVENT, row))
 
     def _take_event(self, event: Mapping[str, Any]) -> None:
         """Keep an event's facts on the machines and on the test's end, of which the earliest cause counts."""

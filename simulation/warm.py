@@ -13,15 +13,13 @@ from common.plan.plan import Plan
 from common.plan.read import parse, with_test
 from common.signals import default_topics
 from laboratories import completeness, device, kinds
-from laboratories.column import model as column_lab
 from laboratories.limits import TickLimits
 from laboratories.sensors import readings
-from laboratories.table import model as table_lab
 from loop import replay, site, substructure
 from loop.closed_loop import simulate
 from loop.nominal.response import response
 from models import cache, compensators, energy_balance
-from models.compiled import plain
+from models.compiled import bound
 from models.registry import Array
 from models.system import System
 from recorder.encoding import RowEncoder, RowTable
@@ -58,14 +56,14 @@ def closed_loops(plan: Plan, ground: Array) -> None:
 
 def ticks(plan: Plan, ground: Array) -> None:
     """What the real loops call at every tick."""
-    substructure.enter(plain(substructure.build(plan, ground)), 0, 0.0, 0.0)
+    bound(substructure.enter, substructure.build(plan, ground), 0, 0.0, 0.0)
     balance = energy_balance.build(plan.test.interval, 0.5, 1.0, 1.0, np.ones(1), np.ones(2))
-    energy_balance.enter(plain(balance), 0.0, 0.0, 0.0, 0.0)
-    column_lab.enter(plain(column_lab.build(plan.test.interval, plan.actuator, plan.column)), 0.0)
-    table_lab.enter(plain(table_lab.build(plan.test.interval, plan.table, plan.damper)), 0.0, 0.0)
+    bound(energy_balance.enter, balance, 0.0, 0.0, 0.0, 0.0)
+    for kind in kinds.KINDS.values():
+        kind.mover(kind.build(System(plan)))
     readings.step(readings.build(plan.test.interval, ("any",), {}), 0, 0.0, 0.0, 0.0)
     none = compensators.build("none", {}, plan.test.interval)
-    compensators.enter(plain(none), *compensators.STILL, plan.test.interval)
+    bound(compensators.enter, none, *compensators.STILL, plan.test.interval)
     TickLimits(None, plan, [], commands=0).violation(0.0)
 
 
@@ -74,13 +72,13 @@ def recorded(storeys: int) -> None:
     topics = default_topics()
     RowEncoder(topics, dict.fromkeys(topics, 1), storeys)
     table = RowTable(topics, storeys)
-    table.sound([(table.names[0], bytes(table.sizes[table.names[0]]))], 1)
+    table.sound(table.names[:1], [bytes(table.sizes[table.names[0]])], 1)
 
 
 def of_users(drive: Array) -> None:
     """What calls a device of a user's, `drive` (ticks, 2) as `replay.laboratory` takes it."""
     lab, truth = kinds.nothing().device, np.zeros(1)
-    device.enter_device(plain(lab), truth, 0.0, 0.0)
+    bound(device.enter_device, lab, truth, 0.0, 0.0)
     completeness.driven(lab.step, lab.parameters, lab.state, truth, 0.0, 1)
     site.play(site.none(len(drive))._replace(lab=lab), drive, 1.0, 0, len(drive))
 

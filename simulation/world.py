@@ -46,14 +46,14 @@ class World:
         self.heap: list[Event] = []
         self.processes: dict[str, Process] = {}
         self.alive = 0  # processes that have begun and not ended
-        self._orders = count()
+        self.next_order = count().__next__
         self._hub: greenlet.greenlet | None = None
         self._pause: Callable[[], bool] | None = None
 
     def at(self, time: int, action: Callable[..., None], *arguments: Any) -> None:
         """Let something happen at a time, or now where that has passed."""
         time = time if time > self.time else self.time  # max() takes seven times as long
-        heappush(self.heap, (time, next(self._orders), action, arguments))
+        heappush(self.heap, (time, self.next_order(), action, arguments))
 
     def process(self, name: str, drift: Drift = NO_DRIFT) -> Process:
         """A process of this world that does not run yet."""
@@ -201,7 +201,7 @@ class Process:
             world.time = until  # nothing happens before: to switch would change nothing
             return
         self._token += 1
-        world.at(until, take_turn, self, self._token)
+        heappush(heap, (until, world.next_order(), take_turn, (self, self._token)))  # as `at` does
         world.hand_over(self)
 
     def wake(self) -> None:

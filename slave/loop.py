@@ -15,6 +15,7 @@ from common.lab.operation import obey
 from common.lab.rig_loop import RigLoop
 from common.link.endpoint import Received
 from common.link.mailbox import LinkModel, Mailbox
+from common.named import maker
 from common.protocol.exchange import Event, State
 from common.protocol.messages import (
     Arm,
@@ -43,6 +44,8 @@ from slave.step import SlaveStep
 NO_COMMAND = Command(0, -1, 0, 0, -1, 0.0, 0.0, 0.0, 0.0, 0.0)
 NOTHING_HEARD = (-1, 0)
 
+answer = maker(Feedback)
+
 
 class SlaveLoop(RigLoop):
     """A slave in a test; `instance` identifies this process among others of its role."""
@@ -53,9 +56,9 @@ class SlaveLoop(RigLoop):
         lab, plan = Laboratory(role, setting, kinds.topics(setting.plan)), setting.plan.of(role)
         kind = kinds.kind_of(setting.plan, role)
         self._limits = SlaveLimits(kind, plan)
-        self._wanted = command_of(kind.channels)
+        self._wanted = maker(command_of(kind.channels))
         self._motor = kind.channels.effort is not None
-        zero = self._wanted(*(0.0 for _ in kind.channels.drives))
+        zero = self._wanted((0.0,) * len(kind.channels.drives))
         descent = Descent(lab, rig, partial(kind.ramp, plan), zero, kind.channels)
         super().__init__(lab, rig, descent, self._limits.standing)
         self._instance = instance
@@ -121,7 +124,7 @@ class SlaveLoop(RigLoop):
         if extra is None:
             self._tally.lose(command.seq)
         else:
-            self._received_ns[command.seq] = received_ns + round(extra * 1e9)
+            self._received_ns[command.seq] = received_ns + (round(extra * 1e9) if extra else 0)
 
     def poll(self) -> None:
         """Take the next step of the handshake."""
@@ -150,19 +153,20 @@ class SlaveLoop(RigLoop):
         lab.tick = tick
         if lab.exchange.state is State.SCHEDULED:
             self._begin(now)
-        late = now >= self.tick_ns(tick + 1)
+        after = now - self.tick_ns(tick)
+        late = after > 0 and now >= self.tick_ns(tick + 1)
         held = late and not lab.plan.makes_good
         if not held and (command := self._commands.take(tick)) is not None:
             self._command = command
             self._tally.use(command.seq)
-        if self._alarmed(tick, now - self.tick_ns(tick), late=late):
+        if self._alarmed(tick, after, late=late):
             self.ease(tick)
             return
         command = self._command
         try:
             measured = self._rig.read()
-            effort = (command.effort,) if self._motor else ()
-            wanted = self._wanted(self._step(command, measured), *effort)
+            position = self._step(command, measured)
+            wanted = self._wanted((position, command.effort) if self._motor else (position,))
             violation = self._limits.violation(measured, command, wanted)
             if violation:
                 lab.violated(violation, tick)
@@ -199,18 +203,18 @@ class SlaveLoop(RigLoop):
         received_ns = self._told(command.seq, started_ns)
         sent_ns = lab.clock.now()
         self._feedbacks += 1
-        lab.endpoint.send(
-            Feedback(
-                lab.exchange.session,
-                tick,
-                command.seq,
-                received_ns,
-                *self._heard,
-                started_ns,
-                sent_ns,
-                tuple(measured),
-            )
+        session = lab.exchange.session
+        fields = (
+            session,
+            tick,
+            command.seq,
+            received_ns,
+            *self._heard,
+            started_ns,
+            sent_ns,
+            tuple(measured),
         )
+        lab.endpoint.send(answer(fields))
         if lab.recorded:
             self._sample(tick, measured, wanted, sent_ns)
 

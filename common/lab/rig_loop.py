@@ -63,7 +63,7 @@ class RigLoop:
         A rig in another process that does not answer in time makes it hold too, and trips by the error of `read`.
         """
         lab = self.lab
-        if lab.overrun(late_ns, tick):
+        if late_ns > 0 and lab.overrun(late_ns, tick):
             return True
         if late:  # the messages may have come while this loop was held up
             return False

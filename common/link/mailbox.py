@@ -59,7 +59,7 @@ class Mailbox(Generic[Frame]):
             self.newest_seen, self._newest = seq, frame
         extra = self._link.fate(self._direction, seq, seq * self._interval)
         if extra is not None:
-            ticks = ticks_late(extra, self._interval)
+            ticks = ticks_late(extra, self._interval) if extra else 0
             self._waiting.append((seq + self._nominal + ticks, seq, frame))
         return extra
 

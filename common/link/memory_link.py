@@ -9,8 +9,11 @@ from typing import Any
 from common.host.clock import Waiter
 from common.link.endpoint import CHANNELS, Received
 from common.link.transport import CONTROL, Route, heard
+from common.named import maker
 from common.protocol.messages import Message
 from common.roles import SLAVE
+
+received = maker(Received)
 
 
 class MemoryHub:
@@ -62,7 +65,7 @@ class MemoryEndpoint:
     def arrive(self, message: Message, role: str) -> None:
         """Take in a message of a role."""
         now = self.clock.now()
-        self._queue.append(Received(message, role, now, now))
+        self._queue.append(received((message, role, now, now)))
         self.clock.wake()
 
     def receive(self, timeout: float = 0.0) -> Received | None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, ClassVar
+from collections.abc import Callable, Mapping
+from typing import ClassVar
 
 from common.plan.plan import Plan
 from common.signals import COLUMN_CHANNELS
@@ -11,6 +11,7 @@ from laboratories.column import model
 from laboratories.column.model import ColumnLab
 from laboratories.descent import HoldRamp
 from laboratories.kind import Chosen, Coupling, Follows, Hysteresis, Kind, Limited, Machine, Pictured, Sensed
+from models.compiled import bound
 from models.registry import Array
 from models.system import System
 
@@ -83,10 +84,9 @@ class ColumnKind(Kind):
         """Displacement (m) and force (N); the actuator's command alone moves it."""
         truth[0], truth[1] = model.advance(lab, command)
 
-    @staticmethod
-    def enter(lab: tuple[Any, ...], command: float) -> tuple[float, ...]:
-        """Displacement (m) and force (N) for a caller outside compiled code."""
-        return model.enter(lab, command)
+    def mover(self, lab: ColumnLab) -> Callable[..., tuple[float, ...]]:
+        """Displacement (m) and force (N) for a caller outside compiled code, which gives the command (m)."""
+        return bound(model.enter, lab, 0.0)
 
     def coupling(self, plan: Plan) -> Coupling:
         """The coupling to the specimen's storey, whose drift its force resists `represents` times."""

@@ -16,7 +16,6 @@ from common.plan.tables import SensorsTable, Test
 from common.rig import ColumnCommand, ColumnMeasurement
 from laboratories.column.kind import COLUMN
 from laboratories.sensors import noise
-from models.compiled import plain
 from models.registry import Array
 from models.system import System
 
@@ -55,7 +54,7 @@ class UnderActuator:
             )
         if substeps < 1:
             raise InputError(f"substeps in [{WHERE}] is {substeps}, but must be at least 1.")
-        self._lab, self._substeps, self._force = plain(COLUMN.build(System(plan))), substeps, force
+        self._move, self._substeps, self._force = COLUMN.mover(COLUMN.build(System(plan))), substeps, force
         self._noise = noise.Noise(seed, COLUMN.noise(plan))
         self._true = (0.0, 0.0)
 
@@ -65,6 +64,6 @@ class UnderActuator:
 
     def write(self, command: ColumnCommand) -> None:
         """Move on by one interval: the specimen follows the actuator in straight lines."""
-        reached, _ = COLUMN.enter(self._lab, command[0])
+        reached, _ = self._move(command[0])
         way = np.linspace(self._true[0], reached, self._substeps + 1)[1:]
         self._true = (reached, self._force(way))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, ClassVar
+from collections.abc import Callable, Mapping
+from typing import ClassVar
 
 from common.plan.laboratory_tables import ForceCorrection
 from common.plan.plan import Plan
@@ -12,6 +12,7 @@ from laboratories.kind import Chosen, Coupling, Follows, Hysteresis, Kind, Limit
 from laboratories.table import model
 from laboratories.table.descent import TableRamp
 from laboratories.table.model import TableLab
+from models.compiled import bound
 from models.registry import Array
 from models.system import System
 
@@ -81,10 +82,9 @@ class TableKind(Kind):
         """Displacement, acceleration, stroke, force; `effort` is the motor's command (N)."""
         truth[0], truth[1], truth[2], truth[3] = model.advance(lab, command, effort)
 
-    @staticmethod
-    def enter(lab: tuple[Any, ...], command: float, effort: float) -> tuple[float, ...]:
-        """Displacement, acceleration, stroke and force for a caller outside compiled code."""
-        return model.enter(lab, command, effort)
+    def mover(self, lab: TableLab) -> Callable[..., tuple[float, ...]]:
+        """Displacement, acceleration, stroke and force for a caller outside compiled code: it gives both commands."""
+        return bound(model.enter, lab, 0.0, 0.0)
 
     def coupling(self, plan: Plan) -> Coupling:
         """The coupling to the damper's floor; without `amd` in [control] neither force nor motor acts."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.optimize import brentq
 
 from common.errors import InputError
 from models.indicators.stability import STILL, companion, shaped
@@ -33,6 +32,10 @@ def critical_delay(M: Array, C: Array, K: Array, directions: Array, specimens: A
     Raises:
         InputError: shapes do not fit, a value is not finite, M is singular, or the undelayed loop is unstable.
     """
+    from scipy.optimize import (
+        brentq,
+    )  # half a second of every command that only plans of several specimens need
+
     for direction, specimen in zip(directions, specimens, strict=True):
         shaped(M, C, K, direction, *specimen)
     k, c, m = (directions.T @ np.diag(of) @ directions for of in specimens.T)

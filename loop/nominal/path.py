@@ -18,7 +18,6 @@ from laboratories.kinds import kind_of
 from loop import site
 from models import excitation, indicators
 from models.compensators.follower import Follower
-from models.compiled import plain
 from models.excitation import Programme, join
 from models.excitation.pieces import Piece, sine
 from models.indicators.growth import grows
@@ -126,8 +125,8 @@ def stepped(kind: Kind, system: System) -> Callable[[float], float]:
     """The nominal laboratory of a kind, from command (m) to position (m) at the interval's end."""
     if kind is COLUMN:
         plan = system.plan
-        lab = plain(column_lab.build(plan.test.interval, plan.actuator, plan.column))
-        return lambda command: column_lab.enter(lab, command)[0]
+        move = kind.mover(column_lab.build(plan.test.interval, plan.actuator, plan.column))
+        return lambda command: move(command)[0]
     played = site.build(kind, system, np.zeros((1, len(kind.channels.names))))
     drive, position = np.zeros((1, 2)), kind.channels.names.index(kind.channels.position)
 

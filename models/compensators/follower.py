@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Protocol
 
 from models import compensators
-from models.compiled import plain
+from models.compiled import bound
 from models.excitation import ACCELERATION, JERK, POSITION, RATE, Programme
 
 
@@ -34,10 +34,8 @@ class Follower:
     ) -> None:
         self._motion = programme.motion
         self._interval = interval
-        still, self._built = (
-            plain(compensators.build(chosen.kind, chosen.parameters, interval, table)) for _ in range(2)
-        )
-        compensators.enter(still, *compensators.STILL, interval)  # compiled before a rig is armed
+        built = compensators.build(chosen.kind, chosen.parameters, interval, table)
+        self._command = bound(compensators.enter, built, *compensators.STILL, interval)
 
     def wanted(self, tick: int) -> float:
         """The programme's value at a tick."""
@@ -48,4 +46,4 @@ class Follower:
         ahead, present = self._motion[:, tick + 1], self.wanted(tick)
         rates = float(ahead[RATE]), float(ahead[ACCELERATION]), float(ahead[JERK])
         wanted = float(ahead[POSITION]), *rates, present, measured
-        return present, float(compensators.enter(self._built, *wanted, self._interval))
+        return present, float(self._command(*wanted, self._interval))

@@ -15,6 +15,8 @@ from numba.core.errors import NumbaError
 import laboratories
 import loop
 import models
+from common.plan.laboratory_tables import Actuator, Column
+from laboratories.column import model as column
 from models import compiled
 from models.registry import Array
 
@@ -49,3 +51,20 @@ def test_a_kernel_that_allocates_does_not_compile() -> None:
     assert numba.njit(cache=False)(allocating)(3) == 0.0
     with pytest.raises(NumbaError):
         compiled.jit(allocating)(3)
+
+
+def test_a_bound_kernel_moves_the_record_that_it_was_given() -> None:
+    lab, other = (column.build(0.002, Actuator(), Column()) for _ in range(2))
+    move = compiled.bound(column.enter, lab, 0.0)
+    for command in np.linspace(1e-4, 2e-3, 20).tolist():
+        assert move(command) == column.enter(compiled.plain(other), command)
+    assert np.array_equal(lab.state, other.state)
+    assert lab.state.any()
+
+
+def test_a_bound_kernel_refuses_what_has_another_type() -> None:
+    move = compiled.bound(column.enter, column.build(0.002, Actuator(), Column()), 0.0)
+    with pytest.raises(TypeError):
+        move(None)
+    with pytest.raises(TypeError):
+        move()

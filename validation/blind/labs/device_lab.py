@@ -18,7 +18,6 @@ from common.roles import SLAVE
 from common.signals import Channels
 from laboratories import effects as catalogue
 from laboratories.kinds import kind_of
-from models.compiled import plain
 from models.system import System
 from validation.blind.labs import laying, sensors
 from validation.blind.labs.laying import PLAIN, KnownEffect, Values
@@ -103,8 +102,8 @@ class OwnKernelLab:
         beside = [item for item in given if item["name"] not in faults]
         laying.lay(values, beside, {**AROUND, **sensors.known(names)})
         entries = [(item["name"], item["parameters"]) for item in given if item["name"] in faults]
-        self._lab = plain(own.build(catalogue.lay(System(plan), entries, faults)))
-        self._enter, self._values, self._interval = own.enter, values, interval
+        self._move = own.mover(own.build(catalogue.lay(System(plan), entries, faults)))
+        self._values, self._interval = values, interval
         self._position, self._force = names.index(own.channels.position), names.index(own.channels.force)
         self._sensors = sensors.TrueSensors(names, values, interval, seed)
         self._lags = filters.bank(names, self._sensors.lags)
@@ -123,7 +122,7 @@ class OwnKernelLab:
         """Move on by one interval, with the command that reaches the transfer system."""
         transfer, *motor = command
         self._ticks += 1
-        truth = list(self._enter(self._lab, self._told(float(transfer)), *map(float, motor)))
+        truth = list(self._move(self._told(float(transfer)), *map(float, motor)))
         truth[self._force] += self._values["cubic"] * truth[self._position] ** 3
         self._true = tuple(map(self._behind_filter, range(len(truth)), self._before, truth))
         self._before = tuple(truth)
