@@ -6,9 +6,10 @@ import contextlib
 import os
 import platform
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib import metadata
 from pathlib import Path
+from types import MappingProxyType
 
 from common.errors import InputError
 from common.host.clock import unix_ns
@@ -18,6 +19,7 @@ from common.plan.plan import Plan
 from common.recording.run import CLOCK, GROUND
 from common.recording.writer import Recording
 from common.safety.risks import Risk
+from common.signals import Signal
 from common.terminal import outputs
 from laboratories.kinds import topics
 from models.ground_motion import GroundMotion
@@ -67,16 +69,17 @@ def begin(
     accepted: Sequence[Risk] = (),
     *,
     clock: str = "virtual",
+    more: Mapping[str, tuple[Signal, ...]] = MappingProxyType({}),
 ) -> Recording:
     """Begin a recording with schemas, plan, versions, host, `ground` motion and a first event at `at_ns` (Unix).
 
-    `clock` is the test's kind of clock, `virtual` or `real`. The recording is flushed, because the metadata reach the
-    file with the first chunk only.
+    `clock` is the test's kind of clock, `virtual` or `real`; `more` are topics beside the test's. The recording is
+    flushed, because the metadata reach the file with the first chunk only.
 
     Raises:
         InputError: the disk does not take it.
     """
-    recording = Recording(path, plan.test.name, plan.storeys, topics(plan), plan.roles)
+    recording = Recording(path, plan.test.name, plan.storeys, {**topics(plan), **more}, plan.roles)
     recording.metadata("plan", {"toml": plan.toml(), "digest": plan.digest()})
     recording.describe()
     recording.metadata("versions", {name: metadata.version(name) for name in PACKAGES})

@@ -25,6 +25,8 @@ VERBS = {
     "init": "write a plan to begin with, and the skeleton of a rig",
     "check": "describe a plan: periods, delays, peaks, likely slips of units, classes of your own that it would run",
     "simulate": "compute the closed loop of nominal models",
+    "predict": "foretell the next test with what a diagnosis found, with a band",
+    "update": "write a plan with the nominal models that a diagnosis found",
     "bench": "test one part alone, recorded",
     "identify": "find a part's parameters in a bench recording",
     "inspect": "summarise a recording: completeness, peaks, tracking, latency",
@@ -49,7 +51,7 @@ VERBS = {
 
 FOLDERS = {
     "rths.perform": ("run", "serve", "live", "stop", "reset"),
-    "rths.prepare": ("init", "check", "simulate", "bench", "identify", "keys", "doctor"),
+    "rths.prepare": ("init", "check", "simulate", "predict", "update", "bench", "identify", "keys", "doctor"),
     "rths.examine": (
         "inspect",
         "report",
@@ -113,6 +115,8 @@ EXAMPLES = {
     "init": "rths init my_test",
     "check": "rths check test.toml",
     "simulate": "rths simulate default --ideal --no-amd",
+    "predict": "rths predict default --found found.toml --scale 0.2 --html prediction.html",
+    "update": "rths update default --found found.toml -o corrected.toml",
     "bench": "rths bench actuator paper -o actuator.mcap",
     "identify": "rths identify actuator.mcap",
     "budget": "rths budget runs/default-20260101-120000.mcap --budget laboratory.toml",

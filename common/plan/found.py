@@ -15,8 +15,10 @@ from common.errors import PlanError
 from common.plan.plan import Plan
 from common.roles import MASTER
 
-# the tables of a plan that say what the laboratories and the building are: what was found is of these nominal models
-OF_MODELS = ("structure", "column", "actuator", "table", "damper", "device", "master", "slave", "slaves")
+# the tables of a plan that say what the laboratories are: what was found is of these nominal models
+OF_MODELS = ("column", "actuator", "table", "damper", "device", "master", "slave")
+BUILDING = "structure"  # table of the plan, and the part of an effect's name that stands before its point
+CHOSEN = "compensator"  # key of a laboratory's table that a plan may choose anew
 
 
 class LearnedEntry(NamedTuple):
@@ -30,10 +32,54 @@ class LearnedEntry(NamedTuple):
 
 
 def models_of(plan: Plan) -> str:
-    """Sixteen hex digits that agree where two plans have the same nominal models; motion and control are free."""
+    """Sixteen hex digits that agree where two plans have the same nominal laboratories.
+
+    The building, the motion, compensators and the control are free.
+    """
     tables = plan.tables()
-    text = json.dumps({name: tables.get(name) for name in OF_MODELS}, sort_keys=True)
+    return digest({name: without_choices(tables.get(name)) for name in OF_MODELS})
+
+
+def building_of(plan: Plan) -> str:
+    """Sixteen hex digits that agree where two plans have the same building."""
+    return digest(plan.tables()[BUILDING])
+
+
+def digest(plain: Any) -> str:
+    """Sixteen hex digits of plain values."""
+    text = json.dumps(plain, sort_keys=True)
     return hashlib.blake2b(text.encode(), digest_size=8).hexdigest()
+
+
+def without_choices(plain: Any) -> Any:
+    """Nested plain values without compensators."""
+    if not isinstance(plain, dict):
+        return plain
+    return {name: without_choices(value) for name, value in plain.items() if name != CHOSEN}
+
+
+def of_building(tables: Mapping[str, Any]) -> list[str]:
+    """What a reality says of the building: the table's name, and its effects."""
+    effects = tables.get("effect", [])
+    names = (
+        [str(one.get("name")) for one in effects if isinstance(one, dict)]
+        if isinstance(effects, list)
+        else []
+    )
+    found = [name for name in names if name.partition(".")[0] == BUILDING]
+    return [*([f"[{BUILDING}]"] if tables.get(BUILDING) else []), *found]
+
+
+def for_another_building(tables: Mapping[str, Any], plan: Plan) -> tuple[dict[str, Any], list[str]]:
+    """The tables of a reality for a plan, and what of them was left out because it is of another building."""
+    found = tables.get("found", {})
+    if not isinstance(found, dict) or found.get("building", building_of(plan)) == building_of(plan):
+        return dict(tables), []
+    gone = of_building(tables)
+    kept = {name: value for name, value in tables.items() if name != BUILDING}
+    if "effect" in kept:
+        kept["effect"] = [one for one in kept["effect"] if one.get("name") not in gone]
+    return kept, gone
 
 
 def check_found(tables: Mapping[str, Any], plan: Plan) -> None:
@@ -46,6 +92,12 @@ def check_found(tables: Mapping[str, Any], plan: Plan) -> None:
         raise PlanError(
             f"it was found with other nominal models than this plan's ({models}, not {models_of(plan)}): diagnose a "
             "recording of this plan's laboratories, or give the plan that it was found with."
+        )
+    building = given.get("building", "")
+    if building and building != building_of(plan) and of_building(tables):
+        raise PlanError(
+            f"it says of another building than this plan's how it differs ({', '.join(of_building(tables))}): leave "
+            "that out of the file, or give the plan that it was found with."
         )
 
 

@@ -6,12 +6,14 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from common.errors import InputError
-from common.plan.found import LearnedEntry, models_of
+from common.plan.found import LearnedEntry, building_of, models_of
 from common.plan.kinds import TABLES_OF_KIND, known_kind
 from common.plan.plan import Plan
 from common.plan.reality import OF_LABORATORY, TRUE_TABLES
+from common.plan.spread import Spread
 from common.roles import MASTER, name_of
 from diagnosis.findings.found import Diagnosis, laid
+from diagnosis.findings.spread import spread
 from diagnosis.recorded.record import Record
 from laboratories.effects.sites import LINK
 from models.system import System
@@ -20,10 +22,11 @@ Tables = dict[str, Any]
 
 
 class FoundReality(NamedTuple):
-    """The tables of a reality file, and the laws that stand beside it."""
+    """The tables of a reality file, and what stands beside it: laws, and how sure all of it is."""
 
     tables: Tables
     learned: tuple[LearnedEntry, ...]
+    spread: Spread
 
 
 def as_reality(found: Mapping[str, Diagnosis]) -> FoundReality:
@@ -34,7 +37,8 @@ def as_reality(found: Mapping[str, Diagnosis]) -> FoundReality:
     """
     first = next(iter(found.values()))
     plan = first.record.plans[MASTER]
-    tables: Tables = {"found": {"models": models_of(plan), "recording": first.record.run.path.name}}
+    origin = {"models": models_of(plan), "building": building_of(plan)}
+    tables: Tables = {"found": origin | {"recording": first.record.run.path.name}}
     tables |= changed(plan.tables(), moved(first, MASTER).tables(), TRUE_TABLES)
     for role, item in found.items():
         if role != MASTER:
@@ -42,7 +46,7 @@ def as_reality(found: Mapping[str, Diagnosis]) -> FoundReality:
     rows = [row for item in found.values() for row in entries(item)]
     tables["effect"] = [row for place, row in enumerate(rows) if row not in rows[:place]]
     laws = dict.fromkeys(law.entry for item in found.values() for law in item.learned)
-    return FoundReality(tables, tuple(laws))
+    return FoundReality(tables, tuple(laws), spread(found))
 
 
 def moved(found: Diagnosis, role: str) -> Plan:

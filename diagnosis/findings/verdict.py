@@ -250,21 +250,28 @@ def on_train(fit: Fit) -> Array:
     return np.asarray(fit.jacobian[np.repeat(fit.data.train, fit.data.sigma.size)])
 
 
+def covariance(fit: Fit) -> Array:
+    """Covariance of what a fit moved: nominal parameters, in tolerances, and then the parameters of effects.
+
+    It comes from the curvature of the cost that the fit saw and the scatter of that cost's gradient.
+    """
+    count, slopes = fit.z.size, on_train(fit)
+    information = slopes.T @ slopes
+    information[:count, :count] += np.eye(count)
+    inverse = np.linalg.pinv(information + 1e-12 * np.trace(information) * np.eye(len(information)))
+    return np.asarray(inverse + inverse @ scatter(fit) @ inverse)
+
+
 def intervals(fit: Fit) -> dict[str, dict[str, Interval]]:
     """Parameters of a fit's effects with their 95 % intervals, from the curvature of the cost that it saw."""
     count = fit.z.size
     problem = Problem(fit.data, fit.values)
-    size = count + len(problem.frees)
-    slopes = on_train(fit)
-    information = slopes.T @ slopes
-    information[:count, :count] += np.eye(count)
-    inverse = np.linalg.pinv(information + 1e-12 * np.trace(information) * np.eye(size))
-    covariance = inverse + inverse @ scatter(fit) @ inverse
+    spread = covariance(fit)
     result: dict[str, dict[str, Interval]] = {}
     low, high = problem.bounds()
     place = problem.place(fit.values, fit.z)
     for i, item in enumerate(problem.frees, start=count):
-        wide = COVER * math.sqrt(max(covariance[i, i], 0.0))
+        wide = COVER * math.sqrt(max(spread[i, i], 0.0))
         ends = [item.outward(float(np.clip(place[i] + side * wide, low[i], high[i]))) for side in (-1, 1)]
         value = fit.values[item.effect][item.parameter.name]
         edge = 1e-6 * (high[i] - low[i])

@@ -37,13 +37,17 @@ class RecordedLoop:
 
     def simulate(self, systems: Systems, *, linked: bool = True, seed: int | None = None) -> Signals | None:
         """Response signals (ticks,) of systems, None where the loop diverges; `linked` with the recorded exchange."""
+        found = self.every(systems, linked=linked, seed=seed)
+        return None if found is None else {name: found[name] for name in self.names}
+
+    def every(self, systems: Systems, *, linked: bool = True, seed: int | None = None) -> Signals | None:
+        """All signals of systems by name, otherwise as `simulate`."""
         believed, system = self.record.plan.ground_motion.scale, systems[MASTER]
         factor = system.plan.ground_motion.scale / believed if believed else 1.0
         rows = substructure.shifted(
             self.ground * factor, system.effects.time_shift / system.plan.test.interval
         )
-        found = simulated(self.record, systems, rows, self.exchange if linked else None, seed)
-        return None if found is None else {name: found[name] for name in self.names}
+        return simulated(self.record, systems, rows, self.exchange if linked else None, seed)
 
     def gap(self, simulated: Mapping[str, Array] | None, mask: Mask | None = None) -> dict[str, float]:
         """rms(recorded − simulated)/rms(recorded) per signal over some of the ticks."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from common.errors import InputError
@@ -13,13 +14,20 @@ from common.terminal.printable import shown
 from report.text.progress import Progress
 
 if TYPE_CHECKING:
+    from simulation.foretold.held import Held
     from simulation.source import ComparedRun
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `compare`."""
     parser.add_argument("a", metavar="A", help="a recording, or a plan, which is then simulated")
-    parser.add_argument("b", metavar="B", help="the other recording or plan")
+    parser.add_argument("b", metavar="B", nargs="?", help="the other recording or plan")
+    parser.add_argument(
+        "--predicted",
+        type=Path,
+        metavar="FILE",
+        help="instead of B: what rths predict -o foretold of A; exit with 1 where it did not hold",
+    )
     parser.add_argument(
         "--tolerance", type=float, metavar="X", help="exit with 1 where an NRMSE exceeds this"
     )
@@ -30,6 +38,10 @@ def run(args: argparse.Namespace) -> int:
     """Compare; 1 where a signal differs by more than the tolerance."""
     if args.tolerance is not None and not args.tolerance >= 0.0:
         raise InputError(f"--tolerance is {args.tolerance}, but must be at least 0.")
+    if (args.b is None) == (args.predicted is None):
+        raise InputError("Give A something to be compared with: B, or --predicted FILE, not both.")
+    if args.predicted:
+        return against_prediction(args)
     with Progress("comparing") as progress:
         from simulation.source import columns
 
@@ -49,6 +61,35 @@ def run(args: argparse.Namespace) -> int:
     else:
         show(args, result)
     return 1 if beyond else 0
+
+
+def against_prediction(args: argparse.Namespace) -> int:
+    """Say what of a recording lay outside the band that was foretold; 1 where the prediction did not hold."""
+    if args.tolerance is not None:
+        raise InputError("--tolerance is of two recordings: leave it out with --predicted, which has a band.")
+    from common.recording.reader import read
+    from simulation.foretold import held
+
+    found = held.held(read(Path(args.a)), read(args.predicted))
+    if args.json:
+        sys.stdout.write(json.dumps(held.plain(found)) + "\n")
+    else:
+        show_held(found)
+    return 0 if found.held else 1
+
+
+def show_held(found: Held) -> None:
+    """How a recording lay in a prediction, as text."""
+    from report.text.terminal import table
+
+    rows = [["signal", "inside", "first left", "times left", "farthest", "at"]]
+    for name, one in found.signals.items():
+        first = f"{one.departures[0].start:.2f} s" if one.departures else "–"
+        far = [f"{one.farthest:.1f} half widths", f"{one.farthest_at:.2f} s"] if one.farthest else ["–", "–"]
+        rows.append([name, f"{100 * one.inside:.0f} %", first, str(len(one.departures)), *far])
+    sys.stdout.write(f"{found.ticks} ticks in common; the band is of 90 % of the time\n\n")
+    table(rows)
+    sys.stdout.write("\n" + "".join(f"{shown(text)}\n" for text in found.sentences))
 
 
 def compare(a: ComparedRun, b: ComparedRun) -> dict[str, Any]:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from diagnosis.findings.as_reality import FoundReality
     from diagnosis.report.records import Report
 
-LAWS = ".npz"  # ending of the file with the laws that were learned, beside the reality
+LAWS = ".npz"  # ending of the file beside the reality: laws that were learned, and how sure all of it is
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -56,8 +56,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--found",
         type=Path,
         metavar="OUT",
-        help="write what was found as a reality for rths run --virtual and rths simulate: out.toml, and beside it "
-        "out.npz where something was learned",
+        help="write what was found as a reality for rths simulate, rths run --virtual and rths predict: out.toml, and "
+        "beside it out.npz with laws that were learned and how sure all of it is",
     )
     parser.add_argument("--html", type=Path, metavar="OUT", help="write the report as one HTML page")
     cli.force_argument(parser)
@@ -118,16 +118,20 @@ def run(args: argparse.Namespace) -> int:
 
 
 def write_found(path: Path, found: FoundReality, force: bool) -> None:
-    """Write what was found as a reality, with the laws that were learned in a file beside it."""
+    """Write what was found as a reality; a file beside it holds laws that were learned and how sure all of it is."""
     import numpy as np
     import tomli_w
 
+    from common.plan.spread import KEY
+
     beside = path.with_suffix(LAWS)
-    if found.learned:
-        with outputs.writing(beside, force) as place, place.open("wb") as file:
-            np.savez(file, **{f"{law.role}.{law.machine}": np.array(law.law) for law in found.learned})  # type: ignore[arg-type]
+    laws = {f"{law.role}.{law.machine}": np.array(law.law) for law in found.learned}
+    arrays: Any = laws | found.spread.arrays()
+    with outputs.writing(beside, force) as place, place.open("wb") as file:
+        np.savez(file, **arrays)
     rows = [{"laboratory": law.role, "machine": law.machine, "file": beside.name} for law in found.learned]
-    tables = found.tables | ({"learned": rows} if rows else {})
+    origin = {"found": found.tables["found"] | {KEY: beside.name}}
+    tables = found.tables | origin | ({"learned": rows} if rows else {})
     outputs.write_text(path, tomli_w.dumps(tables), force)
 
 

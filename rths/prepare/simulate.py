@@ -8,15 +8,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
-from common.errors import InputError
 from common.plan.laboratory_tables import CompensatorTable, Control
 from common.plan.plan import Plan, ideal
-from common.roles import MASTER
 from common.terminal import cli, outputs
 from report.text.progress import Progress
 
 if TYPE_CHECKING:
-    from common.plan.reality import Reality
     from loop.closed_loop import Rollout
 
 
@@ -62,6 +59,7 @@ def rolled_out(plan: Plan, motion: Any, args: argparse.Namespace) -> tuple[dict[
     """Signals of the compiled rollout, which --output also writes, and a sentence on the first value beyond a limit."""
     from loop import substructure
     from loop.closed_loop import simulate
+    from loop.of_reality import really
     from loop.signals import by_role, signals
 
     ground = substructure.ground_rows(plan, motion)
@@ -73,38 +71,6 @@ def rolled_out(plan: Plan, motion: Any, args: argparse.Namespace) -> tuple[dict[
         with outputs.writing(args.output, args.force) as path:
             write(path, plan, rollout, motion, ground)
     return signals(plan, rollout), beyond(plan, by_role(plan, rollout), rollout.ticks)
-
-
-def really(truth: Reality, *, noise: bool) -> Rollout:
-    """The rollout of the laboratories and the network as they really are.
-
-    Raises:
-        InputError: a laboratory's rig is a plug-in, which has no model, or an effect cannot be applied.
-    """
-    from loop import substructure
-    from loop.closed_loop import simulate
-    from loop.exchange import exchange
-    from loop.links import link_model
-    from loop.realised import true_slaves, true_system
-
-    rigs = {MASTER: truth.master} | {role: truth.of(role).slave for role in truth.plan.roles}
-    for role, rig in rigs.items():
-        if rig.own:
-            raise InputError(
-                f"[{role}.rig] names a plug-in, which a simulation has no model of: use rths run --virtual."
-            )
-    system = true_system(truth)
-    plan, effects = system.plan, system.effects
-    ground = substructure.ground_rows(plan, substructure.motion(plan), effects.time_shift)
-    links = {role: link_model(truth.of(role)) for role in plan.roles}
-    return simulate(
-        plan,
-        ground,
-        effects=effects,
-        slaves=true_slaves(truth),
-        seed=truth.seed if noise else None,
-        exchange={role: exchange(plan.ticks, plan.test.interval, link) for role, link in links.items()},
-    )
 
 
 def adapted(plan: Plan, args: argparse.Namespace) -> Plan:

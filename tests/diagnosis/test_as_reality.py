@@ -11,6 +11,7 @@ import pytest
 from common.errors import InputError, PlanError
 from common.plan import reality
 from common.plan.found import models_of
+from common.plan.laboratory_tables import CompensatorTable
 from common.plan.plan import Plan
 from common.plan.read import parse
 from common.recording.reader import read
@@ -38,7 +39,17 @@ def plan_of(path: Path) -> Plan:
 def test_a_diagnosis_read_as_a_reality_is_the_same_laboratories(cases: Cases, tmp_path: Path) -> None:
     path = cases.file(FRICTION, duration=4.0)
     found = examine(record.build(read(path)))
-    tables = as_reality({"slave": found}).tables
+    whole = as_reality({"slave": found})
+    tables, known = whole.tables, whole.spread
+    names = [(one.laboratory, one.effect, one.parameter) for one in known.parameters]
+    assert ("slave", "damper.friction", "force") in names
+    assert ("master", "", "column.stiffness") in names
+    place = names.index(("slave", "damper.friction", "force"))
+    assert 0.0 < np.sqrt(known.covariance[place, place]) < 0.2
+    assert known.noise["master"]["column_force"] == pytest.approx(100.0, rel=0.1)
+    assert known.rest["master"]["column_force"] < 0.01
+    assert known.seen["master"].amplitudes["column_displacement"] > 1e-4
+    assert known.seen["slave"].band[1] > 1.0
     assert tables["effect"][0]["name"] == "damper.friction"
     assert tables["effect"][0]["laboratory"] == "slave"
     truth = reality.from_reality(tables, plan_of(path), tmp_path)
@@ -83,6 +94,7 @@ def test_a_wrong_law_is_one_sentence(row: dict[str, str], says: str, tmp_path: P
 def test_motion_and_control_may_differ_and_models_may_not() -> None:
     plan = short()
     assert models_of(plan) == models_of(short(duration=3.0, scale=0.7))
+    assert models_of(plan) == models_of(replace(plan, compensator=CompensatorTable("none", {})))
     assert models_of(plan) != models_of(replace(plan, table=replace(plan.table, frequency=9.0)))
 
 

@@ -13,9 +13,10 @@ from common.plan.read import with_test
 from common.recording.reader import read
 from diagnosis.report.records import Report
 from loop import substructure
+from loop.of_reality import really
 from report.gap import rig, terminal
 from rths.examine.diagnose import diagnose_slaves
-from rths.prepare.simulate import really, write
+from rths.prepare.simulate import write
 from tests.shapes import plan_of
 
 SECONDS = 6.0

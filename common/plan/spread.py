@@ -1,0 +1,113 @@
+"""How sure a diagnosis is of what it found: spread of parameters, noise of sensors, the rest, and the ranges seen.
+
+`rths diagnose --found` writes it into the file beside the reality, and `rths predict` draws laboratories from it.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+from zipfile import BadZipFile
+
+import numpy as np
+from numpy.typing import NDArray
+
+from common.errors import PlanError
+
+KNOWN, COVARIANCE = "known", "covariance"  # names in the file beside a reality
+KEY = "rest"  # of [found]: the name of that file
+
+ByRole = dict[str, dict[str, float]]
+
+
+class UncertainParameter(NamedTuple):
+    """One parameter that a diagnosis found, and on which scale its spread is given.
+
+    The spread of a nominal parameter is that of a factor on it; the spread of an effect's parameter that of its value,
+    or of its value's logarithm.
+    """
+
+    laboratory: str  # role
+    parameter: str  # `table.name` of the plan, or the name of an effect's parameter
+    effect: str = ""  # the effect's name in the catalogue, empty for a nominal parameter
+    storey: int = 0  # the only storey whose value is meant, from 1; 0 for all
+    logarithmic: bool = False
+    least: float = -math.inf
+    most: float = math.inf
+
+
+class SeenRange(NamedTuple):
+    """What one laboratory was seen to do in the recording that was diagnosed."""
+
+    amplitudes: dict[str, float]  # largest magnitude of each reading that stands out of its noise, SI units
+    band: tuple[float, float]  # Hz, which holds nearly all of its target's motion
+
+
+@dataclass(frozen=True)
+class Spread:
+    """What is known of the errors of a reality that was found."""
+
+    parameters: tuple[UncertainParameter, ...] = ()
+    covariance: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
+    noise: ByRole = field(default_factory=dict)  # rms of each channel's noise by role
+    rest: ByRole = field(default_factory=dict)  # what is left of each signal over its envelope, by role
+    seen: dict[str, SeenRange] = field(default_factory=dict)  # by role
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """The arrays that a file holds."""
+        text = json.dumps(
+            {
+                "parameters": [one._asdict() for one in self.parameters],
+                "noise": self.noise,
+                "rest": self.rest,
+                "seen": {role: one._asdict() for role, one in self.seen.items()},
+            }
+        )
+        return {KNOWN: np.array(text), COVARIANCE: self.covariance}
+
+
+def beside(tables: Mapping[str, Any], base: Path) -> Spread:
+    """The spread in the file that `[found]` of a reality names, relative to `base`.
+
+    Raises:
+        PlanError: the reality names none, or it cannot be read.
+    """
+    given = tables.get("found")
+    name = given.get(KEY) if isinstance(given, dict) else None
+    if not isinstance(name, str):
+        raise PlanError(
+            "it does not say how sure it is: give the file that `rths diagnose --found` wrote, not a reality of "
+            "your own."
+        )
+    path = base / name
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            return read(json.loads(str(file[KNOWN])), np.asarray(file[COVARIANCE], dtype=np.float64))
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, BadZipFile):
+        raise PlanError(
+            f"Cannot read what {path} says of its errors: keep the file that `rths diagnose --found` wrote beside it."
+        ) from None
+
+
+def read(plain: Mapping[str, Any], covariance: NDArray[np.float64]) -> Spread:
+    """A spread from plain values; raises ValueError, KeyError, TypeError or AttributeError for others."""
+    parameters = tuple(UncertainParameter(**one) for one in plain["parameters"])
+    if covariance.shape != (len(parameters),) * 2 or not np.all(np.isfinite(covariance)):
+        raise ValueError("no covariance of these parameters")
+    seen = {
+        role: SeenRange(numbers(one["amplitudes"]), (float(one["band"][0]), float(one["band"][1])))
+        for role, one in plain["seen"].items()
+    }
+    noise, rest = (
+        {role: numbers(values) for role, values in plain[name].items()} for name in ("noise", "rest")
+    )
+    return Spread(parameters, covariance, noise, rest, seen)
+
+
+def numbers(given: Mapping[str, Any]) -> dict[str, float]:
+    """Numbers by name."""
+    return {name: float(value) for name, value in given.items()}

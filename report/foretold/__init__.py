@@ -1,0 +1,1 @@
+"""A prediction for its reader: tables, pictures, one page."""

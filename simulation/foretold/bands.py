@@ -1,0 +1,245 @@
+"""Bands of the predicted signals and of their peaks, and the chance that a limit is passed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from common.errors import InputError
+from common.plan.plan import Plan
+from common.roles import MASTER
+from common.terminal.telling import Tell, untold
+from laboratories import kinds
+from loop.closed_loop import Rollout
+from loop.nominal import limited, partition
+from loop.signals import by_role, signals
+from models.ground_motion import GroundMotion
+from models.registry import Array
+from simulation.foretold import rest
+from simulation.foretold.draws import Ensemble, FoundLaboratories, ensemble
+from simulation.foretold.rest import Reach
+
+HELD = 0.9  # share of the time that a band is to hold
+LOW, HIGH = 0.5 * (1.0 - HELD), 0.5 * (1.0 + HELD)
+DRAWS = 64
+# Draws without which no band of 90 % stands between the smallest and the largest: (n + 1)·0.05 must be 1 at least.
+LEAST = 20
+
+
+class PeakBand(NamedTuple):
+    """The largest magnitude of a quantity over the test: low, median and high of the draws."""
+
+    low: float
+    median: float
+    high: float
+    unit: str
+
+
+class LimitChance(NamedTuple):
+    """How near a limit of the plan a quantity comes, and in how many draws it passes the limit."""
+
+    peak: PeakBand
+    limit: float
+    passed: int
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """The next test foretold."""
+
+    plan: Plan
+    low: Rollout
+    median: Rollout
+    high: Rollout
+    peaks: dict[str, PeakBand]  # by signal as recordings name them
+    drifts: dict[int, PeakBand]  # by storey that a laboratory follows
+    limits: dict[str, LimitChance]
+    reaches: dict[str, Reach]  # by role
+    draws: int
+    diverged: int
+    sentences: tuple[str, ...]
+    motion: GroundMotion
+
+
+def predict(found: FoundLaboratories, plan: Plan, count: int = DRAWS, tell: Tell = untold) -> Prediction:
+    """The test of a plan in laboratories as found, from `count` of them drawn under the plan's seed.
+
+    Raises:
+        InputError: too few of them reach the end of the test for a band.
+    """
+    drawn = ensemble(found, count, tell)
+    if len(drawn.drawn) < LEAST:
+        raise InputError(
+            f"Nothing can be foretold: in {drawn.diverged} of {count} laboratories drawn from what was found the test "
+            "is unstable; choose another compensator or a weaker motion."
+            if drawn.diverged
+            else f"{count} laboratories are too few for a band: draw {LEAST} at least."
+        )
+    reach = rest.reaches(plan, drawn.central, found.spread)
+    rollouts = erring(found, plan, drawn, reach)
+    low, median, high = (quantile(drawn.central, rollouts, level) for level in (LOW, 0.5, HIGH))
+    return Prediction(
+        plan,
+        low,
+        median,
+        high,
+        peaks(plan, rollouts),
+        drifts(plan, rollouts),
+        chances(plan, rollouts, drawn.diverged),
+        reach,
+        count,
+        drawn.diverged,
+        (*about(found, drawn, count), *rest.sentences(reach, plan.test.interval)),
+        drawn.motion,
+    )
+
+
+def about(found: FoundLaboratories, drawn: Ensemble, count: int) -> list[str]:
+    """What was left out, and what diverged, in sentences."""
+    result = []
+    if found.left_out:
+        result.append(
+            f"{', '.join(found.left_out)} was found in another building than this plan's and is left out."
+        )
+    if drawn.diverged:
+        result.append(f"In {drawn.diverged} of {count} laboratories drawn the test is unstable.")
+    if not found.spread.rest:
+        result.append(
+            "The recording that was diagnosed shows no response, so what is left unexplained is not in the band."
+        )
+    return result
+
+
+def erring(
+    found: FoundLaboratories, plan: Plan, drawn: Ensemble, reach: Mapping[str, Reach]
+) -> list[Rollout]:
+    """The rollouts with what was left unexplained as an error of their signals."""
+    random = np.random.default_rng([plan.test.seed, 1])
+    tolerance = plan.tolerances.default
+
+    def wrong(role: str, name: str, series: Array) -> Array:
+        if not np.any(series) or (role == MASTER and name == "ground_acceleration"):
+            return series
+        factor, more = rest.growth(reach, role, tolerance)
+        share = np.hypot(rest.share_of(found.spread, role, name) * np.asarray(factor), more)
+        return series + rest.errors(series, share if np.ndim(share) else float(share), random)
+
+    stacked = mapped(drawn.drawn, wrong)
+    return [taken(drawn.central, stacked, place) for place in range(len(drawn.drawn))]
+
+
+Stacked = tuple[dict[str, Array], dict[str, dict[str, Array]]]  # of the master and of the slaves by role
+
+
+def mapped(rollouts: Sequence[Rollout], change: Callable[[str, str, Array], Array]) -> Stacked:
+    """Every signal of all rollouts in one array (draws, ticks, …), changed by a function of role, name and array."""
+    first = rollouts[0]
+    master = {
+        name: change(MASTER, name, np.stack([one.master[name] for one in rollouts])) for name in first.master
+    }
+    slaves = {
+        role: {
+            name: change(role, name, np.stack([one.slaves[role][name] for one in rollouts])) for name in own
+        }
+        for role, own in first.slaves.items()
+    }
+    return master, slaves
+
+
+def taken(like: Rollout, stacked: Stacked, place: int) -> Rollout:
+    """One rollout out of stacked signals."""
+    master, slaves = stacked
+    return like._replace(
+        master={name: values[place] for name, values in master.items()},
+        slaves={role: {name: values[place] for name, values in own.items()} for role, own in slaves.items()},
+    )
+
+
+def quantile(like: Rollout, rollouts: Sequence[Rollout], level: float) -> Rollout:
+    """The level below which a share of the draws lies, tick by tick.
+
+    Places are those of Weibull, (n + 1)·level: among n draws and one more of the same kind, as often as it says.
+    """
+
+    def of_draws(_role: str, _name: str, series: Array) -> Array:
+        return np.asarray(np.quantile(series, level, axis=0, method="weibull"))[None]
+
+    return taken(like, mapped(rollouts, of_draws), 0)
+
+
+def band(values: Sequence[float], unit: str) -> PeakBand:
+    """Low, median and high of the draws of one number."""
+    low, median, high = np.quantile(np.asarray(values), (LOW, 0.5, HIGH), method="weibull")
+    return PeakBand(float(low), float(median), float(high), unit)
+
+
+def peaks(plan: Plan, rollouts: Sequence[Rollout]) -> dict[str, PeakBand]:
+    """Bands of the largest magnitude of every signal."""
+    rows = {row.name: row for topic in reversed(kinds.topics(plan).values()) for row in topic}
+    every = [signals(plan, one) for one in rollouts]
+    result = {}
+    for name in every[0]:
+        unit = rows[name.rpartition(".")[2]].unit
+        if unit not in ("", "s"):
+            result[name] = band([float(np.max(np.abs(one[name]))) for one in every], unit)
+    return result
+
+
+def drifts(plan: Plan, rollouts: Sequence[Rollout]) -> dict[int, PeakBand]:
+    """Bands of the largest drift of every storey that a laboratory follows."""
+    result = {}
+    for role, coupling in partition.drifts(plan).items():
+        direction = partition.drift_direction(plan, role)
+        tops = [
+            float(np.max(np.abs(one.master["displacement"].reshape(one.ticks, plan.storeys) @ direction)))
+            for one in rollouts
+        ]
+        result[coupling.place] = band(tops, "m")
+    return result
+
+
+def chances(plan: Plan, rollouts: Sequence[Rollout], diverged: int) -> dict[str, LimitChance]:
+    """How near the limits of the plan the draws come; one that diverges has passed every limit."""
+    most = limited.most(plan)
+    tops: dict[str, list[float]] = {}
+    for one in rollouts:
+        for name, values in limited.magnitudes(plan, by_role(plan, one)).items():
+            tops.setdefault(name, []).append(float(np.max(values, initial=0.0)))
+    return {
+        name: LimitChance(
+            band(values, limited.unit_of(plan, name)),
+            most[name],
+            diverged + sum(not value <= most[name] for value in values),
+        )
+        for name, values in tops.items()
+    }
+
+
+def plain(found: Prediction) -> dict[str, Any]:
+    """The prediction's figures as JSON holds them."""
+    limits = {
+        name: one.peak._asdict() | {"limit": one.limit, "passed_in": one.passed, "draws": found.draws}
+        for name, one in found.limits.items()
+        if math.isfinite(one.limit)
+    }
+    return {
+        "test": found.plan.test.name,
+        "ground_motion": found.motion.describe(),
+        "scale": found.plan.ground_motion.scale,
+        "ticks": found.plan.ticks,
+        "band": HELD,
+        "draws": found.draws,
+        "diverged": found.diverged,
+        "peaks": {name: one._asdict() for name, one in found.peaks.items()},
+        "peak_drifts": {str(storey): one._asdict() for storey, one in found.drifts.items()},
+        "limits": limits,
+        "beyond_seen": {
+            role: {"signal": one.signal, "ratio": one.ratio, "energy_outside": one.outside}
+            for role, one in found.reaches.items()
+        },
+        "sentences": list(found.sentences),
+    }

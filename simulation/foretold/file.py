@@ -1,0 +1,59 @@
+"""A prediction as a recording: its median on the topics of a test, its band on topics of their own beside them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from common.errors import InputError
+from common.recording.run import Run
+from common.roles import MASTER
+from common.signals import Signal
+from laboratories import kinds
+from loop import substructure
+from loop.signals import rows
+from recorder import files
+from simulation.foretold.bands import HELD, Prediction, plain
+
+LOWER, UPPER = "lower", "upper"  # before the name of a topic
+ABOUT = "prediction"  # metadata: share of the time that the band is to hold, and the figures as JSON
+
+
+def band_topic(end: str, topic: str) -> str:
+    """The topic of one end of the band."""
+    return f"{end}.{topic}"
+
+
+def write(path: Path, found: Prediction, source: str) -> None:
+    """Write a prediction from what the file `source` found."""
+    plan = found.plan
+    more: dict[str, tuple[Signal, ...]] = {
+        band_topic(end, topic): signals
+        for end in (LOWER, UPPER)
+        for topic, signals in kinds.topics(plan).items()
+        if topic in (MASTER, *plan.roles)
+    }
+    ground = substructure.ground_rows(plan, found.motion)
+    recording = files.begin(path, plan, found.motion, ground, more=more)
+    recording.metadata(
+        ABOUT, {"band": repr(HELD), "found": source, "figures": json.dumps(plain(found), allow_nan=False)}
+    )
+    ends = {"": found.median, LOWER: found.low, UPPER: found.high}
+    for same_tick in zip(*(rows(plan, rollout) for rollout in ends.values()), strict=True):
+        for end, (topic, values) in zip(ends, same_tick, strict=True):
+            at = plan.tick_ns(values[0])
+            recording.add(band_topic(end, topic) if end else topic, at, at, values)
+    recording.close({"outcome": "simulation", "cause": "prediction: median and band of drawn laboratories"})
+
+
+def about(run: Run) -> dict[str, object]:
+    """The figures of a prediction that was read; raises InputError where the recording is none."""
+    given = run.metadata.get(ABOUT, {})
+    try:
+        figures = json.loads(given["figures"])
+        figures["band"] = float(given["band"])
+    except (KeyError, ValueError, TypeError):
+        raise InputError(
+            f"{run.path} is no prediction: give the file that `rths predict -o` wrote."
+        ) from None
+    return dict(figures)

@@ -1,0 +1,204 @@
+"""Whether a prediction held: what of a recording lay outside its band, when and how far, and what that says."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from common.errors import InputError
+from common.recording.run import Run, Values
+from common.roles import MASTER, name_of, title
+from simulation.foretold import file
+from simulation.foretold.bands import HELD
+from simulation.foretold.rest import BEYOND
+
+# Share of the time inside a band of 90 %, over all signals, below which a prediction has not held: of one test the
+# shares scatter, since what is left of a signal rises and falls slowly.
+ENOUGH = HELD - 0.1
+LEAST = (
+    0.5  # of one signal: a parameter at the edge of its band still leaves more than half of the time inside
+)
+GAP = 0.1  # s, between two ticks outside that count as one departure: a fifth of a period of the default building
+SHORT = (
+    0.02  # s, of a departure that noise alone makes now and then, and that says nothing of the laboratories
+)
+NARROW = (
+    1e-6  # width of a band over its signal's peak below which the signal is computed exactly, with no band
+)
+
+
+class Departure(NamedTuple):
+    """A time in which a signal lay outside its band, s, and its largest distance over the band's half width."""
+
+    start: float
+    end: float
+    distance: float
+
+
+class HeldSignal(NamedTuple):
+    """How a signal lay in its band."""
+
+    topic: str
+    inside: float  # share of the time
+    departures: tuple[Departure, ...]  # those that last, the first one first
+    farthest: float  # largest distance from the band over its half width, 0 where it was never left
+    farthest_at: float  # s
+    unit: str
+
+
+class Held(NamedTuple):
+    """How a recording lay in a prediction."""
+
+    ticks: int
+    signals: dict[str, HeldSignal]
+    inside: float  # mean share over the signals
+    held: bool  # whether the prediction held
+    sentences: tuple[str, ...]
+
+
+def held(measured: Run, predicted: Run) -> Held:
+    """How a recording lies in a prediction.
+
+    Raises:
+        InputError: the one is no prediction, or they have no tick and signal in common.
+    """
+    figures = file.about(predicted)
+    found: dict[str, HeldSignal] = {}
+    ticks = 0
+    for topic in (MASTER, *measured.roles):
+        if not (measured.has(topic) and predicted.has(file.band_topic(file.LOWER, topic))):
+            continue
+        count, signals = of_topic(measured, predicted, topic)
+        ticks = max(ticks, count)
+        found |= {name: one for name, one in signals.items() if name not in found}
+    if not found:
+        raise InputError(f"{measured.path} and {predicted.path} have no tick and signal in common.")
+    inside = float(np.mean([one.inside for one in found.values()]))
+    fine = inside >= ENOUGH and all(one.inside >= LEAST for one in found.values())
+    said = verdict(found, inside, figures, fine=fine)
+    return Held(ticks, found, inside, fine, (*said, *of_plans(measured, predicted)))
+
+
+def of_topic(measured: Run, predicted: Run, topic: str) -> tuple[int, dict[str, HeldSignal]]:
+    """The ticks in common and the signals of one topic by name, those of a named slave as `NAME.signal`."""
+    ends = [file.band_topic(end, topic) for end in (file.LOWER, file.UPPER)]
+    ticks, mine, theirs = np.intersect1d(
+        measured.sequences[topic], predicted.sequences[ends[0]], return_indices=True
+    )
+    if not ticks.size:
+        return 0, {}
+    times = measured.columns[topic]["t"][mine]
+    result = {}
+    for name, unit in measured.units[topic].items():
+        low, high = (predicted.columns[end].get(name) for end in ends)
+        values = measured.columns[topic].get(name)
+        if unit in ("", "s") or low is None or high is None or values is None:
+            continue
+        if values.shape[1:] != low.shape[1:] or not np.issubdtype(values.dtype, np.floating):
+            continue
+        lower, upper = (end[theirs].reshape(ticks.size, -1) for end in (low, high))
+        if np.max(upper - lower) > NARROW * max(float(np.max(np.abs(upper))), 1e-300):
+            label = f"{name_of(topic)}.{name}" if name_of(topic) else name
+            result[label] = of_signal(times, values[mine].reshape(ticks.size, -1), lower, upper, topic, unit)
+    return int(ticks.size), result
+
+
+def of_signal(t: Values, values: Values, low: Values, high: Values, topic: str, unit: str) -> HeldSignal:
+    """One signal, (ticks, storeys or slaves)."""
+    half = 0.5 * (high - low)
+    usual = float(np.median(half)) or float(np.max(half))
+    beyond = np.maximum(np.maximum(low - values, values - high), 0.0)
+    distance = np.max(beyond / np.maximum(half, 0.1 * usual), axis=1)
+    outside = np.any(beyond > 0.0, axis=1)
+    share = float(np.mean(beyond <= 0.0))
+    at = int(np.argmax(distance))
+    return HeldSignal(
+        topic, share, tuple(departures(t, outside, distance)), float(distance[at]), float(t[at]), unit
+    )
+
+
+def departures(t: Values, outside: Values, distance: Values) -> list[Departure]:
+    """The times outside that last, those close to each other as one."""
+    places = np.flatnonzero(outside)
+    if not places.size:
+        return []
+    interval = float(np.median(np.diff(t))) if t.size > 1 else 0.0
+    breaks = np.flatnonzero(np.diff(places) > 1)
+    runs = [
+        (int(run[0]), int(run[-1]))
+        for run in np.split(places, breaks + 1)
+        if (run[-1] - run[0] + 1) * interval > SHORT
+    ]
+    joined: list[tuple[int, int]] = []
+    for first, last in runs:
+        if joined and t[first] - t[joined[-1][1]] <= GAP:
+            joined[-1] = (joined[-1][0], last)
+        else:
+            joined.append((first, last))
+    return [
+        Departure(float(t[first]), float(t[last]), float(np.max(distance[first : last + 1])))
+        for first, last in joined
+    ]
+
+
+def of_plans(measured: Run, predicted: Run) -> list[str]:
+    """A sentence where the test had another plan than the one that was foretold."""
+    plans = [run.metadata.get("plan", {}).get("digest") for run in (measured, predicted)]
+    if plans[0] == plans[1]:
+        return []
+    return [
+        "The test was recorded under another plan than the one that was foretold: a difference between the plans is a "
+        "part of what lies outside."
+    ]
+
+
+def verdict(found: dict[str, HeldSignal], inside: float, figures: dict[str, Any], *, fine: bool) -> list[str]:
+    """What the comparison says."""
+    if fine:
+        return [f"The prediction held: {100 * inside:.0f} % of the time was inside its band."]
+    first = min(
+        (one for one in found.items() if one[1].departures and one[1].inside < ENOUGH),
+        key=lambda one: one[1].departures[0].start,
+        default=None,
+    )
+    said = f"The prediction did not hold: {100 * inside:.0f} % of the time was inside its band"
+    if first is None:
+        return [f"{said}, by short departures as of noise: the sensors are noisier than they were."]
+    name, signal = first
+    left = f"{said}; {name} left it first, at t = {signal.departures[0].start:.2f} s."
+    return [left, what_it_says(signal, figures)]
+
+
+def what_it_says(signal: HeldSignal, figures: dict[str, Any]) -> str:
+    """What follows from a signal outside its band."""
+    where = title(signal.topic)
+    ratio = float(figures.get("beyond_seen", {}).get(signal.topic, {}).get("ratio", 0.0))
+    if ratio > BEYOND:
+        return (
+            f"The laboratory of the {where} was foretold up to {ratio:.2g} times the largest motion seen before, and "
+            "what was found does not hold there: diagnose both recordings together, rths diagnose FIRST THIS."
+        )
+    return (
+        f"The test stayed within what was seen in the laboratory of the {where}: it has changed since, or has an "
+        "effect that the first recording did not show; diagnose this recording."
+    )
+
+
+def plain(found: Held) -> dict[str, Any]:
+    """The comparison as JSON holds it."""
+    return {
+        "ticks": found.ticks,
+        "held": found.held,
+        "inside": found.inside,
+        "signals": {
+            name: {
+                "inside": one.inside,
+                "farthest": one.farthest,
+                "farthest_at": one.farthest_at,
+                "outside": [departure._asdict() for departure in one.departures],
+            }
+            for name, one in found.signals.items()
+        },
+        "sentences": list(found.sentences),
+    }

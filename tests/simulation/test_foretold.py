@@ -1,0 +1,199 @@
+"""The next test foretold: draws follow the spread, bands hold what they say, bad files are one sentence."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tomli_w
+
+from common.errors import InputError, PlanError
+from common.plan import read as plans
+from common.plan.found import building_of, models_of
+from common.plan.plan import Plan
+from common.plan.reality import from_reality
+from common.plan.spread import SeenRange, Spread, UncertainParameter
+from common.recording.reader import read
+from common.roles import MASTER
+from common.terminal import cli
+from loop import substructure
+from loop.of_reality import really, rolled_out
+from rths.__main__ import main
+from rths.prepare.simulate import write as record
+from simulation.foretold import bands, draws, file, held, rest
+from simulation.foretold.bands import Prediction
+
+FRICTION = UncertainParameter("slave", "force", "damper.friction", least=0.0, most=100.0)
+STIFFNESS = UncertainParameter(MASTER, "column.stiffness")
+SPREAD = Spread(
+    (STIFFNESS, FRICTION),
+    np.diag([0.01**2, 0.3**2]),
+    noise={MASTER: {"column_force": 100.0}, "slave": {"damper_force": 0.2}},
+    rest={MASTER: {"column_force": 0.01}, "slave": {"damper_force": 0.02}},
+    seen={
+        MASTER: SeenRange({"column_displacement": 2e-3}, (0.5, 8.0)),
+        "slave": SeenRange({"damper_stroke": 1.0}, (0.5, 8.0)),
+    },
+)
+
+
+def short(duration: float = 3.0, **test: Any) -> Plan:
+    """The default plan, shorter."""
+    return plans.with_test(plans.load(cli.plan_path(None)), duration=duration, **test)
+
+
+def tables(plan: Plan, **more: Any) -> dict[str, Any]:
+    """What a diagnosis found in a plan's laboratories."""
+    origin = {"models": models_of(plan), "building": building_of(plan), "rest": "found.npz"}
+    friction = {"name": "damper.friction", "laboratory": "slave", "force": 3.0}
+    return {"found": origin, "effect": [friction]} | more
+
+
+def written(folder: Path, plan: Plan, **more: Any) -> Path:
+    """A file of what was found, with the file beside it."""
+    with (folder / "found.npz").open("wb") as stream:
+        np.savez(stream, **SPREAD.arrays())  # type: ignore[arg-type]
+    path = folder / "found.toml"
+    path.write_text(tomli_w.dumps(tables(plan, **more)), encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with what was found."""
+    result = tmp_path_factory.mktemp("foretold")
+    written(result, short())
+    return result
+
+
+@pytest.fixture(scope="module")
+def found(folder: Path) -> Prediction:
+    """A prediction of a stronger test."""
+    plan = short(scale=0.2)
+    return bands.predict(draws.load(folder / "found.toml", plan), plan, 40)
+
+
+def test_drawn_laboratories_follow_the_spread(folder: Path) -> None:
+    laboratories = draws.load(folder / "found.toml", short())
+    systems = draws.drawn(laboratories, np.array([0.02, -10.0]), 1)
+    assert systems[MASTER].plan.column.stiffness == pytest.approx(1.02 * short().column.stiffness)
+    assert systems["slave"].effects.damper.friction == 0.0  # never below what is possible
+    assert systems["slave"].plan.sensors.damper_force == 0.2
+
+
+def test_a_covariance_with_dependent_parameters_has_a_root() -> None:
+    covariance = np.array([[1.0, 1.0], [1.0, 1.0]])
+    root = draws.square_root(covariance)
+    np.testing.assert_allclose(root @ root.T, covariance, atol=1e-12)
+
+
+def test_a_prediction_is_the_same_every_time(folder: Path, found: Prediction) -> None:
+    plan = short(scale=0.2)
+    again = bands.predict(draws.load(folder / "found.toml", plan), plan, 40)
+    np.testing.assert_array_equal(again.low.master["column_force"], found.low.master["column_force"])
+    assert bands.plain(again) == bands.plain(found)
+
+
+def test_the_band_of_laboratories_drawn_holds_others_of_the_same_kind(
+    folder: Path, found: Prediction
+) -> None:
+    plan = short(scale=0.2)
+    laboratories = draws.load(folder / "found.toml", plan)
+    random = np.random.default_rng(3)
+    shares = []
+    for seed in range(6):
+        place = np.sqrt(np.diag(SPREAD.covariance)) * random.standard_normal(2)
+        one = rolled_out(laboratories.truth, draws.drawn(laboratories, place, seed), found.motion, noise=True)
+        force = one.master["column_force"]
+        inside = (found.low.master["column_force"] <= force) & (force <= found.high.master["column_force"])
+        shares.append(np.mean(inside))
+    assert 0.85 < np.mean(shares) <= 1.0  # with the share that is left the band is wider than that of these
+
+
+def test_a_test_that_leaves_what_was_seen_is_said(found: Prediction) -> None:
+    assert any("column_displacement reaches" in sentence for sentence in found.sentences)
+    assert found.reaches[MASTER].ratio > 1.1 > found.reaches["slave"].ratio
+
+
+def test_what_is_left_grows_with_the_amplitude_beyond_what_was_seen() -> None:
+    reach = rest.Reach(MASTER, "x", np.array([0.5, 1.0, 2.0]), (0.0, 9.0), 0.0)
+    far, more = rest.growth({MASTER: reach}, MASTER, 0.02)
+    np.testing.assert_allclose(far, [1.0, 1.0, 2.0])
+    np.testing.assert_allclose(more, [0.0, 0.0, 0.02])
+
+
+def test_an_error_has_the_share_of_the_envelope_as_its_rms() -> None:
+    wave = np.sin(np.linspace(0.0, 40.0, 2000))
+    drawn = rest.errors(np.tile(wave, (4000, 1)), 0.1, np.random.default_rng(1))
+    assert np.std(drawn, axis=0)[500:1500] == pytest.approx(np.full(1000, 0.1), rel=0.1)
+
+
+def test_a_prediction_is_a_recording_that_a_test_is_compared_with(
+    folder: Path, found: Prediction, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, plan = folder / "next.mcap", short(scale=0.2)
+    file.write(path, found, "found.toml")
+    run = read(path)
+    np.testing.assert_array_equal(run.columns[MASTER]["column_force"], found.median.master["column_force"])
+    for name, more in (("as_found", {}), ("other", {"column": {"stiffness": 1.0e7}})):
+        truth = from_reality(tables(plan, seed=5, **more), plan, folder)
+        record(
+            folder / f"{name}.mcap",
+            plan,
+            really(truth, noise=True),
+            found.motion,
+            substructure.ground_rows(plan, found.motion),
+        )
+    same = held.held(read(folder / "as_found.mcap"), run)
+    assert same.held
+    assert "The prediction held" in same.sentences[0]
+    other = held.held(read(folder / "other.mcap"), run)
+    assert not other.held
+    assert "times the largest motion seen before" in other.sentences[1]
+    assert cli.guarded(lambda: held_code(folder, "other")) == 1
+    assert "The prediction did not hold" in capsys.readouterr().out
+    with pytest.raises(InputError, match="is no prediction"):
+        held.held(run, read(folder / "other.mcap"))
+
+
+def held_code(folder: Path, name: str) -> int:
+    """The exit code of the comparison of a recording with the prediction."""
+    import sys
+
+    sys.argv = ["rths", "compare", str(folder / f"{name}.mcap"), "--predicted", str(folder / "next.mcap")]
+    return main()
+
+
+def test_another_building_leaves_out_what_is_of_the_first(tmp_path: Path) -> None:
+    written(tmp_path, short(), structure={"stiffness": 26e6})
+    heavier = tmp_path / "heavier.toml"
+    heavier.write_text("[structure]\nmass = 200e3\n", encoding="utf-8")
+    plan = plans.with_test(plans.load(heavier), duration=2.0)
+    laboratories = draws.load(tmp_path / "found.toml", plan)
+    assert laboratories.left_out == ("[structure]",)
+    assert laboratories.truth.plan.structure == plan.structure
+    with pytest.raises(PlanError, match="another building"):
+        from_reality(tables(short(), structure={"stiffness": 26e6}), plan, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ('seed = 1\n[[effect]]\nname = "damper.friction"\nforce = 1.0\n', "does not say how sure it is"),
+        ('[found]\nmodels = "0000000000000000"\nrest = "found.npz"\n', "other nominal models"),
+        ('[found]\nrest = "none.npz"\n', "Cannot read what"),
+        ('[found]\nrest = "text.npz"\n', "Cannot read what"),
+        ('[found]\nrest = "found.npz"\n[[effect]]\nname = "damper.frictoin"\n', "Unknown effect"),
+    ],
+)
+def test_a_bad_file_is_one_sentence(text: str, says: str, tmp_path: Path) -> None:
+    written(tmp_path, short())
+    (tmp_path / "text.npz").write_text("no archive", encoding="utf-8")
+    path = tmp_path / "bad.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=says):
+        draws.load(path, short())
+    with pytest.raises(InputError):
+        draws.load(tmp_path / "missing.toml", short())
