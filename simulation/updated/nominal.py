@@ -1,0 +1,165 @@
+"""A plan with the nominal models that a diagnosis found, as far as a plan's language can say them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import tomli_w
+
+from common.plan.found import BUILDING, LearnedEntry
+from common.plan.kinds import TABLES_OF_KIND, known_kind
+from common.plan.plan import INTERFACE, Plan
+from common.plan.reality import Entry
+from common.roles import MASTER, name_of, title
+from laboratories import effects
+from laboratories.effects.effect import Effect
+from laboratories.kinds import kinds_of
+from models.system import Effects, System
+from simulation.foretold.draws import FoundLaboratories
+
+# Relative difference of a sensor's noise from the plan's from which on the plan is changed: the rms of some thousand
+# samples is known to two percent.
+NOISIER = 0.05
+DIGITS = 3  # of a sensor's noise: it is known no better
+PLACES = (("ground_motion", "record"), ("link.security", "folder"))  # paths of a plan, by table and key
+CODE = ".py:"  # in a class of the user's, behind the path of its file
+
+
+class UpdatedPlan(NamedTuple):
+    """The plan, and what it says and cannot say, in sentences."""
+
+    plan: Plan
+    said: tuple[str, ...]
+    unsaid: tuple[str, ...]
+
+
+def update(found: FoundLaboratories, plan: Plan) -> UpdatedPlan:
+    """The plan with the nominal models that were found."""
+    whole = replace(found.truth.plan, ground_motion=plan.ground_motion, tolerances=plan.tolerances)
+    unsaid = [f"{name} is of another building than this plan's." for name in found.left_out]
+    for role in (MASTER, *plan.roles):
+        own = effects.of_role(plan, role)
+        for entry in found.truth.of(role).effects:
+            if entry[0] in own:
+                whole, sentence = laid(whole, role, entry, own[entry[0]])
+                unsaid += [sentence] if sentence else []
+        whole, sentence = with_noise(whole, plan, role, found.spread.noise.get(role, {}))
+        unsaid += [sentence] if sentence else []
+    unsaid += [learned(law) for law in found.truth.learned]
+    return UpdatedPlan(whole, tuple(differences(plan, whole)), tuple(dict.fromkeys(unsaid)))
+
+
+def laid(whole: Plan, role: str, entry: Entry, effect: Effect) -> tuple[Plan, str]:
+    """The plan with an effect, where it changes nothing but parameters of a plan; otherwise a sentence on it."""
+    name, values = entry
+    if effect.random:
+        return whole, ""
+    system = effect.apply(System(whole.of(role)), **effect.values(values))
+    if system.effects == Effects() and system.plan.ground_motion == whole.ground_motion:
+        return merged(whole, role, system.plan), ""
+    given = ", ".join(f"{key} = {value:.6g}" for key, value in values.items())
+    return whole, f"{name} ({given}) of the {title(role)} is no parameter of a plan."
+
+
+def learned(law: LearnedEntry) -> str:
+    """A sentence on a law that no plan can say."""
+    return f"What was learned of the {law.machine} of the {title(law.role)} is no parameter of a plan."
+
+
+def merged(whole: Plan, role: str, own: Plan) -> Plan:
+    """The whole plan with the tables of one role's laboratory and, of the master, the building."""
+    name = name_of(role)
+    if name:
+        taken = TABLES_OF_KIND[known_kind(whole.kinds[role])]
+        parts = {one: getattr(own, one) for one in taken if one in INTERFACE}
+        return replace(whole, slaves=whole.slaves | {name: replace(whole.slaves[name], **parts)})
+    kept: dict[str, Any] = {one: getattr(own, one) for one in (*INTERFACE, BUILDING) if hasattr(own, one)}
+    return replace(whole, **kept)
+
+
+def with_noise(whole: Plan, plan: Plan, role: str, found: Mapping[str, float]) -> tuple[Plan, str]:
+    """The plan with the noise of one role's sensors as it was found, where all laboratories of its kind share it."""
+    kinds = kinds_of(plan)
+    if role not in kinds:
+        return whole, ""
+    planned = dict(zip(kinds[role].channels.names, kinds[role].noise(plan.of(role)).tolist(), strict=True))
+    known = {
+        name: float(f"{rms:.{DIGITS}g}")
+        for name, rms in found.items()
+        if abs(rms - planned[name]) > NOISIER * planned[name]
+    }
+    if not known:
+        return whole, ""
+    system = kinds[role].noisy(System(whole.of(role)), known)
+    alike = [one for one, kind in kinds.items() if kind.name == kinds[role].name]
+    if len(alike) > 1:
+        return (
+            whole,
+            f"The noise of the sensors of the {title(role)} alone ({', '.join(known)}) is no parameter of a plan.",
+        )
+    return replace(merged(whole, role, system.plan), sensors=system.plan.sensors), ""
+
+
+def differences(before: Plan, after: Plan) -> list[str]:
+    """What two plans differ in, one sentence a key."""
+
+    def rows(path: str, one: Any, other: Any) -> list[str]:
+        if one == other:
+            return []
+        if isinstance(one, dict) and isinstance(other, dict):
+            return [
+                row
+                for key in other
+                for row in rows(f"{path}.{key}" if path else key, one.get(key), other[key])
+            ]
+        return [f"{path}: {text(one)} → {text(other)}"]
+
+    return rows("", before.tables(), after.tables())
+
+
+def text(value: Any) -> str:
+    """A value in a few digits."""
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(text, value))}]"
+    return f"{value:.5g}" if isinstance(value, float) else str(value)
+
+
+def toml(updated: UpdatedPlan, source: str, folder: Path) -> str:
+    """The text of the plan for a file in a folder, with what it cannot say as comments at its head."""
+    head = [f"Nominal models as found: {source}."]
+    head += [f"Not said here: {sentence}" for sentence in updated.unsaid]
+    tables = updated.plan.written()
+    relocated(tables, updated.plan.base, folder)
+    return "".join(f"# {line}\n" for line in head) + "\n" + tomli_w.dumps(tables)
+
+
+def relocated(tables: dict[str, Any], base: Path, folder: Path) -> None:
+    """Let the paths in nested tables start from another folder."""
+    if base.resolve() == folder.resolve():
+        return
+    for table, key in PLACES:
+        within: Any = tables
+        for name in table.split("."):
+            within = within.get(name, {})
+        if within.get(key) and (base / within[key]).exists():
+            within[key] = moved(within[key], base, folder)
+    for inner in nested(tables):
+        for key in ("class", "kind"):
+            if CODE in str(inner.get(key, "")):
+                path, _, name = str(inner[key]).rpartition(":")
+                inner[key] = f"{moved(path, base, folder)}:{name}"
+
+
+def moved(path: str, base: Path, folder: Path) -> str:
+    """A path that starts from another folder."""
+    return path if Path(path).is_absolute() else os.path.relpath((base / path).resolve(), folder.resolve())
+
+
+def nested(tables: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """All tables within tables."""
+    inner = [value for value in tables.values() if isinstance(value, dict)]
+    return inner + [one for value in inner for one in nested(value)]

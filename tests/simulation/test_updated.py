@@ -1,0 +1,100 @@
+"""A plan with the models that were found: what it says, what it cannot say, and which compensator serves best."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from common.plan import read as plans
+from common.plan.read import parse
+from simulation.foretold import draws
+from simulation.foretold.draws import FoundLaboratories
+from simulation.updated import nominal, trials
+from simulation.updated.trials import Lag
+from tests.simulation.test_foretold import short, written
+
+SLOWER: list[dict[str, Any]] = [
+    {"name": "actuator.delay", "laboratory": "master", "delay": 0.006},
+    {"name": "actuator.time_constant", "laboratory": "master", "factor": 1.2},
+    {"name": "column.friction", "laboratory": "master", "force": 400.0},
+]
+
+
+@pytest.fixture
+def found(tmp_path: Path) -> FoundLaboratories:
+    """What was found of a slower actuator and a softer column that rubs."""
+    plan = short()
+    return draws.load(written(tmp_path, plan, column={"stiffness": 12e6}, effect=SLOWER), plan)
+
+
+def test_a_plan_says_what_its_language_can_and_lists_the_rest(
+    found: FoundLaboratories, tmp_path: Path
+) -> None:
+    updated = nominal.update(found, short())
+    assert updated.plan.column.stiffness == 12e6
+    assert updated.plan.actuator.delay == pytest.approx(0.020)
+    assert updated.plan.actuator.time_constant == pytest.approx(0.036)
+    assert updated.plan.ground_motion == short().ground_motion
+    assert len(updated.said) == 3
+    assert updated.unsaid == ("column.friction (force = 400) of the master is no parameter of a plan.",)
+    text = nominal.toml(updated, "found.toml", tmp_path)
+    assert text.startswith("# Nominal models as found: found.toml.\n# Not said here: column.friction")
+    assert parse(text, tmp_path).actuator == updated.plan.actuator
+
+
+def test_noise_that_differs_from_the_plan_is_said(tmp_path: Path) -> None:
+    plan = plans.load(Path("rths/plans/default.toml"))
+    found = draws.load(written(tmp_path, plan), plan)
+    louder = found.spread.noise | {"master": {"column_force": 151.23}}
+    updated = nominal.update(FoundLaboratories(found.truth, found.spread.__class__(noise=louder)), plan)
+    assert updated.plan.sensors.column_force == 151.0
+    assert updated.said == ("sensors.column_force: 100 → 151",)
+
+
+def test_slaves_of_a_name_have_their_own_tables(tmp_path: Path) -> None:
+    plan = plans.load(Path("rths/plans/two_dampers.toml"))
+    name = next(iter(plan.slaves))
+    heavier = {"name": "damper.mass", "laboratory": f"slave.{name}", "factor": 1.1}
+    found = draws.load(written(tmp_path, plan, effect=[heavier]), plan)
+    updated = nominal.update(found, plan).plan
+    masses = {one: lab.damper.mass / plan.slaves[one].damper.mass for one, lab in updated.slaves.items()}
+    assert masses.pop(name) == pytest.approx(1.1)
+    assert set(masses.values()) == {1.0}
+
+
+def test_paths_of_a_plan_start_from_the_folder_of_the_new_one(tmp_path: Path) -> None:
+    (tmp_path / "plans").mkdir()
+    (tmp_path / "plans" / "motion.txt").write_text("0.0\n1.0\n", encoding="utf-8")
+    tables: dict[str, Any] = {
+        "ground_motion": {"record": "motion.txt"},
+        "master": {"rig": {"class": "lab.py:Column"}, "kind": "column"},
+    }
+    nominal.relocated(tables, tmp_path / "plans", tmp_path)
+    assert tables["ground_motion"]["record"] == "plans/motion.txt"
+    assert tables["master"]["rig"]["class"] == "plans/lab.py:Column"
+    assert tables["master"]["kind"] == "column"
+
+
+def test_the_series_of_an_inverse_undoes_the_lag() -> None:
+    lag = Lag(0.01, 0.02, 2.0)
+    coefficients = list(lag.inverse.values())
+    s = 1.0 + 2.0j
+    inverse = sum(a * s**order for order, a in enumerate(coefficients))
+    assert inverse == pytest.approx((0.02 * s + 1.0) * (2.718281828459045 ** (0.01 * s)) / 2.0, rel=1e-6)
+
+
+def test_the_compensator_that_serves_best_follows_better_than_the_planned_one(
+    found: FoundLaboratories,
+) -> None:
+    updated = nominal.update(found, short()).plan
+    tried = trials.trials(found, updated)
+    wanted = updated.preflight.delay_margin
+    by_name = {one.name: one for one in tried}
+    assert tried[0].serves(wanted)
+    assert tried[0].error < 0.5 * by_name["as planned"].error
+    assert not by_name["none"].serves(wanted)
+    assert not by_name["pi_lead"].serves(wanted)
+    before, after = trials.margins(short()), trials.margins(updated)
+    assert after.expected > before.expected
