@@ -34,7 +34,7 @@ def write(path: Path, found: Prediction, source: str) -> None:
         if topic in (MASTER, *plan.roles)
     }
     ground = substructure.ground_rows(plan, found.motion)
-    recording = files.begin(path, plan, found.motion, ground, more=more)
+    recording = files.begin(path, plan, (found.motion, ground), more=more)
     recording.metadata(
         ABOUT, {"band": repr(HELD), "found": source, "figures": json.dumps(plain(found), allow_nan=False)}
     )

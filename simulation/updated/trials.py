@@ -15,11 +15,11 @@ from common.roles import MASTER
 from common.terminal.telling import Tell, untold
 from laboratories.kinds import kind_of
 from loop import substructure
-from loop.closed_loop import by_role
 from loop.nominal import limited
 from loop.nominal.partition import assess
 from loop.nominal.preflight import expected_delay
 from loop.of_reality import rolled_out
+from loop.signals import by_role
 from models.compensators import COMPENSATORS
 from simulation.foretold.draws import FoundLaboratories, drawn
 
