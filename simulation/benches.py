@@ -1,4 +1,4 @@
-"""The loop of a bench test: one rig, one programme, one recording; no other laboratory and no network."""
+"""The loop of a bench test: one rig, one programme, one recording; no other laboratories and no network."""
 
 from __future__ import annotations
 
@@ -36,33 +36,40 @@ from models.excitation import POSITION, Programme, ProgrammeSegment, Reach
 from recorder import files
 from recorder.sink import FileSink, Sink, ThreadedSink
 
-LEAD_NS = 100_000_000  # before the first tick: what is left to prepare takes a few ms
+LEAD_NS = (
+    100_000_000  # between the call of `loop` and the first tick; the preparation in between takes a few ms
+)
 UNCOMPENSATED = Chosen("none", {}, "compensator")
 
 TARGET = "target"
-"""The bench test of any laboratory: its target, within a share of its limits."""
+"""The bench test that every kind of laboratory has: its target moves within a share of its limits."""
 
 KIND_OF_PART = {"column": COLUMN, "actuator": COLUMN, "table": TABLE, "damper": TABLE}
-OF_EFFORT = ("damper",)  # parts that a motor's force moves, while the target stands still
+OF_EFFORT = ("damper",)  # parts moved by the force of a motor; the target stays at zero
 
-# of the limits on displacement and on rates: a bench test stays clear of every limit
+# Shares of the limits on displacement, and on velocity and acceleration. The response to a step overshoots by at most
+# 100 %, so that half a limit is not exceeded; of the displacement a fifth is used, because the gain of an unknown
+# transfer system may be wrong by a factor of 2.5 as well.
 SHARE, HALF = 0.2, 0.5
-# where a kind has no such limit: what actuators and tables of the shipped plans bear
+# For a kind without such limits. 0.25 m/s is half the default limit on the actuator's velocity, 5 mm is less than a
+# fifth of the default limit on the specimen's deformation (30 mm), 3 m/s² a tenth of the default table acceleration.
 REACH = Reach(5e-3, 0.25, 3.0)
 
 
 class Order(NamedTuple):
-    """Which bench test is wanted, and in which role's laboratory."""
+    """The bench test to run, and the laboratory to run it in."""
 
     part: str
     compensated: bool = False
     only: tuple[str, ...] = ()
     real_time: bool = False
-    name: str = ""  # whose laboratory it is: a slave's name, master or slave; empty for the only one that has the part
+    name: str = (
+        ""  # of the laboratory: a slave's name, "master" or "slave"; empty where only one has the part
+    )
 
 
 class BenchResult(NamedTuple):
-    """What a bench test has given."""
+    """The result of a bench test: its recording, and how many ticks it has, of which `late` began an interval late."""
 
     path: Path
     part: str
@@ -81,10 +88,11 @@ def play(
     stopping: Callable[[], str],
     tell: Tell = untold,
 ) -> BenchResult:
-    """Play a bench test on the plan's rig, or on the reality's, and record it.
+    """Run a bench test on the rig of the plan, with the deviations of the reality, and record it in `path`.
 
     Raises:
-        InputError: a piece that the part does not have, a rig that cannot be built, or a file not writable.
+        InputError: the part does not have a piece of `order.only`, the rig cannot be built, or the file cannot be
+            written.
     """
     role = role_of(plan, order.part, order.name)
     bench = Bench(plan.of(role), role, kind_of(plan, role), reality.of(role), order)
@@ -111,9 +119,7 @@ def play(
 
 
 def role_of(plan: Plan, part: str, name: str = "") -> str:
-    """The role whose laboratory has a part: of that name, or the only one.
-
-    `name` is a slave's, or `master` or `slave` for those without one.
+    """The role of the laboratory that has a part: the one with the given name, or the only one.
 
     Raises:
         InputError: no such laboratory has the part, or several have it and none is named.
@@ -135,7 +141,7 @@ def role_of(plan: Plan, part: str, name: str = "") -> str:
 
 
 def chosen(plan: Plan, kind: Kind, order: Order) -> Programme:
-    """The programme asked for; raises InputError where the part has no such piece."""
+    """The programme of an order; raises InputError if the part does not have a piece of that name."""
     interval, seed = plan.test.interval, plan.test.seed
     if order.part == TARGET:
         pieces = excitation.target(interval, reach(plan, kind))
@@ -149,7 +155,7 @@ def chosen(plan: Plan, kind: Kind, order: Order) -> Programme:
 
 
 def reach(plan: Plan, kind: Kind) -> Reach:
-    """How far and how fast the target of a kind may go in a bench test, by the limits that hold beside a rig."""
+    """The largest motion of a kind's target in a bench test, from the limits that hold for a real rig."""
     limits, channels, limited = kind.limits(strict(plan)), kind.channels, kind.limited
     ways = (channels.target.name, channels.command.name, channels.position)
     way = min(limits.get(name, math.inf) for name in ways)
@@ -171,7 +177,7 @@ class StoppedError(Exception):
 
 @contextlib.contextmanager
 def armed(rig: GuardedRig, sink: Sink, at_ns: int) -> Iterator[None]:
-    """The rig armed, and disarmed whatever happens; what it complains of then is recorded."""
+    """Arm the rig, and disarm it in any case; a complaint of `disarm` is recorded as an event."""
     rig.arm()
     try:
         yield
@@ -182,9 +188,9 @@ def armed(rig: GuardedRig, sink: Sink, at_ns: int) -> Iterator[None]:
 
 
 class Bench:
-    """One laboratory alone: it follows the programme, or stands still under its motor's force.
+    """One laboratory alone: it follows the programme, or keeps its target at zero while its motor's force follows it.
 
-    The target recorded is that of the tick at the master, that of the interval's end at a slave, as in a whole test.
+    As in a whole test, the recorded target is that of the tick at the master and of the end of the interval at a slave.
     """
 
     def __init__(self, plan: Plan, role: str, kind: Kind, reality: Reality, order: Order) -> None:
@@ -206,12 +212,12 @@ class Bench:
 
     @property
     def rows(self) -> tuple[Signal, ...]:
-        """What is recorded at a tick."""
+        """The signals recorded at every tick."""
         channels = self.kind.channels
         return (SEQ, TIME, *channels.driving, channels.command, *channels.measured)
 
     def tick(self, tick: int) -> tuple[tuple[float, ...], LimitViolation | None]:
-        """Read, compute, write; the recorded values behind seq and t, and the violation of a limit."""
+        """Read, compute and write; returns the recorded values after seq and t, and a violated limit or None."""
         measured = self.rig.read()
         if self._force is None:
             _, command = self._follow(tick, measured[self._position])
@@ -227,7 +233,7 @@ class Bench:
 
 
 def begin(path: Path, bench: Bench, order: Order, at_ns: int) -> Recording:
-    """A recording of one part's in- and outputs, with what was asked of it in the metadata `bench`."""
+    """Begin the recording of one laboratory's inputs and outputs; the metadata `bench` holds the order."""
     plan = bench.plan
     recording = Recording(
         path, plan.test.name, plan.storeys, {bench.topic: bench.rows, "event": signals.EVENT}
@@ -253,10 +259,10 @@ def loop(
     stopping: Callable[[], str],
     tell: Tell,
 ) -> tuple[int, int]:
-    """All ticks; how many, and how many began a whole interval late.
+    """Run all ticks; returns their number, and how many began at least one interval late.
 
     Raises:
-        StoppedError: a limit, the rig or the user ended it.
+        StoppedError: a limit, the rig, the recording or the user ended it.
     """
     plan = bench.plan
     start_ns, late = clock.now() + LEAD_NS, 0

@@ -1,4 +1,4 @@
-"""What the processes of a test do in virtual time: laboratories drive their loops, the recorder takes what is sent."""
+"""The bodies of the processes of a test in virtual time: those of the laboratories, and that of the recorder."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from simulation.world import Process
 NOTHING_REJECTED: Mapping[str, int] = {}
 
 
-class Nowhere(Surroundings):
-    """No machine that could be watched: what was passed before the start is all there is to tell."""
+class VirtualSurroundings(Surroundings):
+    """Virtual time has no machine to watch; only the results of the pre-flight are recorded."""
 
     def begin(self) -> None:
-        """The ticks are about to begin."""
+        """Record the results of the pre-flight; called before the first tick."""
         self._gate.note(self._lab)
 
 
@@ -33,11 +33,12 @@ def driving(
     gate: Gate | None = None,
     rejected: Mapping[str, int] = NOTHING_REJECTED,
 ) -> Callable[[], None]:
-    """What a laboratory's process does; `rejected` counts the frames that its endpoint rejects."""
+    """The body of a laboratory's process; `rejected` counts the frames that its endpoint rejects, by reason."""
 
     def body() -> None:
         loop.lab.heard_ns = loop.lab.clock.now()
-        drive(loop, stopping, Nowhere(loop.lab, NOTHING, rejected, timed=False, gate=gate))
+        surroundings = VirtualSurroundings(loop.lab, NOTHING, rejected, timed=False, gate=gate)
+        drive(loop, stopping, surroundings)
 
     return body
 
@@ -45,8 +46,8 @@ def driving(
 def recording(
     loop: RecorderLoop, endpoint: Endpoint, process: Process, file: Recording
 ) -> Callable[[], None]:
-    """What the recorder's process does; where it is killed, what it had not handed over is gone."""
-    stopping = cast("Stopper", process.stopping)  # all that is asked of one
+    """The body of the recorder's process; if it is killed, data not yet written to the file are lost."""
+    stopping = cast("Stopper", process.stopping)  # `receive` only calls it
 
     def body() -> None:
         try:

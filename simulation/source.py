@@ -1,4 +1,4 @@
-"""Signals to compare: those of a recording, or of the simulation of a plan."""
+"""The signals of a recording, or of the simulation of a plan, for a comparison."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ OF_THE_TICK = ("seq", "t")
 
 
 class ComparedRun(NamedTuple):
-    """What there is to compare: tick numbers, signals by name, and a line on the ground motion.
+    """Tick numbers (ticks,), signals by name (ticks,), and a line of text on the ground motion.
 
     The signals of a named slave are called `NAME.signal`.
     """
@@ -31,10 +31,10 @@ class ComparedRun(NamedTuple):
 
 
 def columns(name: str, tell: Tell = untold) -> ComparedRun:
-    """What there is in a recording, or of the simulation of a plan (.toml, or the name of one that ships).
+    """The signals of a recording, or of the simulation of a plan (a .toml file, or the name of a plan of rths).
 
     Raises:
-        InputError: it can be neither read nor simulated.
+        InputError: the recording cannot be read, or the plan cannot be simulated.
     """
     if name in cli.SHIPPED or name.endswith(".toml"):
         return simulated(cli.plan_path(name))
@@ -56,10 +56,10 @@ def simulated(path: Path) -> ComparedRun:
 
 
 def recorded(run: Run) -> ComparedRun:
-    """The signals of a recording on the ticks that master and slaves have in common.
+    """The signals of a recording at the ticks that master and slaves have in common.
 
     Raises:
-        InputError: it has neither a master's nor a slave's.
+        InputError: it holds no ticks of a master or a slave.
     """
     topics = [topic for topic in (MASTER, *run.roles) if run.has(topic)]
     if not topics:

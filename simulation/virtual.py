@@ -30,29 +30,31 @@ from simulation.world import NO_DRIFT, Drift, World
 from slave.assembly import build_loop as build_slave
 from slave.loop import SlaveLoop
 
-SESSION = 1  # virtual time knows one test only, and the same test gives the same bits
-NO_OPERATOR = "virtual time has no operator who could reset it."
+SESSION = (
+    1  # constant, because the same test must give the same bits; no other test can be on the link in memory
+)
+NO_OPERATOR = "latched in its safe state, and in virtual time there is no operator to reset it."
 SAME_CLOCK: Mapping[str, Drift] = {}
 
 
 class VirtualTest(NamedTuple):
-    """A test in memory: its time, master, slaves by role, and the recorder where there is one."""
+    """A test in virtual time: its world, the master, the slaves by role, and the recorder or None."""
 
     world: World
     master: MasterLoop
     slaves: dict[str, SlaveLoop]
     recorder: RecorderLoop | None
     endpoints: dict[str, Endpoint]
-    gates: dict[str, Gate]  # of master and slaves by role, where they must pass one
+    gates: dict[str, Gate]  # of the pre-flight, for master and slaves by role; empty without a pre-flight
 
     @property
     def slave(self) -> SlaveLoop:
-        """The slave, of several the first."""
+        """The only slave, or the first of several."""
         return next(iter(self.slaves.values()))
 
     @property
     def loops(self) -> dict[str, MasterLoop | SlaveLoop]:
-        """Master and slaves by role."""
+        """The loops of master and slaves by role."""
         return {MASTER: self.master, **self.slaves}
 
 
@@ -66,11 +68,10 @@ def assemble(
     drifts: Mapping[str, Drift] = SAME_CLOCK,
     building: Building | None = None,
 ) -> VirtualTest:
-    """All laboratories over a link in memory, recording into `output` where one is given.
+    """Build all laboratories over a link in memory, and a recorder if `output` is given.
 
-    With a master's `gate` all sensors are judged as the rigs are armed, the slaves' with the same risks accepted, and
-    the recording is told what was passed and overruled; without one nothing is judged. `drifts` are the roles' clocks
-    where they differ; `building` is what has the building where it is not the plan's own.
+    """Create the file and the recorder; the recorder's process begins at time 0."""
+    file = files.begin(output, setting.plan, substructure.recorded_ground(setting.plan))
     """
     world, hub = World(), MemoryHub(plan.roles)
     roles = (MASTER, *plan.roles) if output is None else (MASTER, *plan.roles, RECORDER)
@@ -90,7 +91,7 @@ def assemble(
 
 
 def begin_recording(setting: Setting, world: World, output: Path) -> RecorderLoop:
-    """The recorder of a new file; its process begins when time does."""
+    """Create the file and the recorder; the recorder's process begins at time 0."""
     file = files.begin(output, setting.plan, substructure.recorded_ground(setting.plan))
     recorder = RecorderLoop(setting, FileSink(file, setting.clock, timely=False))
     process = world.process(RECORDER)
@@ -99,10 +100,10 @@ def begin_recording(setting: Setting, world: World, output: Path) -> RecorderLoo
 
 
 def run(bench: VirtualTest, stopping: Callable[[], str], tell: Tell = untold) -> RthsError | None:
-    """Play a test to its end; the error that ended it, None where it was completed.
+    """Run a test to its end; returns the error that ended it, or None if it was completed.
 
-    Where several laboratories end with one, that which follows another's is not the one: the cause counts, and of
-    several causes the master's.
+    If several laboratories end with an error, the cause is returned and not its consequences; of several causes the
+    master's.
     """
     codes = _listening(bench, tell)
     play(bench, stopping)
@@ -117,16 +118,16 @@ def run(bench: VirtualTest, stopping: Callable[[], str], tell: Tell = untold) ->
 def play(
     bench: VirtualTest, stopping: Callable[[], str] = str, pause: Callable[[], bool] | None = None
 ) -> None:
-    """Let time pass to the test's end, or until `pause` becomes true: another call then lets it pass on.
+    """Let time pass to the end of the test, or until `pause` returns true; the next call continues from there.
 
-    `stopping` gives the reason to end the test early, empty while there is none. What a process raises that is no
-    error of a test is raised again once all others have left.
+    `stopping` returns the reason to end the test early, empty while there is none. An exception of a process that is
+    not an error of a test is raised here after all processes have ended.
     """
     for role, loop in bench.loops.items():
         process = bench.world.process(role)
-        wish = stopping if role == MASTER else process.stopping
+        reason = stopping if role == MASTER else process.stopping
         if not process.started:
-            process.start(driving(loop, _unattended(loop, wish), bench.gates.get(role)))
+            process.start(driving(loop, _unattended(loop, reason), bench.gates.get(role)))
     bench.world.run(pause)
     for process in bench.world.processes.values():
         if process.error is not None:
@@ -134,24 +135,24 @@ def play(
 
 
 def _unattended(loop: MasterLoop | SlaveLoop, stopping: Callable[[], str]) -> Callable[[], str]:
-    """The wish to stop, also of a laboratory that would wait for an operator's reset for ever.
+    """The reason to stop of a laboratory without an operator: a latched one stops, because nobody would reset it.
 
-    The handshake takes no time, so that a wish waits until all have agreed on the start and hear of the end.
+    During the handshake `stopping` is not asked: it takes no time, and afterwards all laboratories hear of the end.
     """
     lab = loop.lab
 
-    def wish() -> str:
+    def reason() -> str:
         if lab.running:
             return stopping()
         return NO_OPERATOR if lab.safety.latched else ""
 
-    return wish
+    return reason
 
 
 def _listening(bench: VirtualTest, tell: Tell) -> dict[str, str]:
-    """Codes of the errors that end the laboratories' tests from now on, by role, as they are reported.
+    """The code of the first error that each role reports from here on, by role; filled in as the test runs.
 
-    How far the master is, `tell` is told.
+    The master's progress is passed on to `tell`.
     """
     codes: dict[str, str] = {}
     ticks = bench.master.lab.plan.ticks

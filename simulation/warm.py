@@ -1,4 +1,4 @@
-"""`python -m simulation.warm`: compile every kernel once, so that no test has to wait for it."""
+"""`python -m simulation.warm`: compile every kernel once, so that no test has to wait for the compiler."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from models.registry import Array
 from models.system import System
 from recorder.encoding import RowEncoder, RowTable
 
-SHORT = 0.01  # s
+SHORT = 0.01  # s: five ticks of the default interval; a kernel is compiled by its first call
 TWO_TABLES = "[slave.a]\n[slave.b]\n"
 
 
 def compile_all() -> None:
-    """Compile what the loops, the simulation and the recorder call, and note that it is done."""
+    """Compile the kernels of the loops, the simulation and the recorder, then create the file that marks it as done."""
     plan = with_test(Plan(), duration=SHORT)
     ground = np.zeros((2, plan.ticks + 1))
     closed_loops(plan, ground)
@@ -47,7 +47,7 @@ def compile_all() -> None:
 
 
 def closed_loops(plan: Plan, ground: Array) -> None:
-    """The rollouts that have a kernel of their own: one table at a slave, two, and laboratories of any kinds."""
+    """The rollouts with kernels of their own: one table at a slave, two tables, and laboratories of other kinds."""
     tables = with_test(parse(TWO_TABLES, Path()), duration=SHORT)
     columns = replace(plan, slave=replace(plan.slave, kind=COLUMN))
     for one in (plan, tables, columns):
@@ -55,7 +55,7 @@ def closed_loops(plan: Plan, ground: Array) -> None:
 
 
 def ticks(plan: Plan, ground: Array) -> None:
-    """What the real loops call at every tick."""
+    """The kernels that the loops call at every tick."""
     bound(substructure.enter, substructure.build(plan, ground), 0, 0.0, 0.0)
     balance = energy_balance.build(plan.test.interval, 0.5, 1.0, 1.0, np.ones(1), np.ones(2))
     bound(energy_balance.enter, balance, 0.0, 0.0, 0.0, 0.0)
@@ -68,7 +68,7 @@ def ticks(plan: Plan, ground: Array) -> None:
 
 
 def recorded(storeys: int) -> None:
-    """What the recorder does with rows."""
+    """The kernels with which the recorder encodes and checks rows."""
     topics = default_topics()
     RowEncoder(topics, dict.fromkeys(topics, 1), storeys)
     table = RowTable(topics, storeys)
@@ -76,7 +76,7 @@ def recorded(storeys: int) -> None:
 
 
 def of_users(drive: Array) -> None:
-    """What calls a device of a user's, `drive` (ticks, 2) as `replay.laboratory` takes it."""
+    """The kernels that call a device of a user; `drive` (ticks, 2) as `replay.laboratory` takes it."""
     lab, truth = kinds.nothing().device, np.zeros(1)
     bound(device.enter_device, lab, truth, 0.0, 0.0)
     completeness.driven(lab.step, lab.parameters, lab.state, truth, 0.0, 1)

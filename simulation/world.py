@@ -1,9 +1,9 @@
-"""Virtual time: many processes in one thread, and a scheduler of the events that they wait for.
+"""Virtual time: several processes in one thread, and a scheduler of the events that they wait for.
 
-Every process is a greenlet. Where it would block it hands over to the scheduler, which takes the earliest event from
-a heap of (time, order, action): the same calls give the same order, whatever the machine does. World time is in ns
-and is known to no process; each process has a clock of its own, offset and drifting. Tests in virtual time and tests
-with drawn faults both run on it (docs/decisions/0034-one-virtual-time.md).
+Every process is a greenlet. Where it would block it switches to the scheduler, which takes the earliest event from
+a heap of (time, order, action): the same calls give the same order on every machine. World time is in ns and no
+process knows it; each process has a clock of its own, with an offset and a drift. Tests in virtual time and tests
+with randomly drawn faults both use it (docs/decisions/0034-one-virtual-time.md).
 """
 
 from __future__ import annotations
@@ -18,17 +18,16 @@ from typing import Any, NamedTuple
 
 import greenlet
 
-PPB = 10**9
-FOREVER = 2**62
+PPB = 10**9  # parts per billion in one
+FOREVER = 2**62  # ns, 146 years; sums of a few of them still fit into 64 bits
 
 
-Event = tuple[
-    int, int, Callable[..., None], tuple[Any, ...]
-]  # time, who is first of the same time, what happens
+# time (ns), order among events of the same time, action, its arguments
+Event = tuple[int, int, Callable[..., None], tuple[Any, ...]]
 
 
 class Drift(NamedTuple):
-    """How a process's clock differs from the world's: at time 0 by `offset` ns, then faster by `ppb` ns per second."""
+    """The difference of a process's clock from the world's: `offset` ns at time 0, growing by `ppb` ns per second."""
 
     offset: int = 0
     ppb: int = 0
@@ -38,7 +37,7 @@ NO_DRIFT = Drift()
 
 
 class World:
-    """Virtual time; `limit` (ns) is where it ends whatever still goes on."""
+    """Virtual time; it ends at `limit` (ns) even if processes have not ended."""
 
     def __init__(self, limit: int = FOREVER) -> None:
         self.time = 0
@@ -51,18 +50,18 @@ class World:
         self._pause: Callable[[], bool] | None = None
 
     def at(self, time: int, action: Callable[..., None], *arguments: Any) -> None:
-        """Let something happen at a time, or now where that has passed."""
+        """Schedule an action at a time (ns), or at the present time if that has passed."""
         time = time if time > self.time else self.time  # max() takes seven times as long
         heappush(self.heap, (time, self.next_order(), action, arguments))
 
     def process(self, name: str, drift: Drift = NO_DRIFT) -> Process:
-        """A process of this world that does not run yet."""
+        """The process of that name, created if there is none; it does not run before `Process.start`."""
         return self.processes.setdefault(name, Process(self, name, drift))
 
     def run(self, pause: Callable[[], bool] | None = None) -> None:
-        """Let time pass until every process has ended, or to the limit; what a process raises is kept in it.
+        """Let time pass until every process has ended, or to the limit; an exception of a process is kept in it.
 
-        Where `pause` becomes true time stops before the next event, and may be let pass on by another call.
+        If `pause` returns true, time stops before the next event; the next call continues from there.
         """
         self._hub, self._pause = greenlet.getcurrent(), pause
         heap = self.heap
@@ -79,15 +78,15 @@ class World:
             self._discard()
 
     def _discard(self) -> None:
-        """Leave nothing of any process behind."""
+        """End the greenlets of all processes."""
         for process in self.processes.values():
             process.discard()
 
-    def hand_over(self, process: Process) -> None:
-        """Leave the greenlet of a process that waits, until it is its turn.
+    def switch_from(self, process: Process) -> None:
+        """Switch away from the greenlet of a process that waits; returns when it is its turn.
 
-        Nearly all events are turns. The next process takes its own from here, without the scheduler's greenlet between
-        them, which does whatever else happens.
+        Nearly all events are turns of processes. If the next event is one, this switches to that process directly;
+        the scheduler's greenlet does all other events.
         """
         heap = self.heap
         while self._pause is None and heap[0][2] is take_turn and heap[0][0] <= self.limit:
@@ -110,19 +109,19 @@ class Process:
         self.stalled_until = 0
         self.killed = False
         self.ended = False
-        self.reason = ""  # why somebody wants it to stop
+        self.reason = ""  # to stop, empty while there is none
         self.error: Exception | None = None
         self.ahead = 0  # ns that it has computed since it last waited
         self._listening = False
-        self._token = 0  # of the newest wait: earlier ones are over
+        self._token = 0  # number of the latest wait; turns of earlier waits are ignored
         self._thread: greenlet.greenlet | None = None
         self._woken: list[Callable[[], None]] = []
 
-    # -- the clock --------------------------------------------------------------------------------
+    # -- clock ------------------------------------------------------------------------------------
 
     @property
     def time(self) -> int:
-        """World time of what it does now, what it has computed included, ns."""
+        """World time of the process, including the time that it has spent computing, ns."""
         return self.world.time + self.ahead
 
     def now(self) -> int:
@@ -133,7 +132,7 @@ class Process:
         return time + self._offset + time * self._ppb // PPB
 
     def local(self, time: int) -> int:
-        """What its clock shows at a world time, ns."""
+        """The time on its clock at a world time, ns."""
         return time + self._offset + time * self._ppb // PPB
 
     def reached(self, local: int) -> int:
@@ -146,20 +145,20 @@ class Process:
         return time
 
     def sleep_until(self, deadline: int) -> None:
-        """Sleep until its own clock shows `deadline`, ns; one that has passed returns at once."""
+        """Sleep until its own clock shows `deadline`, ns; returns at once if that has passed."""
         until = self.reached(deadline)
         if self.ahead or until > self.world.time:
             self._wait(until)
 
-    # -- what it does -----------------------------------------------------------------------------
+    # -- actions of the process -------------------------------------------------------------------
 
     def start(self, body: Callable[[], None], at: int = 0) -> None:
-        """Begin at a world time; an exception that leaves `body` is kept as `error`."""
+        """Begin at a world time (ns); an exception of `body` is kept as `error`."""
 
         def guarded() -> None:
             try:
                 body()
-            except Exception as error:  # whatever the loops let through is a finding of the run
+            except Exception as error:  # a fault test reports it as a finding
                 self.error = error
             self._end()
 
@@ -170,7 +169,7 @@ class Process:
 
     @property
     def started(self) -> bool:
-        """Whether it has begun or will begin."""
+        """Whether `start` was called."""
         return self._thread is not None
 
     def _end(self) -> None:
@@ -178,18 +177,18 @@ class Process:
         self.ended = True
 
     def spend(self, duration: int) -> None:
-        """Compute for some ns."""
+        """Account for `duration` ns of computation."""
         self.ahead += duration
 
     def listen(self, timeout: int) -> None:
-        """Wait for a message for at most `timeout` ns of its own clock."""
+        """Wait for a message, at most `timeout` ns of its own clock."""
         self._listening = True
         time = self.world.time + self.ahead
         self._wait(self.reached(self.local(time) + timeout) if self._ppb else time + timeout)
         self._listening = False
 
     def settle(self) -> None:
-        """Let world time catch up with the time it has spent computing, so that what came meanwhile is received."""
+        """Let world time catch up with the time spent computing, so that messages of that time are received."""
         if self.ahead:
             self._wait(self.time)
 
@@ -198,20 +197,20 @@ class Process:
         if self.ahead:
             until, self.ahead = max(until, world.time + self.ahead), 0
         if until <= world.limit and (not heap or heap[0][0] > until):
-            world.time = until  # nothing happens before: to switch would change nothing
+            world.time = until  # there is no earlier event, so that no switch is necessary
             return
         self._token += 1
         heappush(heap, (until, world.next_order(), take_turn, (self, self._token)))  # as `at` does
-        world.hand_over(self)
+        world.switch_from(self)
 
     def wake(self) -> None:
-        """A message has come for it: it goes on at this time, after what is due before."""
+        """Continue at the present time, after the events that are due earlier; called when a message arrives."""
         if self._listening:
             self._listening = False
             self.world.at(self.world.time, take_turn, self, self._token)
 
     def may_go_on(self, token: int) -> bool:
-        """Whether the wait of this token is over now, and takes note of it; one that stands still goes on later."""
+        """Whether the wait with this number ends now; if so it is ended. That of a stalled process ends later."""
         if token != self._token or self.ended:
             return False
         if self.world.time < self.stalled_until:
@@ -221,24 +220,24 @@ class Process:
         return True
 
     def go_on(self) -> None:
-        """Change to its greenlet."""
+        """Switch to its greenlet."""
         assert self._thread is not None  # noqa: S101 - it was started
         self._thread.switch()
 
-    # -- what happens to it -----------------------------------------------------------------------
+    # -- actions on the process -------------------------------------------------------------------
 
     @property
     def stalled(self) -> bool:
-        """Whether it stands still, its link's threads with it."""
+        """Whether it is stalled, and the threads of its link with it."""
         return self.world.time < self.stalled_until
 
     def stall(self, duration: int) -> None:
-        """It does not run for some ns from now on: what should have run is late, what comes queues up."""
+        """Do not let it run for `duration` ns from now on: its work is late, and arriving messages queue up."""
         self.stalled_until = max(self.stalled_until, self.world.time + duration)
         self.world.at(self.stalled_until, self._continue)
 
     def when_woken(self, action: Callable[[], None]) -> None:
-        """Call something whenever it goes on after a stall, before it runs itself."""
+        """Call `action` whenever a stall ends, before the process runs itself."""
         self._woken.append(action)
 
     def _continue(self) -> None:
@@ -247,7 +246,7 @@ class Process:
                 action()
 
     def kill(self) -> None:
-        """End it at once, as SIGKILL would."""
+        """End it immediately, as SIGKILL does."""
         self.killed = not self.ended
         self._end()
 
@@ -260,22 +259,22 @@ class Process:
         return self.reason
 
     def discard(self) -> None:
-        """Leave nothing of its greenlet behind; the world is over."""
+        """End its greenlet; called when the world has ended."""
         if self._thread is not None and not self._thread.dead:
             self._thread.throw(greenlet.GreenletExit)
 
 
 def take_turn(process: Process, token: int) -> None:
-    """Let a process go on where its wait of this token is over."""
+    """Let a process continue if its wait with this number ends now."""
     if process.may_go_on(token):
         process.go_on()
 
 
 @contextmanager
 def _garbage_kept() -> Iterator[None]:
-    """Undo at the end that the loops freeze the garbage collector, because all of them share this interpreter."""
+    """Restore the garbage collector at the end: the loops, which share this interpreter, change its settings."""
     enabled, interval = gc.isenabled(), sys.getswitchinterval()
-    gc.freeze()  # so that the loops' own collections find little to look at
+    gc.freeze()  # so that the collections of the loops have few objects to visit
     try:
         yield
     finally:
