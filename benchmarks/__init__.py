@@ -1,6 +1,6 @@
-"""Benchmarks: figures with their peers in the same run.
+"""Benchmarks: each measures figures of rths, and comparable programs in the same run.
 
-Each takes `quick`: the same work in the least time, which shows that it runs; its figures then say little.
+With `quick` a benchmark does the least work that shows that it runs; its figures are then not representative.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from benchmarks.result import BenchmarkFigure
 
 
 class Benchmark(Protocol):
-    """One benchmark."""
+    """A benchmark: a function that measures figures."""
 
     def __call__(self, *, quick: bool = False) -> list[BenchmarkFigure]:
-        """Its figures."""
+        """Measure and return the figures."""
 
 
 BENCHMARKS: dict[str, Benchmark] = {

@@ -1,4 +1,4 @@
-"""`python -m benchmarks [NAME …] [--json FILE]`: all benchmarks or some, as a table and as JSON."""
+"""`python -m benchmarks [NAME …] [--json FILE]`: run all benchmarks or some; print a table and write JSON."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from report.text.terminal import table
 
 
 def machine() -> dict[str, str]:
-    """The machine the figures are from."""
-    info = Path("/proc/cpuinfo")  # on Linux alone
+    """The machine on which the figures were measured."""
+    info = Path("/proc/cpuinfo")  # exists on Linux only
     lines = info.read_text().splitlines() if info.exists() else []
     models = [line.partition(":")[2].strip() for line in lines if "model name" in line]
     return {
@@ -28,7 +28,7 @@ def machine() -> dict[str, str]:
 
 
 def number(value: object) -> str:
-    """A figure's number as the tables have it."""
+    """The text of a number in the tables."""
     return "–" if value is None else f"{value:,.4g}" if isinstance(value, float) else str(value)
 
 
@@ -48,15 +48,25 @@ def row(figure: BenchmarkFigure) -> list[str]:
 
 
 def main() -> int:
-    """Run what is asked for."""
+    """Run the benchmarks of the command line."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
-    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(BENCHMARKS)} (default: all)")
-    parser.add_argument("--quick", action="store_true", help="the least of each: shows that it runs, no more")
-    parser.add_argument("--json", type=Path, default=Path("runs/benchmarks.json"), metavar="FILE")
+    parser.add_argument(
+        "names", nargs="*", metavar="NAME", help=f"one or more of {', '.join(BENCHMARKS)} (default: all)"
+    )
+    parser.add_argument(
+        "--quick", action="store_true", help="do the least work, to see whether the benchmarks run"
+    )
+    parser.add_argument(
+        "--json",
+        type=Path,
+        default=Path("runs/benchmarks.json"),
+        metavar="FILE",
+        help="file for the figures (default: %(default)s)",
+    )
     args = parser.parse_args()
     unknown = [name for name in args.names if name not in BENCHMARKS]
     if unknown:
-        parser.error(f"unknown benchmark '{unknown[0]}': choose of {', '.join(BENCHMARKS)}")
+        parser.error(f"unknown benchmark '{unknown[0]}': choose from {', '.join(BENCHMARKS)}")
     host = machine()
     figures = {name: BENCHMARKS[name](quick=args.quick) for name in args.names or BENCHMARKS}
     sys.stdout.write(", ".join(f"{name} {value}" for name, value in host.items()) + "\n\n")

@@ -1,4 +1,4 @@
-"""Two network namespaces joined by a virtual cable, as two machines on one network."""
+"""Two network namespaces connected by a virtual cable; they behave like two machines on one network."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ import shutil
 import subprocess
 from collections.abc import Iterator
 
-ADDRESSES = ("10.83.0.1", "10.83.0.2")
+ADDRESSES = ("10.83.0.1", "10.83.0.2")  # private, and visible inside the two namespaces only
 
 
 class NoCableError(Exception):
-    """Network namespaces are not available here, and why."""
+    """Network namespaces are not available on this machine; the text says why."""
 
 
 def ip(*words: str) -> None:
-    """Run the ip command; raises CalledProcessError where it complains."""
+    """Run the ip command; raises CalledProcessError if it fails."""
     subprocess.run(["ip", *words], check=True, capture_output=True, text=True)  # noqa: S607 - found on the path
 
 
 def lay(names: tuple[str, str]) -> None:
-    """Make both namespaces and the cable; raises CalledProcessError where that is not allowed."""
+    """Create both namespaces and the cable; raises CalledProcessError if that is not allowed."""
     for name in names:
         ip("netns", "add", name)
     ends = (f"rva{os.getpid()}", f"rvb{os.getpid()}")
@@ -35,10 +35,10 @@ def lay(names: tuple[str, str]) -> None:
 
 @contextlib.contextmanager
 def cable() -> Iterator[tuple[str, str]]:
-    """Names of two namespaces, with `ADDRESSES[0]` in the first and `ADDRESSES[1]` in the second.
+    """Create two namespaces, with `ADDRESSES[0]` in the first and `ADDRESSES[1]` in the second; yields their names.
 
     Raises:
-        NoCableError: there is no ip command, or no permission.
+        NoCableError: there is no ip command, or no permission to create namespaces.
     """
     if shutil.which("ip") is None:
         raise NoCableError("there is no ip command: install iproute2")

@@ -1,6 +1,6 @@
-"""What is recovered of damaged recordings: by the MCAP library, as `mcap recover` does it, and by `rths recover`.
+"""The share of the messages of damaged recordings that the MCAP library, `mcap recover` and `rths recover` recover.
 
-`python -m benchmarks.damaged_files` prints a table with the share of the messages that each gets out of the same file.
+`python -m benchmarks.damaged_files` prints a table; all read the same damaged file.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ from common.recording.recovery import recover
 from common.recording.writer import Recording
 from common.signals import TICK_TOPICS, TOPICS, FieldType
 
-TICKS = 3000  # some 1.5 MB, so that the definitions stand in the file a second time
-PER_FLUSH = 25
-SECTOR = 4096  # bytes that a disk loses at once
-LIMIT = 64 << 20  # bytes of a record
+TICKS = 3000  # about 1.5 MB, so that the file repeats its schemas and channels once
+PER_FLUSH = 25  # ticks: the recorder flushes every 50 ms, which are 25 ticks of 2 ms
+SECTOR = 4096  # bytes: the sector of today's disks, which is readable or lost as a whole
+LIMIT = 64 << 20  # bytes of a record: a thousand chunks; a larger length can only be a damaged one
 LIBRARY = (McapError, ValueError, KeyError, struct.error, zstandard.ZstdError, MemoryError, OSError)
 FILLING: dict[FieldType, Any] = {
     FieldType.FLAG: False,
@@ -41,11 +41,11 @@ FILLING: dict[FieldType, Any] = {
 Change = Callable[[bytearray], None]
 
 
-# -- the file, and what happens to it -----------------------------------------------------------------
+# -- the file and its damages -------------------------------------------------------------------------
 
 
 def write(path: Path, ticks: int) -> None:
-    """A finished recording of noise, which compression shrinks as little as that of sensors."""
+    """Write a finished recording of noise, which cannot be compressed, like the noise of sensors."""
     noise = np.random.default_rng(1)
     recording = Recording(path, "trial", 1, TOPICS)
     recording.metadata("plan", {"toml": "x = 1"})
@@ -60,11 +60,11 @@ def write(path: Path, ticks: int) -> None:
 
 
 def chunks(data: bytes | bytearray) -> list[tuple[int, int]]:
-    """Begin and end of every chunk of an undamaged file."""
-    place, found = 8, []
+    """The positions (bytes) of the begin and end of every chunk of an undamaged file."""
+    place, found = 8, []  # after the magic bytes
     while place < len(data) - 8:
         opcode, length = struct.unpack_from("<BQ", data, place)
-        if opcode == 6:
+        if opcode == 6:  # of a chunk in the MCAP format
             found.append((place, place + 9 + length))
         place += 9 + length
     return found
@@ -127,11 +127,11 @@ DAMAGES: dict[str, Change] = {
 }
 
 
-# -- who recovers it ----------------------------------------------------------------------------------
+# -- ways to recover it -------------------------------------------------------------------------------
 
 
 def in_order(path: Path) -> Iterator[Message]:
-    """The library's StreamReader with checksums, up to its first error."""
+    """With the library's StreamReader, which checks the checksums, up to its first error."""
     known = set()
     with path.open("rb") as stream:
         for record in StreamReader(stream, validate_crcs=True, record_size_limit=LIMIT).records:
@@ -142,7 +142,7 @@ def in_order(path: Path) -> Iterator[Message]:
 
 
 def by_the_index(path: Path) -> Iterator[Message]:
-    """The library's `make_reader`, which goes by the index at the end, up to its first error."""
+    """With the library's `make_reader`, which uses the index at the end of the file, up to its first error."""
     with path.open("rb") as stream:
         reader = make_reader(stream, validate_crcs=True)
         for _, _, message in reader.iter_messages(log_time_order=False):
@@ -150,7 +150,7 @@ def by_the_index(path: Path) -> Iterator[Message]:
 
 
 def as_mcap_recover(path: Path) -> Iterator[Message]:
-    """As the MCAP project's command: record after record by its length, without chunks whose checksum is wrong."""
+    """As the command `mcap recover`: record after record by the lengths, skipping chunks with a wrong checksum."""
     with path.open("rb") as stream:
         for record in StreamReader(stream, emit_chunks=True, record_size_limit=LIMIT).records:
             if isinstance(record, Chunk) and whole(record):
@@ -158,7 +158,7 @@ def as_mcap_recover(path: Path) -> Iterator[Message]:
 
 
 def whole(chunk: Chunk) -> bool:
-    """Whether a chunk unpacks to what its checksum is of."""
+    """Whether a chunk can be decompressed and has the right checksum."""
     try:
         return zlib.crc32(zstandard.decompress(chunk.data, chunk.uncompressed_size)) == chunk.uncompressed_crc
     except (zstandard.ZstdError, MemoryError):
@@ -166,7 +166,7 @@ def whole(chunk: Chunk) -> bool:
 
 
 def as_rths_recover(path: Path) -> Iterator[int]:
-    """By `rths recover`, and read again."""
+    """With `rths recover`, whose result is read again."""
     output = path.with_suffix(".recovered")
     try:
         recover(path, output, force=True)
@@ -185,7 +185,7 @@ WAYS: dict[str, Callable[[Path], Iterator[Any]]] = {
 
 
 def count(messages: Iterator[Any]) -> int:
-    """How many come before an error or the end."""
+    """The number of messages before an error or the end."""
     found = 0
     try:
         for _ in messages:
@@ -196,7 +196,7 @@ def count(messages: Iterator[Any]) -> int:
 
 
 def compare(folder: Path, ticks: int = TICKS) -> dict[str, list[float]]:
-    """Share of the messages, by damage and way."""
+    """The recovered share of the messages, by damage, in the order of `WAYS`."""
     original, damaged = folder / "whole.mcap", folder / "damaged.mcap"
     write(original, ticks)
     shares = {}

@@ -1,7 +1,7 @@
-"""Trips without a cause in an hour of virtual time, over a link with 1 % loss and 1 ms of jitter, and the gap it adds.
+"""Trips without a cause in an hour of virtual time over a link with 1 % loss and 1 ms of jitter.
 
-The loops, drive, endpoints and codec run on a simulated clock and link (`rths faults`) in pieces of a minute, each with
-seeds of its own for noise and link. A piece is compared with the same test over a cable alone.
+Loops, drive, endpoints and codec run on a simulated clock and link (`rths faults`) in pieces of a minute, each with
+its own seeds for noise and link. The storey drift of a piece is compared with that of the same test over a cable.
 """
 
 from __future__ import annotations
@@ -28,47 +28,48 @@ from validation.faults.lab import Simulation, Surrounding
 from validation.faults.wire import CABLE, Conditions
 
 MINUTES = int(os.environ.get("RTHS_FALSE_TRIPS_MINUTES", "60"))
-PIECE, QUICK_PIECE = 60.0, 1.0  # s
-# jitter: exponential, of mean 1 ms; a frame may overtake another, as over UDP, or waits behind it, as over TCP
+PIECE, QUICK_PIECE = 60.0, 1.0  # s; the pieces are independent, and one takes about ten seconds
+# The jitter is exponential with a mean of 1 ms, half an interval: a poor network between two cities. Frames may
+# overtake each other, as over UDP, or keep their order, as over TCP.
 IN_ORDER = Conditions(minimum=CABLE.minimum, mean=1e-3, loss=0.01)
 FREE = "frames may overtake"
 LINKS = {FREE: IN_ORDER._replace(reorder=1.0), "frames keep their order": IN_ORDER}
 
 
 class Piece(NamedTuple):
-    """One piece over one link: how it ended, and how far its storey drift is from that over the cable alone."""
+    """One piece over one link: how it ended, and the difference of its storey drift from that over the cable."""
 
     link: str
     seed: int
-    seconds: float  # played
-    trips: int
-    violations: int  # of what must hold in every simulated test
+    seconds: float  # simulated
+    trips: int  # 0 or 1
+    violations: int  # of the invariants of `rths faults`
     holds: int  # of both laboratories
-    lost: int  # messages of the ticks
-    nrmse: float | None  # None where it did not reach its end
-    peak: float | None  # largest difference over the largest drift
+    lost: int  # commands and feedbacks
+    nrmse: float | None  # of the storey drift; None if the piece ended early
+    peak: float | None  # largest difference over the largest drift; None if the piece ended early
 
 
 def planned(seed: int, seconds: float) -> Plan:
-    """The default test over a piece's length, without a recorder."""
+    """The default test with a piece's duration (s), without a recorder."""
     plan = with_test(Plan(), duration=seconds)
     return replace(plan, test=replace(plan.test, seed=seed), recording=RecordingTable(required=False))
 
 
 def played(plan: Plan, conditions: Conditions) -> Simulation:
-    """The test over a link."""
+    """The finished simulation of a test over a link."""
     simulation = Simulation(plan, as_planned(plan), Surrounding(plan.test.seed, conditions))
     simulation.run()
     return simulation
 
 
 def drift(simulation: Simulation) -> Array:
-    """Storey drift of every tick, m."""
+    """Storey drift (ticks - 1,), m."""
     return np.array(simulation.probes[MASTER].log.drifts[1 : simulation.plan.ticks])
 
 
 def pieces_of(seed: int, seconds: float) -> list[Piece]:
-    """One piece over each link."""
+    """The results of one piece over each link."""
     plan = planned(seed, seconds)
     perfect = drift(played(plan, CABLE))
     return [piece(link, played(plan, conditions), perfect) for link, conditions in LINKS.items()]
@@ -90,7 +91,7 @@ def piece(link: str, poor: Simulation, perfect: Array) -> Piece:
 
 
 def gap_figure(which: str, link: str, values: list[float]) -> BenchmarkFigure:
-    """Smallest and median of the pieces; the worst stands in the name."""
+    """Smallest and median value of the pieces; the name of the figure has the largest."""
     worst = f", worst {max(values):.3g}" if values else ""
     middle = statistics.median(values) if values else None
     name = f"added gap in the storey drift, {which}, {link}{worst}"
@@ -98,7 +99,11 @@ def gap_figure(which: str, link: str, values: list[float]) -> BenchmarkFigure:
 
 
 def figures(pieces: list[Piece]) -> list[BenchmarkFigure]:
-    """Trips, holds and the added gap over one link; only where frames may overtake is a trip one without a cause."""
+    """Trips, holds and the added difference over one link.
+
+    The target is judged only where frames may overtake each other: in order, one lost frame delays all later ones, so
+    that a trip has a cause.
+    """
     hours = sum(one.seconds for one in pieces) / 3600.0
     trips, link = sum(one.trips for one in pieces), pieces[0].link
     holds = sum(one.holds for one in pieces) / hours
@@ -122,7 +127,7 @@ def figures(pieces: list[Piece]) -> list[BenchmarkFigure]:
 
 
 def run(*, quick: bool = False) -> list[BenchmarkFigure]:
-    """All pieces, a line of progress after each."""
+    """Simulate all pieces; writes a line of progress after each."""
     began, pieces = time.monotonic(), []
     count, seconds = (1, QUICK_PIECE) if quick else (MINUTES, PIECE)
     for seed in range(1, count + 1):

@@ -1,8 +1,8 @@
-"""What a live view costs: late ticks of whole tests with it and without, in turns, and the processor time it takes.
+"""The cost of a live view: late ticks of whole tests with and without it, in turns, and its processor time.
 
-With a browser the page is open in a headless Chromium on the same machine, which draws in software: more than a view
-on a desk costs. The tests go on where a busy machine holds a laboratory up: late ticks are counted and end nothing.
-Each test has a bare timing loop beside it, whose late ticks are those of the machine: only the rest is compared.
+In the tests with a browser the page is open in a headless Chromium on the same machine, which renders in software: that
+costs more than a browser on another machine. The plan tolerates late ticks, so that they are counted but end no test.
+A bare timing loop runs beside each test; its late ticks are caused by the machine, and only the rest is compared.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from common.recording.run import MACHINES, Run
 from tests.browser import chromium, open_page
 from tests.helpers import patient
 
-SECONDS, QUICK_S = 20.0, 2.0
-REPEATS = 5
-MOST = 0.05  # percentage points of late ticks
+SECONDS, QUICK_S = 20.0, 2.0  # duration of a test
+REPEATS = 5  # odd, so that the median is a measured value; fifteen tests take about seven minutes
+MOST = 0.05  # percentage points of late ticks: 5 of the 10,000 ticks of a test
 WITHOUT, VIEW, BROWSER = "without", "--live", "--live and a browser"
 KNOWN = ("master.priority", "bare_loop.ticks", "bare_loop.late")
 URL = re.compile(r"live view: (http://\S+)")
@@ -37,7 +37,10 @@ TIME = re.compile(r"t +([\d.]+)/")
 
 
 class Test(NamedTuple):
-    """One test: late ticks of it and of the bare loop (%), real-time priority, the view's part of a processor (%)."""
+    """Figures of one test: late ticks of the test and of the bare loop (%), and whether it had real-time priority.
+
+    `share` is the processor time of the view over the time that passed (%), NaN if it could not be measured.
+    """
 
     late: float
     beside: float
@@ -46,14 +49,14 @@ class Test(NamedTuple):
 
 
 class Turn(NamedTuple):
-    """How one test ended, and what it gave, None where it ended early."""
+    """How one test ended, and its figures, None if it ended early."""
 
     ending: Ending
     test: Test | None
 
 
 def run(*, quick: bool = False) -> list[BenchmarkFigure]:
-    """All kinds of tests in turns, their order drawn anew each time."""
+    """Run all kinds of tests in turns, in a new random order each time."""
     seconds, repeats = (QUICK_S, 1) if quick else (SECONDS, REPEATS)
     kinds = [WITHOUT, VIEW, *([BROWSER] if chromium() and not quick else [])]
     order, draw = [], random.Random(1)  # noqa: S311 - no secret
@@ -67,7 +70,7 @@ def run(*, quick: bool = False) -> list[BenchmarkFigure]:
 
 
 def played(kind: str, seconds: float) -> Turn:
-    """One test of a kind."""
+    """Run one test of a kind with a duration in s."""
     with tempfile.TemporaryDirectory() as folder:
         path, said = Path(folder) / "a.mcap", Path(folder) / "said"
         words = [str(patient(Path(folder))), "--duration", str(seconds)]
@@ -77,7 +80,7 @@ def played(kind: str, seconds: float) -> Turn:
         ) as process:
             try:
                 share = watched(process, path, said, browser=kind == BROWSER)
-            except PageError as error:  # its test was over before the page was there
+            except PageError as error:  # the test was over before the page had loaded
                 process.communicate()
                 return Turn(Ending(process.returncode, str(error).splitlines()[0], None), None)
         ended = ending(process.returncode, said.read_text(), path)
@@ -85,7 +88,7 @@ def played(kind: str, seconds: float) -> Turn:
 
 
 def facts(recording: Run, share: float) -> Test:
-    """What a recording says of its test."""
+    """The figures of a recorded test."""
     machines = {
         name: float(machine) for name, machine in recording.metadata[MACHINES].items() if name in KNOWN
     }
@@ -95,7 +98,11 @@ def facts(recording: Run, share: float) -> Test:
 
 
 def watched(process: subprocess.Popen[str], path: Path, said: Path, *, browser: bool) -> float:
-    """Keep what a test says; the view's share of a processor between its first and last line of progress."""
+    """Write the output of a running test to `said`; returns the view's processor time over the time passed (%).
+
+    It is measured between the first line of progress after 1 s of the test, when the view has started, and the last;
+    NaN if there are no two such lines.
+    """
     marks: list[tuple[float, float]] = []
     assert process.stderr is not None  # noqa: S101 - it is a pipe
     with contextlib.ExitStack() as pages, said.open("w") as kept:
@@ -106,14 +113,14 @@ def watched(process: subprocess.Popen[str], path: Path, said: Path, *, browser: 
             if found := TIME.match(line):
                 marks.append((float(found[1]), seconds_of(path)))
     steady = [mark for mark in marks if mark[0] > 1.0]
-    if len(steady) < 2:  # it ended too early
+    if len(steady) < 2:
         return math.nan
     (begin, before), (end, after) = steady[0], steady[-1]
     return 100.0 * (after - before) / (end - begin)
 
 
 def seconds_of(path: Path) -> float:
-    """Processor time of the view of a recording so far, s; 0 where there is none."""
+    """Processor time that the view of a recording has used so far, s; 0 without a view."""
     for folder in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):
             words = (folder / "cmdline").read_bytes().split(b"\0")
@@ -124,7 +131,7 @@ def seconds_of(path: Path) -> float:
 
 
 def figures(kind: str, turns: list[Turn], without: list[Turn]) -> list[BenchmarkFigure]:
-    """Late ticks of one kind of test; those beyond the bare loop's are compared with the tests without a view."""
+    """The late ticks of one kind of test, and their difference from those of the tests without a view."""
     early = ended_early(f"test, {kind}", [turn.ending for turn in turns])
     tests = [turn.test for turn in turns if turn.test is not None]
     if not tests:
@@ -141,7 +148,7 @@ def figures(kind: str, turns: list[Turn], without: list[Turn]) -> list[Benchmark
 
 
 def beyond(kind: str, turns: list[Turn], without: list[Turn]) -> list[BenchmarkFigure]:
-    """Late ticks beyond those of the test without in the same turn; nothing where no turn has both."""
+    """Late ticks minus those of the test without a view in the same turn; empty if no turn has both tests."""
     pairs = [(one.test, other.test) for one, other in zip(turns, without, strict=True)]
     both = [(one, other) for one, other in pairs if one is not None and other is not None]
     if not both:

@@ -1,4 +1,4 @@
-"""Processes that do nothing but compute, to see what a test does beside them."""
+"""Processes that only compute, as a load on the machine beside a test."""
 
 from __future__ import annotations
 
@@ -7,12 +7,14 @@ import subprocess
 import sys
 from collections.abc import Iterator
 
-BUSY = 4
+BUSY = (
+    4  # processes: more than the processors that master and slave use, so that every processor is contended
+)
 
 
 @contextlib.contextmanager
 def busy(count: int = BUSY) -> Iterator[None]:
-    """So many busy processes of ordinary priority, until the end of the block."""
+    """Run `count` busy processes of ordinary priority until the end of the block."""
     running = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(count)]
     try:
         yield

@@ -1,7 +1,7 @@
-"""The default building in OpenSeesPy, in an interpreter that has it; runs there as a script, without this project.
+"""The default building in OpenSeesPy.
 
-`ask` starts this file in the interpreter that `RTHS_OPENSEES_PYTHON` names, else in the own one, and hands it a
-case as JSON; so everything imported at the top must be of the standard library.
+`ask` runs this file as a script in the interpreter that `RTHS_OPENSEES_PYTHON` names, else in the present one, and
+passes it a case as JSON. That interpreter need not have rths: this file imports only the standard library at the top.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 PYTHON = "RTHS_OPENSEES_PYTHON"
-REPEATS = 7
-PATIENCE_S = 120.0
+REPEATS = 7  # as in benchmarks/closed_loop.py
+PATIENCE_S = 120.0  # the case takes less than 1 s, importing OpenSees a few seconds on an idle machine
 GROUND, FLOOR, SPRING, LOAD = 1, 2, 1, 1  # tags
 
 
 class PeerCase(NamedTuple):
-    """One storey in an earthquake: kg, N/m, N·s/m, s, and the ground's acceleration (m/s²) at every step."""
+    """One storey in an earthquake: kg, N/m, N·s/m, s, and the ground acceleration (m/s²) at every step."""
 
     mass: float
     stiffness: float
@@ -34,16 +34,16 @@ class PeerCase(NamedTuple):
 
 
 class PeerAnswer(NamedTuple):
-    """What OpenSeesPy gives: its version, displacements (m) after each step, steps per second of each repeat."""
+    """The result of OpenSeesPy: its version, displacements (m) after each step, steps per second of each repeat."""
 
     version: str
     displacement: list[float]
     at_once: list[float]  # all steps by one call of `analyze`
-    by_step: list[float]  # one call a step, and the displacement read after it
+    by_step: list[float]  # one call of `analyze` per step, and the displacement read after it
 
 
 def ask(case: PeerCase) -> PeerAnswer | str:
-    """The answer of the interpreter that has OpenSeesPy, or why there is none."""
+    """The answer of the interpreter that has OpenSeesPy, or a text that says why there is none."""
     command = [os.environ.get(PYTHON) or sys.executable, str(Path(__file__).resolve())]
     try:
         done = subprocess.run(
@@ -65,13 +65,13 @@ def ask(case: PeerCase) -> PeerAnswer | str:
 
 
 def reason(stderr: str) -> str:
-    """The error in a traceback: its last line, which OpenSees's own last line may follow."""
+    """The last error line of a traceback; OpenSees may print a line of its own after it."""
     lines = [line for line in stderr.splitlines() if "Error" in line]
     return lines[-1].partition(": ")[2] if lines else "it ended without an answer"
 
 
 def build(ops: Any, case: PeerCase) -> None:
-    """The storey as a spring and dashpot between ground and floor, explicit Newmark, at rest."""
+    """Build the storey at rest: a spring and a dashpot between ground and floor, with Newmark's explicit method."""
     ops.wipe()
     ops.model("basic", "-ndm", 1, "-ndf", 1)
     ops.node(GROUND, 0.0)
@@ -84,20 +84,20 @@ def build(ops: Any, case: PeerCase) -> None:
     ops.pattern("UniformExcitation", LOAD, 1, "-accel", LOAD)
     ops.constraints("Plain")
     ops.numberer("Plain")
-    ops.system("Diagonal")  # the fastest of its solvers here
+    ops.system("Diagonal")  # the fastest solver of OpenSees for a diagonal matrix
     ops.algorithm("Linear")
     ops.integrator("NewmarkExplicit", 0.5)
     ops.analysis("Transient")
 
 
 def at_once(ops: Any, case: PeerCase) -> None:
-    """All steps by one call: the loop runs in C++ and nothing is read."""
+    """All steps in one call: the loop runs in C++ and no result is read."""
     if ops.analyze(len(case.acceleration), case.interval) != 0:
         raise ArithmeticError("OpenSees did not complete the analysis")
 
 
 def by_step(ops: Any, case: PeerCase) -> list[float]:
-    """One call a step and the displacement read after each, as a hybrid test must; displacements, m."""
+    """One call per step, with the displacement (m) read after each, as a hybrid test needs it."""
     found = []
     for _ in case.acceleration:
         ops.analyze(1, case.interval)
@@ -106,7 +106,7 @@ def by_step(ops: Any, case: PeerCase) -> list[float]:
 
 
 def rates(ops: Any, case: PeerCase, work: Callable[[Any, PeerCase], object]) -> list[float]:
-    """Steps per second of processor time in each repeat; building the model is not counted."""
+    """Steps per second of processor time of each repeat, without the time to build the model."""
     found = []
     for _ in range(case.repeats):
         build(ops, case)
@@ -117,7 +117,7 @@ def rates(ops: Any, case: PeerCase, work: Callable[[Any, PeerCase], object]) -> 
 
 
 def main() -> int:
-    """Answer the case on standard input with one line of JSON."""
+    """Compute the case on standard input and write the answer as one line of JSON."""
     case = PeerCase(**json.load(sys.stdin))
     ops = import_module("openseespy.opensees")
     build(ops, case)

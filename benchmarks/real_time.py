@@ -1,4 +1,7 @@
-"""Whole tests in real time, alone and beside busy processes: round trip, and late ticks beside a bare timing loop's."""
+"""Round trip and late ticks of whole tests in real time, alone and beside busy processes.
+
+The late ticks are compared with those of a bare timing loop that runs beside the test.
+"""
 
 from __future__ import annotations
 
@@ -14,23 +17,23 @@ from benchmarks.result import BenchmarkFigure, cost_figure
 from benchmarks.whole_test import ended_early, played
 from common.recording.run import MACHINES, Run
 
-SECONDS, QUICK_S = 20.0, 0.5
-REPEATS = 3
-MOST_LATE = 0.05  # percentage points beyond the bare timing loop
-MOST_LOADED = 500.0  # µs, p99 of the round trip beside busy processes, with real-time priority
+SECONDS, QUICK_S = 20.0, 0.5  # duration of a test
+REPEATS = 3  # odd, so that the median is a measured value
+MOST_LATE = 0.05  # percentage points above the bare timing loop: 5 of the 10,000 ticks of a test
+MOST_LOADED = 500.0  # µs, p99 of the round trip beside busy processes: a quarter of the interval of 2 ms
 
 
 class Facts(NamedTuple):
-    """What one test gave."""
+    """The figures of one test."""
 
-    priority: float
+    priority: float  # real-time priority of the master, 0 without one
     round_trip: tuple[float, float]  # p50 and p99, µs
     late: float  # %
-    late_beside: float  # %, of the bare timing loop
+    late_beside: float  # of the bare timing loop, %
 
 
 def run(*, quick: bool = False) -> list[BenchmarkFigure]:
-    """The default test's first seconds, several times."""
+    """Run the first seconds of the default test several times."""
     seconds, repeats = (QUICK_S, 1) if quick else (SECONDS, REPEATS)
     return [
         *several("rths run", seconds, repeats, None, loaded=False),
@@ -41,7 +44,7 @@ def run(*, quick: bool = False) -> list[BenchmarkFigure]:
 def several(
     name: str, seconds: float, repeats: int, most: float | None, *, loaded: bool
 ) -> list[BenchmarkFigure]:
-    """Several tests alike; those that end early are counted and give no other figure."""
+    """Run several equal tests; those that end early are counted and not used for the other figures."""
     endings = []
     with tempfile.TemporaryDirectory() as folder, busy() if loaded else contextlib.nullcontext():
         for number in range(repeats):
@@ -64,7 +67,7 @@ def found(run: Run) -> Facts:
 
 
 def figures(name: str, tests: list[Facts], most: float | None) -> list[BenchmarkFigure]:
-    """Round trip and late ticks of several tests alike; targets hold for tests with real-time priority."""
+    """Round trip and late ticks of several equal tests; the targets apply to tests with real-time priority."""
     judged = all(test.priority > 0 for test in tests)
     middle, tail = ([test.round_trip[place] for test in tests] for place in (0, 1))
     beyond = [test.late - test.late_beside for test in tests]

@@ -1,4 +1,4 @@
-"""Messages per second into a recording: the writer alone, and the recorder's process behind a burst over zenoh."""
+"""Messages per second into a recording: of the writer alone, and of the recorder's process in a burst over zenoh."""
 
 from __future__ import annotations
 
@@ -28,18 +28,21 @@ from common.recording.writer import CHUNK_SIZE, Recording
 from common.signals import TICK_TOPICS, TOPICS, FieldType
 
 ROOT = Path(__file__).resolve().parent.parent
-COUNT = 20_000
-REPEATS = 5
-NEEDED = 1_500  # per second of a default test
+COUNT = 20_000  # messages of a repeat: about 0.2 s, long against the resolution of the clock
+REPEATS = 5  # odd, so that the median is a measured value
+NEEDED = 1_500  # messages/s of a default test: three topics at 500 ticks per second
+TARGET = 20 * NEEDED  # messages/s: more than twice those of the fastest plan of rths (4096 ticks per second)
 BURSTS = tuple(times * NEEDED for times in (1, 20, 40, 60, 80, 120))  # messages/s
-BURST_S, QUICK_BURST_S = 3.0, 0.3
-SLOT_S = 0.002  # samples leave a laboratory between ticks
+BURST_S, QUICK_BURST_S = 3.0, 0.3  # the recorder syncs its file once a second: three syncs
+SLOT_S = 0.002  # a laboratory sends its samples once per tick
 SESSION = 1
-REPEAT_S = 0.1
-PATIENCE_S = 30.0  # for the recorder to join
-END_S = 20.0  # for the recorder to end; what it has not written by then counts as missing
-POOL = 1_000  # different samples of a topic: noise, which no compression shrinks
+REPEAT_S = 0.1  # between repeated messages, as in the handshake (REPEAT_NS)
+PATIENCE_S = 30.0  # for the recorder to join; it starts in about 2 s on an idle machine
+END_S = 20.0  # for the recorder to end; messages that it has not written by then count as missing
+POOL = 1_000  # different samples of a topic, of noise; a chunk (64 kB) holds about 500, so that it cannot be compressed
 
+FLUSHED = 150  # messages between two flushes: those of 0.1 s of a default test
+SAMPLE = b"x" * 130  # bytes: the length of an encoded sample of the master
 FILLING = {FieldType.FLAG: True}
 
 Values = list[list[Any]]
@@ -54,43 +57,43 @@ def values_of(topic: str) -> list[Any]:
 
 
 def recorded(path: Path, count: int) -> int:
-    """Write samples of the master, flushed as often as in a test; how many."""
+    """Write `count` samples of the master, flushed as often as in a test; returns `count`."""
     values = values_of("master")
     recording = Recording(path, "trial", 1, TOPICS)
     for seq in range(count):
         recording.add("master", seq, seq, [seq, *values[1:]])
-        if seq % 150 == 0:
+        if seq % FLUSHED == 0:
             recording.flush()
     recording.close({})
     return count
 
 
 def bare(path: Path, count: int) -> int:
-    """Write as many ready-made bytes with the MCAP writer alone; how many."""
+    """Write `count` encoded messages with the MCAP writer alone; returns `count`."""
     with path.open("wb") as stream:
         writer = Writer(stream, chunk_size=CHUNK_SIZE, compression=CompressionType.ZSTD)
         writer.start()
         channel = writer.register_channel("a", "", 0)
         for seq in range(count):
-            writer.add_message(channel, log_time=seq, data=b"x" * 130, publish_time=seq, sequence=seq)
+            writer.add_message(channel, log_time=seq, data=SAMPLE, publish_time=seq, sequence=seq)
         writer.finish()  # type: ignore[no-untyped-call]
     return count
 
 
-# -- the process behind a burst -----------------------------------------------------------------------
+# -- the process in a burst ---------------------------------------------------------------------------
 
 
 class Burst(NamedTuple):
-    """What a burst did: messages per second offered and written to the end, and what became of them."""
+    """The result of a burst: messages per second sent and written, and how many are missing."""
 
     asked: float  # messages/s
-    offered: float  # messages/s that the sending laboratories managed
+    offered: float  # messages/s that the laboratories sent
     written: float  # messages/s from the first sample to the finished file
     messages: int
-    missing: int  # not in the file
-    doubled: int  # in the file more than once, or out of order
-    reported: int  # missing by the recording's own summary, -1 without one
-    sent_again: int  # pieces that the recorder asked for again
+    missing: int  # messages that are not in the file
+    doubled: int  # messages that are in the file more than once, or out of order
+    reported: int  # missing messages according to the summary of the recording, -1 without one
+    sent_again: int  # pieces that the recorder requested again
     behind: float  # s from the last sample sent to the end of the recorder's process
 
     @property
@@ -100,7 +103,7 @@ class Burst(NamedTuple):
 
 
 class Laboratories:
-    """Both laboratories' streams to the recorder, over links of their own as in a test."""
+    """The streams of both laboratories to the recorder, each over its own link as in a test."""
 
     def __init__(self, plan: Plan, endpoint: str) -> None:
         self._digest = plan.digest()
@@ -123,7 +126,7 @@ class Laboratories:
             link.close()
 
     def join(self, recorder: subprocess.Popen[bytes]) -> None:
-        """Wait until the recorder takes part in the session; raises TimeoutError where it does not."""
+        """Wait until the recorder takes part in the session; raises TimeoutError if it does not."""
         master, slave = self.labs
         deadline = time.monotonic() + PATIENCE_S
         while any(lab.recorder is None or lab.recorder.session != SESSION for lab in (master, slave)):
@@ -134,7 +137,7 @@ class Laboratories:
             time.sleep(REPEAT_S)
 
     def listen(self) -> None:
-        """Do what the recorder asks for."""
+        """Receive the recorder's messages and resend the pieces that it requests."""
         for lab in self.labs:
             while (received := lab.endpoint.receive()) is not None:
                 if isinstance(received.message, Resend) and received.message.lab == lab.name:
@@ -142,7 +145,7 @@ class Laboratories:
                 lab.listen_to_recorder(received.message)
 
     def send(self, rate: float, ticks: int) -> float:
-        """Send the samples of so many ticks at `rate` messages/s; the seconds it took."""
+        """Send the samples of `ticks` ticks at `rate` messages/s; returns the seconds it took."""
         began, sent = time.monotonic(), 0
         while sent < ticks:
             due = min(ticks, 1 + int((time.monotonic() - began) * rate / len(TICK_TOPICS)))
@@ -161,7 +164,7 @@ class Laboratories:
             lab.outlet.add(topic, tick, tick, (tick, *self._pools[topic][tick % POOL]))
 
     def finish(self, recorder: subprocess.Popen[bytes]) -> float:
-        """Say how long the streams are until the recorder has ended; the seconds it took, at most `END_S`."""
+        """Send the lengths of the streams until the recorder has ended, at most for `END_S`; returns the s it took."""
         began = time.monotonic()
         for turn in itertools.count():
             if recorder.poll() is not None or time.monotonic() - began > END_S:
@@ -175,7 +178,7 @@ class Laboratories:
 
 
 def pool(topic: str) -> Values:
-    """Samples of a topic without their tick."""
+    """`POOL` samples of a topic without their tick number."""
     draws = np.random.default_rng(1).normal(size=(POOL, len(TOPICS[topic]))).tolist()
     kept = (FieldType.NUMBER, FieldType.STOREYS)
     return [
@@ -188,7 +191,7 @@ def pool(topic: str) -> Values:
 
 
 def burst(rate: float, seconds: float, folder: Path) -> Burst:
-    """A burst into the recorder's own process, which is read back and counted."""
+    """Send a burst to a recorder process, read its file and count the messages."""
     ticks = max(1, round(rate * seconds / len(TICK_TOPICS)))
     plan, endpoint, path = Plan().with_ticks(ticks), listenable(), folder / "burst.mcap"
     (folder / "plan.toml").write_text(plan.toml(), encoding="utf-8")
@@ -219,7 +222,7 @@ def burst(rate: float, seconds: float, folder: Path) -> Burst:
 
 
 def account(run: Run, ticks: int) -> tuple[int, int]:
-    """How many messages of a recording are missing, and how many are there twice or out of order."""
+    """The number of messages missing in a recording, and of those that are there twice or out of order."""
     missing = doubled = 0
     for topic in TICK_TOPICS:
         found = run.sequences.get(topic, np.zeros(0, dtype=np.int64))
@@ -229,13 +232,13 @@ def account(run: Run, ticks: int) -> tuple[int, int]:
 
 
 def reported(run: Run) -> int:
-    """How many items the recording itself says are missing, -1 where it was cut off."""
+    """The number of missing items in the summary of the recording, -1 if it has none because it was cut off."""
     summary = run.metadata.get("summary")
     return int(summary["items_lost"]) + int(summary["items_dropped"]) if summary else -1
 
 
 def bursts(rates_per_s: Sequence[float], seconds: float) -> list[Burst]:
-    """Bursts of rising rate up to the first that loses something."""
+    """Bursts of rising rate, up to the first that loses messages."""
     found: list[Burst] = []
     with tempfile.TemporaryDirectory() as folder:
         for rate in rates_per_s:
@@ -249,12 +252,12 @@ def bursts(rates_per_s: Sequence[float], seconds: float) -> list[Burst]:
 
 
 def figures(found: list[Burst]) -> list[BenchmarkFigure]:
-    """The fastest bursts without loss, with all bursts as points of a curve; and what the next one lost."""
+    """The fastest bursts without loss, with all bursts as points of a curve, and the share that the next one lost."""
     whole = [each for each in found if each.whole]
     most = max((each.offered for each in whole), default=0.0)
     easy = max((each.offered for each in whole if each.sent_again == 0), default=0.0)
     process = "recorder process over zenoh"
-    complete = rate_figure(f"{process}, every message once", "messages/s", [most], least=20 * NEEDED)
+    complete = rate_figure(f"{process}, every message once", "messages/s", [most], least=TARGET)
     results = [
         complete._replace(points=[each._asdict() for each in found]),
         rate_figure(f"{process}, nothing sent again", "messages/s", [easy]),
@@ -268,13 +271,13 @@ def figures(found: list[Burst]) -> list[BenchmarkFigure]:
 
 
 def run(*, quick: bool = False) -> list[BenchmarkFigure]:
-    """The writer beside the bare MCAP writer, and the recorder's process behind bursts."""
+    """Measure the writer, the MCAP writer alone, and the recorder's process in bursts."""
     count, repeats = (100, 1) if quick else (COUNT, REPEATS)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "a.mcap"
         beside = statistics.median(rates(lambda: bare(path, count), repeats))
         found = rates(lambda: recorded(path, count), repeats)
     words = "bare MCAP writer with ready-made bytes"
-    alone = rate_figure("recording", "messages/s", found, least=20 * NEEDED, peer=words, beside=beside)
+    alone = rate_figure("recording", "messages/s", found, least=TARGET, peer=words, beside=beside)
     whole = bursts(BURSTS[:1], QUICK_BURST_S) if quick else bursts(BURSTS, BURST_S)
     return [alone, *figures(whole)]

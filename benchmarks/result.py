@@ -1,4 +1,4 @@
-"""What a benchmark gives: figures with their peers and targets."""
+"""The figures of a benchmark, with targets and with the figures of comparable programs (peers)."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 
 
 class BenchmarkFigure(NamedTuple):
-    """One figure; `best` and `median` of several repeats, in `unit`; `peer` names what stands beside it."""
+    """One figure: `best` and `median` of several repeats in `unit`; `peer` names what it is compared with."""
 
     name: str
     unit: str
-    best: float | None  # None where it could not be had here; the name says why
+    best: float | None  # None if it cannot be measured on this machine; the name says why
     median: float | None
     target: str = ""
     met: bool | None = None
@@ -25,9 +25,9 @@ class BenchmarkFigure(NamedTuple):
 def rates(
     work: Callable[[], int], repeats: int, clock: Callable[[], float] = time.perf_counter
 ) -> list[float]:
-    """Items per second of each repeat; `work` does some and says how many. The first run is not counted.
+    """Items per second of each repeat; `work` returns the number of items it did. A first run is not counted.
 
-    `clock` (s) is the wall's; `time.process_time` leaves out what other processes take of the machine.
+    `clock` returns s: wall time, or with `time.process_time` the processor time, which other processes affect less.
     """
     work()
     found = []
@@ -47,7 +47,7 @@ def rate_figure(
     peer: str = "",
     beside: float = 0.0,
 ) -> BenchmarkFigure:
-    """Figure of a rate; `least` is its target, judged by the best repeat, since the machine is shared."""
+    """The figure of a rate; its target `least` is judged by the best repeat, because the machine is shared."""
     best, median = max(found), statistics.median(found)
     met = None if least is None else best >= least
     target = "" if least is None else f"≥ {least:,.0f}"
@@ -55,7 +55,7 @@ def rate_figure(
 
 
 def cost_figure(name: str, unit: str, found: list[float], *, most: float | None = None) -> BenchmarkFigure:
-    """Figure of a cost; `most` is its target, judged by the median."""
+    """The figure of a cost; its target `most` is judged by the median."""
     best, median = min(found), statistics.median(found)
     met = None if most is None else median <= most
     return BenchmarkFigure(name, unit, best, median, "" if most is None else f"≤ {most:g}", met)

@@ -1,4 +1,4 @@
-"""How long a user waits, and how much memory the laboratories take."""
+"""The time to the help text and to the first tick, and the memory of the processes of a test."""
 
 from __future__ import annotations
 
@@ -13,8 +13,12 @@ from benchmarks.result import BenchmarkFigure, cost_figure
 from benchmarks.whole_test import ROOT, Ending, ended_early, played
 from common.link.zenoh_link import listenable
 
-REPEATS = 5
-MEMORY_S, QUICK_S = 5.0, 0.2  # of the test whose memory is watched
+REPEATS = 5  # odd, so that the median is a measured value
+MEMORY_S, QUICK_S = 5.0, 0.2  # duration of the test whose memory is measured
+MOST_HELP = 0.3  # s: below that a command is felt to answer without a delay
+MOST_FIRST = 3.0  # s: an operator waits for it before every test
+MOST_MEMORY = 200.0  # MB of a laboratory: it fits five times into 1 GB, that of a small industrial computer
+POLL_S = 0.1  # between two looks at the memory; the kernel keeps the peak, only the last look before the end counts
 
 
 def timed(words: list[str]) -> float:
@@ -25,8 +29,8 @@ def timed(words: list[str]) -> float:
 
 
 def first_tick(folder: str) -> tuple[float, Ending]:
-    """From the start of `rths run` to the first tick, s, by the recording's own time stamps; NaN where none came."""
-    path = Path(folder) / f"{time.monotonic_ns()}.mcap"  # none is written over another
+    """Time (s) from the start of `rths run` to the first tick, by the time stamps recorded; NaN without a tick."""
+    path = Path(folder) / f"{time.monotonic_ns()}.mcap"  # a new name, because no recording is overwritten
     began = time.time()
     ending = played(path, "--duration", "0.2")
     ticks = ending.run.log_ns.get("master") if ending.run else None
@@ -34,7 +38,7 @@ def first_tick(folder: str) -> tuple[float, Ending]:
 
 
 def memory(folder: str, seconds: float) -> dict[str, float]:
-    """Largest resident memory of each process in a test, MB."""
+    """Peak resident memory of each process of a test, MB."""
     endpoint = listenable()
     words = {
         "slave": ["--connect", endpoint],
@@ -52,12 +56,12 @@ def memory(folder: str, seconds: float) -> dict[str, float]:
     found: dict[str, float] = {}
     while any(process.poll() is None for process in running.values()):
         found |= {name: high for name, process in running.items() if (high := high_water(process.pid))}
-        time.sleep(0.1)
+        time.sleep(POLL_S)
     return found
 
 
 def high_water(pid: int) -> float:
-    """Largest resident memory of a process so far, MB; 0 where it has ended."""
+    """Peak resident memory of a process so far, MB; 0 if it has ended."""
     try:
         lines = Path(f"/proc/{pid}/status").read_text().splitlines()
     except OSError:
@@ -66,7 +70,7 @@ def high_water(pid: int) -> float:
 
 
 def run(*, quick: bool = False) -> list[BenchmarkFigure]:
-    """Help, first tick and memory, caches warm."""
+    """Measure help, first tick and memory with filled caches."""
     repeats = 1 if quick else REPEATS
     with tempfile.TemporaryDirectory() as folder:
         if not quick:
@@ -76,16 +80,16 @@ def run(*, quick: bool = False) -> list[BenchmarkFigure]:
         sizes = memory(folder, QUICK_S if quick else MEMORY_S)
     ticks = [seconds for seconds, _ in tests if math.isfinite(seconds)]
     return [
-        cost_figure("rths --help", "s", helps, most=0.3),
+        cost_figure("rths --help", "s", helps, most=MOST_HELP),
         ended_early("rths run of 0.2 s", [ending for _, ending in tests]),
-        *([cost_figure("rths run to the first tick", "s", ticks, most=3.0)] if ticks else []),
+        *([cost_figure("rths run to the first tick", "s", ticks, most=MOST_FIRST)] if ticks else []),
         *memory_figures(sizes),
     ]
 
 
 def memory_figures(sizes: dict[str, float]) -> list[BenchmarkFigure]:
-    """The memory of each process; there is no target for the recorder's."""
+    """The memory of each process; the recorder has no target."""
     return [
-        cost_figure(f"memory of the {name}", "MB", [size], most=200.0 if name != "recorder" else None)
+        cost_figure(f"memory of the {name}", "MB", [size], most=MOST_MEMORY if name != "recorder" else None)
         for name, size in sizes.items()
     ]

@@ -1,4 +1,4 @@
-"""A rig in another process: its round trip beside that of a bare UDP socket whose other end sends back what it gets."""
+"""Round trip to a rig in another process, compared with that of a bare UDP socket to an echo."""
 
 from __future__ import annotations
 
@@ -20,8 +20,10 @@ from common.udp.packets import SIZE
 from common.udp.rig import Terms, UdpRig
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
-ROUNDS, EXCHANGES = 7, 2000  # of each figure, in turns
-INTERVAL, WAIT = 0.002, 0.5  # s; every answer is waited for, so that a held-up one counts
+START_S = 0.3  # Python takes about 50 ms to start; a packet sent earlier would be lost
+# rounds of each peer, in turns, and exchanges of a round: 2000 give 20 values above the 99th percentile
+ROUNDS, EXCHANGES = 7, 2000
+INTERVAL, WAIT = 0.002, 0.5  # s; the wait is long, so that a late answer is measured and not lost
 ECHO = """
 import socket, sys
 place = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -32,7 +34,7 @@ while True:
 
 
 def free() -> int:
-    """A port that nobody uses."""
+    """A free port."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as place:
         place.bind(("127.0.0.1", 0))
         return int(place.getsockname()[1])
@@ -40,9 +42,9 @@ def free() -> int:
 
 @contextlib.contextmanager
 def started(words: list[str]) -> Iterator[None]:
-    """Another process, for as long as it is needed."""
+    """Run another process until the end of the block."""
     process = subprocess.Popen(words)
-    time.sleep(0.3)
+    time.sleep(START_S)
     try:
         yield
     finally:
@@ -51,7 +53,7 @@ def started(words: list[str]) -> Iterator[None]:
 
 
 def compiled(folder: str) -> str:
-    """The example in C, empty where there is no compiler."""
+    """The path of the compiled example in C, empty without a compiler."""
     compiler = shutil.which("cc") or shutil.which("gcc")
     if compiler is None:
         return ""
@@ -60,9 +62,8 @@ def compiled(folder: str) -> str:
     return program
 
 
-def bare(port: int) -> Callable[[], None]:
-    """One exchange with the echo."""
-    place = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+def bare(place: socket.socket, port: int) -> Callable[[], None]:
+    """A function that does one exchange with the echo at a port."""
     place.connect(("127.0.0.1", port))
     packet = bytes(SIZE)
 
@@ -74,7 +75,7 @@ def bare(port: int) -> Callable[[], None]:
 
 
 def ours(port: int) -> Callable[[], None]:
-    """One command to a rig and its answer, checked."""
+    """A function that sends one command to a rig and receives and checks its answer."""
     rig = UdpRig(COLUMN_CHANNELS, Terms(f"udp/{port}", "[rig]", INTERVAL, 1, WAIT, 5.0, 60.0, 5, paced=True))
     rig.arm()
 
@@ -86,7 +87,7 @@ def ours(port: int) -> Callable[[], None]:
 
 
 def trips(exchange: Callable[[], None], count: int) -> list[float]:
-    """Round trips in µs, sorted."""
+    """`count` round trips in µs, sorted."""
     found = []
     for _ in range(count):
         begun = time.perf_counter_ns()
@@ -96,7 +97,7 @@ def trips(exchange: Callable[[], None], count: int) -> list[float]:
 
 
 def run(*, quick: bool = False) -> list[BenchmarkFigure]:
-    """Figures of each other end, in turns."""
+    """Measure the echo and the rigs in turns."""
     rounds, count = (1, 50) if quick else (ROUNDS, EXCHANGES)
     with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as stack:
         program, ports = compiled(folder), [free() for _ in range(3)]
@@ -113,7 +114,11 @@ def run(*, quick: bool = False) -> list[BenchmarkFigure]:
             peers["rig in C"] = [program, "127.0.0.1", str(ports[2])]
         for words in peers.values():
             stack.enter_context(started(words))
-        ends = {name: (bare if place == 0 else ours)(ports[place]) for place, name in enumerate(peers)}
+        echo = stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
+        ends = {
+            name: bare(echo, port) if number == 0 else ours(port)
+            for number, (name, port) in enumerate(zip(peers, ports, strict=False))
+        }
         found: dict[str, list[list[float]]] = {name: [] for name in ends}
         for _ in range(rounds):
             for name, exchange in ends.items():
@@ -127,7 +132,7 @@ def run(*, quick: bool = False) -> list[BenchmarkFigure]:
 
 
 def figure(name: str, part: float, found: list[list[float]], beside: float) -> BenchmarkFigure:
-    """A percentile of the round trip, best and median of all rounds."""
+    """A percentile of the round trip (`part` in 0 to 1): best and median of all rounds."""
     values = [quantile(one, part) for one in found]
     median = statistics.median(values)
     ratio = median / beside if beside else None

@@ -1,4 +1,4 @@
-"""A whole test in processes of its own, which may end early: that is a figure, too."""
+"""A whole test in processes of its own; the number of tests that end early is a figure as well."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parent.parent
 
 
 class Ending(NamedTuple):
-    """How a test ended: its exit code, the last thing it said, and its recording where there is one."""
+    """How a test ended: its exit code, the last line of its standard error, and its recording or None."""
 
     code: int
     said: str
@@ -25,7 +25,7 @@ class Ending(NamedTuple):
 
     @property
     def completed(self) -> bool:
-        """Whether it came to its end, with a recording."""
+        """Whether the test was completed and has a recording."""
         return self.code == 0 and self.run is not None
 
 
@@ -35,23 +35,23 @@ def command(path: Path, *words: str) -> list[str]:
 
 
 def played(path: Path, *words: str) -> Ending:
-    """Run a test to its end, whatever that is."""
+    """Run a test until it is completed or ends early."""
     done = subprocess.run(command(path, *words), cwd=ROOT, check=False, capture_output=True, text=True)
     return ending(done.returncode, done.stderr, path)
 
 
 def ending(code: int, said: str, path: Path) -> Ending:
-    """How a test ended that gave this exit code and said this on its standard error."""
+    """The ending of a test with this exit code and this text on its standard error."""
     lines = [line for line in said.splitlines() if line.strip()]
     try:
         run = read(path)
-    except (RthsError, OSError):  # it ended before anything was recorded
+    except (RthsError, OSError):  # the test ended before its recording began
         run = None
     return Ending(code, lines[-1] if lines else "", run)
 
 
 def ended_early(name: str, endings: Sequence[Ending]) -> BenchmarkFigure:
-    """How many of several tests did not come to their end, and what each of those said."""
+    """The number of tests that ended early, with the last line of each."""
     early = [one for one in endings if not one.completed]
     points = [{"exit code": one.code, "said": one.said} for one in early]
     count = float(len(early))

@@ -13,7 +13,7 @@ import random
 from common.errors import RigError
 from common.rig import ColumnCommand, ColumnMeasurement
 
-SUBSTEPS = 8
+SUBSTEPS = 8  # of an interval: 0.25 ms at 2 ms, a thirtieth of the servo loop's 1/ω = 8 ms
 
 
 class ColumnLab:

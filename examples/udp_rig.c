@@ -5,7 +5,8 @@
 
    rig_arm, rig_read, rig_write and rig_stop are the rig: an actuator that lags by 11 ms and a column of 12.5 kN/mm, the
    same as examples/udp_rig.py. Replace them by functions that move your hardware. docs/reference/udp-rig.md has the
-   layout of the packets. Numbers are put together byte by byte, so the order of bytes of the machine does not matter. */
+   layout of the packets. Numbers are read and written byte by byte, so that the byte order of the machine does not
+   matter. */
 
 #include <arpa/inet.h>
 #include <math.h>
@@ -49,7 +50,7 @@ static void rig_write(const double *values)                       /* ramp to the
         position += part * (start + (command - start) * i / 8.0 - position);
 }
 
-static void rig_stop(void) {}                                     /* come to a safe stop */
+static void rig_stop(void) {}                                     /* stop safely */
 
 /* ---- packets ------------------------------------------------------------------------------------------------- */
 
@@ -104,7 +105,7 @@ static int state = IDLE;
 static const char *text = "";
 static uint32_t session, seq;
 static double silence, heard;
-static unsigned char last[SIZE];                                  /* answer to the last packet that moved something */
+static unsigned char last[SIZE];                                  /* answer to the last packet other than an echo */
 
 static void fill(unsigned char *answer, int kind, uint32_t of, uint32_t number, int said, const char *why, int measured)
 {
@@ -135,7 +136,7 @@ static int answer_to(const unsigned char *packet, ssize_t size, unsigned char *a
     uint32_t of = get(packet + 8, 4), number = get(packet + 12, 4);
     if (get(packet + 4, 2) != 1)
         return 0;
-    if (kind == ECHO) {                                           /* real sensors would be read here too */
+    if (kind == ECHO) {                                           /* answer with the readings of real sensors here */
         fill(answer, kind, of, number, state, text, 0);
         return 1;
     }
@@ -150,14 +151,14 @@ static int answer_to(const unsigned char *packet, ssize_t size, unsigned char *a
         return kind == ARM;
     }
     heard = now();
-    if (number == seq)                                            /* sent twice: say the same again */
+    if (number == seq)                                            /* a packet that is sent twice is answered twice */
         memcpy(answer, last, SIZE);
     if (number <= seq)
         return number == seq;
     seq = number;
     if (get(packet + 44, 4) != crc32((const unsigned char *)CHANNELS, strlen(CHANNELS))) {
         state = STOPPED;
-        text = "other channels than mine";
+        text = "other channels than in the plan";
     } else if (kind == ARM) {
         text = rig_arm(get_double(packet + 16), get(packet + 32, 8));
         state = text ? STOPPED : READY;

@@ -1,10 +1,10 @@
-"""A rig in a process of its own, in Python without any further library: one UDP packet each way per tick.
+"""A rig in a process of its own, in Python without other libraries: one UDP packet each way per tick.
 
 Try it:    python examples/udp_rig.py --listen 127.0.0.1:9100      and, in a second terminal,
            rths run examples/udp_rig.toml --virtual
 
-`Column` is the rig; replace it by one that moves your hardware. `Server` does the packets, and stops the rig when they
-cease. docs/reference/udp-rig.md has the layout of the packets; examples/udp_rig.c is the same in C.
+`Column` is the rig; replace it by one that moves your hardware. `Server` answers the packets, and stops the rig if
+they no longer arrive. docs/reference/udp-rig.md has the layout of the packets; examples/udp_rig.c is the same in C.
 """
 
 from __future__ import annotations
@@ -31,11 +31,12 @@ class Column:
     """An actuator that lags by 11 ms and a column of 12.5 kN/mm."""
 
     def __init__(self, interval: float, seed: int) -> None:
-        self._part = 1.0 - math.exp(-interval / 8.0 / 0.011)  # of the way to go, in an eighth of an interval
+        # share of the remaining way that the lag covers in an eighth of an interval
+        self._part = 1.0 - math.exp(-interval / 8.0 / 0.011)
         self._position = self._command = 0.0
 
     def arm(self) -> None:
-        """Get ready to move; raise an exception with the reason where that cannot be."""
+        """Prepare to move; raise an exception with the reason if that is not possible."""
 
     def read(self) -> tuple[float, ...]:
         """Deformation (m) and force (N) now."""
@@ -49,11 +50,11 @@ class Column:
             self._position += self._part * (wanted - self._position)
 
     def disarm(self) -> None:
-        """Come to a safe stop; also called when no packet has come for too long."""
+        """Stop safely; also called when no packet has arrived for too long."""
 
 
 class Server:
-    """Answers packets for a rig; `build` makes it from interval and seed when a test arms it."""
+    """Answers packets for a rig; `build` creates it from interval (s) and seed when a test arms it."""
 
     def __init__(self, build: Callable[[float, int], Any], channels: str = CHANNELS) -> None:
         self._build, self._channels = build, zlib.crc32(channels.encode())
@@ -61,17 +62,17 @@ class Server:
         self._state, self._text = IDLE, ""
         self._session = self._seq = 0
         self._silence = 0.0
-        self._packet = b""  # the last answer to a packet that moved something
+        self._packet = b""  # the answer to the last packet other than an echo
         self._heard = time.monotonic()
 
     def answer(self, packet: bytes) -> bytes:
-        """The answer to a packet, empty for one that is damaged, old, or of another test."""
+        """The answer to a packet; empty if the packet is damaged, old, or of another test."""
         if len(packet) != SIZE or zlib.crc32(packet[:CHECKED]) != int.from_bytes(packet[CHECKED:], "little"):
             return b""
         magic, version, kind, session, seq, interval, silence, seed, _, count, *rest = REQUEST.unpack(packet)
         if magic != b"RTHR" or version != 1:
             return b""
-        if kind == ECHO:  # a rig with real sensors gives its readings here too
+        if kind == ECHO:  # a rig with real sensors should answer with its readings here as well
             return self._filled(kind, session, seq)
         if kind == ARM and session != self._session and self._state not in (READY, RUNNING):
             self._session, self._seq, self._silence = session, 0, silence
@@ -84,10 +85,10 @@ class Server:
             if rest[0] == self._channels:
                 self._do(kind, rest[1 : 1 + count])
             else:
-                self._state, self._text = STOPPED, "other channels than mine"
+                self._state, self._text = STOPPED, "other channels than in the plan"
             measured = () if kind == DISARM else tuple(self._rig.read())
             self._packet = self._filled(kind, session, seq, measured=measured)
-        return self._packet if seq == self._seq else b""  # one that is sent twice is answered twice
+        return self._packet if seq == self._seq else b""  # a packet that is sent twice is answered twice
 
     def _do(self, kind: int, values: Sequence[float]) -> None:
         try:
@@ -108,7 +109,7 @@ class Server:
         self._rig.disarm()
 
     def look(self) -> None:
-        """Stop a rig that moves and has had no packet for too long."""
+        """Stop a running rig if no packet has arrived for too long."""
         if self._state == RUNNING and time.monotonic() - self._heard > self._silence:
             self._stop(f"no packet for {self._silence * 1e3:.0f} ms")
 

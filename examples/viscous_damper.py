@@ -2,7 +2,7 @@
 
 Try it:    rths run examples/viscous_damper.toml --virtual
 
-Spring (oil and brace) and dashpot stand in a row, a Maxwell element. With the piston at x and the dashpot at d:
+Spring (oil and brace) and dashpot are in series, a Maxwell element. With the piston at x and the dashpot at d:
 
     f = k·(x − d) = c·|v|^α·sgn v,    v = ḋ
 
@@ -19,12 +19,16 @@ from laboratories.device import Channels, Device, Fault, Limited, Nominal, Signa
 from models.registry import Array
 from models.transfer_systems import delay, first_order
 
-SUBSTEPS = 8  # of an interval
-MEMORY = 512  # commands kept, enough for the largest dead time at the shortest interval of a plan
+SUBSTEPS = 8  # of an interval: 0.25 ms at 2 ms, a fortieth of the relaxation time c/k of 9 ms (α = 1)
+MEMORY = (
+    512  # commands kept: enough for the largest dead time (50 ms) at the shortest interval of a plan (0.1 ms)
+)
 
-# places in `parameters`: the interval, then `nominal`, then `faults`
+# indices of `parameters`: the interval, then `nominal`, then `faults`
 INTERVAL, STIFFNESS, COEFFICIENT, EXPONENT, DELAY, TIME_CONSTANT, LEAK, AIR = range(8)
-PISTON, DASHPOT, COMMANDS = range(3)  # places in `state`: m, m, the commands written (m), newest first
+PISTON, DASHPOT, COMMANDS = range(
+    3
+)  # indices of `state`: m, m, and the first of the past commands (m), newest first
 
 
 class ViscousDamper(Device):
@@ -33,11 +37,11 @@ class ViscousDamper(Device):
     name = "viscous_damper"
     says = "actuator and viscous damper"
     channels = Channels(
-        target=Signal("piston_target", "m", "displacement of the piston wanted"),
-        command=Signal("piston_command", "m", "command written, to be reached at the end of the interval"),
+        target=Signal("piston_target", "m", "target displacement of the piston"),
+        command=Signal("piston_command", "m", "command, to be reached at the end of the interval"),
         measured=(
-            Signal("piston_displacement", "m", "displacement of the piston measured"),
-            Signal("piston_force", "N", "force of the damper measured"),
+            Signal("piston_displacement", "m", "measured displacement of the piston"),
+            Signal("piston_force", "N", "measured force of the damper"),
         ),
         position="piston_displacement",
         force="piston_force",
@@ -66,7 +70,7 @@ class ViscousDamper(Device):
 
     @staticmethod
     def step(parameters: Array, state: Array, truth: Array, command: float, _effort: float) -> None:
-        """Actuator and damper one interval later."""
+        """Advance actuator and damper by one interval."""
         commands = state[COMMANDS:]
         delay.remember(commands, command)
         length = parameters[INTERVAL] / SUBSTEPS
@@ -74,11 +78,11 @@ class ViscousDamper(Device):
         late = 1.0 + math.expm1(-q) / q
         row: Any = (math.exp(-q), -math.expm1(-q) - late, late)
         ago = 1.0 + parameters[DELAY] / parameters[INTERVAL]  # intervals
-        before = commanded(commands, ago)
+        before = command_at(commands, ago)
         for i in range(SUBSTEPS):
-            after = commanded(commands, ago - (i + 1) / SUBSTEPS)
+            after = command_at(commands, ago - (i + 1) / SUBSTEPS)
             piston = first_order.step(row, state[PISTON], before, after)
-            state[DASHPOT] = slid(parameters, state[DASHPOT], state[PISTON], piston, length)
+            state[DASHPOT] = dashpot_after(parameters, state[DASHPOT], state[PISTON], piston, length)
             state[PISTON] = piston
             before = after
         truth[0] = state[PISTON]
@@ -86,32 +90,37 @@ class ViscousDamper(Device):
 
 
 @kernel
-def commanded(commands: Array, ago: float) -> float:
-    """The command (m) so many intervals before the end of the present one; it is a ramp in between."""
+def command_at(commands: Array, ago: float) -> float:
+    """The command (m) `ago` intervals before the end of the present one, interpolated linearly."""
     whole = int(ago)
     return commands[whole] + (ago - whole) * (commands[whole + 1] - commands[whole])
 
 
 @kernel
 def force(parameters: Array, stretch: float) -> float:
-    """Force (N) of the spring by its stretch (m); air takes a stretch without any."""
+    """Force (N) of the spring at its stretch (m); trapped air takes part of the stretch without force."""
     half = 0.5 * parameters[AIR]
     return parameters[STIFFNESS] * (stretch - min(max(stretch, -half), half))
 
 
 @kernel
-def rate(parameters: Array, stretch: float) -> float:
-    """Velocity (m/s) of the dashpot under the force of the spring."""
+def dashpot_velocity(parameters: Array, stretch: float) -> float:
+    """Velocity (m/s) of the dashpot under the force of the spring at its stretch (m)."""
     f, c = force(parameters, stretch), (1.0 - parameters[LEAK]) * parameters[COEFFICIENT]
     return math.copysign((abs(f) / c) ** (1.0 / parameters[EXPONENT]), f)
 
 
 @kernel
-def slid(parameters: Array, dashpot: float, piston: float, there: float, length: float) -> float:
-    """The dashpot (m) after `length` s of straight motion of the piston, by Runge and Kutta's fourth order."""
-    middle = 0.5 * (piston + there)
-    first = rate(parameters, piston - dashpot)
-    second = rate(parameters, middle - dashpot - 0.5 * length * first)
-    third = rate(parameters, middle - dashpot - 0.5 * length * second)
-    last = rate(parameters, there - dashpot - length * third)
+def dashpot_after(
+    parameters: Array, dashpot: float, piston: float, piston_after: float, length: float
+) -> float:
+    """The dashpot (m) after `length` s, by the fourth-order method of Runge and Kutta.
+
+    The piston moves from `piston` to `piston_after` (m) at constant velocity.
+    """
+    middle = 0.5 * (piston + piston_after)
+    first = dashpot_velocity(parameters, piston - dashpot)
+    second = dashpot_velocity(parameters, middle - dashpot - 0.5 * length * first)
+    third = dashpot_velocity(parameters, middle - dashpot - 0.5 * length * second)
+    last = dashpot_velocity(parameters, piston_after - dashpot - length * third)
     return dashpot + length / 6.0 * (first + 2.0 * second + 2.0 * third + last)

@@ -1,9 +1,10 @@
-"""Coverage-guided fuzzing of the decoder of frames, and of the recorder's decoder of pieces of samples.
+"""Coverage-guided fuzzing of the decoder of frames, and of the decoder with which the recorder reads samples.
 
     python fuzz/decode.py [-max_total_time=600] [-seed=1] [FOLDER]
 
-Options are those of libFuzzer; FOLDER keeps inputs that reached something new. Atheris is no dependency of the
-project. Ends with a traceback, and the input in a file, where decoding does anything but give a message or reject.
+The options are those of libFuzzer; FOLDER keeps the inputs that covered new code. Atheris is not a dependency of the
+project. If decoding does anything but return a message or reject the frame, the program ends with a traceback and
+writes the input to a file.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ with atheris.instrument_imports(
     from common.signals import TOPICS
     from recorder.items import Items
 
-SESSION = 7
+SESSION = 7  # any but 0, which stands for no session
 KEY = codec.session_key(SESSION, "plan")
 ROLES = ("master", "slave", "recorder", "operator")
 PLAN = Plan()
@@ -42,20 +43,20 @@ ITEMS = {lab: Items(PLAN, lab) for lab in ("master", "slave")}
 
 
 class SilentLink:
-    """A link on which nothing is sent."""
+    """A link that discards all frames."""
 
     def send(self, channel: str, frame: bytes, to: str = "") -> None:
         """Discard a frame."""
 
     def listen(self, heard: object) -> None:
-        """Frames are handed to the endpoint itself."""
+        """Do nothing: `hear` passes frames to the endpoint directly."""
 
     def close(self) -> None:
-        """Nothing to leave."""
+        """Do nothing."""
 
 
 def listening(session: int) -> endpoint.FrameEndpoint:
-    """An endpoint in a session."""
+    """An endpoint that has entered a session."""
     wire: Transport = SilentLink()
     found = endpoint.FrameEndpoint(wire, "plan")
     found.enter(session)
@@ -66,7 +67,7 @@ ENDS = (listening(SESSION), listening(0))
 
 
 def one_input(data: bytes) -> None:
-    """A frame as it is, and one that holds the same bytes under the right key, on a route that its first byte picks."""
+    """Decode the input as a frame, and its bytes with a valid check; the first byte chooses the route."""
     if not data:
         return
     choice, payload = data[0], data[1:]
@@ -81,18 +82,18 @@ def one_input(data: bytes) -> None:
 
 
 def hear(end: endpoint.FrameEndpoint, packet: Packet) -> None:
-    """What arrives is a message with that frame and no other, or it is counted."""
+    """Check that a frame is either the only encoding of a message, or counted as rejected."""
     before = end.rejected.total()
     end._heard(packet)
     received = end.receive()
     if (received is None) == (end.rejected.total() == before):
-        raise AssertionError("a frame must be either a message or rejected")
+        raise AssertionError("a frame must either be decoded into a message or be rejected")
     if received is not None and codec.encode(received.message, KEY)[:-8] != packet.frame[:-8]:
-        raise AssertionError("a message must have one frame only")
+        raise AssertionError("the message is encoded into another frame than the one it was decoded from")
 
 
 def take(payload: bytes) -> None:
-    """The recorder's side of a piece: items that can be recorded, or none."""
+    """Decode a piece of samples as the recorder does: it yields items that can be recorded, or none."""
     for items in ITEMS.values():
         inlet = outlet.Inlet(items.unpack, most=1_000)
         for first in (0, 5, 10):
@@ -102,7 +103,7 @@ def take(payload: bytes) -> None:
 
 
 def seeds(folder: Path) -> None:
-    """One valid frame of every kind, and one piece, for the fuzzer to begin with."""
+    """Write one valid frame of every kind and one piece of samples, from which the fuzzer starts."""
     folder.mkdir(parents=True, exist_ok=True)
     for kind in codec.MESSAGES:
         hints = get_type_hints(kind)
@@ -116,7 +117,7 @@ def seeds(folder: Path) -> None:
 
 
 def main() -> None:
-    """Fuzz until the time is over or something is found."""
+    """Fuzz until the time is over or an error is found."""
     folders = [word for word in sys.argv[1:] if not word.startswith("-")]
     if folders:
         seeds(Path(folders[0]))

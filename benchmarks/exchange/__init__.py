@@ -1,4 +1,4 @@
-"""The exchange of a tick beside bare zenoh, bare sockets and TLS: free-running, paced, under load, over a cable."""
+"""The exchange of a tick, compared with bare zenoh, bare sockets and TLS: free-running, paced, loaded, over a cable."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from common.link.zenoh_link import listenable
 from rths.prepare import keys
 
 ROOT = Path(__file__).resolve().parents[2]
-REPEATS = 3
-INTERVAL = 0.002
+REPEATS = 3  # odd, so that the median is a measured value; the whole takes a few minutes
+INTERVAL = 0.002  # s, of the default test
 LOCAL = ("127.0.0.1", "127.0.0.1")
 PEERS = {"zenoh": "bare zenoh", "tcp": "bare TCP", "udp": "bare UDP"}
 OURS = {"rths": "exchange", "rths_lab": "exchange with the emulated laboratory"}
@@ -33,7 +33,7 @@ DAY = timedelta(days=1)
 
 
 class Scenario(NamedTuple):
-    """One way to run the exchange; `most` are the ratios to bare zenoh that are aimed at, by percentile."""
+    """One way to run the exchange; `most` holds the largest ratio to bare zenoh that is the target, by percentile."""
 
     name: str
     interval: float
@@ -43,6 +43,7 @@ class Scenario(NamedTuple):
     wired: bool = False
 
 
+# Targets: codec, check, limits and the slave's step may add a quarter to the median of bare zenoh, half to its tail.
 SCENARIOS = (
     Scenario("free-running", 0.0, 60, {50: 1.25}),
     Scenario("every 2 ms", INTERVAL, 30, {50: 1.25, 99: 1.5}),
@@ -54,11 +55,11 @@ QUICK = (Scenario("free-running", 0.0, 1, {}), Scenario("free-running over a cab
 
 
 class ExchangeError(Exception):
-    """A run gave no round trips, and why."""
+    """A run without a result; the text says why."""
 
 
 def run(*, quick: bool = False) -> list[BenchmarkFigure]:
-    """All scenarios, each several times."""
+    """Run all scenarios, each several times."""
     scenarios, repeats = (QUICK, 1) if quick else (SCENARIOS, REPEATS)
     figures = []
     for scenario in scenarios:
@@ -74,12 +75,12 @@ def run(*, quick: bool = False) -> list[BenchmarkFigure]:
 
 
 def percentile(found: dict[str, Any], name: str, share: int) -> float:
-    """Percentile of a transport's round trips in one run, µs."""
+    """A percentile (`share` in %) of a transport's round trips in one run, µs."""
     return float(np.percentile(found["trips"][name], share)) * 1e-3
 
 
 def ours(scenario: Scenario, name: str, words: str, runs: list[dict[str, Any]]) -> Iterator[BenchmarkFigure]:
-    """Median and 99th percentile of the exchange, beside bare zenoh in the same run."""
+    """Median and 99th percentile of the exchange, compared with bare zenoh in the same run."""
     for share in (50, 99):
         values = [percentile(found, name, share) for found in runs]
         ratios = [percentile(found, name, share) / percentile(found, "zenoh", share) for found in runs]
@@ -98,7 +99,7 @@ def ours(scenario: Scenario, name: str, words: str, runs: list[dict[str, Any]]) 
 
 
 def secured(scenario: Scenario, runs: list[dict[str, Any]]) -> Iterator[BenchmarkFigure]:
-    """Median and 99th percentile of the exchange over TLS, beside that over TCP in the same run."""
+    """Median and 99th percentile of the exchange over TLS, compared with that over TCP in the same run."""
     for share in (50, 99):
         values = [percentile(found, "rths_tls", share) for found in runs]
         ratios = [percentile(found, "rths_tls", share) / percentile(found, "rths", share) for found in runs]
@@ -119,7 +120,7 @@ def peer(scenario: Scenario, name: str, words: str, runs: list[dict[str, Any]]) 
 
 
 def once(scenario: Scenario) -> dict[str, Any]:
-    """Round trips of one run by transport, ns."""
+    """The result of one run of benchmarks/exchange/ask.py: the key `trips` holds the round trips by transport, ns."""
     with contextlib.ExitStack() as stack:
         if scenario.loaded:
             stack.enter_context(busy())
@@ -162,7 +163,7 @@ def module(words: list[str]) -> list[str]:
 
 @contextlib.contextmanager
 def answerer(words: list[str]) -> Iterator[None]:
-    """The answering process, until the end of the block."""
+    """Run the answering process until the end of the block."""
     process = subprocess.Popen(words, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None  # noqa: S101 - it is a pipe
     process.stdout.readline()
@@ -171,6 +172,6 @@ def answerer(words: list[str]) -> Iterator[None]:
     finally:
         try:
             process.communicate(timeout=30)
-        except subprocess.TimeoutExpired:  # it waits for an asking end that never came
+        except subprocess.TimeoutExpired:  # it waits for an asking process that failed to start
             process.kill()
             process.wait()

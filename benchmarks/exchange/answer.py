@@ -14,7 +14,7 @@ from common.host import realtime
 
 
 def main() -> int:
-    """Answer; sockets and bare zenoh in threads of their own."""
+    """Answer on every transport; sockets and bare zenoh answer in threads of their own."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--asking", required=True, help="address of the asking end, where zenoh listens")
     parser.add_argument("--here", required=True, help="address of this end, where the sockets listen")
@@ -47,7 +47,7 @@ def main() -> int:
 
 
 def input_ended() -> bool:
-    """Whether whoever started this process has closed its input."""
+    """Whether the parent process has closed the input of this process."""
     return bool(select.select([sys.stdin], [], [], 0.0)[0])
 
 

@@ -1,8 +1,8 @@
-"""Both ends of every transport that is compared: an exchange is a frame there and a frame back.
+"""Both ends of the compared transports: an exchange is one frame there and one frame back.
 
-`rths` is the exchange itself: frames of the codec over the link, answered by the slave's loop, its step and limits
-included, whose laboratory stands still; `rths_tls` is the same over a link with certificates and access control,
-`rths_lab` has the emulated laboratory there. The others carry as many bytes and nothing else.
+`rths` is the exchange of a test: frames of the codec over the link, answered by the slave's loop with its step and
+limits, whose laboratory stands still. `rths_tls` is the same over a link with certificates and access control;
+`rths_lab` has the emulated laboratory. The other transports carry as many bytes and do nothing else.
 """
 
 from __future__ import annotations
@@ -42,44 +42,44 @@ from common.protocol.messages import (
 from common.rig import TableCommand
 from slave.assembly import build_loop
 
-PAYLOAD = b"x" * 110  # a command's frame is about as long
+PAYLOAD = b"x" * 110  # bytes: between the frames of a command (100) and of a feedback (118)
 NAMES = ("rths", "rths_tls", "rths_lab", "zenoh", "tcp", "udp")
 SESSION = INSTANCE = 1
-PATIENCE_S = 20.0
-# Exchanges of a few transports take turns, so they keep no timetable of 2 ms. The start is agreed so far ahead that no
-# tick is late, and a message counts as fresh however far it is from its nominal time.
+PATIENCE_S = 20.0  # for the other end to start and to answer; it starts in about 3 s on an idle machine
+# The transports take turns, so that a tick is not exchanged at its nominal time. The start is agreed so far ahead that
+# no tick is late, and messages of any age are accepted. Both times are longer than any run, which takes minutes.
 LEAD_S = 1_800.0
 NEVER_S = 3_600.0
 
 
 class Asking(Protocol):
-    """The end that asks."""
+    """The end that sends first."""
 
     def exchange(self) -> int:
-        """One frame there and one back; when the answer was in the asker's hands, ns."""
+        """Send a frame and wait for the answer; returns the time of its receipt, ns."""
 
     def close(self) -> None:
-        """Leave."""
+        """Close the connection."""
 
 
 class StillTable:
-    """A laboratory that takes no time, so that only the exchange is timed."""
+    """A rig that takes no time, so that only the exchange is measured."""
 
     def __init__(self, interval: float, seed: int) -> None:
         pass
 
     def arm(self) -> None:
-        """Ready."""
+        """Do nothing: there is no actuator."""
 
     def read(self) -> tuple[float, float, float, float]:
-        """All at rest."""
+        """Readings at rest."""
         return (0.0, 0.0, 0.0, 0.0)
 
     def write(self, command: TableCommand) -> None:
-        """Nothing moves."""
+        """Do nothing: there is no actuator."""
 
     def disarm(self) -> None:
-        """Nothing has moved."""
+        """Do nothing: there is no actuator."""
 
 
 LABORATORIES = {
@@ -91,7 +91,7 @@ SECURE = ("rths_tls",)
 
 
 def bench_plan(kind: str, keys: Path) -> Plan:
-    """The default test with one of the laboratories; it needs no recorder here; `keys` is a folder of certificates."""
+    """The default test without a recorder, with the laboratory of a transport; `keys` is a folder of certificates."""
     return replace(
         Plan(),
         test=replace(Plan().test, name=kind),
@@ -103,12 +103,12 @@ def bench_plan(kind: str, keys: Path) -> Plan:
 
 
 def identity(plan: Plan, role: str) -> Identity | None:
-    """A role's certificate, None where the link is open."""
+    """A role's certificate, None for a link without encryption."""
     return security.identity(plan, role) if plan.link.security.folder else None
 
 
 class RthsAsking:
-    """The master's end: encode, send, receive, check, decode."""
+    """The master's end: it encodes and sends a command; it receives, checks and decodes the feedback."""
 
     def __init__(self, kind: str, keys: Path, host: str, port: int) -> None:
         plan = bench_plan(kind, keys)
@@ -131,7 +131,7 @@ class RthsAsking:
         raise TimeoutError(f"no {answer.__name__} from the slave")
 
     def exchange(self) -> int:
-        """A command and the feedback that has it in force, until its values are there; the loop sleeps meanwhile."""
+        """Send a command and wait for the feedback of the tick that uses it; returns when it was decoded, ns."""
         seq = self._seq
         self._seq += 1
         now = time.monotonic_ns()
@@ -144,12 +144,12 @@ class RthsAsking:
         raise TimeoutError(f"no feedback from the slave that uses command {seq}")
 
     def close(self) -> None:
-        """Leave the link."""
+        """Close the link."""
         self._link.close()
 
 
 def answer_rths(kind: str, keys: Path, host: str, port: int, ended: Callable[[], bool]) -> None:
-    """The slave's end: its loop and emulated laboratory, a tick for every command."""
+    """The slave's end: its loop and laboratory do a tick for every command, until `ended` returns true."""
     plan = bench_plan(kind, keys)
     link = ZenohLink(
         "slave",
@@ -170,7 +170,7 @@ def answer_rths(kind: str, keys: Path, host: str, port: int, ended: Callable[[],
 
 
 def bare_session(listen: str = "", connect: str = "") -> zenoh.Session:
-    """A session with nothing but a static link."""
+    """A zenoh session with one fixed link and without discovery."""
     config = zenoh.Config()
     config.insert_json5("listen/endpoints", json.dumps([listen] if listen else []))
     config.insert_json5("connect/endpoints", json.dumps([connect] if connect else []))
@@ -179,7 +179,7 @@ def bare_session(listen: str = "", connect: str = "") -> zenoh.Session:
 
 
 class ZenohAsking:
-    """Bare zenoh: put, then wait on a channel."""
+    """Bare zenoh: put a payload, then wait for the echo."""
 
     def __init__(self, host: str, port: int) -> None:
         self._session = bare_session(listen=f"tcp/{host}:{port}")
@@ -188,22 +188,22 @@ class ZenohAsking:
         deadline = MonotonicClock().now() + int(PATIENCE_S * 1e9)
         while not self._publisher.matching_status.matching:  # type: ignore[attr-defined]
             if MonotonicClock().now() > deadline:
-                raise TimeoutError("nobody answers over bare zenoh")
+                raise TimeoutError(f"no subscriber over bare zenoh within {PATIENCE_S:g} s")
             MonotonicClock().sleep_until(MonotonicClock().now() + 10_000_000)
 
     def exchange(self) -> int:
-        """A payload and its echo."""
+        """Send a payload and wait for its echo; returns the time of its receipt, ns."""
         self._publisher.put(PAYLOAD)
         self._heard.recv().payload.to_bytes()
         return time.monotonic_ns()
 
     def close(self) -> None:
-        """Leave the session."""
+        """Close the session."""
         self._session.close()  # type: ignore[no-untyped-call]
 
 
 def answer_zenoh(host: str, port: int) -> Callable[[], None]:
-    """Echo in the callback; what closes it."""
+    """Echo payloads in the callback of zenoh; returns the function that ends it."""
     deadline = MonotonicClock().now() + int(PATIENCE_S * 1e9)
     while True:
         try:
@@ -225,7 +225,7 @@ class TcpAsking:
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
     def exchange(self) -> int:
-        """A payload and its echo."""
+        """Send a payload and wait for its echo; returns the time of its receipt, ns."""
         self._socket.sendall(PAYLOAD)
         left = len(PAYLOAD)
         while left:
@@ -238,7 +238,7 @@ class TcpAsking:
 
 
 def answer_tcp(host: str, port: int) -> None:
-    """Listen, and echo in a thread of its own."""
+    """Listen, and echo payloads in a thread of its own."""
     server = socket.create_server((host, port))
 
     def serve() -> None:
@@ -259,7 +259,7 @@ class UdpAsking:
         self._socket.connect((host, port))
 
     def exchange(self) -> int:
-        """A payload and its echo."""
+        """Send a payload and wait for its echo; returns the time of its receipt, ns."""
         self._socket.send(PAYLOAD)
         self._socket.recv(4096)
         return time.monotonic_ns()
@@ -270,7 +270,7 @@ class UdpAsking:
 
 
 def answer_udp(host: str, port: int) -> None:
-    """Echo in a thread of its own."""
+    """Echo payloads in a thread of its own."""
     server = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     server.bind((host, port))
 

@@ -1,1 +1,1 @@
-"""The wire by which OpenSees and OpenFresco talk to a laboratory: bytes to values and back, and a server's states."""
+"""OpenSees as a specimen in another process, and the messages by which OpenSees and OpenFresco command a laboratory."""

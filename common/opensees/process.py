@@ -1,4 +1,4 @@
-"""One OpenSees specimen in a process of its own: a way of deformations goes in, the force at its end comes back."""
+"""One OpenSees specimen in a process of its own: it is sent a path of deformations and returns the force at its end."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ INTERPRETER = (
     "RTHS_OPENSEES_PYTHON"  # environment: an interpreter that has openseespy, where this one has not
 )
 INSTALL = f"`make opensees` installs OpenSeesPy, or {INTERPRETER} names an interpreter that has it"
-LOADED = b"Process 0 Terminating"  # what OpenSees says as it ends, of no interest
+ENDED = b"Process 0 Terminating"  # the line that OpenSees writes whenever it ends
 
 
 class SpecimenProcess:
-    """The process; `task` is {"materials": rows} or {"model": file, "options": {…}}, `name` stands in errors.
+    """The process; `task` is {"materials": rows} or {"model": file, "options": {…}}, `name` is for messages.
 
     Raises:
-        InputError: OpenSees is not installed, or does not take the materials or the model.
+        InputError: OpenSees is not installed, or refuses the materials or the model.
     """
 
     def __init__(self, name: str, task: Mapping[str, Any]) -> None:
@@ -58,7 +58,7 @@ class SpecimenProcess:
             raise InputError(f"OpenSees cannot be the specimen {name} ({said}){hint}.")
 
     def force(self, way: Sequence[float] | Array) -> float:
-        """The force (N) at the end of a way (m).
+        """The force (N) at the end of a path of deformations (m).
 
         Raises:
             RigError: OpenSees finds no equilibrium, or its process has ended.
@@ -85,27 +85,27 @@ class SpecimenProcess:
         return float(server.VALUE.unpack(answer)[0]) if len(answer) == server.VALUE.size else None
 
     def _words(self) -> str:
-        """The last thing that the process said."""
+        """The last line of the standard error of the process, without the type of the error."""
         if self._said.closed:
             return "its process is closed"
         self._said.seek(0)
-        lines = [line for line in self._said.read().splitlines() if line.strip() and LOADED not in line]
+        lines = [line for line in self._said.read().splitlines() if line.strip() and ENDED not in line]
         last = lines[-1].decode(errors="replace").strip() if lines else "it said nothing"
         return re.sub(r"^\w+Error: ", "", last)
 
 
 def _end(process: subprocess.Popen[bytes], said: IO[bytes]) -> None:
-    """End the process; what it has to say is of no interest any more."""
+    """End the process and close its streams."""
     process.kill()
     for stream in (process.stdin, process.stdout, said):
         if stream is not None and not stream.closed:
-            with contextlib.suppress(BrokenPipeError):  # what was not flushed
+            with contextlib.suppress(BrokenPipeError):  # `close` flushes to a process that has ended
                 stream.close()
     process.wait()
 
 
 def absolute(file: str) -> str:
-    """A model's file as the process finds it; raises InputError where there is none."""
+    """The absolute path of a model's file; raises InputError if there is no such file."""
     path = Path(file).expanduser()
     if not path.is_file():
         raise InputError(

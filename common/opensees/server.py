@@ -1,9 +1,9 @@
-"""A process that holds one OpenSees specimen: `python server.py TASK`, started by `common.opensees.process`.
+"""A process with one OpenSees specimen: `python server.py TASK`, started by `common.opensees.process`.
 
-OpenSees has one domain per process, so each specimen has a process of its own; it may be another interpreter's, and
-imports nothing of this project. It reads deformations (m, eight bytes each, a count before them) from standard input
-and answers with the force (N) at the last, NaN where OpenSees finds no equilibrium. What OpenSees itself writes to
-standard output goes to standard error.
+OpenSees has one domain per process, so each specimen has a process of its own. It may run in another interpreter, and
+imports nothing of rths. It reads a count and as many deformations (m, eight bytes each) from standard input and
+answers with the force (N) at the last, NaN if OpenSees finds no equilibrium. The standard output of OpenSees is
+redirected to standard error.
 """
 
 from __future__ import annotations
@@ -19,14 +19,17 @@ from collections.abc import Iterable
 from typing import Any
 
 COUNT, VALUE = struct.Struct("<i"), struct.Struct("<d")
-OWN = 1_000_000  # tag of the pattern and time series beside those of a model
-HALVINGS = 8  # of a way that finds no equilibrium: 1/256 of it is far below what a tick moves
+OWN = 1_000_000  # tag of the pattern and time series of the deformation; a model of a user has lower tags
+# of a step without equilibrium, to 1/256 of it: 1 µm, as 0.5 m/s are 0.25 mm in each of the four steps of a tick
+HALVINGS = 8
 ALGORITHMS = (("Newton",), ("KrylovNewton",), ("NewtonLineSearch",), ("ModifiedNewton", "-initial"))
-TOLERANCE, ITERATIONS = 1e-11, 60  # m, of the last iteration's step: a thousandth of a sensor's resolution
+# m, increment of the last iteration: with a stiffness of 100 kN/mm an error of 1 mN. Newton's method needs about five
+# iterations; the others converge linearly and may need some tens.
+TOLERANCE, ITERATIONS = 1e-11, 60
 
 
 class Material:
-    """A uniaxial material: deformation as strain, force as stress; `rows` are calls of `uniaxialMaterial`."""
+    """A uniaxial material: deformation (m) as strain, force (N) as stress; `rows` are calls of `uniaxialMaterial`."""
 
     def __init__(self, ops: Any, rows: list[list[Any]]) -> None:
         self._ops = ops
@@ -35,16 +38,16 @@ class Material:
         ops.testUniaxialMaterial(int(rows[-1][1]))
 
     def force(self, way: Iterable[float]) -> float:
-        """The force (N) at the end of a way (m)."""
+        """The force (N) at the end of a path of deformations (m)."""
         for deformation in way:
             self._ops.setStrain(deformation)
         return float(self._ops.getStress())
 
 
 class Model:
-    """A model of a user's file: its `build(ops, **options)` gives the node and the direction that are moved.
+    """A model in a file of the user, whose `build(ops, **options)` returns the node and the direction to be moved.
 
-    What it computes beforehand, as an axial load, is its own matter; loads of it must be constant by then.
+    `build` may apply loads, as an axial force; they must be constant when it returns.
     """
 
     def __init__(self, ops: Any, file: str, options: dict[str, Any]) -> None:
@@ -56,7 +59,7 @@ class Model:
         unit = [0.0] * len(ops.nodeDisp(self._node))
         unit[self._dof - 1] = 1.0
         ops.load(self._node, *unit)
-        ops.setTime(0.0)  # from now on it is the load factor: the force
+        ops.setTime(0.0)  # the time is the load factor of the unit load, hence the force
         ops.constraints("Transformation")
         ops.numberer("RCM")
         ops.system("BandGeneral")
@@ -67,14 +70,14 @@ class Model:
         self._zero = float(ops.nodeDisp(self._node, self._dof))
 
     def force(self, way: Iterable[float]) -> float:
-        """The force (N) at the end of a way (m); NaN where no equilibrium is found."""
+        """The force (N) at the end of a path of deformations (m); NaN if no equilibrium is found."""
         for deformation in way:
             if not self._move(deformation, HALVINGS):
                 return math.nan
         return float(self._ops.getLoadFactor(OWN))
 
     def _move(self, to: float, halvings: int) -> bool:
-        """Move on to a deformation, in halves where it is too far for one step."""
+        """Move to a deformation (m); a step without equilibrium is halved up to `halvings` times."""
         if to == self._at:
             return True
         step = self._zero + to - float(self._ops.nodeDisp(self._node, self._dof))

@@ -1,9 +1,9 @@
 """The messages of OpenSees' `genericClient` and `actuator` elements and of OpenFresco's `GenericTCP` control as bytes.
 
-Whoever connects sends one header of eleven 32-bit integers: how many displacements, velocities, accelerations, forces
-and times it commands, how many it acquires, and how many 64-bit numbers every later message has, both ways. A message
-to a server begins with a code, behind which the commanded values stand; an answer holds values alone. Nothing on the
-wire says the order of bytes: it is the machine's own, and a header that makes no sense is refused.
+The client sends one header of eleven 32-bit integers: how many displacements, velocities, accelerations, forces and
+times it commands, how many of each it acquires, and how many 64-bit numbers every later message has in both directions.
+A message to a server begins with a code, followed by the commanded values; an answer holds values only. The messages do
+not state the byte order: it is that of the machine, and a header without a valid meaning is refused.
 
 Source: OpenSees, `SRC/element/generic/GenericClient.cpp` and `SRC/actor/channel/TCP_Socket.cpp`; OpenFresco,
 `SRC/experimentalControl/ECGenericTCP.cpp`.
@@ -26,11 +26,11 @@ MOST_NUMBERS = 4096
 
 
 class Code(IntEnum):
-    """What a message to a server wants."""
+    """The codes of messages to a server."""
 
     TRIAL = 3  # move to these displacements; not answered
-    COMMIT = 5  # the step is done; not answered
-    ACQUIRE = 6  # all that the header acquires
+    COMMIT = 5  # the step is complete; not answered
+    ACQUIRE = 6  # request all quantities that the header acquires
     FORCE = 10
     INITIAL_STIFFNESS = 12  # matrices, column by column
     STIFFNESS = 13
@@ -44,7 +44,7 @@ MATRICES = frozenset({Code.INITIAL_STIFFNESS, Code.STIFFNESS, Code.DAMPING, Code
 
 
 class Sizes(NamedTuple):
-    """How many values of each quantity a message carries, in this order."""
+    """The number of values of each quantity in a message, in this order."""
 
     displacement: int = 0
     velocity: int = 0
@@ -54,7 +54,7 @@ class Sizes(NamedTuple):
 
 
 class Header(NamedTuple):
-    """What a client commands and acquires, and how many numbers (`data`) every message of both sides has."""
+    """The quantities that a client commands and acquires, and the length (`data`) of all messages in numbers."""
 
     control: Sizes
     acquired: Sizes
@@ -62,7 +62,7 @@ class Header(NamedTuple):
 
     @property
     def least(self) -> int:
-        """The numbers that a message needs at least: a code with the commanded values, or those acquired."""
+        """The least length of a message: the code and the commanded values, or the acquired values."""
         return max(1 + sum(self.control), sum(self.acquired))
 
     @property
@@ -72,7 +72,7 @@ class Header(NamedTuple):
 
 
 class Quantities(NamedTuple):
-    """The values of a message, quantity by quantity: m, m/s, m/s², N, s; empty where it carries none."""
+    """The values of a message by quantity, in m, m/s, m/s², N and s; empty for a quantity that it does not hold."""
 
     displacement: tuple[float, ...] = ()
     velocity: tuple[float, ...] = ()
@@ -82,7 +82,7 @@ class Quantities(NamedTuple):
 
 
 def element(dofs: int, data: int = 256) -> Header:
-    """The header of a `genericClient` element with so many degrees of freedom."""
+    """The header of a `genericClient` element with `dofs` degrees of freedom."""
     control = Sizes(displacement=dofs, velocity=dofs, acceleration=dofs, time=1)
     return Header(control, Sizes(force=dofs), max(data, 3 * dofs + 2, dofs * dofs))
 
@@ -96,7 +96,8 @@ def read_header(data: bytes) -> Header:
     """The header in the first bytes of a connection, exactly `HEADER.size` of them.
 
     Raises:
-        RemoteProtocolError: its numbers make no sense: another program, or a machine of the other order of bytes.
+        RemoteProtocolError: its numbers are not valid: it is of another program, or of a machine with the other
+            byte order.
     """
     numbers = HEADER.unpack(data)
     header = Header(Sizes(*numbers[:5]), Sizes(*numbers[5:10]), numbers[10])
@@ -109,10 +110,10 @@ def read_header(data: bytes) -> Header:
 
 
 def message(header: Header, code: Code, values: Quantities | None = None) -> bytes:
-    """A message to a server: a code, and behind it the values that the header commands.
+    """A message to a server: a code, followed by the values that the header commands.
 
     Raises:
-        ValueError: there are other numbers of values than the header says.
+        ValueError: the numbers of values are not those of the header.
     """
     numbers = [float(code)]
     for name, size, given in zip(Sizes._fields, header.control, values or zeros(header.control), strict=True):
@@ -128,19 +129,19 @@ def zeros(sizes: Sizes) -> Quantities:
 
 
 def answer(header: Header, values: Sequence[float]) -> bytes:
-    """An answer of a server: some values, the rest of the message is zero."""
+    """An answer of a server: the values, padded with zeros."""
     return packed(header, values)
 
 
 def packed(header: Header, numbers: Sequence[float]) -> bytes:
-    """Numbers as a message, filled up with zeros; raises ValueError where there are too many."""
+    """Encode numbers as a message padded with zeros; raises ValueError if there are too many."""
     if len(numbers) > header.data:
         raise ValueError(f"{len(numbers)} numbers for a message of {header.data}")
     return struct.pack(f"={len(numbers)}d", *numbers).ljust(header.size, b"\0")
 
 
 def numbers_in(header: Header, data: bytes, count: int, first: int = 0) -> tuple[float, ...]:
-    """Some numbers of a message, from the place `first` on."""
+    """`count` numbers of a message, from the index `first` on."""
     return struct.unpack_from(f"={count}d", data, NUMBER * first)
 
 
@@ -166,12 +167,12 @@ def commanded(header: Header, data: bytes) -> Quantities:
 
 
 def acquired(header: Header, data: bytes) -> Quantities:
-    """The values of an answer to `Code.ACQUIRE`; raises RemoteProtocolError where one is not finite."""
+    """The values of an answer to `Code.ACQUIRE`; raises RemoteProtocolError if one is not finite."""
     return quantities(header.acquired, numbers_in(header, data, sum(header.acquired)))
 
 
 def quantities(sizes: Sizes, numbers: Sequence[float]) -> Quantities:
-    """Numbers quantity by quantity; raises RemoteProtocolError where one is not finite."""
+    """Divide numbers into quantities; raises RemoteProtocolError if one is not finite."""
     if not math.isfinite(sum(numbers)) and not all(map(math.isfinite, numbers)):
         raise RemoteProtocolError("a message holds a value that is not finite.")
     found, place = [], 0

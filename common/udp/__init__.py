@@ -1,1 +1,1 @@
-"""Rigs in other processes: one UDP packet each way per tick, its layout, and what is measured of the exchange."""
+"""Rigs in other processes: one UDP packet each way per tick, their layout, and the statistics of the exchange."""

@@ -1,4 +1,4 @@
-"""What is measured of the exchange with a rig in another process."""
+"""Statistics of the exchange with a rig in another process."""
 
 from __future__ import annotations
 
@@ -18,28 +18,28 @@ CAUSES = {
 
 
 def quantile(ranked: Sequence[float], part: float) -> float:
-    """The smallest of sorted values that as many as `part` do not exceed; 0 of none."""
+    """The smallest of sorted values that has a share of `part` (0 to 1) of them at or below it; 0 without values."""
     return ranked[math.ceil(part * len(ranked)) - 1] if ranked else 0.0
 
 
 class Account:
-    """Answers by what became of them, and how long ticks waited for them."""
+    """Counts of the answers by outcome, and the times that ticks waited for them."""
 
     def __init__(self) -> None:
         self.counts: Counter[str] = Counter()
         self._waited = array("q")  # ns
 
     def answered(self, waited_ns: int) -> None:
-        """The answer due came in time, after so long in its tick."""
+        """Count an answer in time, for which its tick waited `waited_ns`."""
         self._waited.append(waited_ns)
 
     @property
     def answers(self) -> int:
-        """Answers that came in time."""
+        """Number of answers in time."""
         return len(self._waited)
 
     def values(self) -> dict[str, float]:
-        """The figures, times in s; none before the first answer or fault."""
+        """The statistics, times in s; empty before the first answer or fault."""
         if not self._waited and not self.counts:
             return {}
         ranked = sorted(self._waited)
@@ -48,7 +48,7 @@ class Account:
         return found | {name: quantile(ranked, part) * 1e-9 for name, part in parts.items()}
 
     def sentence(self) -> str:
-        """The same in words."""
+        """The statistics as a sentence."""
         values = self.values()
         faults = [f"{self.counts[name]} {text}" for name, text in CAUSES.items() if self.counts[name]]
         times = ", ".join(f"{name} {values[f'waited_{name}'] * 1e3:.3f} ms" for name in ("p50", "p99", "max"))

@@ -1,7 +1,7 @@
-"""The two packets between a laboratory and a rig in another process: their layout, checks and words.
+"""The two packets between a laboratory and a rig in another process: their layout, checks and meaning.
 
-Both have 128 bytes of fixed layout in little-endian order, so that a model of Simulink, a program of LabVIEW or a few
-lines of C can read them. docs/reference/udp-rig.md has the tables of bytes, which are made from `REQUEST` and `ANSWER`.
+Both have 128 bytes of fixed layout in little-endian order, so that a Simulink model, a LabVIEW program or a few lines
+of C can read them. The tables of bytes in docs/reference/udp-rig.md are generated from `REQUEST` and `ANSWER`.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from common.signals import Channels
 
 VERSION = 1
 SIZE = 128  # bytes of a packet, either way
-VALUES = 8  # numbers that a packet has room for: the most channels of a kind are six
-TEXT = 36  # bytes of the sentence of a rig
+VALUES = 8  # numbers in a packet; the kinds of rths have at most six channels
+TEXT = 36  # bytes of a rig's text: those that are left of 128
 TO_RIG, FROM_RIG = b"RTHR", b"RTHA"
 CHECKED = SIZE - 4  # bytes before the checksum
 
@@ -27,7 +27,7 @@ class Field(NamedTuple):
 
     name: str
     form: str  # of `struct`
-    kind: str  # in words
+    kind: str  # for the documentation
     text: str
 
 
@@ -52,7 +52,7 @@ REQUEST = (
     Field("reserved", "12s", "12 bytes", "zero"),
     Field("checksum", "I", "uint32", f"CRC-32 of the {CHECKED} bytes before it"),
 )
-"""What a laboratory sends its rig."""
+"""The packet from a laboratory to its rig."""
 
 ANSWER = (
     Field("magic", "4s", "4 bytes", 'the letters "RTHA"'),
@@ -69,11 +69,11 @@ ANSWER = (
     ),
     Field("checksum", "I", "uint32", f"CRC-32 of the {CHECKED} bytes before it"),
 )
-"""What a rig answers."""
+"""The packet from a rig to its laboratory."""
 
 
 def layout(fields: Sequence[Field]) -> struct.Struct:
-    """The layout of a packet."""
+    """The binary layout of a packet."""
     return struct.Struct("<" + "".join(field.form for field in fields))
 
 
@@ -82,16 +82,16 @@ _HEAD = struct.Struct("<4sH")
 
 
 class Asked(IntEnum):
-    """Kinds of packets, by what they ask of a rig."""
+    """The kinds of packets to a rig."""
 
-    ECHO = 1  # answer, and do nothing
-    ARM = 2  # be ready to move
+    ECHO = 1  # answer without moving
+    ARM = 2  # prepare to move
     COMMAND = 3  # follow the commands over the coming interval
-    DISARM = 4  # come to a safe stop
+    DISARM = 4  # stop safely
 
 
 class RigState(IntEnum):
-    """What a rig says of itself."""
+    """The state that a rig reports."""
 
     IDLE = 0  # not armed
     PREPARING = 1  # about to be ready
@@ -112,7 +112,7 @@ STATES = {
 
 
 class Request(NamedTuple):
-    """What a packet to a rig says."""
+    """The content of a packet to a rig."""
 
     kind: Asked
     session: int
@@ -126,7 +126,7 @@ class Request(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """What a packet of a rig says."""
+    """The content of a packet from a rig."""
 
     kind: int
     session: int
@@ -138,14 +138,14 @@ class Answer(NamedTuple):
 
 
 def number(channels: Channels) -> int:
-    """The number of a rig's channels: CRC-32 of 'name unit' of commands and measurements, joined by ';', in UTF-8."""
+    """The number of channels: CRC-32 of 'name unit' of commands and measurements, joined by ';', in UTF-8."""
     driving = (channels.command, *([channels.effort] if channels.effort else []))
     words = ";".join(f"{row.name} {row.unit}" for row in (*driving, *channels.measured))
     return zlib.crc32(words.encode())
 
 
 def pack(request: Request) -> bytes:
-    """A packet to a rig."""
+    """Encode a packet to a rig."""
     head = request[:8]
     padded = (*request.values, *[0.0] * (VALUES - len(request.values)))
     body = _REQUEST.pack(
@@ -155,7 +155,7 @@ def pack(request: Request) -> bytes:
 
 
 def fault(packet: bytes) -> str:
-    """What is wrong with a packet that should be a rig's answer: 'damaged', 'version', or empty."""
+    """The fault of a packet from a rig: 'damaged', or 'version' for another layout; empty if it is valid."""
     if len(packet) != SIZE or zlib.crc32(packet[:CHECKED]) != int.from_bytes(packet[CHECKED:], "little"):
         return "damaged"
     magic, version = _HEAD.unpack_from(packet)
@@ -165,7 +165,7 @@ def fault(packet: bytes) -> str:
 
 
 def unpack(packet: bytes) -> Answer:
-    """The answer in a packet without a fault."""
+    """Decode a packet without a fault."""
     _, _, kind, session, seq, channels, state, count, *rest = _ANSWER.unpack(packet)
     values, (text, _) = rest[:VALUES], rest[VALUES:]
     said = text.partition(b"\0")[0].decode(errors="replace")

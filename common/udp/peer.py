@@ -1,4 +1,4 @@
-"""A UDP socket that knows one other end, and is read up to a deadline."""
+"""A UDP socket that is connected to one address and is read until a deadline."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ LOOPBACK = "127.0.0.1"
 
 
 def place(address: str, where: str) -> tuple[str, int]:
-    """Host and port of 'udp/HOST:PORT', or of 'udp/PORT' on this machine; `where` names the key in errors.
+    """Host and port of 'udp/HOST:PORT', or of 'udp/PORT' on this machine; `where` names the plan's table in errors.
 
     Raises:
-        InputError: it is no such address.
+        InputError: the address has another form.
     """
     found = ADDRESS.fullmatch(address)
     if found is None or not 0 < int(found[2]) < 65536:
@@ -30,7 +30,7 @@ def place(address: str, where: str) -> tuple[str, int]:
 
 
 class Peer:
-    """The socket; what comes from anybody but the other end is dropped by the system.
+    """The socket; the operating system discards packets from other addresses.
 
     Raises:
         InputError: the host has no IPv4 address.
@@ -38,7 +38,7 @@ class Peer:
 
     def __init__(self, address: str, where: str) -> None:
         host, port = place(address, where)
-        self.refused = False  # whether the other machine has said that nothing listens there
+        self.refused = False  # whether the other machine reported that nothing listens at the port
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.close = weakref.finalize(self, self._socket.close)
         self._socket.setblocking(False)
@@ -51,7 +51,7 @@ class Peer:
             ) from None
 
     def send(self, packet: bytes) -> None:
-        """Send a packet; one that the system does not take is lost, as any other may be."""
+        """Send a packet; if the system cannot send it, it is lost, as a packet may be lost on the network."""
         try:
             self._socket.send(packet)
         except ConnectionRefusedError:
@@ -60,7 +60,7 @@ class Peer:
             pass
 
     def receive(self, deadline: int) -> bytes | None:
-        """The next packet, None where none has come by `deadline` (ns of the monotonic clock)."""
+        """The next packet, None if none arrives before `deadline` (ns of the monotonic clock)."""
         while True:
             try:
                 packet = self._socket.recv(SIZE + 1)

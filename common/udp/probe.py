@@ -1,4 +1,4 @@
-"""Whether the rigs of a plan that stand in other processes are there, and how fast they answer; nothing moves."""
+"""Check before a test whether the rigs in other processes answer, and how fast; nothing moves."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from common.udp.rig import Echoes, Terms, compared, echoes, unanswered
 
 
 class Probed(NamedTuple):
-    """One rig as a plan names it, and what came of the exchanges with it."""
+    """The terms of the exchange with one rig, and the result of test exchanges."""
 
     terms: Terms
     channels: int  # the number of the plan's channels
@@ -22,7 +22,7 @@ class Probed(NamedTuple):
 
 
 def probe(terms: Terms, channels: int) -> Probed:
-    """Exchange packets that move nothing with a rig; raises InputError where its address cannot be used."""
+    """Exchange packets that move nothing with a rig; raises InputError if its address cannot be used."""
     peer = Peer(terms.address, terms.where)
     try:
         return Probed(terms, channels, echoes(peer, terms, secrets.randbits(32), channels))
@@ -31,7 +31,7 @@ def probe(terms: Terms, channels: int) -> Probed:
 
 
 def risk(probed: Probed, plan: Plan) -> Risk | None:
-    """The risk of a rig that is not there, is another kind's, or answers too late; None where it serves."""
+    """The risk of a rig that does not answer, has other channels or answers too late; None if there is none."""
     terms, found = probed.terms, probed.found
     if found.answer is None:
         return Risk("rig", unanswered(terms))
@@ -41,7 +41,7 @@ def risk(probed: Probed, plan: Plan) -> Risk | None:
 
 
 def slow(terms: Terms, round_trips_s: Sequence[float], lost: int, plan: Plan) -> Risk | None:
-    """The risk of a rig whose answers are lost, or come too late too often in real time."""
+    """The risk of a rig that loses answers, or in real time answers too late too often; None if there is none."""
     late = sum(trip > terms.wait for trip in round_trips_s) if terms.paced else 0
     most = plan.preflight.late_share * len(round_trips_s)
     if lost <= plan.preflight.lost and late <= most:
@@ -56,12 +56,12 @@ def slow(terms: Terms, round_trips_s: Sequence[float], lost: int, plan: Plan) ->
 
 
 def text(terms: Terms, round_trips_s: Sequence[float]) -> str:
-    """What a rig has passed, in words."""
+    """The result of a passed check as a sentence."""
     return f"Rig at {terms.address}: {len(round_trips_s)} exchanges, {trips(round_trips_s)}"
 
 
 def trips(round_trips_s: Sequence[float]) -> str:
-    """Round trips in words, to the microsecond."""
+    """Median and 99th percentile of the round trips as text."""
     ranked = sorted(round_trips_s)
     p50, p99 = (quantile(ranked, part) * 1e3 for part in (0.5, 0.99))
     return f"round trip p50 {p50:.3f} ms, p99 {p99:.3f} ms"

@@ -1,7 +1,7 @@
-"""A rig in another process, behind the interface of any rig: one UDP packet each way per tick.
+"""A rig in another process, with the interface of every rig: one UDP packet each way per tick.
 
-The answer to the command of a tick is what the rig measures at that command's end, so it is due at the next tick. A
-tick waits for it for a share of the interval, never longer, and goes on with the newest reading where it is not there.
+The answer to the command of a tick holds the measurements at the end of that command, so that it is due at the next
+tick. A tick waits for it for a share of the interval at most; if it is missing, the latest measurements are used.
 """
 
 from __future__ import annotations
@@ -19,30 +19,33 @@ from common.udp.account import Account
 from common.udp.packets import Answer, Asked, Request, RigState
 from common.udp.peer import Peer
 
-ECHOES = 50  # exchanges before a test by which its rig is judged: a 98th percentile, in some 10 ms
-FIRST_NS = 200_000_000  # an answer to the first packets is waited for: any network of a laboratory is faster
-TRIES = 5  # of the first packet, and of the last
-AGAIN_NS = 100_000_000  # an unanswered wish to arm is repeated after this long
-FREE_NS = 1_000_000_000  # in virtual time an answer is waited for: no clock runs away meanwhile
-RUNNING = 3  # number of that safety mode: of a bench test, which has no modes
+ECHOES = 50  # test exchanges before a test: they resolve the 98th percentile and take about 10 ms
+FIRST_NS = (
+    200_000_000  # wait for the answer to a test exchange: far longer than a round trip in a local network
+)
+# attempts of the first packet and of the last: with 10 % loss each way all five fail in one of 4000 tests (0.19^5)
+TRIES = 5
+AGAIN_NS = 100_000_000  # after which an unanswered request to arm is repeated; an operator does not notice it
+FREE_NS = 1_000_000_000  # wait for an answer in virtual time, in which the tick does not pass meanwhile
+RUNNING = 3  # number of the safety mode `running`, which is sent in a bench test, because that has no modes
 
 
 class Terms(NamedTuple):
-    """What a plan says of the exchange with a rig."""
+    """The terms of the exchange with a rig, from a plan."""
 
     address: str
-    where: str  # table of the plan, for sentences about it
+    where: str  # table of the plan, for messages
     interval: float  # s
     seed: int
-    wait: float  # s that a tick waits for an answer at most
+    wait: float  # s, the longest time that a tick waits for an answer
     arm_timeout: float  # s
-    silence: float  # s without a packet after which the rig shall stop on its own
-    most: int  # intervals without an answer in time after which the rig is given up
+    silence: float  # s without a packet after which the rig must stop by itself
+    most: int  # intervals in a row without an answer in time after which the test is stopped
     paced: bool  # whether the test runs in real time
 
 
 class Echoes(NamedTuple):
-    """What came of the exchanges before a test."""
+    """The result of the test exchanges before a test."""
 
     round_trips_s: tuple[float, ...]
     lost: int
@@ -50,7 +53,7 @@ class Echoes(NamedTuple):
 
 
 def echoes(peer: Peer, terms: Terms, session: int, channels: int) -> Echoes:
-    """Exchange packets that move nothing; none are lost on a rig that is there and not held up."""
+    """Do `ECHOES` exchanges that move nothing, after the first one that is answered within `TRIES` attempts."""
     trips: list[float] = []
     answer: Answer | None = None
     patience, lost = FIRST_NS, 0
@@ -63,7 +66,7 @@ def echoes(peer: Peer, terms: Terms, session: int, channels: int) -> Echoes:
             if seq == TRIES - 1:
                 break
             continue
-        if answer is not None:  # the first one is slow: caches are cold
+        if answer is not None:  # the first exchange is not counted, because it fills caches
             lost += found is None
             if found is not None:
                 trips.append((time.monotonic_ns() - sent) * 1e-9)
@@ -74,7 +77,7 @@ def echoes(peer: Peer, terms: Terms, session: int, channels: int) -> Echoes:
 
 
 def answer_to(peer: Peer, session: int, seq: int, deadline: int) -> Answer | None:
-    """The answer to a packet of that number, None where it has not come by the deadline (ns)."""
+    """The answer to the packet `seq` of a session, None if it does not arrive before the deadline (ns)."""
     while (packet := peer.receive(deadline)) is not None:
         if not packets.fault(packet):
             answer = packets.unpack(packet)
@@ -84,31 +87,31 @@ def answer_to(peer: Peer, session: int, seq: int, deadline: int) -> Answer | Non
 
 
 class UdpRig:
-    """The rig at an address; `channels` are those of its laboratory's kind."""
+    """The rig at an address; `channels` are those of the kind of laboratory."""
 
     def __init__(self, channels: Channels, terms: Terms) -> None:
         self.terms = terms
         self.missed = 0  # intervals in a row without an answer in time
         self.account = Account()
         self.echoes = Echoes((), 0, None)
-        self.idle_readings = False  # whether its answers to an echo hold readings
+        self.idle_readings = False  # whether its answers to an echo hold measurements
         self._channels, self._count = packets.number(channels), len(channels.names)
         self._session = secrets.randbits(32)
         self._peer = Peer(terms.address, terms.where)
         self._mode: Callable[[], int] = lambda: RUNNING
         self._wait_ns = round(terms.wait * 1e9) if terms.paced else FREE_NS
-        self._seq = self._heard = 0  # numbers of the last packet sent, and of the newest one answered
-        self._due = 0  # number of the packet whose answer is awaited; 0: none
+        self._seq = self._heard = 0  # number of the last packet sent, and of the latest packet answered
+        self._due = 0  # number of the packet whose answer is due; 0 if none is
         self._values: tuple[float, ...] = (0.0,) * self._count
 
     def follow(self, mode: Callable[[], int]) -> None:
-        """Tell the rig from now on the number that `mode` gives of the laboratory's safety mode."""
+        """Send the rig the number of the laboratory's safety mode, which `mode` returns, with every packet."""
         self._mode = mode
 
     # -- the interface of a rig -----------------------------------------------------------------------
 
     def arm(self) -> None:
-        """Find the rig, measure the round trip and let it get ready; raises RigError with a reason if it does not."""
+        """Measure the round trip and let the rig prepare; raises RigError with a reason if it does not get ready."""
         self._seq = TRIES + ECHOES
         self.echoes = found = echoes(self._peer, self.terms, self._session, self._channels)
         if found.answer is None:
@@ -122,7 +125,7 @@ class UdpRig:
             raise RigError(f"{complaint}.")
 
     def _ready(self) -> Answer:
-        """The rig's answer that it is ready."""
+        """Request the rig to arm until it answers that it is ready; raises RigError otherwise."""
         packet = self._packet(Asked.ARM)
         end = time.monotonic_ns() + round(self.terms.arm_timeout * 1e9)
         said = "nothing"
@@ -149,10 +152,11 @@ class UdpRig:
         )
 
     def read(self) -> tuple[float, ...]:
-        """What the rig measured at the end of the last interval; the newest reading where its answer is not there.
+        """The measurements at the end of the last interval, or the latest ones if the answer is missing.
 
         Raises:
-            RigError: the rig has stopped, or answers have not been there in time for too many intervals.
+            RigError: the rig has stopped, or `terms.most` answers in a row were missing or late.
+            EmergencyStopError: the rig reports that its emergency stop was pressed.
         """
         if not self._due:
             if not self.idle_readings:
@@ -174,7 +178,7 @@ class UdpRig:
         self._send(Asked.COMMAND, command)
 
     def disarm(self) -> None:
-        """Let the rig come to a safe stop; raises RigError where it does not confirm it."""
+        """Request the rig to stop safely; raises RigError if it does not confirm that."""
         packet = self._packet(Asked.DISARM)
         if self.echoes.answer is None:  # it was never reached
             self._peer.send(packet)
@@ -198,7 +202,7 @@ class UdpRig:
         self._due = self._seq
 
     def _hear(self, deadline: int) -> bool:
-        """Take what has come, until the answer that is due is among it; whether it was there by the deadline."""
+        """Receive packets until the answer that is due; returns whether it arrived before the deadline (ns)."""
         while (packet := self._peer.receive(deadline)) is not None:
             answer = self._accepted(packet)
             if answer is None:
@@ -211,7 +215,12 @@ class UdpRig:
         return False
 
     def _accepted(self, packet: bytes) -> Answer | None:
-        """The answer in a packet, None where it must not be used; raises where the rig says that it has stopped."""
+        """The answer in a packet, None if it must not be used.
+
+        Raises:
+            RigError: the rig reports that it has stopped.
+            EmergencyStopError: it reports that its emergency stop was pressed.
+        """
         if packets.fault(packet):
             self.account.counts[causes.DAMAGED] += 1
             return None
@@ -232,7 +241,7 @@ class UdpRig:
         return answer
 
     def _silent(self) -> str:
-        """Why the rig is given up, in words."""
+        """The reason to stop the test because of missing answers, and what to do, as text."""
         terms, counts = self.terms, self.account.counts
         since = f"for {self.missed} intervals in a row no valid answer was there {terms.wait * 1e3:g} ms into the tick"
         seen = [f"{counts[name]} {text}" for name, text in causes.CAUSES.items() if counts[name]]
@@ -243,12 +252,12 @@ class UdpRig:
 
 
 def unanswered(terms: Terms) -> str:
-    """A sentence's words on a rig that does not answer at all."""
+    """The text of the message on a rig that does not answer at all."""
     return f"nothing answers at {terms.address}: start the rig's program there, or correct address in {terms.where}"
 
 
 def compared(answer: Answer, channels: int) -> str:
-    """What is wrong where a rig says other channels than the plan's kind has; empty where nothing is."""
+    """The text of the message on a rig with other channels than the plan's kind of laboratory; empty if they agree."""
     if answer.channels in (0, channels):
         return ""
     return (

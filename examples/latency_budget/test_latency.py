@@ -1,4 +1,4 @@
-"""A latency test for continuous integration: a short test in real time, judged by rths' fixture `latency_budget`."""
+"""A latency test for continuous integration: a short test in real time, judged by the fixture `latency_budget`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ HERE = Path(__file__).parent
 
 
 def test_the_loop_keeps_its_budget(latency_budget: Callable[..., object], tmp_path: Path) -> None:
-    """Five seconds of the default test; over the budget fails, a machine too busy for a verdict skips."""
+    """Run 5 s of the default test; fails above the budget, and is skipped on a machine too busy for a verdict."""
     recording = tmp_path / "latency.mcap"
     command = [sys.executable, "-m", "rths", "run", "default", "--duration", "5", "-o", str(recording)]
     subprocess.run(command, check=True)

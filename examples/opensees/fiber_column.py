@@ -1,9 +1,10 @@
-"""A reinforced-concrete column of fibres for OpenSees: 250 × 250 mm, loaded 750 mm above its foot.
+"""A reinforced-concrete column for OpenSees, with a fibre section of 250 × 250 mm, loaded 750 mm above its foot.
 
 Concrete, steel, height and axial force are those of the seed paper's specimen (36.5 and 2.98 N/mm², D22 with 381
-N/mm², axial force ratio 0.2). Assumed, as the paper does not say them: where the bars lie, 50 mm from the face to their
-centre; a core that the hoops make 1.15 times as strong; the concrete's strain at its strength, and what is left of it
-beyond. `slip` lets the bars slip in the footing by Zhao and Sritharan's law (`Bond_SP01`).
+N/mm², axial force ratio 0.2). The paper does not state the following, which are assumed: the distance of 50 mm from the
+face to the centre of the bars; the strength of the confined core, 1.15 times that of the cover; the strain of the
+concrete at its strength, and its residual strength. With `slip` the bars slip in the footing by Zhao and Sritharan's
+law (`Bond_SP01`).
 
     options = { file = "opensees/fiber_column.py", options = { bars = 4, slip = true } }
 """
@@ -23,14 +24,14 @@ SLIP_AT_YIELD, SLIP_AT_END = (
     0.46e-3,
     16e-3,
 )  # m: Zhao and Sritharan for D22 in that concrete; 35 times the first
-PRESSED = 0.5 * WIDTH  # m of concrete that is compressed at the foot where bars slip
-FIBRES = 20  # over the width
-CORE, COVER, BARS = 1, 2, 3  # tags of the materials; those of the foot are ten more
-COLUMN, FOOT = 0, 10  # tags of the sections, added to those of their materials
+PRESSED = 0.5 * WIDTH  # m, length of the compressed concrete at the foot where bars slip
+FIBRES = 20  # over the width: fibres of 9 mm resolve the neutral axis
+CORE, COVER, BARS = 1, 2, 3  # tags of the materials of the column; those of the foot are FOOT higher
+COLUMN, FOOT = 0, 10  # tags of the sections
 
 
 def build(ops: Any, bars: int = 4, slip: bool = False) -> tuple[int, int]:
-    """Make the column under its axial force; the node at its top and the direction that is moved."""
+    """Build the column under its axial force; returns the node at its top and the direction in which it is moved."""
     ops.wipe()
     ops.model("basic", "-ndm", 2, "-ndf", 3)
     materials(ops)
@@ -53,7 +54,7 @@ def build(ops: Any, bars: int = 4, slip: bool = False) -> tuple[int, int]:
 
 
 def materials(ops: Any) -> None:
-    """Concrete of core and cover and bars; of the foot by deformations (m) in place of strains, with bars that slip."""
+    """Define core, cover and bars; those of the foot, where bars slip, by deformations (m) in place of strains."""
     for tag, length in ((0, 1.0), (FOOT, PRESSED)):
         for which, factor, crushed, end in ((CORE, CONFINED, 0.8, 0.020), (COVER, 1.0, 0.2, 0.010)):
             peak, strain = factor * STRENGTH, factor * PEAK_STRAIN * length
@@ -65,7 +66,7 @@ def materials(ops: Any) -> None:
 
 
 def section(ops: Any, tag: int, bars: int) -> None:
-    """The section in fibres; 4 bars stand in the corners, 8 also in the middle of the sides."""
+    """Define the fibre section; 4 bars are in the corners, the others of 8 in the middle of the sides."""
     core, cover, steel = (tag + which for which in (CORE, COVER, BARS))
     half, inner = 0.5 * WIDTH, 0.5 * WIDTH - 0.034  # m; the core ends at the hoops' centre
     bar, row = half - TO_BAR, 2 if bars == 4 else 3
@@ -82,7 +83,7 @@ def section(ops: Any, tag: int, bars: int) -> None:
 
 
 def press(ops: Any) -> None:
-    """The axial force, in ten steps, which stays."""
+    """Apply the axial force in ten steps and keep it constant."""
     ops.timeSeries("Linear", 1)
     ops.pattern("Plain", 1, 1)
     ops.load(3, 0.0, -AXIAL * STRENGTH * WIDTH**2, 0.0)
@@ -94,5 +95,5 @@ def press(ops: Any) -> None:
     ops.integrator("LoadControl", 0.1)
     ops.analysis("Static", "-noWarnings")
     if ops.analyze(10) != 0:
-        raise RuntimeError("the axial force finds no equilibrium")
+        raise RuntimeError("OpenSees found no equilibrium under the axial force")
     ops.loadConst("-time", 0.0)

@@ -1,9 +1,9 @@
-"""The force of four fibre columns over the deformation of the seed paper's static test, as CSV.
+"""Compute the force of four fibre columns over the deformation of the seed paper's static test, as CSV.
 
     python examples/opensees/fiber_column_curves.py tests/data/fiber_column
 
-Three cycles each of 1.5, 3, 4.5, 6 and 7.5 mm in steps of 0.05 mm, of which every third is written; no step leaves the
-section's branch, since each is repeated with shorter ones until OpenSees finds its equilibrium.
+Three cycles each of 1.5, 3, 4.5, 6 and 7.5 mm in steps of 0.05 mm, of which every third is written. A step for which
+OpenSees finds no equilibrium is divided into shorter ones.
 """
 
 from __future__ import annotations

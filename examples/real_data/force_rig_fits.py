@@ -1,4 +1,4 @@
-"""How far simple linear models follow the force rig: a comparison for the diagnosis, computed without it.
+"""Fit simple linear models to the force rig without rths, for a comparison with the diagnosis.
 
 python examples/real_data/force_rig_fits.py
 """
@@ -15,24 +15,27 @@ from scipy.signal import lfilter
 
 Array = NDArray[np.float64]
 
-INTERVAL = 1.0 / 128.982  # s
-FINE = 8  # steps per sample
-TAPS = 60  # of the free filter
-BLOCK = 258  # samples, 2 s
+INTERVAL = 1.0 / 128.982  # s, see ORIGIN.md
+FINE = 8  # steps per sample, 1 ms: a tenth of the lag of 10 ms
+TAPS = 60  # of the finite impulse response: 0.47 s, longer than any lag of the rig
+BLOCK = (
+    258  # samples, 2 s: the residuals of blocks are taken as independent, because they are longer than TAPS
+)
+LEAST_LAG = 1e-4  # s: a tenth of a step, where a lag has no effect; avoids a division by 0
 
 
 def response(r: Array, gain: float, delay: float, *lags: float) -> Array:
-    """Gain, dead time (s) and first-order lags (s) in a row on a reference."""
-    places = np.arange(r.size * FINE) / FINE
-    u = np.interp(places - delay / INTERVAL, np.arange(r.size), r)
+    """The response (samples,) of a gain, a dead time (s) and first-order lags (s) in series to the reference `r`."""
+    samples = np.arange(r.size * FINE) / FINE
+    u = np.interp(samples - delay / INTERVAL, np.arange(r.size), r)
     for lag in lags:
-        pole = np.exp(-INTERVAL / FINE / max(abs(lag), 1e-4))
+        pole = np.exp(-INTERVAL / FINE / max(abs(lag), LEAST_LAG))
         u = lfilter([1.0 - pole], [1.0, -pole], u)
     return np.asarray(gain * u[::FINE], dtype=np.float64)
 
 
 def main() -> None:
-    """Print what every model leaves of the measured force, and how it compares with a dead time."""
+    """Print the residual of every model over the measured force, and how it compares with that of a dead time."""
     data = np.loadtxt(Path(__file__).with_name("force_rig.csv"), delimiter=",", skiprows=1)
     r, y = data.T
     level = float(np.sqrt(np.mean(y**2)))

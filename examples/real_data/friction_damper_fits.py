@@ -1,4 +1,4 @@
-"""The friction damper's law fitted to three of its thirteen sines, and all sines predicted with it.
+"""Fit the law of the friction damper to three of its thirteen sines, and predict all sines with it.
 
 python examples/real_data/friction_damper_fits.py
 """
@@ -23,7 +23,7 @@ from models.system import System
 Array = NDArray[np.float64]
 
 HERE = Path(__file__).parent
-FITTED = (1, 6, 11)
+FITTED = (1, 6, 11)  # sines of the fit: one of each amplitude, at 0.25 and 0.5 Hz; their data are in `…_fit`
 # frequency (Hz) and amplitude (mm) of the sines
 SINES = [
     *((f, 19) for f in (0.1, 0.25, 0.5, 1.0, 2.0)),
@@ -32,7 +32,7 @@ SINES = [
 
 
 def sine(data: dict[str, Array], name: str | int) -> tuple[Array, Array]:
-    """Displacement at the intervals' ends (m), and both readings (ticks, 2), m and N."""
+    """Displacement at the ends of the intervals (ticks,) in m, and the readings (ticks, 2) in m and N."""
     reached, displacement, resistance = (
         scale * data[f"{signal}_{name}"].astype(np.float64)
         for signal, scale in (("reached", 1e-6), ("displacement", 1e-6), ("force", 1.0))
@@ -41,13 +41,13 @@ def sine(data: dict[str, Array], name: str | int) -> tuple[Array, Array]:
 
 
 def force(plan: Plan, reached: Array) -> Array:
-    """Predicted force (N)."""
+    """Predicted force (ticks,) in N."""
     drive = np.column_stack([reached, np.zeros(reached.size)])
     return replay.laboratory(kind_of(plan, MASTER), System(plan), drive)[:, 1]
 
 
 def main() -> None:
-    """Print the parameters, and of every sine the misfit over the measured force."""
+    """Print the parameters, and the error of every sine over its measured force."""
     plan = plans.load(HERE / "friction_damper.toml")
     kind = kind_of(plan, MASTER)
     assert isinstance(kind, Device)  # noqa: S101 - the plan names one
@@ -62,8 +62,8 @@ def main() -> None:
     fitted = plans.from_tables(tables, plan.base)
     for number, (frequency, amplitude) in enumerate(SINES):
         reached, readings = sine(data, number)
-        left = force(fitted, reached) - readings[:, 1]
-        share = np.sqrt(np.mean(left**2) / np.mean(readings[:, 1] ** 2))
+        error = force(fitted, reached) - readings[:, 1]
+        share = np.sqrt(np.mean(error**2) / np.mean(readings[:, 1] ** 2))
         how = "fitted" if number in FITTED else "predicted"
         print_out(f"{frequency:5.2f} Hz {amplitude} mm  {how:9s} {100.0 * share:5.1f} %\n")
 
