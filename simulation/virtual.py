@@ -70,8 +70,9 @@ def assemble(
 ) -> VirtualTest:
     """Build all laboratories over a link in memory, and a recorder if `output` is given.
 
-    """Create the file and the recorder; the recorder's process begins at time 0."""
-    file = files.begin(output, setting.plan, substructure.recorded_ground(setting.plan))
+    With a `gate` the sensors of all rigs are judged when the rigs are armed, the slaves accept the same risks as the
+    master, and the results and accepted risks are recorded; without one nothing is judged. `drifts` are the clocks, by
+    role, that differ from the world's. With a `building` the master serves it instead of computing the plan's own.
     """
     world, hub = World(), MemoryHub(plan.roles)
     roles = (MASTER, *plan.roles) if output is None else (MASTER, *plan.roles, RECORDER)
