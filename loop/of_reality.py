@@ -1,4 +1,4 @@
-"""The closed loop of the laboratories and the network as they really are, as one compiled rollout."""
+"""The compiled simulation of the closed loop with the deviations of a reality."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from models.system import System
 
 
 def really(truth: Reality, *, noise: bool) -> Rollout:
-    """The rollout of the laboratories and the network as they really are.
+    """The simulation of the true laboratories and the true network of a reality.
 
     Raises:
         InputError: a laboratory's rig is a plug-in, which has no model, or an effect cannot be applied.
@@ -40,7 +40,7 @@ def refuse_plugins(truth: Reality) -> None:
 def rolled_out(
     truth: Reality, systems: Mapping[str, System], motion: GroundMotion, *, noise: bool
 ) -> Rollout:
-    """The rollout of laboratories by role, the master's first, on the reality's link and under its seed."""
+    """The simulation of laboratories by role, with the reality's links and, with `noise`, its seed."""
     master, slaves = systems[MASTER], {role: systems[role] for role in truth.plan.roles}
     plan = master.plan
     ground = substructure.ground_rows(plan, motion, master.effects.time_shift)

@@ -1,4 +1,4 @@
-"""The building as the master's loop sees it: computed here, or by a client that asks for displacements."""
+"""The interface of the building for the master's loop: computed by the master or by a client."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ Sent = tuple[float, ...]  # target m, motor force N, and the rates of the target
 
 
 class Outputs(NamedTuple):
-    """What a tick computes: the building and the targets at t_k, and the commands for the interval's end.
+    """The results of a tick: the building and the target at t_k, and the commands for the end of the interval.
 
-    Of a master without a laboratory target, command and effort are zero.
+    For a master without a laboratory target, command and effort are zero.
     """
 
     ground_acceleration: float
@@ -24,10 +24,8 @@ class Outputs(NamedTuple):
     command: float  # of its transfer system, m
     effort: float  # of its motor, N
     sent: Sequence[Sent]  # to each slave, in the plan's order
-    storeys: list[
-        float
-    ]  # of each signal of the storeys in turn (`common.signals.OF_STOREYS`) the value of every one
-    held: bool = False  # whether nothing new is wanted: every laboratory keeps the command that it has
+    storeys: list[float]  # signal by signal (`common.signals.OF_STOREYS`) the values of all storeys
+    held: bool = False  # whether every laboratory keeps its present command
 
     @property
     def of_storeys(self) -> dict[str, list[float]]:
@@ -37,49 +35,49 @@ class Outputs(NamedTuple):
 
 
 class Answering(Protocol):
-    """A slave as a building sees it."""
+    """The part of a slave that a building uses."""
 
-    used: Feedback  # the newest that has come
-    position: int  # place of its position (m) among what it measures
+    used: Feedback  # the latest one received
+    position: int  # index of its position (m) in its measurements
 
 
 class Building:
-    """Whoever moves the laboratories: from what they measured at a tick to what they do in the coming interval."""
+    """Computes from the measurements of a tick what the laboratories do in the coming interval."""
 
     def join(self, lab: Laboratory, partners: Sequence[Answering]) -> None:
-        """Know the master's clock and the slaves, before the handshake."""
+        """Receive the master's laboratory, with its clock, and the slaves; called before the handshake."""
 
     @property
     def awaited(self) -> str:
-        """Who has to come before the laboratories arm, empty where all that is needed is there."""
+        """Name of the program that must connect before the laboratories arm; empty if none is missing."""
         return ""
 
     def look_after(self) -> None:
-        """Serve those who have come, while nothing moves."""
+        """Serve connected programs while nothing moves."""
 
     def __call__(self, tick: int, position: float, force: float, forces: Sequence[float]) -> Outputs:
-        """One tick, from the master's own position (m) and force (N) as measured and each slave's force (N).
+        """Compute a tick from the measured position (m) and force (N) of the master's rig and the slaves' forces (N).
 
         Raises:
-            InterlockError, LostError: it cannot go on.
+            InterlockError, LostError: the building cannot continue.
         """
         raise NotImplementedError
 
     def written(self, tick: int) -> None:
-        """The tick's commands are out; there is time until the next one."""
+        """Use the time until the next tick; called when the commands of a tick have been sent."""
 
     @property
     def over(self) -> bool:
-        """Whether it wants the test to end in order."""
+        """Whether the building requests an orderly end of the test."""
         return False
 
     def look(self, tick: int) -> WatchdogFinding:
-        """The watchdog's finding on it at a tick that came in time."""
+        """The watchdog's finding on the building, at a tick that is not late."""
         return WatchdogFinding.FINE
 
     def recorded(self, outputs: Outputs) -> tuple[Sequence[float], Sequence[float]]:
-        """What stands of it in a row of the recording: before the master's own laboratory, and behind it."""
+        """Its values in a row of the recording: those before and those after the values of the master's laboratory."""
         raise NotImplementedError
 
     def leave(self) -> None:
-        """The test is over."""
+        """Close connections; called when the test has ended."""

@@ -1,8 +1,8 @@
-"""The building as a client of OpenSees or OpenFresco has it: displacements come from its elements, forces go back.
+"""The building of a client of OpenSees or OpenFresco: its elements send displacements and receive forces.
 
-Each displacement is imposed over the plan's `intervals` of control. Over one interval the forces go back as those of a
-slave do in any test: the master's own as measured at the interval's end, a slave's as measured one interval before.
-Over several intervals the laboratories are at the displacement for the last of them where there are slaves, so that all
+Each displacement is imposed over the plan's `intervals`, a number of control intervals. Over one interval the forces
+are those of any test: the master's own are measured at the end of the interval, a slave's one interval before. Over
+several intervals, if there are slaves, all laboratories are at the displacement for the last interval, so that all
 forces belong to it.
 """
 
@@ -31,25 +31,29 @@ from master.building import Answering, Building, Outputs
 from models import compensators, force_correction
 from models.compiled import plain
 
-SLICE_S = 0.1  # a wish to stop waits no longer than this while virtual time stands still
-SCALE = 1e-6  # relative: a client's step beside what it takes here, which rounding of its times may change
-NOTHING = math.nan
+SLICE_S = (
+    0.1  # longest delay of a request to stop while virtual time stands still; an operator does not notice it
+)
+SCALE = (
+    1e-6  # relative difference of the client's step from the plan's that is rounding of the client's times
+)
+NOTHING = math.nan  # recorded where a tick has no value
 
 
 class Pace(Protocol):
-    """How long a tick waits for the client."""
+    """The time that a tick waits for the client."""
 
-    settles: bool  # whether the time behind a tick's commands is used to answer the client
+    settles: bool  # whether the client is answered in the time after the commands of a tick
 
     def until(self, lab: Laboratory, tick: int) -> Callable[[], float]:
-        """Gives again and again how many seconds are left of a tick's patience; 0 or less: none."""
+        """A function that returns the remaining time (s) to wait in a tick; 0 or less if it has passed."""
 
     def over(self) -> None:
-        """The patience is over; raises ClientError where that ends the test at once."""
+        """Called when that time has passed; raises ClientError if that ends the test at once."""
 
 
 class RealTime:
-    """A tick waits for its share of the interval; beyond it the watchdog counts."""
+    """A tick waits for the plan's share of the interval; longer silences are judged by the watchdog."""
 
     settles = True
 
@@ -57,16 +61,16 @@ class RealTime:
         self._share_ns = round(plan.link.wait_share * plan.test.interval * 1e9)
 
     def until(self, lab: Laboratory, tick: int) -> Callable[[], float]:
-        """The share of the interval from the tick's nominal time on."""
+        """The remaining part of the plan's share of the interval, which begins at the tick's nominal time."""
         now, end = lab.clock.now, lab.tick_ns(tick) + self._share_ns
         return lambda: (end - now()) * 1e-9
 
     def over(self) -> None:
-        """The laboratories hold, and the watchdog says when to ramp."""
+        """Do nothing: the laboratories hold, and the watchdog decides when to ramp."""
 
 
 class AsFastAsItGoes:
-    """Time stands still until the client has spoken, for `seconds` of the wall clock, or somebody wants to stop."""
+    """Virtual time stands still until the client sends or a stop is requested, at most for `seconds` of wall time."""
 
     settles = False
 
@@ -74,37 +78,35 @@ class AsFastAsItGoes:
         self._seconds, self._stopping = seconds, stopping
 
     def until(self, lab: Laboratory, tick: int) -> Callable[[], float]:
-        """Slices of the patience, so that a wish to stop is noticed."""
+        """The remaining time, in slices so that a request to stop is noticed."""
         end = time.monotonic() + self._seconds
         return lambda: 0.0 if self._stopping() else min(end - time.monotonic(), SLICE_S)
 
     def over(self) -> None:
-        """The client has stalled."""
+        """End the test, because the client sends nothing."""
         if not self._stopping():
             raise ClientError(f"No displacement has come from the client for {self._seconds:g} s.")
 
 
 class Follower:
-    """One laboratory behind an element: what it is told of the element's displacement, and what its force is there."""
+    """One laboratory of an element: converts the element's displacement into a target, and the force back."""
 
     def __init__(self, coupling: Coupling, interval: float, intervals: int) -> None:
         self.coupling = coupling
         self.sign = 1.0 if coupling.follows is Follows.DRIFT else -1.0  # OpenSees takes forces that resist
         self.target = 0.0
         self._interval, self._intervals = interval, intervals
-        self._past: deque[float] = deque(
-            [0.0] * 3, maxlen=3
-        )  # targets before the present one, the newest first
+        self._past: deque[float] = deque([0.0] * 3, maxlen=3)  # targets before the present one, newest first
         chosen = coupling.correction
         self._filter = force_correction.coefficients(chosen, interval)
         self._filtered = np.zeros(force_correction.CORRECTED + 1)
         self._delayed: float | None = 0.0 if chosen.unit_delay else None
 
     def follow(self, displacement: float) -> tuple[float, float, float, float, float]:
-        """The target (m) for the interval's end, the motor's force (N), and the target's rates.
+        """The target (m) for the end of the interval, the motor's force (N), and the target's rates (m/s, m/s², m/s³).
 
-        Over one interval the rates are differences of second order backwards from the end; over several the way is a
-        ramp, whose speed alone is told.
+        Over one interval the first two rates are backward differences of second order, the third of first order. Over
+        several intervals the motion is a ramp, of which only the velocity is not zero.
         """
         target, h = self.coupling.ratio * displacement, self._interval
         x1, x2, x3 = self._past
@@ -120,7 +122,7 @@ class Follower:
         return target, effort, velocity, acceleration, jerk
 
     def resists(self, force: float) -> float:
-        """The element's resisting force (N) of a force measured in the laboratory (N), corrected as the plan says."""
+        """The element's resisting force (N) from the measured force (N), with the plan's force correction."""
         corrected: float = force_correction.step(*self._filter, self._filtered, force)
         if self._delayed is not None:
             corrected, self._delayed = self._delayed, corrected
@@ -144,7 +146,7 @@ class ClientBuilding(Building):
         self._interval, self._pace = interval, pace
         self._watchdog = Watchdog(plan.safety, interval)
         self._report = report
-        self._early: list[str] = []  # what was said before the start, from which on times are known
+        self._early: list[str] = []  # warnings before the start, when the time of the test is not known
         self._lab: Laboratory | None = None
         self._partners: Sequence[Answering] = ()
         self._ports = Ports(ports(addresses, list(couplings.values()), self._say))
@@ -161,11 +163,11 @@ class ClientBuilding(Building):
     # -- before the start ------------------------------------------------------------------------------
 
     def join(self, lab: Laboratory, partners: Sequence[Answering]) -> None:
-        """Know the master's clock and the slaves."""
+        """Receive the master's laboratory and the slaves."""
         self._lab, self._partners, self._report = lab, partners, lab.report
 
     def _say(self, text: str) -> None:
-        """Warn; what is said before the start is recorded as it begins."""
+        """Report a warning; one before the start is recorded at the first tick."""
         if self._lab is not None and self._lab.start_ns:
             self._lab.note("client", text, level="warning", tick=self._lab.tick)
             return
@@ -175,11 +177,11 @@ class ClientBuilding(Building):
 
     @property
     def awaited(self) -> str:
-        """OpenSees, until its first displacement has come."""
+        """OpenSees with its address, until its first displacement has arrived."""
         return "" if self._ready() else f"OpenSees at {' and '.join(port.name for port in self._ports.ports)}"
 
     def look_after(self) -> None:
-        """Answer those who ask before anything moves, where time stands still after a wait for them."""
+        """Answer clients before the first tick; in virtual time wait for them, because time stands still."""
         self._serve(0.0 if self._pace.settles or self._ready() else SLICE_S)
         while self._serve(0.0):
             pass
@@ -187,7 +189,7 @@ class ClientBuilding(Building):
     # -- ticks -------------------------------------------------------------------------------------------
 
     def __call__(self, tick: int, position: float, force: float, forces: Sequence[float]) -> Outputs:
-        """One tick: hand back what belongs to the displacement before, and take the next."""
+        """One tick: return the forces of a completed displacement, and take the next displacement."""
         assert self._lab is not None  # noqa: S101 - `join` comes first
         if self._early:
             self._record_early(self._lab)
@@ -214,7 +216,7 @@ class ClientBuilding(Building):
         self._early = []
 
     def _hand_back(self, tick: int, position: float, force: float, forces: Sequence[float]) -> None:
-        """Give every client the forces that were measured at its displacement."""
+        """Send every client the forces that were measured at its displacement."""
         assert self._lab is not None  # noqa: S101 - `join` comes first
         given, moved = list(forces), [one.used.measured[one.position] for one in self._partners]
         if self._own:
@@ -233,7 +235,7 @@ class ClientBuilding(Building):
             first = last
 
     def _fetch(self, tick: int) -> None:
-        """The next displacement, where it comes in the tick's time."""
+        """Wait for the next displacement within the time of the tick, and begin to impose it."""
         assert self._lab is not None  # noqa: S101 - `join` comes first
         left = self._pace.until(self._lab, tick)
         while not self._ready():
@@ -241,7 +243,7 @@ class ClientBuilding(Building):
                 self._pace.over()
                 return
         while len(self._ports.ports) > 1 and self._serve(0.0):
-            pass  # what other elements have said of the same step is there already
+            pass  # the messages of the other elements of the same step have arrived already
         if self._ended():
             self._over = True
             return
@@ -260,11 +262,11 @@ class ClientBuilding(Building):
         self._steps += 1
         if self._handed_ns:
             self._wait = (self._lab.clock.now() - self._handed_ns) * 1e-9
-        if self._steps == 3:  # the first step may begin anywhere, and some integrators repeat its time
+        if self._steps == 3:  # the first step may begin at any time, and some integrators repeat that time
             self._tell_scale()
 
     def _tell_scale(self) -> None:
-        """Say how the client's time passes here, where it is known."""
+        """Record the client's time step beside that of the test, if it is known."""
         assert self._lab is not None  # noqa: S101 - `join` comes first
         here, there = self._interval * self._intervals, self._step_time
         if there > 0.0:
@@ -274,7 +276,7 @@ class ClientBuilding(Building):
             self._lab.note("client", text, level=level, tick=self._lab.tick, values={"scale": here / there})
 
     def _move(self, position: float) -> Outputs:
-        """What every laboratory is told for the coming interval."""
+        """The targets and commands of all laboratories for the coming interval."""
         share = (self._done + 1) / self._ramp
         here = (
             self._to
@@ -292,7 +294,7 @@ class ClientBuilding(Building):
         return self._outputs
 
     def written(self, tick: int) -> None:
-        """Answer what the client asks while the laboratories move, so that nothing is left to say at the next tick."""
+        """Answer the client's requests while the laboratories move, so that the next tick is not delayed by them."""
         if not (self._pace.settles and self._lab):
             return
         left = self._pace.until(self._lab, tick)
@@ -304,17 +306,17 @@ class ClientBuilding(Building):
 
     @property
     def over(self) -> bool:
-        """Whether the client has said that its analysis is over."""
+        """Whether the client has ended its analysis."""
         return self._over
 
     def look(self, tick: int) -> WatchdogFinding:
-        """The watchdog's finding on the client, whose displacements come in every tick that waits for one."""
+        """The watchdog's finding on the client's displacements; none in virtual time or before the first one."""
         if not self._pace.settles or self._heard < 0:
             return WatchdogFinding.FINE
         return self._watchdog.look(tick - 1, self._heard, self._heard)
 
     def recorded(self, outputs: Outputs) -> tuple[Sequence[float], Sequence[float]]:
-        """The client's step, its displacements, the forces handed back, and how it kept time."""
+        """The client's step and time, its displacements, the forces returned, and its waiting time and lateness."""
         return (
             self._steps,
             self._time,
@@ -334,8 +336,9 @@ class ClientBuilding(Building):
     def _ready(self) -> bool:
         """Whether the next displacements of all elements are known, or no more will come.
 
-        OpenSees tells all elements their displacements before it asks any of them for forces. So where there are
-        several, an element that asks has been told, and so have those whose displacement stays.
+        OpenSees sends all elements their displacements before it requests forces from any of them. With several
+        elements, a request for forces therefore means that all new displacements have been sent; those of the other
+        elements have not changed.
         """
         servers = self._ports.servers
         if len(servers) == 1:
@@ -355,7 +358,7 @@ class ClientBuilding(Building):
 
     @staticmethod
     def _guarded(work: Callable[[Any], Any], given: Any) -> Any:
-        """Do something with clients; one that revises displacements ends the test."""
+        """Call `work(given)`; raises InterlockError if a client revises displacements."""
         try:
             return work(given)
         except RevisedError as error:
@@ -368,12 +371,12 @@ def couplings_of(plan: Plan) -> dict[str, Coupling]:
 
 
 def compensator(plan: Plan) -> Any:
-    """The compensator of the master's own laboratory as `compensators.enter` takes it; without one it does nothing."""
+    """The compensator of the master's own laboratory, for `compensators.enter`; one without effect if there is none."""
     return plain(substructure.own_compensator(plan))
 
 
 def ports(addresses: Sequence[str], couplings: Sequence[Coupling], say: Callable[[str], None]) -> list[Port]:
-    """A port for all laboratories, or one for each."""
+    """One port for all laboratories, or one for each; raises InputError if the number fits neither or one is in use."""
     stiffness = [one.stiffness for one in couplings]
     if len(addresses) not in (1, len(stiffness)):
         raise InputError(

@@ -1,11 +1,11 @@
 """The server's side of an element of OpenSees, or of a control of OpenFresco, as a state machine without sockets.
 
-Bytes go in, bytes come out. Whoever drives the laboratories asks for the displacements that are `wanted`, has them
-imposed, and hands back what was measured. Nothing is answered that was not measured: a request for forces waits until
-the laboratories have come to the displacements it belongs to.
+It receives and returns bytes. The caller takes the displacements that are `wanted`, lets the laboratories move there,
+and passes back the measurements. Every answer is measured: a request for forces waits until the laboratories have
+reached the displacements that it belongs to.
 
-A specimen cannot be un-deformed. So within one step, which a commit ends, or an acquisition of OpenFresco, which does
-not commit, displacements may change once, and any further ones are refused.
+A deformation of a specimen cannot be undone. Within one step, which ends with a commit or, for OpenFresco, which does
+not commit, with an acquisition, displacements may therefore change once; further changes are refused.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ FITTING = "NewmarkExplicit, CentralDifference or AlphaOS"
 
 
 class RevisedError(RemoteProtocolError):
-    """A displacement that was imposed already would be revised within its step."""
+    """A client tries to change a displacement that was imposed in the same step."""
 
 
 class Phase(Enum):
-    """What is known of the displacements that a client asked for last."""
+    """The state of the displacements that a client sent last."""
 
-    GREETING = auto()  # nothing yet: the header has not come
-    MEASURED = auto()  # they were imposed and measured
-    WANTED = auto()  # they have come and are not imposed yet
-    MOVING = auto()  # they are imposed and not measured yet
-    ENDED = auto()  # the client has said that nothing more comes
+    GREETING = auto()  # the header has not arrived
+    MEASURED = auto()  # imposed and measured
+    WANTED = auto()  # received and not imposed yet
+    MOVING = auto()  # imposed and not measured yet
+    ENDED = auto()  # the client has ended
 
 
 class Measurement(NamedTuple):
-    """What the laboratories give back, one value for each degree of freedom: m, N, and the test's time, s."""
+    """Measured displacements (m) and forces (N) of all degrees of freedom, and the time of the test (s)."""
 
     displacement: tuple[float, ...]
     force: tuple[float, ...]
@@ -45,10 +45,10 @@ class Measurement(NamedTuple):
 
 
 class ElementServer:
-    """Serves one client; `stiffness` (N/m) is that of each degree of freedom, as its matrices have it.
+    """Serves one client; `stiffness` (N/m) of each degree of freedom is the diagonal of its stiffness matrices.
 
-    Damping and mass are zero, because the forces that are measured have their part in them already: what OpenSees
-    would add for a matrix of damping or mass would count twice.
+    Damping and mass matrices are zero, because the measured forces include damping and inertia: OpenSees would add
+    them a second time.
     """
 
     def __init__(self, stiffness: Sequence[float]) -> None:
@@ -63,60 +63,62 @@ class ElementServer:
         ]
         self._measured = Measurement((0.0,) * n, (0.0,) * n, 0.0)
         self._moved = False  # whether displacements have changed in the present step
-        self._asked: Code | None = None  # the request, or the end, that waits for the measurement
-        self._next: bytes = b""  # displacements that wait until those before them are measured
+        self._asked: Code | None = None  # a request, or the end, that waits for the measurement
+        self._next: bytes = (
+            b""  # a message with displacements that waits until the previous ones are measured
+        )
         self._heard = False
         self._in = bytearray()
         self._out = bytearray()
 
-    # -- what comes and goes -------------------------------------------------------------------------
+    # -- bytes of the client -------------------------------------------------------------------------
 
     def take(self, data: bytes) -> None:
-        """Take in bytes of the client.
+        """Process bytes of the client.
 
         Raises:
-            RemoteProtocolError: they are no messages of such a client.
-            RevisedError: displacements would be revised.
+            RemoteProtocolError: they are not messages of such a client.
+            RevisedError: the client changes a displacement that was imposed in the same step.
         """
         self._heard = True
         self._in += data
         self._read()
 
     def outgoing(self) -> bytes:
-        """The bytes to be sent to the client; they are handed out once."""
+        """The bytes to be sent to the client; each is returned once."""
         data = bytes(self._out)
         self._out.clear()
         return data
 
     @property
     def waits(self) -> bool:
-        """Whether the client waits for a measurement, so that nothing more comes from it before that."""
+        """Whether the client waits for a measurement; until then it sends nothing."""
         return self._asked is not None
 
     @property
     def ending(self) -> bool:
-        """Whether the client has said that nothing more comes, be it before its last displacements are measured."""
+        """Whether the client has ended, even if its last displacements are not measured yet."""
         return self.phase is Phase.ENDED or self._asked is Code.END
 
     @property
     def untouched(self) -> bool:
-        """Whether nothing has come from the client."""
+        """Whether the client has not sent any byte."""
         return not self._heard
 
     @property
     def full(self) -> bool:
-        """Whether nothing more can be taken in before the laboratories have moved."""
+        """Whether the laboratories must move before more messages can be processed."""
         return self._asked is not None or bool(self._next)
 
-    # -- what the laboratories do ----------------------------------------------------------------------
+    # -- laboratories ----------------------------------------------------------------------------------
 
     def impose(self) -> Quantities:
-        """The displacements that are wanted; the laboratories move to them from now on."""
+        """Mark the wanted displacements as being imposed, and return them."""
         self.phase = Phase.MOVING
         return self.wanted
 
     def measured(self, found: Measurement) -> None:
-        """The laboratories have come to the displacements imposed last; raises as `take`."""
+        """Take the measurements at the displacements imposed last, and answer a waiting request; raises as `take`."""
         self._measured = found
         self.phase = Phase.MEASURED
         if (asked := self._asked) is not None:
@@ -145,7 +147,7 @@ class ElementServer:
         return data
 
     def _greet(self, header: Header) -> None:
-        """Refuse a client that commands or acquires what there is not."""
+        """Take the header; raises RemoteProtocolError if it commands or acquires other quantities than there are."""
         n, control, acquired = len(self._measured.force), header.control, header.acquired
         if control.displacement != n:
             raise RemoteProtocolError(
@@ -178,7 +180,7 @@ class ElementServer:
             self._asked = code
 
     def _trial(self, data: bytes) -> None:
-        """Take displacements, which may repeat those before them."""
+        """Take displacements; equal ones to the previous are ignored."""
         assert self.header is not None  # noqa: S101 - messages follow the header
         values = wire.commanded(self.header, data)
         if values.displacement == self.wanted.displacement:
@@ -189,7 +191,7 @@ class ElementServer:
                 f"{shown(values)}): choose an integrator that imposes each once, such as {FITTING}, with "
                 "algorithm('Linear')."
             )
-        if self.phase is not Phase.MEASURED:  # those before them come first
+        if self.phase is not Phase.MEASURED:  # the previous ones must be measured first
             self._next = data
             return
         self._moved = True
@@ -219,5 +221,5 @@ class ElementServer:
 
 
 def shown(values: Quantities) -> str:
-    """Displacements in mm."""
+    """Displacements as text in mm."""
     return ", ".join(f"{1e3 * value:.6g}" for value in values.displacement) + " mm"

@@ -1,7 +1,7 @@
-"""Ports at which clients of OpenSees or OpenFresco are served, over TCP: one client a port, no second one.
+"""TCP ports at which clients of OpenSees or OpenFresco are served, one client at a time on each port.
 
-Nothing here blocks for longer than it is told to, and no thread is begun: whoever drives the laboratories says when
-there is time for the clients.
+Calls block at most for the time they are given, and there are no threads: the caller decides when there is time for the
+clients.
 """
 
 from __future__ import annotations
@@ -18,24 +18,24 @@ from common.opensees.element import ElementServer, Measurement, Phase, RevisedEr
 
 ADDRESS = re.compile(r"(?:(.+):)?(\d+)")
 LOOPBACK = "127.0.0.1"
-BYTES = 1 << 16  # taken from a socket at once: 32 messages of the default size
-QUICKACK = getattr(socket, "TCP_QUICKACK", None)  # on Linux alone
-LOOKS = 64  # at what the client that is there has sent, before another one is turned away
-TOLD = 10  # clients turned away that are reported, each with an event of its own
+BYTES = 1 << 16  # read from a socket at once: 32 messages of the default size
+QUICKACK = getattr(socket, "TCP_QUICKACK", None)  # exists on Linux only
+LOOKS = 64  # reads from the present client, to see whether it has ended, before a second one is refused: 4 MB
+TOLD = 10  # refused clients that are reported by an event; more would fill the recording
 
 Say = Callable[[str], None]
 
 
 def is_open(host: str) -> bool:
-    """Whether others than this machine reach an address."""
+    """Whether other machines can connect to an address."""
     return not ipaddress.IPv4Address(host).is_loopback
 
 
 def address_of(text: str) -> tuple[str, int]:
-    """Host, as a dotted address, and port of `HOST:PORT` or `PORT`; loopback where no host is given.
+    """Host, as a dotted address, and port of `HOST:PORT` or `PORT`; the loopback address if there is no host.
 
     Raises:
-        InputError: it is none, or no address of IPv4, which is all that OpenSees connects to.
+        InputError: the text has another form, or is not an IPv4 address; OpenSees connects to IPv4 addresses only.
     """
     found = ADDRESS.fullmatch(text)
     host = "" if found is None else (found[1] or LOOPBACK).replace("localhost", LOOPBACK)
@@ -53,7 +53,7 @@ def address_of(text: str) -> tuple[str, int]:
 
 
 class ClientError(LostError):
-    """A client has gone, stalled or sent what makes no sense (exit 4)."""
+    """A client disconnected, sent nothing, or sent messages that are not valid (exit 4)."""
 
 
 class Port:
@@ -78,13 +78,13 @@ class Port:
         self.listener.setblocking(False)
 
     def accept(self) -> None:
-        """Take the client that calls, or turn it away where one is there already."""
+        """Accept a client, or refuse it if there is another one."""
         try:
             client, (host, port) = self.listener.accept()
-        except OSError:  # it has gone again
+        except OSError:  # the client has disconnected again
             return
         peer = f"{host}:{port}"
-        for _ in range(LOOKS):  # the one that is there may have gone since
+        for _ in range(LOOKS):  # the present client may have ended meanwhile
             if self.client is None or self.server.steps or not self.read():
                 break
         if self.client is not None or self.server.ending:
@@ -101,11 +101,11 @@ class Port:
         self.client, self.peer, self.server = client, peer, ElementServer(self._stiffness)
 
     def read(self) -> bool:
-        """Take in what the client has sent, and answer; whether there was anything.
+        """Process the bytes that the client has sent, and answer; returns whether there were any.
 
         Raises:
-            ClientError: it has gone, or sends what makes no sense, after it has moved the laboratories.
-            RevisedError: it revises displacements.
+            ClientError: the client disconnected or sent an invalid message after it has moved the laboratories.
+            RevisedError: it changes a displacement that was imposed in the same step.
         """
         client = self.client
         if client is None or self.server.full:
@@ -120,17 +120,19 @@ class Port:
         if not data:
             self._gone("is lost: it closed the connection without saying that its analysis is over")
             return True
-        if QUICKACK is not None:  # else the client's next small message waits 40 ms for an acknowledgement
+        if (
+            QUICKACK is not None
+        ):  # otherwise the client's next small message waits 40 ms for an acknowledgement
             client.setsockopt(socket.IPPROTO_TCP, QUICKACK, 1)
         self._fed(self.server.take, data)
         return True
 
     def measured(self, found: Measurement) -> None:
-        """Hand the client what was measured at its displacements; raises as `read`."""
+        """Send the client the measurements at its displacements if it waits for them; raises as `read`."""
         self._fed(self.server.measured, found)
 
     def _fed(self, feed: Callable[[Any], None], what: Any) -> None:
-        """Let the server take something in, and send what it answers."""
+        """Pass `what` to the server and send its answers."""
         try:
             feed(what)
         except RevisedError:
@@ -146,7 +148,7 @@ class Port:
                 self.server = ElementServer(self._stiffness)
 
     def flush(self) -> None:
-        """Send what is to be answered; raises ClientError where the client does not take it."""
+        """Send the answers; raises ClientError if the client does not receive them."""
         if self.client is None or not (data := self.server.outgoing()):
             return
         try:
@@ -158,11 +160,11 @@ class Port:
             self._gone("was turned away: it does not take its answers")
 
     def _gone(self, how: str) -> None:
-        """The client is served no more; before it has moved anything the next one may come."""
+        """Close the connection, so that another may connect; raises ClientError if this client has moved anything."""
         server = self.server
         silent, moved = server.ending or server.untouched, server.steps > 0
         self.leave()
-        if silent:  # it has said that it ends, or has only looked whether somebody is there
+        if silent:  # the client has ended, or only checked whether the port is open
             return
         text = f"The client at {self.peer} {how.rstrip('.')}."
         if moved:
@@ -191,29 +193,31 @@ class Ports:
 
     @property
     def servers(self) -> list[ElementServer]:
-        """What is said with each client."""
+        """The server of each port."""
         return [port.server for port in self.ports]
 
     def serve(self, seconds: float) -> bool:
-        """Serve whoever has something to say, waiting at most `seconds` for it; whether there was anything.
+        """Process messages and connections, waiting for them at most `seconds`; returns whether there were any.
 
         Raises:
             ClientError, RevisedError: as `Port.read`.
         """
-        if self._one is not None and self._one.read():  # as in nearly every call, without asking who is ready
+        if (
+            self._one is not None and self._one.read()
+        ):  # succeeds in nearly every call and saves the call of `poll`
             return True
         ready = self._ready(seconds)
         if not ready:
             return False
         for port in self.ports:
             if port.client is not None and port.client.fileno() in ready:
-                port.read()  # one that has gone makes room for the one that calls
+                port.read()  # a client that has ended makes room for the next one
             if port.listener.fileno() in ready:
                 port.accept()
         return True
 
     def _ready(self, seconds: float) -> set[int]:
-        """The descriptors that have something to be read."""
+        """The file descriptors that have data to read."""
         poll = select.poll()
         for port in self.ports:
             poll.register(port.listener, select.POLLIN)
@@ -222,6 +226,6 @@ class Ports:
         return {descriptor for descriptor, _ in poll.poll(max(seconds, 0.0) * 1e3)}
 
     def close(self) -> None:
-        """Close all of them."""
+        """Close all connections and ports."""
         for port in self.ports:
             port.close()

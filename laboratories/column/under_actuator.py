@@ -1,4 +1,4 @@
-"""The emulated actuator above a specimen whose force comes from elsewhere: another program, another model."""
+"""The emulated actuator on a specimen whose force another program or model computes."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from models.system import System
 
 __all__ = ["Array", "UnderActuator"]
 
-WHERE = "options of a rig"  # in sentences about tables that the options hold
+WHERE = "options of a rig"  # name of the tables within the options, for messages
 
 
 class UnderActuator:
-    """Actuator and sensors; `force` gives the force (N) at the end of a way (m) of `substeps` deformations.
+    """Actuator and sensors; `force` returns the force (N) at the end of a path (substeps,) of deformations (m).
 
-    `actuator` and `sensors` are as the plan has these tables; the actuator does not feel the force.
+    `actuator` and `sensors` are tables as in a plan; the force does not act on the actuator.
 
     Raises:
-        InputError: a table cannot be, or the actuator is one that feels the force.
+        InputError: a table is not valid, or the actuator's model depends on the force.
     """
 
     def __init__(
@@ -59,11 +59,11 @@ class UnderActuator:
         self._true = (0.0, 0.0)
 
     def read(self) -> ColumnMeasurement:
-        """Readings at the present tick, with the sensors' noise."""
+        """The measurements at the present tick, with the noise of the sensors."""
         return ColumnMeasurement(*map(add, self._true, self._noise.row()))
 
     def write(self, command: ColumnCommand) -> None:
-        """Move on by one interval: the specimen follows the actuator in straight lines."""
+        """Advance by one interval, in which the deformation changes linearly."""
         reached, _ = self._move(command[0])
         way = np.linspace(self._true[0], reached, self._substeps + 1)[1:]
         self._true = (reached, self._force(way))
