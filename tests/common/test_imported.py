@@ -64,6 +64,14 @@ def test_a_prediction_passes_filter_and_delay() -> None:
     assert NOTHING_STATED.through(ramp, 0.002) is ramp
 
 
+def test_a_channel_is_late_by_its_delay_and_by_what_its_filter_delays_slow_motion() -> None:
+    passed = LoggerFilter("butterworth", 2, 50.0)
+    assert ImportedChannel(delay=0.002).late == pytest.approx(0.002)
+    assert ImportedChannel(passed, 0.002).late == pytest.approx(
+        0.002 + math.sqrt(2.0) / (2.0 * math.pi * 50.0)
+    )
+
+
 def test_the_exchange_is_known_by_numbers_or_stamps() -> None:
     numbers = Run(Path("a.mcap"), columns={"master": {"damper_force_seq": np.zeros(3)}})
     stamps = Run(Path("a.mcap"), columns={"latency": {"command_one_way": np.zeros(3)}})
