@@ -120,7 +120,7 @@ def examine(record: Record, tell: Tell = untold, more: Sequence[Record] = ()) ->
         verdicts,
         readings.findings(record, sharp, rounded, logged=late is not None),
         exchanged(record),
-        held,
+        {} if late is not None else held,  # a logger's steps repeat samples too
         readings.levels(final, list(map(heard, searches))),
         [*together(more), *of_plan(record), *not_recorded(record), *reversed_signs(datas), *repeating(held)],
         [law for verdict in verdicts if verdict.outcome in UNNAMED for law in learn(verdict.search.chosen)],

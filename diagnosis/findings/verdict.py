@@ -83,7 +83,7 @@ def judge(search: Search) -> PartVerdict:
     if not search.chosen.names:
         return PartVerdict(search, without_effects(search), 1.0, (), ())
     outcome = how_well(search)
-    if outcome == "unknown":
+    if outcome == "unknown" or (outcome == "partly" and strain(search) < HALF):
         return unnamed(search)
     chosen = search.chosen
     noise = max(1.0, chosen.chi / chosen.reduced.size)
@@ -209,9 +209,14 @@ def certainty(search: Search) -> float:
     """
     before, after = search.commissioned, search.chosen
     margin = max(before.prior - after.prior, 0.0) / PRIOR_GAIN + max(before.chi - after.chi, 0.0) / DATA_GAIN
-    usual = after.z.size + STRAINED * math.sqrt(2.0 * after.z.size)
-    strain = max(after.prior - usual, 0.0) / (2.0 * TEMPERATURE)
-    return (1.0 - 0.5 * math.exp(-(margin - 1.0))) * math.exp(-strain)
+    return (1.0 - 0.5 * math.exp(-(margin - 1.0))) * strain(search)
+
+
+def strain(search: Search) -> float:
+    """Share of belief that is left to effects beside which the nominal parameters are as far off as they are."""
+    z = search.chosen.z
+    usual = z.size + STRAINED * math.sqrt(2.0 * z.size)
+    return math.exp(-max(search.chosen.prior - usual, 0.0) / (2.0 * TEMPERATURE))
 
 
 def equivalents(search: Search) -> tuple[tuple[str, ...], ...]:

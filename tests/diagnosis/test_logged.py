@@ -109,6 +109,8 @@ def test_nominal_parameters_that_are_all_far_off_speak_against_an_effect(driftin
     far = replace(drifting.chosen, z=np.full(drifting.chosen.z.size, 2.9))
     assert verdict.certainty(drifting) > 0.9
     assert verdict.certainty(replace(drifting, chosen=far)) < 0.5
+    worse = replace(far, reduced=far.reduced + 1.0)
+    assert verdict.judge(replace(drifting, chosen=worse)).outcome == "unknown"
 
 
 def test_what_hardly_closes_the_gap_explains_nothing(cases: Cases, drifting: Search) -> None:
