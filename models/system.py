@@ -31,7 +31,18 @@ class ColumnEffects:
     hardening: float = 0.0
     exponent: float = 2.0  # sharpness of the transition: Bouc-Wen's n, Menegotto and Pinto's R₀
     law: float = 0.0  # index of the law of yielding in `laboratories.column.specimen.LAWS`
-    unloading: float = 0.0  # exponent of the unloading stiffness, of a peak-oriented specimen
+    unloading: float = 0.0  # exponent of the unloading stiffness, of a peak-oriented or pinched specimen
+    first_bend: float = 1.0  # of a trilinear or pinched specimen, over the yield displacement
+    second_stiffness: float = 0.5  # between the bends, over the first
+    pinch_force: float = 1.0  # of a pinched specimen: the corner of reloading, over the peak's force
+    pinch_displacement: float = 1.0  # and its place on the way to the peak
+    damage: float = 0.0  # growth of that peak per plastic deformation of the yield displacement
+    centring: float = math.inf  # m, deformation where a self-centring specimen bends
+    centring_hardening: float = 0.05
+    centring_loop: float = 0.5  # height of its flag over its force there
+    stiffening: float = 0.0  # stiffness gained over the first one
+    stiffening_law: float = 0.0  # 0 with the square of the deformation, 1 from a bend on
+    stiffening_bend: float = 1e-3  # m
     degradation: float = (
         0.0  # share of stiffness lost when the largest deformation is far beyond the reference
     )
@@ -43,9 +54,14 @@ class ColumnEffects:
     friction_velocity: float = (
         1e-6  # v of F·tanh(δ̇/v), m/s: below any motion of a test, so that it acts as Coulomb's
     )
+    friction_asymmetry: float = 0.0  # share more in the positive direction, and less in the other
+    friction_drop: float = 0.0  # share that is lost at speed
+    friction_speed: float = 0.02  # m/s, at which two thirds of that are lost
     viscous: float = 0.0  # N·s/m
     inertia: float = 0.0  # kg
     slip: float = 0.0  # m, whole gap
+    slip_law: float = 0.0  # where the gap is: `laboratories.column.specimen.PLAYS`
+    slip_share: float = 1.0  # of the stiffness that is behind the gap; the rest is beside it
     learned: tuple[float, ...] = ()  # a law of `models.preisach` that adds to the force, N
 
 
@@ -60,6 +76,10 @@ class TableEffects:
     backlash: float = 0.0  # m, whole play
     friction: float = 0.0  # m/s²: force over moving mass
     friction_velocity: float = 1e-6  # m/s, as in `ColumnEffects`
+    friction_asymmetry: float = 0.0  # share more in the positive direction, and less in the other
+    friction_drop: float = 0.0  # share that is lost at speed
+    friction_speed: float = 0.02  # m/s, at which two thirds of that are lost
+    learned: tuple[float, ...] = ()  # a law of `models.preisach` of the table's motion that brakes it, m/s²
 
 
 @dataclass(frozen=True)
@@ -69,6 +89,9 @@ class DamperEffects:
     gain: float = 1.0
     friction: float = 0.0  # N
     friction_velocity: float = 1e-6  # m/s, as in `ColumnEffects`
+    friction_asymmetry: float = 0.0  # share more in the positive direction, and less in the other
+    friction_drop: float = 0.0  # share that is lost at speed
+    friction_speed: float = 0.02  # m/s, at which two thirds of that are lost
     force_limit: float = math.inf  # N
     offset: float = 0.0  # N, a constant force on the moving mass
     stop_stroke: float = math.inf  # m

@@ -3,31 +3,43 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterator
 
 import numpy as np
 from scipy.optimize import minimize
 
+from common.plan.kinds import COLUMN
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Fit, Problem, excess
-from laboratories.effects.effect import Effect
+from diagnosis.recorded.joined import JoinedPart
+from diagnosis.recorded.parts import ColumnAlone, LaboratoryPart, Part
+from laboratories.effects.effect import Effect, Parameter
 from models.registry import Array
+from models.specimens import fit as specimens
 
-# Where a column stands once it has yielded hangs on all before, so that a fit from afar ends nowhere: starts are dense.
+# Where a column stands once it has yielded hangs on all before, so that a fit from afar ends nowhere: it starts from
+# what follows the measured force over the measured deformation best, or else starts are dense.
 NEARER = np.geomspace(0.5, 1.3, 10)  # times the strength found under another law
 FINER = (0.0, 0.5, 1.5)  # times the sizes of the first shape that a law has, beside these
-FITTED = 2  # of the starts, the best ones
+FITTED = 3  # of the laws, those with the best starts
 STEPS, ROUNDS = 8, 2  # of a fit
 TURNS, EVALUATIONS = 2, 60  # of the simplex with the effects' parameters, each followed by a fit of all
 LOGARITHMIC, LINEAR = 0.06, 0.4  # first edges of the simplex, of the logarithm and of a shape over its size
+SURELY = 25.0  # cost by which another law must be better: 5 standard deviations squared
 BETTER = 0.9  # of what is left beyond noise: less of it is worth another law than the first
 
 
 def in_best_law(fit: Fit) -> Fit:
     """The fit with its last effect under the law that leaves least; the first one where none is much better."""
     effect = fit.data.catalogue[fit.names[-1]]
-    others = [under(fit, effect, place) for place in range(1, len(effect.laws))]
-    best = min(others, key=lambda item: item.cost, default=fit)
-    return settled(best) if excess(best) < BETTER * excess(fit) else fit
+    begun = [begun_under(fit, effect, place) for place in range(1, len(effect.laws))]
+    begun = sorted(begun, key=lambda item: item.cost)[:FITTED]
+    best = fit
+    for start in sorted(begun, key=lambda item: len(Problem(item.data, item.values).frees)):
+        found = fitting.fit(fit.data, start.values, start.z, STEPS, rounds=ROUNDS)
+        surely = found.cost < best.cost - SURELY
+        best = found if surely and excess(found) < BETTER * excess(best) else best
+    return best if best is fit else settled(best)
 
 
 def settled(fit: Fit) -> Fit:
@@ -54,19 +66,56 @@ def settled(fit: Fit) -> Fit:
     return fit
 
 
-def under(fit: Fit, effect: Effect, place: int) -> Fit:
-    """The fit with an effect under the law at a place of its laws, from the best of some starts.
+def begun_under(fit: Fit, effect: Effect, place: int) -> Fit:
+    """The fit with an effect under the law at a place of its laws, where a fit of it starts best.
 
-    All start from the plan's parameters, as those of a fit under a wrong law mean nothing.
+    From the plan's parameters, as those of a fit under a wrong law mean nothing.
     """
-    base = effect.under(place, fit.values[effect.name])
+    begun = (
+        fitting.at(fit.data, fit.values | {effect.name: values}, np.zeros(fit.z.size))
+        for values in starts(fit, effect, place)
+    )
+    return min(begun, key=lambda item: item.cost)
+
+
+def starts(fit: Fit, effect: Effect, place: int) -> Iterator[dict[str, float]]:
+    """Parameters from which a law may start: of the specimen that it is, or near those under another law."""
+    base, law = effect.under(place, fit.values[effect.name]), effect.laws[place]
     (strength,) = (item for item in effect.parameters if not item.shape)
-    shape = next(item for item in effect.parameters if item.name in effect.laws[place].shapes)
-    sizes = {share * size for share in (*FINER, 1.0) for size in shape.sizes}
-    begun = []
+    way = path(fit.data.part) if law.model else None
+    if way is not None:
+        found = specimens.fit(law.model, *way).parameters
+        known = {item.name: item for item in effect.every}
+        for name in (strength.name, *law.shapes):
+            base[name] = within(known[name], found[law.renamed.get(name, name)])
+        yield base
+        return
+    shape = next((item for item in effect.every if item.name in law.shapes and item.sizes), None)
+    sizes = {share * size for share in (*FINER, 1.0) for size in shape.sizes} if shape else {0.0}
     for share, size in itertools.product(NEARER.tolist(), sorted(sizes)):
-        values = base | {strength.name: share * base[strength.name], shape.name: size}
-        begun.append(fitting.at(fit.data, fit.values | {effect.name: values}, np.zeros(fit.z.size)))
-    begun.sort(key=lambda item: item.cost)
-    fits = [fitting.fit(fit.data, item.values, item.z, STEPS, rounds=ROUNDS) for item in begun[:FITTED]]
-    return min(fits, key=lambda item: item.cost)
+        nearer = {strength.name: within(strength, share * base[strength.name])}
+        yield base | nearer | ({shape.name: within(shape, size)} if shape else {})
+
+
+def within(parameter: Parameter, value: float) -> float:
+    """A value within a parameter's bounds."""
+    return min(max(value, parameter.least), parameter.most)
+
+
+def path(part: Part) -> tuple[Array, Array] | None:
+    """Measured deformation (m) and force (N) of a part's column, where both are there; None where there is none.
+
+    Of several recordings those of the one that goes farthest.
+    """
+    if isinstance(part, JoinedPart):
+        ways = [way for piece in part.pieces if (way := path(piece)) is not None]
+        return max(ways, key=lambda way: float(np.max(np.abs(way[0]))), default=None)
+    if isinstance(part, ColumnAlone):
+        there, way, force = part.present[:, 0], part.inputs, part.measured[:, 0]
+    elif isinstance(part, LaboratoryPart) and part.lab.kind.name == COLUMN:
+        there, (way, force) = part.present.all(axis=1), part.measured.T
+    else:
+        return None
+    if not (np.any(way[there]) and np.any(force[there])):
+        return None
+    return way[there], force[there]

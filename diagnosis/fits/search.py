@@ -38,6 +38,7 @@ MOSTLY = (
 
 # Whether there is a gap: in sums over averaged samples, because noise averages out and systematic errors do not.
 LEVELS = (1, 4, 16)  # averaged samples in a sum, from fast to slow systematic errors
+SLIGHT = 0.02  # of the same, below which one law of a mechanism is as good as another: it can hardly be seen
 MATERIAL = 0.12  # systematic residual over noise below which a gap would interest nobody
 SIGNIFICANT = (
     5.0  # standard deviations from which on it is no chance, with all signals and time scales looked at
@@ -50,6 +51,7 @@ SMALL = (
     0.05  # of a reading's rms that may be coloured noise where only the residual beside effects tells of it
 )
 UNEVEN = 3.0  # times what the energy of normal noise varies by: such noise comes and goes, as a motion does
+FARTHEST = 8.0  # times what the best effect leaves: one that leaves more is under no law the right one
 POLISHED = 12  # steps of a fit that leaves something, before that counts
 HALVINGS = 20  # by which a value is found beyond which the system is the same
 RIVALS = 3  # candidates of the projection that are fitted in the place of coloured noise
@@ -326,9 +328,11 @@ class Searcher:
 
     def in_best_laws(self, fits: list[Fit]) -> list[Fit]:
         """The fits, best first, with effects under other laws where the best leaves a gap and these leave less."""
-        if not fits or remaining(fits[0]) < MATERIAL:
+        if not fits or remaining(fits[0]) < SLIGHT:
             return fits
-        return sorted(map(laws.in_best_law, fits), key=lambda item: item.cost)
+        least = excess(fits[0])
+        better = [laws.in_best_law(item) if excess(item) <= FARTHEST * least else item for item in fits]
+        return sorted(better, key=lambda item: item.cost)
 
     def with_stop(self, fit: Fit, fits: list[Fit]) -> list[Fit]:
         """The fits, and one with an end stop where all the others leave a large residual."""

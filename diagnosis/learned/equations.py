@@ -5,6 +5,7 @@ Each series comes from the recorded signals at the machine itself, so that error
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
@@ -20,7 +21,7 @@ from diagnosis.signals.mask import Mask
 from diagnosis.signals.systematic import systematic
 from loop import replay
 from models.registry import Array
-from models.system import System
+from models.system import DamperEffects, System, TableEffects
 
 STILL = 1e-3  # m/s, below which the sign of a measured rate is noise: 2 µm of stroke noise over one interval of 2 ms
 
@@ -35,7 +36,9 @@ class Equation:
     rate: Array  # (ticks,) m/s
     left: Array  # (ticks,) in `unit`
     there: Mask
-    over: Literal["piston displacement", "deformation", "velocity"]  # abscissa of its curve
+    over: Literal[
+        "piston displacement", "deformation", "table displacement", "velocity"
+    ]  # abscissa of its curve
     quantity: str  # what `left` is, in words
     unit: str
 
@@ -81,6 +84,56 @@ def of_column(fit: Fit, part: LaboratoryPart, system: System) -> list[Equation]:
 
 
 def of_table(fit: Fit, part: LaboratoryPart, system: System) -> list[Equation]:
+    """What brakes the table beyond its model, and the damper's force over its stroke."""
+    return [*of_platform(fit, part, system), *of_damper(fit, part, system)]
+
+
+def of_platform(fit: Fit, part: LaboratoryPart, system: System) -> list[Equation]:
+    """The acceleration that the table lacks beside its servo loop's, over its place."""
+    places = [
+        part.lab.kind.channels.names.index(name) for name in ("table_displacement", "table_acceleration")
+    ]
+    (place, felt), (seen, there) = part.measured.T[places], part.present.T[places]
+    if not (seen.any() and there.any()) or not servo_alone(system):
+        return []
+    interval = system.plan.test.interval
+    predicted = part.predict(system)[:, places[0]]
+    white = float(fit.data.white[places[0]])
+    motion = predicted + systematic(np.where(seen, place - predicted, 0.0), white, interval)
+    rate = np.gradient(motion, interval)
+    command = next(iter(part.inputs.values()))
+    left = np.where(there, platform_acceleration(system, command, motion, rate) - felt, 0.0)
+    site = part.lab.site("table")
+    return [Equation(site, "table", motion, rate, left, there, "table displacement", "acceleration", "m/s²")]
+
+
+def servo_alone(system: System) -> bool:
+    """Whether a table is a servo loop of second order alone, so that its acceleration follows from its motion."""
+    effects = system.effects.table
+    plain = math.isinf(effects.oil_frequency) and effects.compliance == effects.backlash == 0.0
+    return plain and math.isfinite(system.plan.table.frequency)
+
+
+def platform_acceleration(system: System, command: Array, motion: Array, rate: Array) -> Array:
+    """Acceleration (ticks,) m/s² by which a servo loop moves a table at a place (m) and rate (m/s)."""
+    table, effects = system.plan.table, system.effects.table
+    omega = 2.0 * math.pi * table.frequency
+    ticks = np.arange(command.size)
+    late = np.interp(ticks - table.delay / system.plan.test.interval, ticks, command, left=0.0)
+    servo: Array = omega**2 * (effects.gain * late - motion) - 2.0 * table.damping_ratio * omega * rate
+    return servo - friction_of(effects, rate)
+
+
+def friction_of(effects: TableEffects | DamperEffects, rate: Array) -> Array:
+    """The friction (ticks,) of a machine at a rate (m/s), as its effects have it."""
+    sides = 1.0 + effects.friction_asymmetry * np.sign(rate)
+    speeds = 1.0 - effects.friction_drop * (1.0 - np.exp(-np.abs(rate) / effects.friction_speed))
+    smooth = np.tanh(rate / max(effects.friction_velocity, STILL))
+    result: Array = effects.friction * smooth * sides * speeds
+    return result
+
+
+def of_damper(fit: Fit, part: LaboratoryPart, system: System) -> list[Equation]:
     """The damper's force over its stroke."""
     places = [part.lab.kind.channels.names.index(name) for name in ("damper_stroke", "damper_force")]
     (stroke, force), (seen, felt) = part.measured.T[places], part.present.T[places]
@@ -105,7 +158,7 @@ def damper_force(system: System, stroke: Array, rate: Array, command: Array) -> 
     kept = float(np.exp(-system.plan.test.interval / lag)) if lag > 0.0 else 0.0
     motor = lfilter([0.0, 1.0 - kept], [1.0, -kept], wanted)
     over = stroke - np.clip(stroke, -effects.stop_stroke, effects.stop_stroke)
-    rubbing = effects.friction * np.tanh(rate / max(effects.friction_velocity, STILL))
+    rubbing = friction_of(effects, rate)
     beside: Array = effects.stop_stiffness * over + rubbing - effects.offset
     return damper.stiffness * stroke + damper.damping * rate + beside - motor
 

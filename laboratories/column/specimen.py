@@ -1,10 +1,10 @@
 """The specimen of a column laboratory as its load cell measures it: the column's model and effects on it.
 
-    f = g(δ_max)·p(δ')·f_column(δ') + friction + c·δ̇ + m·δ̈,    δ' = δ outside the grip's gap
+    f = g(δ_max)·p(δ')·(f_column(δ') + e(δ')) + friction + c·δ̇ + m·δ̈,    δ' = δ outside the grip's gap
 
-`f_column` is the plan's model or, with the effect of yielding, one of `LAWS`; m and c include the plan's mass and
-dashpot. A law learned from a recording adds to the force. Without any of these the force equals exactly that of the
-plan's model.
+`f_column` is the plan's model or, with the effects of yielding or centring, another of `models.specimens` in its place;
+e is the effect of hardening; m and c include the plan's mass and dashpot. A law learned from a recording adds to the
+force. Without any of these the force equals exactly that of the plan's model.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from common.plan.laboratory_tables import Column
-from models import preisach, specimens
+from models import friction, preisach, specimens
 from models.compiled import jit, jit_apart
 from models.registry import Array
 from models.specimens import SPECIMENS
@@ -24,15 +24,21 @@ from models.system import ColumnEffects
 # places in `effects`
 PRESENT, STIFFNESS, YIELDS, DEGRADATION, PINCHING, PINCHING_WIDTH, PINCHING_HARDENING = range(7)
 FRICTION, PRESLIDING, VISCOUS, INERTIA, SLIP, FRICTION_VELOCITY = range(7, 13)
+ASYMMETRY, DROP, SPEED, PLAY, BESIDE, CENTRES, STIFFENING, BEND = range(13, 21)
 
-# places in `cell`
-DEFORMATION, RATE, LARGEST, SLIDER, LAST_STEP, REACTION = range(6)
+# places in `cell`; the last two are the specimen's place within play, and the force that it carried there
+DEFORMATION, RATE, LARGEST, SLIDER, LAST_STEP, REACTION, INSIDE, CARRIED = range(8)
 LAWS = (
     "bouc_wen",
     "bilinear",
     "menegotto_pinto",
     "clough",
+    "trilinear",
+    "pinched",
 )  # of yielding, in the order of `ColumnEffects.law`
+PLAYS = ORIGIN, RESTING, HELD, PARTLY = range(4)  # where the gap is: see `column.slip`
+CENTRING = SPECIMENS["self_centring"].code
+STIFFENED_AT = 2e-3  # m, reference deformation of hardening with the square of the deformation
 DEGRADED_AT = (
     2e-3  # m, reference deformation of degradation, at which 63 % of the stiffness is lost that will be
 )
@@ -47,6 +53,8 @@ class Specimen(NamedTuple):
     effects: Array
     yielding: Array  # parameters of the law of yielding, which replaces the planned stiffness
     yielded: Array  # memory of that law
+    centring: Array  # parameters of the law of centring, likewise
+    centred: Array  # memory of that law
     cell: Array  # memory of the effects
     learned: Array  # a law of `models.preisach`, empty for none
     learned_memory: Array
@@ -57,7 +65,8 @@ def build(column: Column, effects: ColumnEffects | None = None) -> Specimen:
     more = effects or ColumnEffects()
     more = replace(more, viscous=more.viscous + column.damping, inertia=more.inertia + column.mass)
     code, params, memory = specimens.pack(column.model, stiffness=column.stiffness, **column.parameters)
-    yields = np.isfinite(more.yield_displacement)
+    yields, centres = np.isfinite(more.yield_displacement), np.isfinite(more.centring)
+    bend = more.stiffening_bend if more.stiffening_law else 0.0
     values = [
         float(more != ColumnEffects()),
         column.stiffness,
@@ -72,6 +81,14 @@ def build(column: Column, effects: ColumnEffects | None = None) -> Specimen:
         more.inertia,
         more.slip,
         more.friction_velocity,
+        more.friction_asymmetry,
+        more.friction_drop,
+        more.friction_speed,
+        more.slip_law,
+        (1.0 - more.slip_share) * column.stiffness if more.slip_law == PARTLY else 0.0,
+        float(centres),
+        more.stiffening * column.stiffness,
+        bend,
     ]
     law = np.array(more.learned)
     return Specimen(
@@ -81,22 +98,35 @@ def build(column: Column, effects: ColumnEffects | None = None) -> Specimen:
         np.array(values),
         yielding(column.stiffness, more),
         np.zeros(specimens.STATE_SIZE),
-        np.zeros(6),
+        np.array([column.stiffness, bending(more.centring), more.centring_hardening, more.centring_loop]),
+        np.zeros(specimens.STATE_SIZE),
+        np.zeros(8),
         law,
         preisach.memory(law),
     )
 
 
+def bending(place: float) -> float:
+    """Where a law bends (m), at any place where it does not."""
+    return place if np.isfinite(place) else 1.0
+
+
 def yielding(stiffness: float, effects: ColumnEffects) -> Array:
     """Parameters of the law by which a column of that stiffness (N/m) yields, in the order of its kernel."""
-    limit = effects.yield_displacement if np.isfinite(effects.yield_displacement) else 1.0
+    limit = bending(effects.yield_displacement)
     name = LAWS[int(effects.law)]
+    skeleton = [stiffness, limit, effects.hardening, effects.first_bend, effects.second_stiffness]
     if name == "bouc_wen":
         return np.array([stiffness, limit, effects.hardening, effects.exponent, 0.5, 0.5])
     if name == "menegotto_pinto":
         return np.array([stiffness, limit, effects.hardening, effects.exponent, 0.925, 0.15])
     if name == "clough":  # which has no negative hardening
         return np.array([stiffness, limit, max(effects.hardening, 0.0), effects.unloading, 0.0, 0.0])
+    if name == "trilinear":  # whose sliders cannot push
+        return np.array([*skeleton[:-1], max(effects.second_stiffness, effects.hardening)])
+    if name == "pinched":
+        corner = [effects.pinch_force, effects.pinch_displacement]
+        return np.array([*skeleton, *corner, effects.unloading, effects.damage])
     return np.array([stiffness, limit, effects.hardening])
 
 
@@ -131,19 +161,55 @@ def force(specimen: Specimen, deformation: float, step: float) -> float:
     return with_effects(specimen, deformation, step)
 
 
+@jit
+def behind_play(effects: Array, cell: Array, deformation: float) -> float:
+    """Deformation (m) of a specimen in a grip with play.
+
+    The gap is about the origin; or where the specimen rests without force, once it leaves the contact that loads it; or
+    where it is held, by friction, until the other flank takes it along.
+    """
+    half = 0.5 * effects[SLIP]
+    if half == 0.0 or effects[PLAY] == ORIGIN or effects[PLAY] == PARTLY:
+        return deformation - min(max(deformation, -half), half)
+    if effects[PLAY] == RESTING and cell[CARRIED] != 0.0:
+        cell[INSIDE] = deformation - (half if cell[CARRIED] > 0.0 else -half)
+    else:
+        cell[INSIDE] = min(max(cell[INSIDE], deformation - half), deformation + half)
+    return cell[INSIDE]
+
+
+@jit
+def carried(specimen: Specimen, within: float) -> float:
+    """Force (N) of the column at its own deformation (m): of the plan's model, or of the laws in its place."""
+    effects = specimen.effects
+    result = specimens.step(specimen.code, specimen.params, specimen.memory, within)
+    elastic = effects[STIFFNESS] * within
+    if effects[YIELDS] != 0.0:
+        law = int(effects[YIELDS])
+        result += specimens.step(law, specimen.yielding, specimen.yielded, within) - elastic
+    if effects[CENTRES] != 0.0:
+        result += specimens.step(CENTRING, specimen.centring, specimen.centred, within) - elastic
+    if effects[STIFFENING] != 0.0:
+        bend = effects[BEND]
+        square = within * within / (STIFFENED_AT * STIFFENED_AT)
+        beyond = within - min(max(within, -bend), bend)
+        result += effects[STIFFENING] * (beyond if bend > 0.0 else square * within)
+    return result
+
+
 @jit_apart
 def with_effects(specimen: Specimen, deformation: float, step: float) -> float:
     """`force` for a specimen with effects."""
     effects, cell = specimen.effects, specimen.cell
-    half = 0.5 * effects[SLIP]
-    inside = min(max(deformation, -half), half)
-    within = deformation - inside
-    result = specimens.step(specimen.code, specimen.params, specimen.memory, within)
-    if effects[YIELDS] != 0.0:
-        law = int(effects[YIELDS])
-        result += (
-            specimens.step(law, specimen.yielding, specimen.yielded, within) - effects[STIFFNESS] * within
-        )
+    rested, loaded = cell[INSIDE], cell[CARRIED]
+    within = behind_play(effects, cell, deformation)
+    result = carried(specimen, within)
+    if effects[PLAY] == RESTING and effects[SLIP] > 0.0:
+        if result * loaded < 0.0 or (loaded == 0.0 and within == rested):  # between both contacts
+            result = 0.0
+        cell[CARRIED] = result
+    if effects[BESIDE] != 0.0:
+        result += effects[BESIDE] * (deformation - within)
     cell[LARGEST] = max(cell[LARGEST], abs(within))
     if effects[DEGRADATION] != 0.0:
         result *= 1.0 - effects[DEGRADATION] * (1.0 - np.exp(-cell[LARGEST] / DEGRADED_AT))
@@ -155,8 +221,9 @@ def with_effects(specimen: Specimen, deformation: float, step: float) -> float:
     if effects[FRICTION] != 0.0:
         contact = effects[PRESLIDING]
         cell[SLIDER] = min(max(cell[SLIDER] + moved, -contact), contact)
-        left = 1.0 if effects[FRICTION_VELOCITY] <= 1e-6 else np.tanh(abs(rate) / effects[FRICTION_VELOCITY])
-        result += effects[FRICTION] * cell[SLIDER] / contact * left
+        left = friction.left(rate, effects[FRICTION_VELOCITY], effects[DROP], effects[SPEED])
+        side = effects[ASYMMETRY] if cell[SLIDER] > 0.0 else -effects[ASYMMETRY]
+        result += effects[FRICTION] * (1.0 + side) * cell[SLIDER] / contact * left
     if specimen.learned.size > 0:
         result += preisach.step(specimen.learned, specimen.learned_memory, deformation, rate)
     cell[REACTION] = result

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 from common.plan.plan import Plan
@@ -47,6 +47,12 @@ class Law:
 
     name: str  # its name in texts
     shapes: Mapping[str, float]  # its parameters of shape, with the values from which a fit starts
+    model: str = (
+        ""  # the model of `models.specimens` that it is, fitted to force over deformation for a start
+    )
+    renamed: Mapping[str, str] = field(
+        default_factory=dict
+    )  # the model's names of parameters where they differ
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,10 @@
-"""The parameter that all friction in the catalogue shares: the velocity below which its force decreases."""
+"""The parameters that all friction in the catalogue shares: how its force depends on speed and on direction."""
 
 from __future__ import annotations
 
-from laboratories.effects.effect import Parameter
+from collections.abc import Mapping
+
+from laboratories.effects.effect import Law, Parameter
 
 VELOCITY = Parameter(
     "velocity",
@@ -16,3 +18,37 @@ VELOCITY = Parameter(
     # of the peak velocity: a fit then has a gradient, and the force is still constant for most of a cycle
     smoothing=0.03,
 )
+
+FURTHER = {
+    "": Parameter("law", "", 0.0, 0.0, 1.0, (), "0 the same both ways, 1 by direction and speed", shape=True),
+    "friction_asymmetry": Parameter(
+        "asymmetry",
+        "",
+        null=0.0,
+        least=-0.95,
+        most=0.95,
+        sizes=(),
+        says="share more in the positive direction, and less in the other",
+        shape=True,
+    ),
+    "friction_drop": Parameter(
+        "drop", "", null=0.0, least=-3.0, most=0.95, sizes=(), says="share that is lost at speed", shape=True
+    ),
+    "friction_speed": Parameter(
+        "speed",
+        "m/s",
+        null=0.02,
+        least=1e-4,
+        most=1.0,
+        sizes=(),
+        says="at which two thirds of that are lost",
+        shape=True,
+    ),
+}
+"""Of the second law, by the field that each sets; the number of the law itself sets none."""
+
+
+def laws(shapes: Mapping[str, float]) -> tuple[Law, ...]:
+    """The laws of a friction that has these shapes: the same both ways and at all speeds, or not."""
+    sided = {"velocity": 3e-4, "asymmetry": 0.0, "drop": 0.1, "speed": 0.02}
+    return Law("Coulomb", shapes), Law("by direction and speed", {**shapes, **sided})

@@ -58,11 +58,11 @@ def sets(
             others, which are parameters of shape, have no influence.
         says: the effect in a few words.
         reference: a source or an equation.
-        further: optional parameters, by the field that each sets.
+        further: optional parameters, by the field that each sets; the empty field sets none.
         more: further fields of `Effect`.
     """
     rest = further or {}
-    names = {field: parameter.name for field, parameter in (*fields.items(), *rest.items())}
+    names = {field: parameter.name for field, parameter in (*fields.items(), *rest.items()) if field}
     parameters = tuple(fields.values())
     law = partial(laid, site=site, fields=names, null=parameters[0].null)
     more |= {"further": tuple(rest.values())}

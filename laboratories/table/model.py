@@ -18,7 +18,7 @@ import numpy as np
 from common.errors import InputError
 from common.plan.laboratory_tables import Damper, ShakingTable
 from laboratories.column.model import substeps
-from models import preisach
+from models import friction, preisach
 from models.compiled import jit
 from models.registry import Array
 from models.system import DamperEffects, TableEffects
@@ -34,6 +34,7 @@ PRESENT, TABLE_GAIN, PLAY, TABLE_FRICTION, MOTOR_GAIN, FORCE_LIMIT, FRICTION, ST
 TABLE_VELOCITY, VELOCITY = 9, 10  # below which the frictions fall off
 OFFSET = 12
 IDEAL = 11  # interval (s) of a table that follows at once, 0 for any other
+TABLE_SHAPE, SHAPE = 13, 16  # of the frictions: asymmetry, what speed takes of them, and that speed
 
 
 class TableLab(NamedTuple):
@@ -49,6 +50,8 @@ class TableLab(NamedTuple):
     scratch: Array  # (n + 7,): the last two are the command after the play and an ideal table's last velocity
     learned: Array  # a law of `models.preisach` of the stroke, empty for none
     learned_memory: Array
+    braked: Array  # a law of the table's motion, m/s², empty for none
+    braked_memory: Array
 
 
 def build(
@@ -66,8 +69,8 @@ def build(
     on_table, on_damper = table_effects or TableEffects(), damper_effects or DamperEffects()
     present = on_table != TableEffects() or on_damper != DamperEffects()
     short = on_table.backlash or on_table.friction or on_damper.friction or on_damper.stop_stiffness
-    law = np.array(on_damper.learned)
-    short = short or law.size > 0
+    law, braked = np.array(on_damper.learned), np.array(on_table.learned)
+    short = short or law.size > 0 or braked.size > 0
     segments = delay.split(interval, table.delay, substeps(interval) if short else 1)
     alike: dict[float, Array] = {}  # equal steps differ by rounding only
     for length in segments.lengths:
@@ -79,6 +82,8 @@ def build(
     limits += [on_damper.force_limit, on_damper.friction, on_damper.stop_stroke, on_damper.stop_stiffness]
     limits += [on_table.friction_velocity, on_damper.friction_velocity]
     limits += [interval if math.isinf(table.frequency) else 0.0, on_damper.offset]
+    for part in (on_table, on_damper):
+        limits += [part.friction_asymmetry, part.friction_drop, part.friction_speed]
     return TableLab(
         segments.taps,
         matrices,
@@ -89,6 +94,8 @@ def build(
         np.zeros(size + INPUTS + 2),
         law,
         preisach.memory(law),
+        braked,
+        preisach.memory(braked),
     )
 
 
@@ -96,7 +103,8 @@ def propagation(length: float, table: ShakingTable, damper: Damper, effects: Tab
     """Propagation over one segment; shape (n, n + 5)."""
     if not math.isinf(table.frequency):
         return lagging_matrix(length, table, damper, effects)
-    for name, null in (("compliance", 0.0), ("friction", 0.0), ("oil_frequency", math.inf)):
+    nulls = {"compliance": 0.0, "friction": 0.0, "oil_frequency": math.inf, "learned": ()}
+    for name, null in nulls.items():
         if getattr(effects, name) != null:
             raise InputError(
                 f"An ideal table (frequency inf) cannot have the effect '{name}': leave it out, or give a frequency."
@@ -162,7 +170,7 @@ def advance(lab: TableLab, command: float, motor_command: float) -> tuple[float,
 def resist(matrix: Array, lab: TableLab, scratch: Array, size: int) -> None:
     """Compute a segment's forces beyond the matrices.
 
-    Of the table's friction, and of the damper's stop, law and friction.
+    Of the table's friction and law, and of the damper's stop, law and friction.
     """
     limits = lab.limits
     rail, drag = size + 3, size + 4
@@ -174,28 +182,35 @@ def resist(matrix: Array, lab: TableLab, scratch: Array, size: int) -> None:
         scratch[rail] += limits[STOP_STIFFNESS] * (over if middle > 0.0 else -over)
     if lab.learned.size > 0:
         scratch[rail] += preisach.step(lab.learned, lab.learned_memory, middle, scratch[STROKE_RATE])
+    base = BASE_RATE if size > BASE else TABLE_RATE
+    if lab.braked.size > 0:
+        place = scratch[base - 1] + 0.5 * matrix[base - 1, base] * scratch[base]
+        scratch[drag] -= preisach.step(lab.braked, lab.braked_memory, place, scratch[base])
     if limits[TABLE_FRICTION] > 0.0:
-        base = BASE_RATE if size > BASE else TABLE_RATE
-        most = limits[TABLE_FRICTION] * falling(scratch[base], limits[TABLE_VELOCITY])
-        scratch[drag] = stopping(matrix, scratch, base, drag, most)
+        most = limits[TABLE_FRICTION] * rubbing(limits, TABLE_SHAPE, scratch[base], limits[TABLE_VELOCITY])
+        side = limits[TABLE_SHAPE]
+        scratch[drag] += stopping(matrix, scratch, base, drag, -most * (1.0 + side), most * (1.0 - side))
     if limits[FRICTION] > 0.0:
-        most = limits[FRICTION] * falling(scratch[STROKE_RATE], limits[VELOCITY])
-        scratch[rail] += stopping(matrix, scratch, STROKE_RATE, rail, most)
+        most = limits[FRICTION] * rubbing(limits, SHAPE, scratch[STROKE_RATE], limits[VELOCITY])
+        side = limits[SHAPE]
+        scratch[rail] += stopping(
+            matrix, scratch, STROKE_RATE, rail, -most * (1.0 - side), most * (1.0 + side)
+        )
 
 
 @jit
-def falling(rate: float, velocity: float) -> float:
-    """Factor on a friction force at a rate (m/s), which decreases below `velocity`; Coulomb friction at 1e-6 m/s."""
-    return 1.0 if velocity <= 1e-6 else np.tanh(abs(rate) / velocity)
+def rubbing(limits: Array, shape: int, rate: float, velocity: float) -> float:
+    """Factor on a friction force at a rate (m/s), with the parameters of its shape from place `shape` on."""
+    return friction.left(rate, velocity, limits[shape + 1], limits[shape + 2])
 
 
 @jit
-def stopping(matrix: Array, scratch: Array, rate: int, place: int, most: float) -> float:
-    """The value of input `place` with which state `rate` is zero at the segment's end, limited to ±`most`."""
+def stopping(matrix: Array, scratch: Array, rate: int, place: int, least: float, most: float) -> float:
+    """The value of input `place` with which state `rate` is zero at the segment's end, limited to a range."""
     free = 0.0
     for column in range(scratch.size - 2):
         free += matrix[rate, column] * scratch[column]
-    return min(max(-free / matrix[rate, place], -most), most)
+    return min(max(-free / matrix[rate, place], least), most)
 
 
 def damper_rows(a: Array, b: Array, damper: Damper) -> None:

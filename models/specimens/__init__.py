@@ -17,7 +17,17 @@ from common.plan.schema import Rule, nearest
 from models import registry
 from models.compiled import jit
 from models.registry import Array
-from models.specimens import bilinear, bouc_wen, bwbn, clough, linear, menegotto_pinto
+from models.specimens import (
+    bilinear,
+    bouc_wen,
+    bwbn,
+    clough,
+    linear,
+    menegotto_pinto,
+    pinched,
+    self_centring,
+    trilinear,
+)
 
 
 def no_fault(_params: Any) -> str:
@@ -54,6 +64,22 @@ SPECIMENS = {
             menegotto_pinto.RULES,
             menegotto_pinto.STATE_SIZE,
         ),
+        SpecimenModel("pinched", 6, pinched.PinchedParams, pinched.RULES, pinched.STATE_SIZE),
+        SpecimenModel(
+            "trilinear",
+            7,
+            trilinear.TrilinearParams,
+            trilinear.RULES,
+            trilinear.STATE_SIZE,
+            trilinear.fault,
+        ),
+        SpecimenModel(
+            "self_centring",
+            8,
+            self_centring.SelfCentringParams,
+            self_centring.RULES,
+            self_centring.STATE_SIZE,
+        ),
     )
 }
 STATE_SIZE = max(model.state_size for model in SPECIMENS.values())
@@ -85,13 +111,21 @@ def pack(name: str, **params: float) -> tuple[int, Array, Array]:
 def step(kind: int, p: Array, s: Array, deformation: float) -> float:
     """Force (N) of the model with code `kind` at a deformation (m); its memory `s` moves on."""
     if kind == 1:
-        return bilinear.step(p, s, deformation)
-    if kind == 2:
-        return bouc_wen.step(p, s, deformation)
-    if kind == 3:
-        return clough.step(p, s, deformation)
-    if kind == 4:
-        return bwbn.step(p, s, deformation)
-    if kind == 5:
-        return menegotto_pinto.step(p, s, deformation)
-    return linear.step(p, s, deformation)
+        force = bilinear.step(p, s, deformation)
+    elif kind == 2:
+        force = bouc_wen.step(p, s, deformation)
+    elif kind == 3:
+        force = clough.step(p, s, deformation)
+    elif kind == 4:
+        force = bwbn.step(p, s, deformation)
+    elif kind == 5:
+        force = menegotto_pinto.step(p, s, deformation)
+    elif kind == 6:
+        force = pinched.step(p, s, deformation)
+    elif kind == 7:
+        force = trilinear.step(p, s, deformation)
+    elif kind == 8:
+        force = self_centring.step(p, s, deformation)
+    else:
+        force = linear.step(p, s, deformation)
+    return force

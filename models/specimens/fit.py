@@ -80,6 +80,13 @@ ROUND = {
     "n": SHARPNESS,
     "beta": SHARE,
 }
+SKELETON = {
+    "stiffness": SearchRange(0.2, 100.0, (1.5,), "secant"),
+    "yield_displacement": SearchRange(0.002, 5.0, (0.2, 0.5), "reach"),
+    "hardening": SearchRange(-0.2, 0.95, (0.05, 0.3), log=False),
+    "first_bend": SearchRange(0.02, 1.0, (0.4, 0.8), log=False),
+    "second_stiffness": SearchRange(0.0, 1.0, (0.5,), log=False),
+}
 FREE: dict[str, dict[str, SearchRange]] = {
     "linear": {"stiffness": STIFFNESS},
     "bilinear": {"stiffness": STIFFNESS, "yield_displacement": YIELDING, "hardening": HARDENING},
@@ -109,6 +116,20 @@ FREE: dict[str, dict[str, SearchRange]] = {
         "hardening": HARDENING,
         "sharpness": SearchRange(1.0, 50.0, (5.0, 18.0)),
         "loss": SearchRange(0.0, 0.98, (0.9,), log=False),
+    },
+    "trilinear": SKELETON,
+    "pinched": SKELETON
+    | {
+        "pinch_force": SearchRange(0.0, 1.0, (0.2, 0.8), log=False),
+        "pinch_displacement": SearchRange(0.0, 1.0, (0.5,), log=False),
+        "unloading": SearchRange(0.0, 1.0, (0.2,), log=False),
+        "damage": SearchRange(0.0, 1.0, (0.01,), log=False),
+    },
+    "self_centring": {
+        "stiffness": STIFFNESS,
+        "yield_displacement": YIELDING,
+        "hardening": HARDENING,
+        "loop": SearchRange(0.0, 1.0, (0.3, 0.8), log=False),
     },
 }
 
@@ -226,6 +247,8 @@ def parameters(model: str, x: Array, units: Array) -> dict[str, float]:
         values["gamma"] = 1.0 - values["beta"]
     if "closing" in values:
         values["hardening"] *= 1.0 - values["closing"]
+    if model == "trilinear":
+        values["second_stiffness"] = max(values["second_stiffness"], values["hardening"])
     return values
 
 

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 
 from common.plan.plan import Plan
 from common.roles import MASTER
 from diagnosis.fits import fitting, laws
 from diagnosis.fits.fitting import Data, Fit
+from diagnosis.recorded.joined import JoinedPart
 from diagnosis.recorded.nuisances import Nuisance
+from diagnosis.recorded.parts import ColumnAlone, Part
 from laboratories.effects import CATALOGUE
 from laboratories.effects.effect import Effect
 from loop import replay
 from models.registry import Array
+from models.specimens.fit import forces
 from models.system import System
 
 INTERVAL, TICKS, NOISE = 0.002, 4000, 100.0
@@ -55,12 +60,54 @@ class Specimen:
         raise NotImplementedError
 
 
-def first_law() -> Fit:
+class Driven(ColumnAlone):
+    """A column alone that yields by the pinched law, driven by its deformation."""
+
+    TRUE: ClassVar = {
+        "hardening": 0.03,
+        "first_bend": 0.5,
+        "second_stiffness": 0.6,
+        "pinch_force": 0.3,
+        "pinch_displacement": 0.5,
+        "unloading": 0.3,
+        "damage": 0.02,
+    }
+
+    def __init__(self) -> None:
+        self.signals, self.nuisances, self.candidates = ("column_force",), (), Specimen.candidates
+        self.role = MASTER
+        self.inputs = swelling()
+        force = forces("pinched", {"stiffness": K, "yield_displacement": LIMIT, **self.TRUE}, self.inputs)
+        self.measured = (force + NOISE * np.random.default_rng(2).standard_normal(TICKS))[:, None]
+        self.present = np.ones((TICKS, 1), dtype=bool)
+
+
+def first_law(part: Part | None = None) -> Fit:
     group, train = fitting.withheld(TICKS, INTERVAL)
     level = np.array([NOISE])
-    data = Data(Specimen(), System(Plan()), level, level, group, train, np.zeros(1))
+    data = Data(part or Specimen(), System(Plan()), level, level, group, train, np.zeros(1))
     values = {"yield_displacement": 1e-3, "hardening": 0.1, "exponent": 2.0}
     return fitting.fit(data, {"column.yielding": values})
+
+
+def test_a_pinched_law_with_damage_is_found_from_force_over_deformation() -> None:
+    found = laws.in_best_law(first_law(Driven()))
+    values = found.values["column.yielding"]
+    effect = CATALOGUE["column.yielding"]
+    assert effect.laws[int(values["law"])].name == "pinched"
+    np.testing.assert_allclose(values["yield_displacement"], LIMIT, rtol=0.03)
+    for name, true in Driven.TRUE.items():
+        np.testing.assert_allclose(values[name], true, atol=0.05)
+    assert found.chi < 1.2 * found.reduced.size
+
+
+def test_of_several_recordings_the_one_that_goes_farthest_starts_a_law() -> None:
+    near, far = Driven(), Driven()
+    near.inputs = 0.5 * near.inputs
+    found = laws.path(JoinedPart([near, far]))
+    assert found is not None
+    np.testing.assert_array_equal(found[0], far.inputs)
+    assert laws.path(Specimen()) is None
 
 
 def test_the_law_is_picked_and_its_parameters_are_those_of_the_column() -> None:
@@ -87,4 +134,6 @@ def test_a_parameter_that_a_law_lacks_is_not_fitted() -> None:
         1: {"yield_displacement", "hardening"},
         2: {"yield_displacement", "hardening", "exponent"},
         3: {"yield_displacement", "hardening", "unloading"},
+        4: {"yield_displacement", "hardening", "first_bend", "second_stiffness"},
+        5: {"yield_displacement", *Driven.TRUE},
     }

@@ -9,7 +9,7 @@ import pytest
 
 from common.plan.plan import Plan
 from diagnosis.learned import regression
-from diagnosis.learned.equations import damper_force
+from diagnosis.learned.equations import damper_force, platform_acceleration
 from diagnosis.learned.regression import AGEING, STEADY, Regression, regress
 from laboratories.effects import lay
 from laboratories.kinds import KINDS
@@ -147,6 +147,38 @@ def test_the_dampers_force_is_that_of_its_laboratory() -> None:
     assert np.std(found - force) < 0.03 * np.std(force)
     without = damper_force(System(Plan()), stroke, np.gradient(stroke, INTERVAL), command[:, 1])
     assert np.std(without - force) > 2.5
+
+
+def test_the_tables_acceleration_follows_from_its_motion() -> None:
+    rubbing = {"acceleration": 0.3, "law": 1.0, "asymmetry": 0.3}
+    system = lay(System(Plan()), [("table.friction", rubbing), ("table.gain", {"factor": 1.05})])
+    t = np.arange(3000) * INTERVAL
+    command = np.stack([0.01 * np.sin(9.0 * t), np.zeros(t.size)], axis=1)
+    place, felt = replay.laboratory(KINDS["table"], system, command)[:, :2].T
+    found = platform_acceleration(system, command[:, 0], place, np.gradient(place, INTERVAL))
+    assert np.std((found - felt)[100:]) < 0.06 * np.std(felt)
+    without = platform_acceleration(System(Plan()), command[:, 0], place, np.gradient(place, INTERVAL))
+    assert np.std((without - felt)[100:]) > 0.2 * np.std(felt)
+
+
+def test_what_brakes_a_table_is_learned_and_marched() -> None:
+    """A spring that stiffens beside the servo loop, which no effect of the table is."""
+    base, drive = System(Plan()), np.stack([motion(1, 20e-3), np.zeros(TICKS)], axis=1)
+    x = motion(7, 20e-3)
+    stiffening = regress(x, rate(x), 2e6 * x**3, np.ones(TICKS, dtype=bool), INTERVAL)
+    assert stiffening is not None
+    true = base.laid("table", learned=tuple(stiffening.law.tolist()))
+    place, felt = replay.laboratory(KINDS["table"], true, drive)[:, :2].T
+    speed = np.gradient(place, INTERVAL)
+    left = platform_acceleration(base, drive[:, 0], place, speed) - felt
+    found = regress(place, speed, left, np.ones(TICKS, dtype=bool), INTERVAL)
+    assert found is not None
+    other = np.stack([motion(2, 20e-3), np.zeros(TICKS)], axis=1)
+    bare, real, corrected = (
+        replay.laboratory(KINDS["table"], system, other)[:, :2]
+        for system in (base, true, base.laid("table", learned=tuple(found.law.tolist())))
+    )
+    assert np.all(np.std(corrected - real, axis=0) < 0.1 * np.std(bare - real, axis=0))
 
 
 @pytest.mark.parametrize(

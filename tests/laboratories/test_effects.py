@@ -32,6 +32,8 @@ from laboratories.table.kind import TABLE
 from loop import substructure
 from loop.closed_loop import Rollout, simulate
 from loop.signals import signals
+from models import preisach
+from models.specimens.fit import forces
 from models.system import ActuatorEffects, ColumnEffects, DamperEffects, System, TableEffects
 from tests.laboratories.effects.distinct import DISTINCT
 
@@ -298,6 +300,99 @@ def test_the_loose_column_feels_nothing_inside_its_gap(gap: float, where: float)
     (got,) = specimen_under(np.array([where]), ColumnEffects(slip=gap))
     outside = abs(where) - 0.5 * gap
     assert got == pytest.approx(math.copysign(K * max(outside, 0.0), where), abs=1e-6)
+
+
+def through(*turns: float, steps: int = 400) -> Array:
+    """Deformations from rest through turning points, in short steps."""
+    parts = [np.linspace(a, b, steps)[1:] for a, b in itertools.pairwise((0.0, *turns))]
+    return np.concatenate([[0.0], *parts])
+
+
+def test_the_gap_goes_along_with_a_specimen_that_rests_elsewhere() -> None:
+    gap, limit = 0.4e-3, 1e-3
+    more = ColumnEffects(slip=gap, slip_law=1.0, yield_displacement=limit, hardening=0.0, law=1.0)
+    path = through(3e-3, 0.0)
+    got = specimen_under(path, more)
+    up, back = path[:400], path[400:]
+    loaded = np.clip(up - 0.5 * gap, 0.0, limit)
+    assert np.allclose(got[:400], K * loaded, atol=0.01 * K * limit)
+    # it unloads by the yield displacement, and nothing is felt until the other contact, one gap away
+    left = np.maximum(limit - (3e-3 - back), 0.0)
+    met = np.minimum(back - (3e-3 - limit - gap), 0.0)
+    assert np.allclose(got[400:], K * (left + np.maximum(met, -limit)), atol=0.01 * K * limit)
+
+
+def test_a_gap_where_an_elastic_specimen_rests_is_the_one_around_the_origin() -> None:
+    path = through(2e-3, -1.5e-3, 1e-3, -0.1e-3, 0.5e-3)
+    resting = specimen_under(path, ColumnEffects(slip=0.6e-3, slip_law=1.0))
+    assert np.allclose(resting, specimen_under(path, ColumnEffects(slip=0.6e-3)), atol=0.01 * K * 1e-3)
+
+
+def test_a_specimen_that_is_held_stays_behind_by_half_the_gap() -> None:
+    gap, top = 0.4e-3, 2e-3
+    path = through(top, -top, top)
+    got = specimen_under(path, ColumnEffects(slip=gap, slip_law=2.0))
+    loop = float(trapezoid(got[399:], path[399:]))
+    # a parallelogram, in which the force lags behind: what holds the specimen gives the work
+    assert loop == pytest.approx(-K * 2.0 * gap * (top - 0.5 * gap), rel=0.01)
+    assert got[399] == pytest.approx(K * (top - 0.5 * gap))
+
+
+@given(gap=st.floats(2e-5, 1e-3), share=st.floats(0.05, 1.0), where=st.floats(-3e-3, 3e-3))
+def test_a_part_beside_the_gap_carries_on(gap: float, share: float, where: float) -> None:
+    (got,) = specimen_under(np.array([where]), ColumnEffects(slip=gap, slip_law=3.0, slip_share=share))
+    inside = min(max(where, -0.5 * gap), 0.5 * gap)
+    assert got == pytest.approx(K * (where - share * inside), abs=1e-6)
+
+
+@given(share=st.floats(-0.5, 2.0), bend=st.floats(1e-4, 3e-3), where=st.floats(-4e-3, 4e-3))
+def test_the_hardening_column_is_its_formulas(share: float, bend: float, where: float) -> None:
+    cubic, bent = (
+        specimen_under(
+            np.array([where]), ColumnEffects(stiffening=share, stiffening_law=law, stiffening_bend=bend)
+        )[0]
+        for law in (0.0, 1.0)
+    )
+    assert cubic == pytest.approx(K * where * (1.0 + share * (where / 2e-3) ** 2), abs=1e-6)
+    beyond = math.copysign(max(abs(where) - bend, 0.0), where)
+    assert bent == pytest.approx(K * (where + share * beyond), abs=1e-6)
+
+
+def test_the_self_centring_column_loses_two_flags_and_rests_at_the_origin() -> None:
+    place, loop, amplitude = 1e-3, 0.6, 3e-3
+    _, path = cycles(amplitude, 1.0)
+    more = ColumnEffects(centring=place, centring_hardening=0.1, centring_loop=loop)
+    force = specimen_under(path, more)
+    # between two parallel lines, that both have the stiffness k where they are left and reached
+    height = 0.9 * loop * K * place
+    expected = 2.0 * height * (amplitude - place)
+    assert last_loop(path, force, 1.0) == pytest.approx(expected, rel=0.01)
+    assert abs(specimen_under(through(amplitude, 0.0), more)[-1]) < 1e-6
+
+
+@pytest.mark.parametrize("name", ["trilinear", "pinched"])
+def test_further_laws_of_yielding_are_their_models(name: str) -> None:
+    path = through(2e-3, -3e-3, 2.5e-3, -1e-3)
+    shapes = {"hardening": 0.03, "first_bend": 0.4, "second_stiffness": 0.6}
+    corner = {"pinch_force": 0.3, "pinch_displacement": 0.6, "unloading": 0.2, "damage": 0.05}
+    given = shapes | (corner if name == "pinched" else {})
+    law = float(specimen.LAWS.index(name))
+    got = specimen_under(path, ColumnEffects(yield_displacement=1e-3, law=law, **given))
+    expected = forces(name, {"stiffness": K, "yield_displacement": 1e-3, **given}, path)
+    assert np.allclose(got, expected, rtol=1e-9, atol=1e-6)
+
+
+def test_friction_by_direction_and_speed() -> None:
+    more = ColumnEffects(friction=900.0, presliding=1e-6, friction_asymmetry=0.2)
+    path = through(2e-3, -2e-3)
+    got = specimen_under(path, more) - K * path
+    assert got[300] == pytest.approx(1080.0)
+    assert got[-1] == pytest.approx(-720.0)
+    fast = ColumnEffects(friction=900.0, presliding=1e-6, friction_drop=0.3, friction_speed=0.02)
+    for speed in (0.002, 0.02, 0.2):
+        way = np.arange(1, 400) * speed * SHORT
+        rubbing = specimen_under(way, fast)[-1] - K * way[-1]
+        assert rubbing == pytest.approx(900.0 * (1.0 - 0.3 * (1.0 - math.exp(-speed / 0.02))), rel=1e-6)
 
 
 def test_effects_of_the_column_come_on_top_of_any_model() -> None:
@@ -636,12 +731,40 @@ def test_table_friction_falls_off_with_its_velocity() -> None:
     assert ramp[-1] - got[-1, Y] == pytest.approx(behind, rel=1e-6)
 
 
+def test_table_friction_by_direction_and_speed() -> None:
+    omega, speed = 2.0 * math.pi * 15.0, 0.02
+    more = TableEffects(friction=0.5, friction_asymmetry=0.2, friction_drop=0.4, friction_speed=0.01)
+    for way, share in ((1.0, 1.2), (-1.0, 0.8)):
+        ramp = way * speed * DT * np.arange(1, 1001)
+        got = run_b(ramp, table=ShakingTable(delay=0.0), damper=STILL, table_effects=more)
+        rubbing = 0.5 * share * (1.0 - 0.4 * (1.0 - math.exp(-speed / 0.01)))
+        behind = (1.4 * omega * speed + rubbing) / omega**2
+        assert way * (ramp[-1] - got[-1, Y]) == pytest.approx(behind, rel=1e-6)
+
+
+def test_a_law_of_the_tables_motion_brakes_it() -> None:
+    """One that says a spring does what a stiffer servo loop with a smaller gain would: ω²·(u − y) − s·y."""
+    omega, spring = 2.0 * math.pi * 15.0, 900.0
+    grid = preisach.pack(preisach.Grid((0.0,), (), ()), 0.02, 1.0)
+    weights = np.zeros(preisach.count(grid))
+    weights[0] = spring * 0.02  # of the play without width, which is the place over the reach
+    more = TableEffects(learned=tuple(np.concatenate([grid, weights]).tolist()))
+    command = tones(800, size=5e-3)
+    got = run_b(command, table=ShakingTable(delay=0.0), damper=STILL, table_effects=more)
+    stiff = math.sqrt(omega**2 + spring)
+    table = ShakingTable(frequency=stiff / (2.0 * math.pi), damping_ratio=0.7 * omega / stiff, delay=0.0)
+    expected = run_b(omega**2 / stiff**2 * command, table=table, damper=STILL)
+    for signal in (Y, ACCELERATION):
+        assert np.std(got[:, signal] - expected[:, signal]) < 0.01 * np.std(expected[:, signal])
+
+
 @pytest.mark.parametrize(
     ("name", "effects"),
     [
         ("compliance", TableEffects(compliance=1e-6)),
         ("friction", TableEffects(friction=0.1)),
         ("oil_frequency", TableEffects(oil_frequency=25.0)),
+        ("learned", TableEffects(learned=(0.0,) * 16)),
     ],
 )
 def test_an_ideal_table_refuses_what_it_cannot_have(name: str, effects: TableEffects) -> None:

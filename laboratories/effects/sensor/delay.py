@@ -12,6 +12,8 @@ from __future__ import annotations
 from laboratories.effects.effect import Parameter
 from laboratories.effects.reading import ReadingFault
 
+LONGEST = 0.1  # s, of converters, buses and buffers in a loop that is controlled; a longer one is a travel
+
 FAULT = ReadingFault(
     "delay",
     lambda _: Parameter(
@@ -22,6 +24,7 @@ FAULT = ReadingFault(
         most=1.0,
         sizes=(0.001, 0.003, 0.008, 0.02),
         says="between the value and its reading",
+        believed=LONGEST,
     ),
     says="the reading comes late",
     reference="reading(t) = value(t − delay)",

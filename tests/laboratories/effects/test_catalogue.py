@@ -53,6 +53,8 @@ ROWS = {  # parameters and their units, as users write them in a reality
     "column.viscous": {"coefficient": "N·s/m"},
     "column.inertia": {"mass": "kg"},
     "column.slip": {"gap": "m"},
+    "column.self_centring": {"displacement": "m", "hardening": "", "loop": ""},
+    "column.hardening": {"share": ""},
     "link.delay": {"delay": "s"},
     "link.jitter": {"std": "s"},
     "link.loss": {"probability": "", "burst": ""},

@@ -80,6 +80,46 @@ def test_bouc_wen_is_theirs(ops: Any, n: float, beta: float, gamma: float) -> No
     np.testing.assert_allclose(found, expected, rtol=0, atol=3e-3 * K * DY)
 
 
+@pytest.mark.parametrize(("force", "place", "unloading"), [(1.0, 1.0, 0.0), (0.3, 0.6, 0.0), (0.5, 0.4, 0.3)])
+def test_pinched_is_hysteretic(ops: Any, force: float, place: float, unloading: float) -> None:
+    # theirs ends in a third point, beyond which its last line goes on
+    points, first, last = path(2000), 0.5, 40.0
+    bend, yields = first * K * DY, (first + 0.5 * 0.4) * K * DY
+    corners = [bend, first * DY, yields, DY, yields + 0.05 * K * (last - 1.0) * DY, last * DY]
+    skeleton = [*corners, *(-corner for corner in corners)]
+    expected = theirs(ops, points, "Hysteretic", *skeleton, place, force, 0.0, 0.0, unloading)
+    found = ours(
+        "pinched",
+        points,
+        hardening=0.05,
+        first_bend=first,
+        second_stiffness=0.4,
+        pinch_force=force,
+        pinch_displacement=place,
+        unloading=unloading,
+    )
+    np.testing.assert_allclose(found, expected, rtol=0, atol=2e-3 * K * DY)
+
+
+def test_trilinear_is_a_sum_of_steel01(ops: Any) -> None:
+    points, bend, second, hardening = path(200), 0.4, 0.5, 0.05
+    ops.uniaxialMaterial("Steel01", 2, (1.0 - second) * K * bend * DY, (1.0 - second) * K, 0.0)
+    ops.uniaxialMaterial("Steel01", 3, (second - hardening) * K * DY, (second - hardening) * K, 0.0)
+    ops.uniaxialMaterial("Elastic", 4, hardening * K)
+    expected = theirs(ops, points, "Parallel", 2, 3, 4)
+    found = ours("trilinear", points, hardening=hardening, first_bend=bend, second_stiffness=second)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * K * DY)
+
+
+@pytest.mark.parametrize("loop", [0.3, 0.9])
+def test_self_centring_is_theirs(ops: Any, loop: float) -> None:
+    # theirs leaves a line up to one increment late
+    points = path(2000)
+    expected = theirs(ops, points, "SelfCentering", K, 0.1 * K, K * DY, loop)
+    found = ours("self_centring", points, hardening=0.1, loop=loop)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=2e-3 * K * DY)
+
+
 def test_degradation_is_theirs(ops: Any) -> None:
     # their energy is k·∫z dx over lengths, ours over k·δ_y²
     points, n, rate = path(4000), 2.0, 1.0 / (K * DY**2)

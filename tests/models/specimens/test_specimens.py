@@ -30,6 +30,19 @@ EXAMPLES: dict[str, dict[str, float]] = {
     },
     "bwbn": {"stiffness": K, "yield_displacement": DY, "hardening": 0.05},
     "menegotto_pinto": {"stiffness": K, "yield_displacement": DY, "hardening": 0.05, "sharpness": 18.0},
+    "pinched": {
+        "stiffness": K,
+        "yield_displacement": DY,
+        "hardening": 0.05,
+        "first_bend": 0.5,
+        "second_stiffness": 0.4,
+        "pinch_force": 0.3,
+        "pinch_displacement": 0.6,
+        "unloading": 0.3,
+        "damage": 0.02,
+    },
+    "trilinear": {"stiffness": K, "yield_displacement": DY, "hardening": 0.05},
+    "self_centring": {"stiffness": K, "yield_displacement": DY, "hardening": 0.1, "loop": 0.6},
 }
 
 

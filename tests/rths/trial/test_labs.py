@@ -200,7 +200,7 @@ CASES: dict[str, tuple[dict[str, float], dict[str, float], set[str]]] = {
     ),
     "x.actuator.droop": ({"loss": 0.3}, {"loss": 1e-6}, set()),
     "x.actuator.valve_hysteresis": ({"width": 4e-4}, {"width": 1e-9}, set()),
-    "x.column.hardening": ({"stiffness": 4e11}, {"stiffness": 1e6}, A),
+    "column.hardening": ({"share": 0.3}, {"share": 1e-6}, A),
     "x.column.creep": ({"share": 0.1, "relaxation_time": 1.0}, {"share": 1e-6, "relaxation_time": 1.0}, A),
     "x.column.asymmetry": ({"share": 0.1}, {"share": 1e-6}, A),
     "x.table.pitch": (
@@ -272,8 +272,9 @@ def test_forces_resist_motion_and_deformation() -> None:
     assert np.interp(0.02, *paired(v, extra)) == pytest.approx(1000.0, rel=0.03)
     extra = play_a(effect("column.inertia", mass=1000.0))["column_force"] - CLEAN["column_force"]
     assert np.corrcoef(extra[500:], np.gradient(v, DT)[500:])[0, 1] > 0.95
-    extra = play_a(effect("x.column.hardening", stiffness=1e11))["column_force"] - CLEAN["column_force"]
-    assert np.allclose(extra, 1e11 * x**3, atol=0.1)
+    extra = play_a(effect("column.hardening", share=0.1))["column_force"] - CLEAN["column_force"]
+    y = x / 2e-3
+    assert np.allclose(extra, 0.6 * 12.5e6 * 2e-3 * (np.sinh(y) - y), atol=0.1)
     extra = play_a(effect("x.column.asymmetry", share=0.1))["column_force"] - CLEAN["column_force"]
     assert np.allclose(extra, 0.1 * 12.5e6 * np.abs(x), atol=0.1)
 

@@ -108,9 +108,9 @@ def valve_hysteresis(values: Values, *, width: float) -> None:
     values["hysteresis"] = width
 
 
-def hardening(values: Values, *, stiffness: float) -> None:
-    """Cubic force `stiffness·δ³`, N/m³."""
-    values["cubic"] = stiffness
+def hardening(values: Values, *, share: float) -> None:
+    """Share of the stiffness gained at 2 mm, beside which it grows still faster."""
+    values["hardened"] = share
 
 
 def creep(values: Values, *, share: float, relaxation_time: float) -> None:
@@ -155,10 +155,10 @@ KNOWN = {
     "column.viscous": KnownEffect(viscous, {"power": 0}),
     "column.inertia": KnownEffect(inertia, PLAIN),
     "column.slip": KnownEffect(slip, {"smooth": 0}),
+    "column.hardening": KnownEffect(hardening, {"sinh": 0}),
     "x.actuator.ripple": KnownEffect(ripple, PLAIN),
     "x.actuator.droop": KnownEffect(droop, PLAIN),
     "x.actuator.valve_hysteresis": KnownEffect(valve_hysteresis, PLAIN),
-    "x.column.hardening": KnownEffect(hardening, PLAIN),
     "x.column.creep": KnownEffect(creep, PLAIN),
     "x.column.asymmetry": KnownEffect(asymmetry, PLAIN),
 }

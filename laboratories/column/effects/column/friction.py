@@ -2,14 +2,16 @@
 
     f = f_column + force·s/presliding,    ṡ = δ̇ while |s| < presliding, else s stays
 
-It acts as a spring that slides at `force`, before which the contact deforms by `presliding` to either side. Not to be
-confused with `column.viscous`, whose loop grows with speed, or `column.yielding`, which has no loop at small amplitude.
+It acts as a spring that slides at `force`, before which the contact deforms by `presliding` to either side. With
+`law` 1 the force is larger by the share `asymmetry` one way than the other, and at speed the share `drop` of it is lost. Not to
+be confused with `column.viscous`, whose loop grows with speed, or `column.yielding`, which has no loop at small
+amplitude.
 """
 
 from __future__ import annotations
 
 from laboratories.effects.effect import Parameter
-from laboratories.effects.friction import VELOCITY
+from laboratories.effects.friction import FURTHER, VELOCITY, laws
 from laboratories.effects.laws import sets
 
 EFFECT = sets(
@@ -31,6 +33,8 @@ EFFECT = sets(
         ),
         "friction_velocity": VELOCITY,
     },
+    further=FURTHER,
+    laws=laws({"presliding": 1e-5, "velocity": 1e-6}),
     says="friction in the set-up of the specimen",
     reference="Armstrong-Hélouvry, Dupont, Canudas de Wit, Automatica 30 (1994) 1083-1138",
 )

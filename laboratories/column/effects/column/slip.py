@@ -2,13 +2,19 @@
 
     f = f_column(δ'),    δ' = δ − clip(δ, −gap/2, +gap/2)
 
-`gap` is the whole gap, from one contact to the other, around the origin. Not to be confused with
-`actuator.backlash`, where the specimen does not move, or `column.pinching`, which has no edge.
+`gap` is the whole gap, from one contact to the other, around the origin. The parameter `law` moves it: with 1 it is
+where the specimen rests, so that δ' follows the contact that loads it until the force is zero, and stays there until a
+contact is met again; the gap goes along with a specimen that yields. With 2 something holds the specimen, and δ' stays
+where the motion turns until the gap is used up (the play operator of control engineering). With 3 the share 1 − `share`
+of the stiffness k is beside the gap and acts inside it as well: f = f_column(δ') + (1 − share)·k·(δ − δ').
+
+Not to be confused with `actuator.backlash`, where the actuator's motion itself has play, or `column.pinching`, which
+has no edge.
 """
 
 from __future__ import annotations
 
-from laboratories.effects.effect import Parameter
+from laboratories.effects.effect import Law, Parameter
 from laboratories.effects.laws import sets
 
 EFFECT = sets(
@@ -25,6 +31,34 @@ EFFECT = sets(
             says="whole gap",
         ),
     },
+    further={
+        "slip_law": Parameter(
+            "law",
+            "",
+            null=0.0,
+            least=0.0,
+            most=3.0,
+            sizes=(),
+            says="0 around the origin, 1 where the specimen rests, 2 where it is held, 3 beside a part without play",
+            shape=True,
+        ),
+        "slip_share": Parameter(
+            "share",
+            "",
+            null=1.0,
+            least=0.01,
+            most=1.0,
+            sizes=(),
+            says="of the stiffness that is behind the gap, of law 3",
+            shape=True,
+        ),
+    },
+    laws=(
+        Law("around the origin", {}),
+        Law("where the specimen rests", {}),
+        Law("where the specimen is held", {}),
+        Law("beside a part without play", {"share": 0.5}),
+    ),
     says="no force within a gap",
     reference="f = f_column(δ − clip(δ, ±gap/2))",
 )

@@ -4,9 +4,10 @@
 
 with yield displacement δ_y, hardening α and exponent n. The parameter `law` chooses another formula: 1 the bilinear
 one, 2 that of Menegotto and Pinto with R₀ as the exponent, 3 the peak-oriented one of Clough and Johnston with the
-exponent `unloading` of its unloading stiffness (models/specimens). Not to be confused with
-`column.degradation`, which softens without a loop, or `column.friction`, whose loop has the same height at every
-amplitude.
+exponent `unloading` of its unloading stiffness, 4 the trilinear one, 5 the pinched one, whose skeleton is
+trilinear too and whose reloading stiffness is damaged with every cycle (models/specimens). Not to be confused with
+`column.degradation`, which softens without a loop, `column.friction`, whose loop has the same height at every
+amplitude, or `column.self_centring`, whose loop closes before the origin.
 """
 
 from __future__ import annotations
@@ -15,6 +16,14 @@ import math
 
 from laboratories.effects.effect import Law, Parameter
 from laboratories.effects.laws import sets
+
+SKELETON = {"first_bend": 0.5, "second_stiffness": 0.5}
+
+
+def share(name: str, null: float, least: float, says: str) -> Parameter:
+    """A shape of some laws that is a share."""
+    return Parameter(name, "", null, least, 1.0, (), says, shape=True)
+
 
 EFFECT = sets(
     "column",
@@ -55,9 +64,9 @@ EFFECT = sets(
             "",
             null=0.0,
             least=0.0,
-            most=3.0,
+            most=5.0,
             sizes=(),
-            says="0 Bouc and Wen, 1 bilinear, 2 Menegotto and Pinto, 3 peak-oriented",
+            says="0 Bouc and Wen, 1 bilinear, 2 Menegotto and Pinto, 3 peak-oriented, 4 trilinear, 5 pinched",
             shape=True,
         ),
         "unloading": Parameter(
@@ -67,15 +76,49 @@ EFFECT = sets(
             least=0.0,
             most=1.0,
             sizes=(),
-            says="exponent of the unloading stiffness of law 3",
+            says="exponent of the unloading stiffness of laws 3 and 5",
+            shape=True,
+        ),
+        "first_bend": share(
+            "first_bend", 1.0, 0.02, "where laws 4 and 5 first bend, over yield_displacement"
+        ),
+        "second_stiffness": share("second_stiffness", 0.5, 0.0, "stiffness between the bends over the first"),
+        "pinch_force": share("pinch_force", 1.0, 0.0, "corner of law 5's reloading, over the peak's force"),
+        "pinch_displacement": share("pinch_displacement", 1.0, 0.0, "its place on the way to the peak"),
+        "damage": Parameter(
+            "damage",
+            "",
+            null=0.0,
+            least=0.0,
+            most=10.0,
+            sizes=(),
+            says="growth of law 5's peak per plastic deformation of yield_displacement",
             shape=True,
         ),
     },
     laws=(
-        Law("Bouc and Wen", {"hardening": 0.05, "exponent": 2.0}),
-        Law("bilinear", {"hardening": 0.05}),
-        Law("Menegotto and Pinto", {"hardening": 0.05, "exponent": 15.0}),
-        Law("peak-oriented", {"hardening": 0.05, "unloading": 0.3}),
+        Law("Bouc and Wen", {"hardening": 0.05, "exponent": 2.0}, "bouc_wen", {"exponent": "n"}),
+        Law("bilinear", {"hardening": 0.05}, "bilinear"),
+        Law(
+            "Menegotto and Pinto",
+            {"hardening": 0.05, "exponent": 15.0},
+            "menegotto_pinto",
+            {"exponent": "sharpness"},
+        ),
+        Law("peak-oriented", {"hardening": 0.05, "unloading": 0.3}, "clough"),
+        Law("trilinear", {"hardening": 0.05, **SKELETON}, "trilinear"),
+        Law(
+            "pinched",
+            {
+                "hardening": 0.05,
+                **SKELETON,
+                "pinch_force": 0.5,
+                "pinch_displacement": 0.5,
+                "unloading": 0.2,
+                "damage": 0.01,
+            },
+            "pinched",
+        ),
     ),
     says="the specimen yields",
     reference="Wen, Method for random vibration of hysteretic systems, J. Eng. Mech. Div. ASCE 102 (1976) 249-263",

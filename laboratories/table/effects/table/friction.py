@@ -9,7 +9,7 @@ be confused with `table.backlash`: friction causes spikes of acceleration at rev
 from __future__ import annotations
 
 from laboratories.effects.effect import Parameter
-from laboratories.effects.friction import VELOCITY
+from laboratories.effects.friction import FURTHER, VELOCITY, laws
 from laboratories.effects.laws import sets
 
 EFFECT = sets(
@@ -27,6 +27,8 @@ EFFECT = sets(
         ),
         "friction_velocity": VELOCITY,
     },
+    further=FURTHER,
+    laws=laws({"velocity": 1e-6}),
     says="Coulomb friction of the table's bearings",
     reference="Armstrong-Hélouvry, Dupont, Canudas de Wit, Automatica 30 (1994) 1083-1138",
 )

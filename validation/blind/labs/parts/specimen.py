@@ -13,6 +13,7 @@ LORENTZ, SECH = 1, 2  # formulas of the pinching
 # Deformations (m) of the damage, within the peaks of the trial's columns: nothing is lost up to the first; the linear
 # loss is complete at the second beyond it; the third is the scale of the exponential loss.
 UNDAMAGED, DESTROYED, DAMAGE = 0.5e-3, 4e-3, 1e-3
+HARDENED_AT = 2e-3  # m, deformation at which a column has hardened by what is stated
 # m/s; the column moves at up to 0.1 m/s, so that friction is Coulomb's but near a reversal.
 RUBBING = 0.5e-3  # scale of the regularised friction
 STICKING = 1e-3  # scale of the Stribeck effect
@@ -46,7 +47,7 @@ class TrueSpecimen(NamedTuple):
     viscous: float = 0.0  # N·s/m
     inertia: float = 0.0  # kg
     slip: float = 0.0  # m
-    cubic: float = 0.0  # N/m³
+    hardened: float = 0.0  # stiffness gained at HARDENED_AT over k, by the first term of its series
     creep: float = 0.0  # stiffness of the Maxwell element over k
     relaxation: float = 1.0  # s
     asymmetry: float = 0.0
@@ -93,6 +94,15 @@ def pinch(formula: float, factor: float, hardening: float, width: float, x: floa
 
 
 @jit
+def stiffer(share: float, x: float) -> float:
+    """Force over stiffness (m) that hardening adds: `6·share·s·(sinh(δ/s) − δ/s)` with s = 2 mm."""
+    if share == 0.0:
+        return 0.0
+    y = min(max(x / HARDENED_AT, -20.0), 20.0)
+    return 6.0 * share * HARDENED_AT * (math.sinh(y) - y)
+
+
+@jit
 def maxwell(force: float, stiffness: float, relaxation: float, moved: float, step: float) -> float:
     """Force of spring and dashpot in series after a move at constant speed: `ḟ = k_m·δ̇ − f/τ`, exact."""
     fade = math.exp(-step / relaxation)
@@ -127,7 +137,7 @@ def restoring(p: TrueSpecimen, memory: Array, x: float) -> float:
     memory[LARGEST] = max(memory[LARGEST], abs(x))
     result *= left_over(p.degrading, p.degradation, memory[LARGEST])
     result *= pinch(p.pinching, p.pinched, p.pinched_hardening, p.pinched_width, x)
-    return result + p.cubic * x**3 + p.asymmetry * p.stiffness * abs(x)
+    return result + stiffer(p.hardened, x) * p.stiffness + p.asymmetry * p.stiffness * abs(x)
 
 
 @jit

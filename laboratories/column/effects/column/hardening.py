@@ -1,0 +1,54 @@
+"""The specimen stiffens (or softens) with the deformation, and gives back what it took: an elastic curve, no loop.
+
+    f = f_column + share·k·δ·(δ/δ_ref)²,    δ_ref = 2 mm
+
+With `law` 1 it does so at a bend: f = f_column + share·k·(δ − clip(δ, −bend, +bend)). A negative share softens. Not to
+be confused with `column.yielding`, which dissipates, `column.degradation`, which does not come back, or
+`column.pinching`, which is soft at the origin and stiff beyond, towards a line.
+"""
+
+from __future__ import annotations
+
+from laboratories.effects.effect import Law, Parameter
+from laboratories.effects.laws import sets
+
+EFFECT = sets(
+    "column",
+    "hardening",
+    {
+        "stiffening": Parameter(
+            "share",
+            "",
+            null=0.0,
+            least=-10.0,
+            most=10.0,
+            sizes=(0.03, 0.08, 0.2, 0.5),
+            says="stiffness gained over the first: as a secant at 2 mm, or beyond the bend",
+        ),
+    },
+    further={
+        "stiffening_law": Parameter(
+            "law",
+            "",
+            null=0.0,
+            least=0.0,
+            most=1.0,
+            sizes=(),
+            says="0 with the square of the deformation, 1 at a bend",
+            shape=True,
+        ),
+        "stiffening_bend": Parameter(
+            "bend",
+            "m",
+            null=0.001,
+            least=1e-05,
+            most=0.1,
+            sizes=(0.0005, 0.001, 0.002, 0.003),
+            says="deformation from which on it is stiffer or softer",
+            shape=True,
+        ),
+    },
+    laws=(Law("cubic", {}), Law("with a bend", {"bend": 0.001})),
+    says="the specimen stiffens or softens with the deformation, without a loop",
+    reference="Kerschen, Worden, Vakakis, Golinval, Mech. Syst. Signal Process. 20 (2006) 505-592",
+)

@@ -1,0 +1,53 @@
+"""The specimen centres itself: a flag-shaped loop that closes before the origin.
+
+    f = k·δ up to `displacement`, with the stiffness hardening·k beyond; back at the stiffness k down to the line that
+    bends at (1 − loop)·displacement, and along it
+
+as of post-tensioned frames, rocking walls and shape memory alloy (models/specimens/self_centring.py). Not to be
+confused with `column.yielding`, which rests away from the origin, or `column.hardening`, which has no loop.
+"""
+
+from __future__ import annotations
+
+import math
+
+from laboratories.effects.effect import Parameter
+from laboratories.effects.laws import sets
+
+EFFECT = sets(
+    "column",
+    "self_centring",
+    {
+        "centring": Parameter(
+            "displacement",
+            "m",
+            null=math.inf,
+            least=1e-05,
+            most=0.1,
+            sizes=(0.004, 0.0025, 0.0015, 0.0008),
+            says="where it bends",
+        ),
+        "centring_hardening": Parameter(
+            "hardening",
+            "",
+            null=0.1,
+            least=-0.2,
+            most=1.0,
+            sizes=(0.02, 0.1, 0.3),
+            says="stiffness beyond over elastic",
+            shape=True,
+        ),
+        "centring_loop": Parameter(
+            "loop",
+            "",
+            null=0.6,
+            least=0.0,
+            most=1.0,
+            sizes=(0.3, 0.6, 0.9),
+            says="height of the loop over the force at the bend",
+            shape=True,
+        ),
+    },
+    says="the specimen centres itself: its loop closes before the origin",
+    reference="Christopoulos, Tremblay, Kim, Lacerte, J. Struct. Eng. ASCE 134 (2008) 96-107",
+)

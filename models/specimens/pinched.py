@@ -1,0 +1,145 @@
+"""Peak-oriented specimen with a trilinear skeleton, pinched reloading, softer unloading and damage.
+
+    skeleton:   k up to c·δ_y, m·k up to δ_y, α·k beyond, never below zero
+    unloading:  k_u = k·(c·δ_y/δ_m)^a, never below the secant to the peak
+    reloading:  from where the force is zero, δ_0, straight to the corner (δ_c, p·f_m), then straight to the peak
+                (δ_m, f_m);  δ_c = δ_0 + q·(δ_m − (1 − p)·f_m/k_u − δ_0);  never stiffer than k_u
+    damage:     δ_m grows by the factor 1 + d·L/δ_y at every reversal, L the way of δ_0 since the last
+
+δ_m is the largest deformation so far on the side that the motion goes to, at first that of the first bend, and f_m the
+skeleton's force there. With p = 1, q = 1 and c = 1 reloading is Clough's and Johnston's. A partial unloading and
+reloading goes at k_u until it meets the line that it left.
+
+The rules of reloading are those of M. H. Scott and F. C. Filippou's material Hysteretic in OpenSees (as its manual
+states them), after M. Saiidi and M. A. Sozen, Simple nonlinear seismic analysis of R/C structures, J. Struct. Div.
+ASCE 107 (1981), 937-953; damage by accumulated plastic deformation in the manner of Y. J. Park and A. H.-S. Ang,
+Mechanistic seismic damage model for reinforced concrete, J. Struct. Eng. ASCE 111 (1985), 722-739, is told from the
+branches' ends alone, so that an increment of any size is exact.
+
+Not to be confused with `bwbn`, which is smooth, or with `trilinear`, whose reloading does not aim at a peak.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from common.plan.schema import Rule
+from models.compiled import jit
+from models.registry import Array
+
+
+class PinchedParams(NamedTuple):
+    """Parameters, in the order of the kernel's array."""
+
+    stiffness: float  # k, N/m
+    yield_displacement: float  # δ_y, m: where the third line of the skeleton begins
+    hardening: float = 0.0  # α, stiffness of the third line over the first
+    first_bend: float = 1.0  # c, where the second line begins, over δ_y
+    second_stiffness: float = 0.5  # m, stiffness of the second line over the first
+    pinch_force: float = 0.5  # p, force at the corner over that at the peak; 1: no pinching
+    pinch_displacement: float = 0.5  # q, where the corner is on the way to the peak
+    unloading: float = 0.0  # a, 0: unloading stays elastic
+    damage: float = 0.0  # d, growth of the peak per plastic deformation of δ_y
+
+
+RULES = {
+    "stiffness": Rule("elastic stiffness", "N/m", least=0.0),
+    "yield_displacement": Rule("deformation where the skeleton's third line begins", "m", above=0.0),
+    "hardening": Rule("stiffness of the third line over the first", above=-1.0, most=1.0),
+    "first_bend": Rule("where the second line begins, over yield_displacement", above=0.0, most=1.0),
+    "second_stiffness": Rule("stiffness of the second line over the first", least=0.0, most=1.0),
+    "pinch_force": Rule("force at the corner of reloading over that at the peak", least=0.0, most=1.0),
+    "pinch_displacement": Rule(
+        "where the corner of reloading is on the way to the peak", least=0.0, most=1.0
+    ),
+    "unloading": Rule("exponent of the unloading stiffness", least=0.0, most=1.0),
+    "damage": Rule("growth of the peak per plastic deformation of yield_displacement", least=0.0, most=10.0),
+}
+STIFFNESS, YIELD_DISPLACEMENT, HARDENING, FIRST_BEND, SECOND_STIFFNESS = range(5)
+PINCH_FORCE, PINCH_DISPLACEMENT, UNLOADING, DAMAGE = range(5, 9)
+
+# of the last call: δ (m), f (N), way (±1, 0 before any motion); then, of upward and downward motion each, the peak that
+# it goes to (m, as a size), where the force was zero as it began (m, in its direction), and the way of that place since
+# the peak last grew (m); at last that place
+DEFORMATION, FORCE, WAY, PEAK, ZERO, TRAVELLED, LAST = 0, 1, 2, 3, 5, 7, 9
+STATE_SIZE = 10
+
+
+@jit
+def skeleton(p: Array, size: float) -> float:
+    """Force (N) of the skeleton at a deformation (m)."""
+    limit = p[YIELD_DISPLACEMENT]
+    first = p[FIRST_BEND] * limit
+    if size <= first:
+        return p[STIFFNESS] * size
+    second = min(size, limit) - first
+    way = first + p[SECOND_STIFFNESS] * second + p[HARDENING] * max(size - limit, 0.0)
+    return p[STIFFNESS] * max(way, 0.0)
+
+
+@jit
+def unloading_stiffness(p: Array, peak: float) -> float:
+    """Stiffness (N/m) at which the force leaves the side whose peak (m) this is."""
+    first = p[FIRST_BEND] * p[YIELD_DISPLACEMENT]
+    if peak <= first:
+        return p[STIFFNESS]
+    return max(p[STIFFNESS] * (first / peak) ** p[UNLOADING], skeleton(p, peak) / peak)
+
+
+@jit
+def rise(p: Array, force: float, start: float, end: float, zero: float, peak: float, other: float) -> float:
+    """Force (N) after the deformation grew from `start` to `end` (m), `other` the peak of the side that it leaves."""
+    if start < zero:
+        if end < zero:
+            return min(force + unloading_stiffness(p, other) * (end - start), 0.0)
+        start, force = zero, 0.0
+    if end >= peak:
+        return skeleton(p, end)
+    stiffness = unloading_stiffness(p, peak)
+    elastic = force + stiffness * (end - start)
+    aim = skeleton(p, peak)
+    share = p[PINCH_FORCE]
+    ahead = max(peak - (1.0 - share) * aim / stiffness - zero, 0.0)
+    corner = zero + p[PINCH_DISPLACEMENT] * ahead
+    if end < corner:
+        return min(elastic, share * aim * (end - zero) / (corner - zero))
+    if peak <= corner:  # the force was zero beyond the peak: the skeleton has fallen to nothing
+        return min(elastic, aim)
+    return min(elastic, aim * (share + (1.0 - share) * (end - corner) / (peak - corner)))
+
+
+@jit
+def turn(p: Array, s: Array, side: int, way: float) -> None:
+    """Begin a branch against the force of the last call: where the force will be zero, and the damage until then."""
+    first = p[FIRST_BEND] * p[YIELD_DISPLACEMENT]
+    zero = way * s[DEFORMATION] - way * s[FORCE] / unloading_stiffness(p, max(s[PEAK + 1 - side], first))
+    s[ZERO + side] = zero
+    travelled = abs(way * zero - s[LAST])
+    s[LAST] = way * zero
+    s[TRAVELLED + 1 - side] += travelled
+    if s[PEAK + side] > first:
+        lost = s[TRAVELLED + side] + travelled
+        s[PEAK + side] *= 1.0 + p[DAMAGE] * lost / p[YIELD_DISPLACEMENT]
+    s[TRAVELLED + side] = 0.0
+
+
+@jit
+def step(p: Array, s: Array, deformation: float) -> float:
+    """Force (N) at a deformation (m) reached from that of the last call; `s` (10,) moves on."""
+    moved = deformation - s[DEFORMATION]
+    if moved == 0.0:
+        return s[FORCE]
+    # a deformation that shrinks is one that grows, seen in the mirror
+    way, side = (1.0, 0) if moved > 0.0 else (-1.0, 1)
+    if way != s[WAY]:
+        s[WAY] = way
+        if way * s[FORCE] <= 0.0:
+            turn(p, s, side, way)
+    first = p[FIRST_BEND] * p[YIELD_DISPLACEMENT]
+    peak, other = max(s[PEAK + side], first), max(s[PEAK + 1 - side], first)
+    begun, ended = way * s[DEFORMATION], way * deformation
+    force = way * rise(p, way * s[FORCE], begun, ended, s[ZERO + side], peak, other)
+    s[PEAK + side] = max(peak, ended)
+    s[DEFORMATION] = deformation
+    s[FORCE] = force
+    return force
