@@ -21,6 +21,7 @@ from models.specimens import fit as specimens
 # what follows the measured force over the measured deformation best, or else starts are dense.
 NEARER = np.geomspace(0.5, 1.3, 10)  # times the strength found under another law
 FINER = (0.0, 0.5, 1.5)  # times the sizes of the first shape that a law has, beside these
+REACHED = (0.15, 0.3, 0.5, 0.75)  # of the largest deformation: where a bend is looked for
 FITTED = 3  # of the laws, those with the best starts
 STEPS, ROUNDS = 8, 2  # of a fit
 TURNS, EVALUATIONS = 2, 60  # of the simplex with the effects' parameters, each followed by a fit of all
@@ -90,11 +91,22 @@ def starts(fit: Fit, effect: Effect, place: int) -> Iterator[dict[str, float]]:
             base[name] = within(known[name], found[law.renamed.get(name, name)])
         yield base
         return
+    for share, shape in itertools.product(NEARER.tolist(), shapes(fit, effect, place)):
+        yield base | shape | {strength.name: within(strength, share * base[strength.name])}
+
+
+def shapes(fit: Fit, effect: Effect, place: int) -> list[dict[str, float]]:
+    """The first shape of a law at some sizes: a length that only some laws have follows what the column reaches."""
+    law = effect.laws[place]
     shape = next((item for item in effect.every if item.name in law.shapes and item.sizes), None)
-    sizes = {share * size for share in (*FINER, 1.0) for size in shape.sizes} if shape else {0.0}
-    for share, size in itertools.product(NEARER.tolist(), sorted(sizes)):
-        nearer = {strength.name: within(strength, share * base[strength.name])}
-        yield base | nearer | ({shape.name: within(shape, size)} if shape else {})
+    if shape is None:
+        return [{}]
+    way = path(fit.data.part)
+    if shape in effect.further and way is not None:
+        sizes = {share * float(np.max(np.abs(way[0]))) for share in REACHED}
+    else:
+        sizes = {share * size for share in (*FINER, 1.0) for size in shape.sizes}
+    return [{shape.name: within(shape, size)} for size in sorted(sizes)]
 
 
 def within(parameter: Parameter, value: float) -> float:

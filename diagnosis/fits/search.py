@@ -51,7 +51,7 @@ SMALL = (
     0.05  # of a reading's rms that may be coloured noise where only the residual beside effects tells of it
 )
 UNEVEN = 3.0  # times what the energy of normal noise varies by: such noise comes and goes, as a motion does
-FARTHEST = 8.0  # times what the best effect leaves: one that leaves more is under no law the right one
+FARTHEST = 30.0  # times what the best effect leaves: one that leaves more is under no law the right one
 POLISHED = 12  # steps of a fit that leaves something, before that counts
 HALVINGS = 20  # by which a value is found beyond which the system is the same
 RIVALS = 3  # candidates of the projection that are fitted in the place of coloured noise

@@ -119,7 +119,8 @@ def platform_acceleration(system: System, command: Array, motion: Array, rate: A
     table, effects = system.plan.table, system.effects.table
     omega = 2.0 * math.pi * table.frequency
     ticks = np.arange(command.size)
-    late = np.interp(ticks - table.delay / system.plan.test.interval, ticks, command, left=0.0)
+    reached = ticks - 1.0 - table.delay / system.plan.test.interval  # a command is reached one interval later
+    late = np.interp(reached, ticks, command, left=0.0)
     servo: Array = omega**2 * (effects.gain * late - motion) - 2.0 * table.damping_ratio * omega * rate
     return servo - friction_of(effects, rate)
 

@@ -83,9 +83,11 @@ def test_a_fibre_column_yields_and_softens_with_the_drift_it_has_seen(name: str,
     first = report["which"][0]
     assert first["effects"] == ["column.yielding"]
     law = first["parameters"]["column.yielding"]["law"]["value"]
-    assert law == 3  # reloading aims at the largest drift seen, and so softens with it
+    assert (
+        law == 5
+    )  # a skeleton of three lines, and reloading aims at the largest drift seen: it softens with it
     assert report["status"] == "partly_explained"
-    assert report["how_far"]["after"] < 0.15 * report["how_far"]["before"]
+    assert report["how_far"]["after"] < 0.1 * report["how_far"]["before"]
 
 
 @pytest.mark.slow  # compiles the kind; the page of the documents runs the same commands

@@ -41,7 +41,7 @@ EFFECT = sets(
             "loop",
             "",
             null=0.6,
-            least=0.0,
+            least=0.1,  # a lower flag is a bend without a loop: `column.hardening`
             most=1.0,
             sizes=(0.3, 0.6, 0.9),
             says="height of the loop over the force at the bend",
