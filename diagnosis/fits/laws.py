@@ -22,7 +22,7 @@ from models.specimens import fit as specimens
 NEARER = np.geomspace(0.5, 1.3, 10)  # times the strength found under another law
 FINER = (0.0, 0.5, 1.5)  # times the sizes of the first shape that a law has, beside these
 REACHED = (0.15, 0.3, 0.5, 0.75)  # of the largest deformation: where a bend is looked for
-FITTED = 3  # of the laws, those with the best starts
+FITTED = 4  # of the laws, those with the best starts
 STEPS, ROUNDS = 8, 2  # of a fit
 TURNS, EVALUATIONS = 2, 60  # of the simplex with the effects' parameters, each followed by a fit of all
 LOGARITHMIC, LINEAR = 0.06, 0.4  # first edges of the simplex, of the logarithm and of a shape over its size
@@ -87,6 +87,9 @@ def starts(fit: Fit, effect: Effect, place: int) -> Iterator[dict[str, float]]:
     if way is not None:
         found = specimens.fit(law.model, *way).parameters
         known = {item.name: item for item in effect.every}
+        if "first_bend" in found.keys() - law.shapes.keys():  # without it the law yields at the same force
+            bend = found["first_bend"]
+            found["yield_displacement"] *= bend + found["second_stiffness"] * (1.0 - bend)
         for name in (strength.name, *law.shapes):
             base[name] = within(known[name], found[law.renamed.get(name, name)])
         yield base

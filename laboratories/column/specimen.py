@@ -35,6 +35,7 @@ LAWS = (
     "clough",
     "trilinear",
     "pinched",
+    "pinched",
 )  # of yielding, in the order of `ColumnEffects.law`
 PLAYS = ORIGIN, RESTING, HELD, PARTLY = range(4)  # where the gap is: see `column.slip`
 CENTRING = SPECIMENS["self_centring"].code

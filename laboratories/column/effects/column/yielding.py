@@ -4,8 +4,8 @@
 
 with yield displacement δ_y, hardening α and exponent n. The parameter `law` chooses another formula: 1 the bilinear
 one, 2 that of Menegotto and Pinto with R₀ as the exponent, 3 the peak-oriented one of Clough and Johnston with the
-exponent `unloading` of its unloading stiffness, 4 the trilinear one, 5 the pinched one, whose skeleton is
-trilinear too and whose reloading stiffness is damaged with every cycle (models/specimens). Not to be confused with
+exponent `unloading` of its unloading stiffness, 4 the trilinear one, 5 the pinched one, whose reloading stiffness is
+damaged with every cycle, 6 the same with a trilinear skeleton (models/specimens). Not to be confused with
 `column.degradation`, which softens without a loop, `column.friction`, whose loop has the same height at every
 amplitude, or `column.self_centring`, whose loop closes before the origin.
 """
@@ -18,6 +18,7 @@ from laboratories.effects.effect import Law, Parameter
 from laboratories.effects.laws import sets
 
 SKELETON = {"first_bend": 0.5, "second_stiffness": 0.5}
+RELOADING = {"pinch_force": 0.5, "pinch_displacement": 0.5, "unloading": 0.2, "damage": 0.01}
 
 
 def share(name: str, null: float, least: float, says: str) -> Parameter:
@@ -64,9 +65,9 @@ EFFECT = sets(
             "",
             null=0.0,
             least=0.0,
-            most=5.0,
+            most=6.0,
             sizes=(),
-            says="0 Bouc and Wen, 1 bilinear, 2 Menegotto and Pinto, 3 peak-oriented, 4 trilinear, 5 pinched",
+            says="0 Bouc and Wen, 1 bilinear, 2 Menegotto and Pinto, 3 peak-oriented, 4 trilinear, 5 pinched, 6 both",
             shape=True,
         ),
         "unloading": Parameter(
@@ -76,14 +77,16 @@ EFFECT = sets(
             least=0.0,
             most=1.0,
             sizes=(),
-            says="exponent of the unloading stiffness of laws 3 and 5",
+            says="exponent of the unloading stiffness of laws 3, 5 and 6",
             shape=True,
         ),
         "first_bend": share(
-            "first_bend", 1.0, 0.02, "where laws 4 and 5 first bend, over yield_displacement"
+            "first_bend", 1.0, 0.02, "where laws 4 and 6 first bend, over yield_displacement"
         ),
         "second_stiffness": share("second_stiffness", 0.5, 0.0, "stiffness between the bends over the first"),
-        "pinch_force": share("pinch_force", 1.0, 0.0, "corner of law 5's reloading, over the peak's force"),
+        "pinch_force": share(
+            "pinch_force", 1.0, 0.0, "corner of reloading of laws 5 and 6, over the peak's force"
+        ),
         "pinch_displacement": share("pinch_displacement", 1.0, 0.0, "its place on the way to the peak"),
         "damage": Parameter(
             "damage",
@@ -92,7 +95,7 @@ EFFECT = sets(
             least=0.0,
             most=10.0,
             sizes=(),
-            says="growth of law 5's peak per plastic deformation of yield_displacement",
+            says="growth of the peak of laws 5 and 6 per plastic deformation of yield_displacement",
             shape=True,
         ),
     },
@@ -107,18 +110,8 @@ EFFECT = sets(
         ),
         Law("peak-oriented", {"hardening": 0.05, "unloading": 0.3}, "clough"),
         Law("trilinear", {"hardening": 0.05, **SKELETON}, "trilinear"),
-        Law(
-            "pinched",
-            {
-                "hardening": 0.05,
-                **SKELETON,
-                "pinch_force": 0.5,
-                "pinch_displacement": 0.5,
-                "unloading": 0.2,
-                "damage": 0.01,
-            },
-            "pinched",
-        ),
+        Law("pinched", {"hardening": 0.05, **RELOADING}, "pinched"),
+        Law("pinched trilinear", {"hardening": 0.05, **SKELETON, **RELOADING}, "pinched"),
     ),
     says="the specimen yields",
     reference="Wen, Method for random vibration of hysteretic systems, J. Eng. Mech. Div. ASCE 102 (1976) 249-263",
