@@ -18,7 +18,7 @@ from common.plan.laboratory_tables import Column
 from models import friction, preisach, specimens
 from models.compiled import jit, jit_apart
 from models.registry import Array
-from models.specimens import SPECIMENS
+from models.specimens import SPECIMENS, self_centring
 from models.system import ColumnEffects
 
 # places in `effects`
@@ -38,7 +38,6 @@ LAWS = (
     "pinched",
 )  # of yielding, in the order of `ColumnEffects.law`
 PLAYS = ORIGIN, RESTING, HELD, PARTLY = range(4)  # where the gap is: see `column.slip`
-CENTRING = SPECIMENS["self_centring"].code
 STIFFENED_AT = 2e-3  # m, reference deformation of hardening with the square of the deformation
 DEGRADED_AT = (
     2e-3  # m, reference deformation of degradation, at which 63 % of the stiffness is lost that will be
@@ -100,7 +99,7 @@ def build(column: Column, effects: ColumnEffects | None = None) -> Specimen:
         yielding(column.stiffness, more),
         np.zeros(specimens.STATE_SIZE),
         np.array([column.stiffness, bending(more.centring), more.centring_hardening, more.centring_loop]),
-        np.zeros(specimens.STATE_SIZE),
+        np.zeros(self_centring.STATE_SIZE),
         np.zeros(8),
         law,
         preisach.memory(law),
@@ -189,7 +188,7 @@ def carried(specimen: Specimen, within: float) -> float:
         law = int(effects[YIELDS])
         result += specimens.step(law, specimen.yielding, specimen.yielded, within) - elastic
     if effects[CENTRES] != 0.0:
-        result += specimens.step(CENTRING, specimen.centring, specimen.centred, within) - elastic
+        result += self_centring.step(specimen.centring, specimen.centred, within) - elastic
     if effects[STIFFENING] != 0.0:
         bend = effects[BEND]
         square = within * within / (STIFFENED_AT * STIFFENED_AT)
