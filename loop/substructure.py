@@ -233,7 +233,7 @@ def ground_rows(plan: Plan, record: GroundMotion, shift: float = 0.0) -> Array:
 
 
 def recorded_ground(plan: Plan) -> tuple[GroundMotion, Array] | None:
-    """The record of the plan and its rows for a recording, None where the building is a client's with its own motion.
+    """The plan's record and its rows for a recording; None if a client has the building and its own ground motion.
 
     Raises:
         InputError: it cannot be read.

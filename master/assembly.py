@@ -87,7 +87,7 @@ def serve(
     epoch_ns: int | None = None,
     gate: Gate | None = None,
 ) -> MasterLoop:
-    """As `build_loop`, for the `building` that is given, whose kernels are compiled."""
+    """The loop of a master with the given `building`, whose kernels must be compiled; otherwise as `build_loop`."""
     return MasterLoop(
         setting,
         build_rig(reality, rigs.at_rest(gate, setting, MASTER), paced=real(setting.clock)),
@@ -100,7 +100,7 @@ def serve(
 
 
 class Served:
-    """How the master is put together that serves clients of OpenSees at `addresses`, in real time."""
+    """Builds a master that serves clients of OpenSees at `addresses` in real time."""
 
     def __init__(self, addresses: Sequence[str]) -> None:
         self._addresses = addresses
@@ -110,18 +110,18 @@ class Served:
         warm_up_served(reality)
 
     def preflight(self, _plan: Plan) -> list[PreflightCheck]:
-        """No check: of a client's building nothing is known here."""
+        """No checks, because the client's building is not known."""
         return []
 
     def build_loop(self, setting: Setting, reality: Reality, *, gate: Gate | None = None) -> MasterLoop:
-        """The loop, with ports that are open; raises InputError where one cannot be."""
+        """The loop, with open ports; raises InputError if a port cannot be opened."""
         plan = setting.plan
         building = ClientBuilding(plan, self._addresses, RealTime(plan))
         return serve(setting, reality, building=building, gate=gate)
 
 
 def warm_up_served(reality: Reality) -> None:
-    """Compile what a client's building needs of the master, on arrays that are thrown away."""
+    """Compile the master's kernels for a client's building."""
     plan = reality.plan
     compensators.enter(compensator(plan), *compensators.STILL, plan.test.interval)
     for kind in kinds.kinds_of(plan).values():
@@ -135,7 +135,7 @@ def warm_up(reality: Reality) -> None:
 
 
 def of_own(reality: Reality, outputs: Outputs) -> None:
-    """Compile those of the master's own laboratory and of the limits."""
+    """Compile the kernels of the master's own laboratory and of the limits."""
     plan = reality.plan
     own = OwnLaboratory(plan)
     measured = (0.0,) * (len(own.channels.names) if own.channels else 0)

@@ -160,7 +160,7 @@ class MasterLoop(RigLoop):
             try:
                 outputs = self._building(tick, *self._own.felt(measured), forces)
             except (InterlockError, LostError) as error:
-                self._left_alone(error, tick)
+                self._building_failed(error, tick)
                 self._descent.step(tick, measured)
                 return
             if self._building.over:
@@ -188,19 +188,19 @@ class MasterLoop(RigLoop):
             self._settle(tick)
 
     def _settle(self, tick: int) -> None:
-        """Let the building use the time behind the commands; where it fails, the ramp begins with the next tick."""
+        """Let the building use the time after the commands; if it fails, the ramp begins at the next tick."""
         try:
             self._building.written(tick)
         except (InterlockError, LostError) as error:
-            self._left_alone(error, tick)
+            self._building_failed(error, tick)
 
-    def _left_alone(self, error: InterlockError | LostError, tick: int) -> None:
-        """End the test because the building gives no further displacements."""
+    def _building_failed(self, error: InterlockError | LostError, tick: int) -> None:
+        """End the test, because the building computes no further displacements."""
         event = Event.LOSE if isinstance(error, LostError) else Event.TRIP
         self.lab.fail(event, error, code="client", tick=tick)
 
     def _finding(self, tick: int) -> tuple[WatchdogFinding, str]:
-        """The worst finding of the watchdogs on the building and the slaves, and the first that has it."""
+        """The worst finding of the watchdogs on the building and the slaves, and the name of the first that has it."""
         worst, who = self._building.look(tick), CLIENT
         for partner in self._partners:
             found = partner.look(tick)
@@ -343,7 +343,9 @@ class MasterLoop(RigLoop):
     @property
     def completed(self) -> bool:
         """Whether the test had all its ticks."""
-        ended = self.lab.plan.served and self.lab.exchange.cause == COMPLETED  # as its client wants it
+        ended = (
+            self.lab.plan.served and self.lab.exchange.cause == COMPLETED
+        )  # the client has ended its analysis
         return ended or self.ticks >= self.lab.plan.ticks
 
     @property
