@@ -115,7 +115,7 @@ def margin_cells(one: Margins) -> list[str]:
         f"{one.critical * 1e3:.1f} ms" if isfinite(one.critical) else "any",
         f"{one.expected * 1e3:.1f} ms" if isfinite(one.expected) else "unstable",
         f"{one.margin:.1f}" if isfinite(one.margin) and one.margin < 1e3 else "–",
-        f"{100 * one.damping_points:.2f} points" if stable else "unstable",
+        f"{100 * one.damping_points:z.2f} points" if stable else "unstable",
     ]
 
 

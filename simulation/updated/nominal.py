@@ -105,7 +105,7 @@ def with_noise(whole: Plan, plan: Plan, role: str, found: Mapping[str, float]) -
 
 
 def differences(before: Plan, after: Plan) -> list[str]:
-    """What two plans differ in, one sentence a key."""
+    """What two plans differ in by five digits, a line for each key."""
 
     def rows(path: str, one: Any, other: Any) -> list[str]:
         if one == other:
@@ -116,7 +116,8 @@ def differences(before: Plan, after: Plan) -> list[str]:
                 for key in other
                 for row in rows(f"{path}.{key}" if path else key, one.get(key), other[key])
             ]
-        return [f"{path}: {text(one)} → {text(other)}"]
+        said = text(one), text(other)
+        return [f"{path}: {said[0]} → {said[1]}"] if said[0] != said[1] else []
 
     return rows("", before.tables(), after.tables())
 
