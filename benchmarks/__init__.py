@@ -13,6 +13,7 @@ from benchmarks import (
     exchange,
     false_trips,
     live,
+    opensees,
     real_time,
     recorder,
     scale,
@@ -40,6 +41,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "recorder": recorder.run,
     "codec": codec.run,
     "udp_rig": udp_rig.run,
+    "opensees": opensees.run,
     "start": start.run,
     "false_trips": false_trips.run,
 }

@@ -23,7 +23,6 @@ from master.limits import MasterLimits
 from master.loop import MasterLoop
 from master.own import OwnLaboratory
 from master.step import MasterStep
-from models import compensators
 from models.registry import Array
 from models.system import System
 
@@ -123,7 +122,7 @@ class Served:
 def warm_up_served(reality: Reality) -> None:
     """Compile the master's kernels for a client's building."""
     plan = reality.plan
-    compensators.enter(compensator(plan), *compensators.STILL, plan.test.interval)
+    compensator(plan)
     for kind in kinds.kinds_of(plan).values():
         Follower(kind.coupling(plan), plan.test.interval, 1).resists(0.0)
     of_own(reality, Outputs(0.0, 0.0, 0.0, 0.0, [(0.0,) * substructure.SENT_VALUES for _ in plan.roles], []))

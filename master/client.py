@@ -29,7 +29,7 @@ from laboratories.kind import Coupling, Follows
 from loop import substructure
 from master.building import Answering, Building, Outputs
 from models import compensators, force_correction
-from models.compiled import plain
+from models.compiled import bound
 
 SLICE_S = (
     0.1  # longest delay of a request to stop while virtual time stands still; an operator does not notice it
@@ -289,7 +289,7 @@ class ClientBuilding(Building):
         if self._own:
             target, effort, velocity, acceleration, jerk = told.pop(0)
             rates = (velocity, acceleration, jerk)
-            command = compensators.enter(self._compensator, target, *rates, present, position, self._interval)
+            command = self._compensator(target, *rates, present, position, self._interval)
         self._outputs = Outputs(0.0, present, command, effort, told, [])
         return self._outputs
 
@@ -370,19 +370,25 @@ def couplings_of(plan: Plan) -> dict[str, Coupling]:
     return {role: kind.coupling(plan.of(role)) for role, kind in kinds.kinds_of(plan).items()}
 
 
-def compensator(plan: Plan) -> Any:
-    """The compensator of the master's own laboratory, for `compensators.enter`; one without effect if there is none."""
-    return plain(substructure.own_compensator(plan))
+def compensator(plan: Plan) -> Callable[..., float]:
+    """The compensator of the master's own laboratory, as `compensators.enter`; without one it does nothing."""
+    built = substructure.own_compensator(plan)
+    return bound(compensators.enter, built, *compensators.STILL, plan.test.interval)
+
+
+def check_count(addresses: Sequence[str], laboratories: int) -> None:
+    """Raise InputError where elements are served at neither one address nor one for each laboratory."""
+    if len(addresses) not in (1, laboratories):
+        raise InputError(
+            f"--opensees is given {len(addresses)} times for {laboratories} laboratories: give it once for one "
+            "element with all of them, or once for each in the plan's order."
+        )
 
 
 def ports(addresses: Sequence[str], couplings: Sequence[Coupling], say: Callable[[str], None]) -> list[Port]:
     """One port for all laboratories, or one for each; raises InputError if the number fits neither or one is in use."""
     stiffness = [one.stiffness for one in couplings]
-    if len(addresses) not in (1, len(stiffness)):
-        raise InputError(
-            f"--opensees is given {len(addresses)} times for {len(stiffness)} laboratories: give it once for one "
-            "element with all of them, or once for each in the plan's order."
-        )
+    check_count(addresses, len(stiffness))
     dealt = [stiffness] if len(addresses) == 1 else [[k] for k in stiffness]
     opened: list[Port] = []
     try:

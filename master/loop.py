@@ -6,7 +6,7 @@ real and in virtual time.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import chain
 from typing import Any
 
@@ -157,14 +157,8 @@ class MasterLoop(RigLoop):
             return
         try:
             measured = self._rig.read()
-            try:
-                outputs = self._building(tick, *self._own.felt(measured), forces)
-            except (InterlockError, LostError) as error:
-                self._building_failed(error, tick)
-                self._descent.step(tick, measured)
-                return
-            if self._building.over:
-                self.stop(COMPLETED)
+            outputs = self._computed(tick, measured, forces)
+            if outputs is None:
                 self._descent.step(tick, measured)
                 return
             wanted = self._own.command(outputs)
@@ -186,6 +180,18 @@ class MasterLoop(RigLoop):
         self._watch(tick, wake)
         if lab.running:
             self._settle(tick)
+
+    def _computed(self, tick: int, measured: tuple[float, ...], forces: Sequence[float]) -> Outputs | None:
+        """What the building gives, None where it has ended the test."""
+        try:
+            outputs = self._building(tick, *self._own.felt(measured), forces)
+        except (InterlockError, LostError) as error:
+            self._building_failed(error, tick)
+            return None
+        if self._building.over:
+            self.stop(COMPLETED)
+            return None
+        return outputs
 
     def _settle(self, tick: int) -> None:
         """Let the building use the time after the commands; if it fails, the ramp begins at the next tick."""

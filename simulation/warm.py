@@ -18,7 +18,7 @@ from laboratories.sensors import readings
 from loop import replay, site, substructure
 from loop.closed_loop import simulate
 from loop.nominal.response import response
-from models import cache, compensators, energy_balance
+from models import cache, compensators, energy_balance, force_correction
 from models.compiled import bound
 from models.registry import Array
 from models.system import System
@@ -64,6 +64,7 @@ def ticks(plan: Plan, ground: Array) -> None:
     readings.step(readings.build(plan.test.interval, ("any",), {}), 0, 0.0, 0.0, 0.0)
     none = compensators.build("none", {}, plan.test.interval)
     bound(compensators.enter, none, *compensators.STILL, plan.test.interval)
+    force_correction.step(1.0, 0.0, np.zeros(2), 0.0)
     TickLimits(None, plan, [], commands=0).violation(0.0)
 
 

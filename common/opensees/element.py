@@ -68,6 +68,7 @@ class ElementServer:
             b""  # a message with displacements that waits until the previous ones are measured
         )
         self._heard = False
+        self._zeros = b""  # the answer for a matrix of zeros
         self._in = bytearray()
         self._out = bytearray()
 
@@ -166,6 +167,7 @@ class ElementServer:
                 f"its messages of {header.data} numbers hold no matrix of {n} times {n}."
             )
         self.header, self.phase = header, Phase.MEASURED
+        self._zeros = wire.answer(header, ())
 
     def _message(self, data: bytes) -> None:
         code = wire.code_in(data)
@@ -182,9 +184,10 @@ class ElementServer:
     def _trial(self, data: bytes) -> None:
         """Take displacements; equal ones to the previous are ignored."""
         assert self.header is not None  # noqa: S101 - messages follow the header
-        values = wire.commanded(self.header, data)
-        if values.displacement == self.wanted.displacement:
+        n = self.header.control.displacement
+        if wire.numbers_in(self.header, data, n, first=1) == self.wanted.displacement:
             return
+        values = wire.commanded(self.header, data)
         if self._moved:
             raise RevisedError(
                 f"A trial revises displacements that were imposed in the same step ({shown(self.wanted)} to "
@@ -216,7 +219,8 @@ class ElementServer:
         elif code in (Code.STIFFNESS, Code.INITIAL_STIFFNESS):
             values = self._diagonal
         else:
-            values = ()
+            self._out += self._zeros
+            return
         self._out += wire.answer(header, values)
 
 

@@ -52,6 +52,22 @@ def address_of(text: str) -> tuple[str, int]:
     return host, port
 
 
+def check_free(text: str) -> None:
+    """Raise InputError where an address cannot be served; nobody can connect to it meanwhile."""
+    place = address_of(text)
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind(place)
+        except OSError as error:
+            raise unusable(*place, error) from None
+
+
+def unusable(host: str, port: int, error: OSError) -> InputError:
+    """What is said of an address that cannot be served."""
+    return InputError(f"Cannot serve OpenSees at {host}:{port}: {error.strerror}; choose another port.")
+
+
 class ClientError(LostError):
     """A client disconnected, sent nothing, or sent messages that are not valid (exit 4)."""
 
@@ -72,9 +88,7 @@ class Port:
         try:
             self.listener = socket.create_server((host, port), family=socket.AF_INET, backlog=64)
         except OSError as error:
-            raise InputError(
-                f"Cannot serve OpenSees at {self.name}: {error.strerror}; choose another port."
-            ) from None
+            raise unusable(host, port, error) from None
         self.listener.setblocking(False)
 
     def accept(self) -> None:
@@ -190,6 +204,10 @@ class Ports:
     def __init__(self, ports: Sequence[Port]) -> None:
         self.ports = ports
         self._one = ports[0] if len(ports) == 1 else None
+        self._poll = select.poll()
+        for port in ports:
+            self._poll.register(port.listener, select.POLLIN)
+        self._polled: dict[int, Port] = {}  # clients by descriptor
 
     @property
     def servers(self) -> list[ElementServer]:
@@ -216,14 +234,20 @@ class Ports:
                 port.accept()
         return True
 
-    def _ready(self, seconds: float) -> set[int]:
-        """The file descriptors that have data to read."""
-        poll = select.poll()
-        for port in self.ports:
-            poll.register(port.listener, select.POLLIN)
-            if port.client is not None and not port.server.full:
-                poll.register(port.client, select.POLLIN)
-        return {descriptor for descriptor, _ in poll.poll(max(seconds, 0.0) * 1e3)}
+    def _ready(self, seconds: float) -> list[int]:
+        """The descriptors that have something to be read; of a client that waits for us none is expected."""
+        wanted = {
+            port.client.fileno(): port
+            for port in self.ports
+            if port.client is not None and not port.server.full
+        }
+        if wanted != self._polled:
+            for descriptor in self._polled.keys() - wanted.keys():
+                self._poll.unregister(descriptor)
+            for descriptor in wanted.keys() - self._polled.keys():
+                self._poll.register(descriptor, select.POLLIN)
+            self._polled = wanted
+        return [descriptor for descriptor, _ in self._poll.poll(seconds * 1e3)]
 
     def close(self) -> None:
         """Close all connections and ports."""

@@ -39,7 +39,8 @@ class Code(IntEnum):
     END = 99  # not answered
 
 
-CODES = frozenset(Code)
+CODES = {float(code): code for code in Code}
+FIRST = struct.Struct("=d")
 MATRICES = frozenset({Code.INITIAL_STIFFNESS, Code.STIFFNESS, Code.DAMPING, Code.MASS})
 
 
@@ -151,10 +152,11 @@ def code_in(data: bytes) -> Code:
     Raises:
         RemoteProtocolError: there is no such code.
     """
-    (number,) = struct.unpack_from("=d", data)
-    if number not in CODES:
+    (number,) = FIRST.unpack_from(data)
+    code = CODES.get(number)
+    if code is None:
         raise RemoteProtocolError(f"a message has the code {number:g}, which means nothing here.")
-    return Code(int(number))
+    return code
 
 
 def commanded(header: Header, data: bytes) -> Quantities:

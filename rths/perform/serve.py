@@ -49,11 +49,11 @@ def run(args: argparse.Namespace) -> int:
 
 def checked(plan: Plan, addresses: Sequence[str]) -> None:
     """Raise InputError where elements cannot be served at these addresses, before anything starts."""
-    from master.client import couplings_of, ports
+    from master.client import check_count
 
-    for one in ports(addresses, list(couplings_of(plan).values()), say=print):
-        one.close()
+    check_count(addresses, len(plan.kinds))
     for text in addresses:
+        port.check_free(text)
         host, number = port.address_of(text)
         if port.is_open(host):
             sys.stderr.write(

@@ -14,6 +14,7 @@ from common.plan.read import parse
 from common.plan.reality import as_planned
 from common.recording.reader import read
 from common.recording.run import Run
+from master.assembly import warm_up_served
 from master.client import AsFastAsItGoes, ClientBuilding, Pace
 from simulation import virtual
 from tests.serve.client import PATIENCE_S, Script, free_port
@@ -85,6 +86,7 @@ def serve(
 ) -> Served:
     """Serve a client, whose `script` is given its port, to the end."""
     chosen, number = plan or plan_of(), free_port()
+    warm_up_served(as_planned(chosen))  # which takes its time where nothing is compiled yet
     building = ClientBuilding(chosen, [f"127.0.0.1:{number}"], pace or AsFastAsItGoes(PATIENCE_S, str))
     client, end = Script(lambda: script(number)), time.monotonic() + PATIENCE_S
     while building.awaited and time.monotonic() < end:

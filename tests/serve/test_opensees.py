@@ -21,11 +21,12 @@ from common.plan.reality import as_planned
 from common.recording.reader import read
 from master.client import AsFastAsItGoes, ClientBuilding
 from simulation import virtual
+from tests.helpers import ROOT
 from tests.opensees import lacking
 from tests.serve.client import PATIENCE_S, free_port
 from tests.serve.serving import ALONE, plan_of
 
-MODEL = Path(__file__).with_name("model.py")
+MODEL = ROOT / "benchmarks" / "opensees" / "model.py"
 STEPS = 400
 pytestmark = pytest.mark.skipif(bool(lacking()), reason=lacking())
 EXPLICIT = ("NewmarkExplicit", "CentralDifference", "AlphaOS")

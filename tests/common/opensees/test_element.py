@@ -167,7 +167,7 @@ def test_messages_too_short_for_a_matrix_are_refused() -> None:
         server(header, (K,) * 5)
 
 
-@given(st.lists(st.integers(1, 7), min_size=1, max_size=40))
+@given(st.lists(st.integers(1, 7), min_size=1, max_size=8))
 def test_how_the_bytes_are_cut_changes_nothing(lengths: list[int]) -> None:
     data = wire.header_bytes(HEADER) + said(Code.TRIAL, 1e-3) + said(Code.MASS) + said(Code.FORCE)
     one, place = ElementServer([K]), 0

@@ -1,14 +1,16 @@
 """A model for OpenSees in another interpreter, which has no other module of this project: one storey, two at most.
 
-`python model.py INTEGRATOR ALGORITHM STEPS PORT …` prints the displacements after every step as JSON; without a port
-springs stand in the laboratories' place, and with one port for two laboratories one element has both.
+`python model.py INTEGRATOR ALGORITHM STEPS LABORATORIES PORT …` prints the displacements after every step as JSON;
+without a port springs stand in the laboratories' place, and with one port for two laboratories one element has both.
 """
 
 from __future__ import annotations
 
 import json
 import math
+import socket
 import sys
+import time
 from importlib import import_module
 from typing import Any
 
@@ -52,6 +54,8 @@ def place(ops: Any, floors: list[int], ports: list[int]) -> None:
             ops.uniaxialMaterial("Elastic", 10 + floor, 6.25e6)
             ops.element("zeroLength", 10 + floor, 1, floor, "-mat", 10 + floor, "-dir", 1)
         return
+    while any(socket.socket().connect_ex(("127.0.0.1", port)) for port in ports):
+        time.sleep(0.05)  # an element connects as it is made, and tries once only
     shared = [floors] if len(ports) == 1 else [[floor] for floor in floors]
     for tag, (port, those) in enumerate(zip(ports, shared, strict=True), start=20):
         dofs = [word for _ in those for word in ("-dof", 1)]
@@ -63,12 +67,14 @@ def main() -> int:
     integrator, algorithm, steps, laboratories, *ports = sys.argv[1:]
     ops = import_module("openseespy.opensees")
     build(ops, integrator, algorithm, int(laboratories), [int(port) for port in ports])
-    found = []
+    found, began = [], 0.0
     for _ in range(int(steps)):
         if ops.analyze(1, STEP):
             break
+        began = began or time.perf_counter()  # the first step waits until the laboratories are armed
         found.append([ops.nodeDisp(floor, 1) for floor in range(2, 2 + int(laboratories))])
-    sys.stdout.write("\n" + json.dumps({"version": ops.version(), "found": found}) + "\n")
+    rate = (len(found) - 1) / (time.perf_counter() - began)
+    sys.stdout.write("\n" + json.dumps({"version": ops.version(), "rate": rate, "found": found}) + "\n")
     sys.stdout.flush()
     return 0
 
