@@ -41,7 +41,7 @@ def build(ops: Any, integrator: str, algorithm: str, laboratories: int, ports: l
     ops.constraints("Plain")
     ops.numberer("Plain")
     ops.system("FullGeneral")
-    ops.test("NormUnbalance", 1e-9, 10)
+    ops.test("NormUnbalance", 1e-6, 10)
     ops.algorithm(algorithm)
     ops.integrator(integrator, *INTEGRATORS[integrator])
     ops.analysis("Transient")

@@ -109,6 +109,12 @@ def test_a_revised_displacement_is_refused_before_it_is_imposed_too() -> None:
         one.take(said(Code.TRIAL, 1e-3) + said(Code.TRIAL, 2e-3))
 
 
+def test_the_rounding_of_an_iteration_revises_nothing() -> None:
+    one = server()
+    one.take(said(Code.TRIAL, 1e-3) + said(Code.TRIAL, 1e-3 * (1.0 + 1e-11)) + said(Code.FORCE))
+    assert one.wanted.displacement == (1e-3,)
+
+
 def test_displacements_of_a_client_that_does_not_wait_come_one_after_the_other() -> None:
     one = server()
     one.take(b"".join(said(Code.TRIAL, x) + said(Code.COMMIT) for x in (1e-3, 2e-3, 3e-3)) + said(Code.END))
