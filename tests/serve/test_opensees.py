@@ -31,9 +31,7 @@ STEPS = 400
 pytestmark = pytest.mark.skipif(bool(lacking()), reason=lacking())
 EXPLICIT = ("NewmarkExplicit", "CentralDifference", "AlphaOS")
 TWICE = '[slave.east]\nkind = "column"\n'
-YIELDING = (
-    ALONE + '[column]\nmodel = "bilinear"\nparameters = { yield_displacement = 2e-4, hardening = 0.1 }\n'
-)
+YIELDING = ALONE + '[column]\nmodel = "bilinear"\nyield_displacement = 2e-4\nhardening = 0.1\n'
 
 
 def opensees(*words: object) -> subprocess.Popen[str]:
