@@ -14,6 +14,7 @@ from rths.__main__ import VERBS, parser_for
 WRITES = {
     "run": (("--virtual",), "-o"),
     "run in real time": ((), "-o"),
+    "serve": (("two_storeys", "--opensees", "127.0.0.1:47112"), "-o"),
     "record": (("default",), "-o"),
     "simulate": (("default",), "-o"),
     "predict": (("default", "--found", "{plan}"), "-o"),
