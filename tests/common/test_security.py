@@ -66,7 +66,7 @@ def test_keys_are_made_for_every_role_and_only_their_owner_reads_them(
 ) -> None:
     folder = tmp_path / "keys"
     assert made_by(folder, "--host", "lab-a.example", "192.0.2.1", "--days", "3") == 0
-    assert "authority.key must not travel" in capsys.readouterr().out
+    assert "authority.key away from the laboratories" in capsys.readouterr().out
     assert {path.name for path in folder.iterdir()} == {
         f"{name}.{end}" for name in ("authority", *ROLES) for end in ("pem", "key")
     }
@@ -105,9 +105,9 @@ def test_nothing_is_overwritten(copy: Path, capsys: pytest.CaptureFixture[str]) 
     [
         (("--days", "0"), "--days 0 cannot be used: give 1 to 3650."),
         (("--host", "tcp/192.0.2.1:7447"), "is neither a host's name nor its address"),
-        (("--slaves", "Roof"), "must begin with a letter"),
+        (("--slaves", "Roof"), "begin with a lower-case letter"),
         (("--slaves", "a" * 70), "is too long for a certificate"),
-        (("--slaves", "a", "a"), "is there twice"),
+        (("--slaves", "a", "a"), "has a name twice"),
         (("--plan", "nowhere.toml"), "Cannot read the plan nowhere.toml"),
     ],
 )

@@ -72,13 +72,16 @@ def test_a_complete_class_is_a_kind(tmp_path: Path) -> None:
         ({"name": '"My spring"'}, "has the name 'My spring', but a name begins with a letter"),
         (
             {"channels": CHANNELS.replace("told", "t")},
-            "has a signal 't', which another signal of the recording",
+            "has a signal 't', which is the name of another signal of the recording",
         ),
         (
             {"channels": CHANNELS.replace("told", "wish_jerk")},
-            "has a signal 'wish_jerk', which another signal",
+            "has a signal 'wish_jerk', which is the name of another signal",
         ),
-        ({"channels": CHANNELS.replace('"place", "m"', '"push", "m"')}, "has a signal 'push', which another"),
+        (
+            {"channels": CHANNELS.replace('"place", "m"', '"push", "m"')},
+            "has a signal 'push', which is the name of another",
+        ),
         (
             {"channels": CHANNELS.replace('force="push"', 'force="pull"')},
             "has 'pull' for its force, but must name",
@@ -168,7 +171,7 @@ def test_a_step_that_writes_or_reads_beside_its_arrays_is_found_before_it_runs(
 
 
 def test_a_channel_that_step_leaves_out_is_named(tmp_path: Path) -> None:
-    assert "gives push (truth[1]) no finite number" in complaint(
+    assert "sets push (truth[1]) to no finite number" in complaint(
         tmp_path, step=STEP.rsplit("\n", 2)[0] + "\n"
     )
 

@@ -58,5 +58,5 @@ def test_yielding_columns_are_refused(default_plan: Plan) -> None:
         default_plan.structure.columns, model="bilinear", parameters={"yield_displacement": 0.01}
     )
     plan = replace(default_plan, structure=replace(default_plan.structure, columns=columns))
-    with pytest.raises(InputError, match="linear columns only, not 'bilinear'"):
+    with pytest.raises(InputError, match="linear columns, not 'bilinear'"):
         response(plan, np.zeros((2, plan.ticks + 1)))

@@ -91,7 +91,7 @@ MISTAKES = {
     "unwritable page": (["{file}", "--html", "{tmp}/no/a.html"], "There is no folder"),
     "one file for both": (
         ["{file}", "--json", "{tmp}/a", "--html", "{tmp}/a"],
-        "--html and --json both name ",
+        "--html, --json and --found name one file twice",
     ),
     "a head alone": (["{tmp}/head.mcap"], "holds no topic"),
 }

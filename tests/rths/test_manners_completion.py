@@ -157,7 +157,7 @@ def test_fish_completes_verbs_options_choices_plans_and_files(folder: Path) -> N
 
 def test_another_shtab_is_refused_in_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("shtab.complete", lambda *_: "compdef _rths rths")
-    with pytest.raises(InputError, match=r"install that of requirements\.lock"):
+    with pytest.raises(InputError, match=r"install the one in requirements\.lock"):
         script("zsh")
 
 
