@@ -20,15 +20,11 @@ from models.registry import Array
 from models.transfer_systems import delay, first_order
 
 SUBSTEPS = 8  # of an interval: 0.25 ms at 2 ms, a fortieth of the relaxation time c/k of 9 ms (α = 1)
-MEMORY = (
-    512  # commands kept: enough for the largest dead time (50 ms) at the shortest interval of a plan (0.1 ms)
-)
+MEMORY = 512  # commands kept: enough for the largest dead time, 50 ms, at the shortest interval, 0.1 ms
 
 # indices of `parameters`: the interval, then `nominal`, then `faults`
 INTERVAL, STIFFNESS, COEFFICIENT, EXPONENT, DELAY, TIME_CONSTANT, LEAK, AIR = range(8)
-PISTON, DASHPOT, COMMANDS = range(
-    3
-)  # indices of `state`: m, m, and the first of the past commands (m), newest first
+PISTON, DASHPOT, COMMANDS = range(3)  # indices of `state`: m, m, past commands (m) from the newest on
 
 
 class ViscousDamper(Device):
@@ -114,10 +110,7 @@ def dashpot_velocity(parameters: Array, stretch: float) -> float:
 def dashpot_after(
     parameters: Array, dashpot: float, piston: float, piston_after: float, length: float
 ) -> float:
-    """The dashpot (m) after `length` s, by the fourth-order method of Runge and Kutta.
-
-    The piston moves from `piston` to `piston_after` (m) at constant velocity.
-    """
+    """The dashpot (m) after `length` s of constant piston velocity, by the fourth-order method of Runge and Kutta."""
     middle = 0.5 * (piston + piston_after)
     first = dashpot_velocity(parameters, piston - dashpot)
     second = dashpot_velocity(parameters, middle - dashpot - 0.5 * length * first)

@@ -67,7 +67,7 @@ def test_a_record_that_carries_nothing_is_refused(damper: Device, plan: Plan, co
         device.least_squares(damper, plan, commands, zero, read * [1.0, 0.0])
     with pytest.raises(InputError, match="at least 20"):
         device.least_squares(damper, plan, commands[:9], zero[:9], read[:9])
-    with pytest.raises(InputError, match="does not follow the command"):
+    with pytest.raises(InputError, match="do not follow the command"):
         device.least_squares(
             damper, plan, commands[:400], zero[:400], np.random.default_rng(1).normal(size=(400, 2))
         )
