@@ -126,11 +126,11 @@ def path(part: Part) -> tuple[Array, Array] | None:
         ways = [way for piece in part.pieces if (way := path(piece)) is not None]
         return max(ways, key=lambda way: float(np.max(np.abs(way[0]))), default=None)
     if isinstance(part, ColumnAlone):
-        there, way, force = part.present[:, 0], part.inputs, part.measured[:, 0]
+        there, deformation, force = part.present[:, 0], part.inputs, part.measured[:, 0]
     elif isinstance(part, LaboratoryPart) and part.lab.kind.name == COLUMN:
-        there, (way, force) = part.present.all(axis=1), part.measured.T
+        there, (deformation, force) = np.all(part.present, axis=1), part.measured.T
     else:
         return None
-    if not (np.any(way[there]) and np.any(force[there])):
+    if not (np.any(deformation[there]) and np.any(force[there])):
         return None
-    return way[there], force[there]
+    return deformation[there], force[there]

@@ -62,7 +62,8 @@ def played(plan: Plan) -> Array:
 
 def reached(step: MasterStep, plan: Plan) -> float:
     """Drift (m) of the master's storey at the interval's end, as the building has it in its memory."""
-    return float(step._building[ASKED][0]) / plan.column.deformation_ratio
+    advance: Any = step._advance  # the compiled kernel, bound to the building's arrays
+    return float(advance.args[0][ASKED][0]) / plan.column.deformation_ratio
 
 
 ASKED = Substructure._fields.index("asked")

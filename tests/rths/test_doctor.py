@@ -126,7 +126,7 @@ def test_messages_of_the_exchange_can_be_sent() -> None:
 
 
 def test_a_slave_that_fails_ends_the_exchange_with_its_message(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(children.realtime, "assign", lambda _count: [None, 10**6])
+    monkeypatch.setattr("rths.checkup.children.realtime.assign", lambda _count: [None, 10**6])
     began = time.monotonic()
     _, found = children.exchange(2_000_000, 1.0, "on")
     assert "error" in found

@@ -88,7 +88,7 @@ class Column(EmulatedLab):
 
     def read(self) -> ColumnMeasurement:
         """Readings, or what is wished."""
-        found: ColumnMeasurement = super().read()
+        found = ColumnMeasurement(*super().read())
         if self._log.wish == Wish.EMERGENCY:
             raise EmergencyStopError("the red button of laboratory A.")
         if self._log.wish == Wish.READ_FAR:
@@ -110,7 +110,7 @@ class Table(EmulatedLab):
 
     def read(self) -> TableMeasurement:
         """Readings, or what is wished."""
-        found: TableMeasurement = super().read()
+        found = TableMeasurement(*super().read())
         if self._log.wish == Wish.EMERGENCY:
             raise EmergencyStopError("the red button of laboratory B.")
         if self._log.wish == Wish.READ_FAR:
