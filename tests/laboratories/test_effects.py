@@ -377,7 +377,8 @@ def test_further_laws_of_yielding_are_their_models(name: str) -> None:
     corner = {"pinch_force": 0.3, "pinch_displacement": 0.6, "unloading": 0.2, "damage": 0.05}
     given = shapes | (corner if name == "pinched" else {})
     law = float(specimen.LAWS.index(name))
-    got = specimen_under(path, dataclasses.replace(ColumnEffects(yield_displacement=1e-3, law=law), **given))
+    more: dict[str, Any] = {"yield_displacement": 1e-3, "law": law, **given}
+    got = specimen_under(path, ColumnEffects(**more))
     expected = forces(name, {"stiffness": K, "yield_displacement": 1e-3, **given}, path.astype(np.float64))
     assert np.allclose(got, expected, rtol=1e-9, atol=1e-6)
 
