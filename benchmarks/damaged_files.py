@@ -22,7 +22,7 @@ from mcap.stream_reader import StreamReader, breakup_chunk
 
 from common.errors import InputError
 from common.recording.reader import read
-from common.recording.recovery import recover
+from common.recording.recover.recovery import recover
 from common.recording.writer import Recording
 from common.signals import TICK_TOPICS, TOPICS, FieldType
 

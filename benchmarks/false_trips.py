@@ -18,8 +18,8 @@ import numpy as np
 from benchmarks.result import BenchmarkFigure
 from common.plan.plan import Plan
 from common.plan.read import with_test
-from common.plan.reality import as_planned
 from common.plan.tables import RecordingTable
+from common.reality.reality import as_planned
 from common.roles import MASTER
 from models.indicators import nrmse, peak_error
 from models.registry import Array

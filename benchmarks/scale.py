@@ -17,10 +17,10 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.result import BenchmarkFigure
-from common.plan import reality
 from common.plan.laboratory_tables import SlaveLaboratory
 from common.plan.plan import Plan, ideal
 from common.plan.tables import RecordingTable
+from common.reality import reality
 from loop import substructure
 from loop.closed_loop import simulate
 from loop.nominal import partition

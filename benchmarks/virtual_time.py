@@ -11,10 +11,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 from benchmarks.result import BenchmarkFigure, rate_figure
-from common.plan import read, reality
+from common.plan import read
 from common.plan.plan import Plan
 from common.plan.read import with_test
 from common.plan.tables import RecordingTable
+from common.reality import reality
 from common.terminal import cli
 from simulation import virtual
 

@@ -7,7 +7,7 @@ import hashlib
 from common.errors import InputError
 from common.link.mailbox import LinkModel, PerfectLink
 from common.plan.plugins import construct, find
-from common.plan.reality import Reality
+from common.reality.reality import Reality
 from loop.realised import true_system
 from models.system import LinkEffects
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from common.errors import InputError
-from common.plan.reality import Reality
+from common.reality.reality import Reality
 from common.roles import MASTER
 from loop import substructure
 from loop.closed_loop import Rollout, simulate

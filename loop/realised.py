@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from common.errors import InputError
-from common.plan.found import LearnedEntry
 from common.plan.plan import Plan
-from common.plan.reality import Reality
 from common.plan.schema import nearest
+from common.reality.found import LearnedEntry
+from common.reality.reality import Reality
 from common.roles import MASTER
 from laboratories import effects
 from laboratories.effects import CATALOGUE, lay, sites

@@ -10,7 +10,7 @@ from common.lab.preflight import Gate, SensorsAtRest
 from common.plan import patience
 from common.plan.plan import Plan
 from common.plan.plugins import construct, find
-from common.plan.reality import Reality, as_planned
+from common.reality.reality import Reality, as_planned
 from common.rig import METHODS, AtRest, GuardedRig, NoRig, NothingMeasurement, measurement_of
 from common.roles import MASTER, name_of, title
 from common.udp import packets

@@ -9,7 +9,7 @@ from common.host.clock import real, unix_ns
 from common.lab.laboratory import Setting
 from common.lab.preflight import Gate, PreflightCheck
 from common.plan.plan import Plan
-from common.plan.reality import Reality
+from common.reality.reality import Reality
 from common.rig import AtRest, GuardedRig
 from common.roles import MASTER
 from laboratories import kinds
@@ -17,7 +17,7 @@ from loop import rigs, substructure
 from loop.links import link_model
 from loop.nominal import preflight as nominal
 from loop.realised import true_system
-from master.building import Building, Outputs
+from master.building import BuildingStep, Outputs
 from master.client import ClientBuilding, Follower, RealTime, compensator
 from master.limits import MasterLimits
 from master.loop import MasterLoop
@@ -81,7 +81,7 @@ def serve(
     setting: Setting,
     reality: Reality,
     *,
-    building: Building,
+    building: BuildingStep,
     session: int | None = None,
     epoch_ns: int | None = None,
     gate: Gate | None = None,

@@ -41,7 +41,7 @@ class Answering(Protocol):
     position: int  # index of its position (m) in its measurements
 
 
-class Building:
+class BuildingStep:
     """Computes from the measurements of a tick what the laboratories do in the coming interval."""
 
     def join(self, lab: Laboratory, partners: Sequence[Answering]) -> None:

@@ -19,7 +19,7 @@ import numpy as np
 from common.errors import InputError, InterlockError
 from common.lab.laboratory import Laboratory
 from common.opensees.element import Measurement, Phase, RevisedError
-from common.opensees.port import ClientError, Port, Ports
+from common.opensees.port import ClientError, ElementPort, Ports
 from common.plan.plan import Plan
 from common.reporting import Report, silent
 from common.roles import MASTER
@@ -27,7 +27,7 @@ from common.safety.watchdog import Watchdog, WatchdogFinding
 from laboratories import kinds
 from laboratories.kind import Coupling, Follows
 from loop import substructure
-from master.building import Answering, Building, Outputs
+from master.building import Answering, BuildingStep, Outputs
 from models import compensators, force_correction
 from models.compiled import bound
 
@@ -129,7 +129,7 @@ class Follower:
         return self.sign * self.coupling.scale * corrected
 
 
-class ClientBuilding(Building):
+class ClientBuilding(BuildingStep):
     """Serves the elements of a client at `addresses`: one for all laboratories, or one for each in the plan's order.
 
     Raises:
@@ -385,15 +385,17 @@ def check_count(addresses: Sequence[str], laboratories: int) -> None:
         )
 
 
-def ports(addresses: Sequence[str], couplings: Sequence[Coupling], say: Callable[[str], None]) -> list[Port]:
+def ports(
+    addresses: Sequence[str], couplings: Sequence[Coupling], say: Callable[[str], None]
+) -> list[ElementPort]:
     """One port for all laboratories, or one for each; raises InputError if the number fits neither or one is in use."""
     stiffness = [one.stiffness for one in couplings]
     check_count(addresses, len(stiffness))
     dealt = [stiffness] if len(addresses) == 1 else [[k] for k in stiffness]
-    opened: list[Port] = []
+    opened: list[ElementPort] = []
     try:
         for text, own in zip(addresses, dealt, strict=True):
-            opened.append(Port(text, own, say))
+            opened.append(ElementPort(text, own, say))
     except InputError:
         for port in opened:
             port.close()

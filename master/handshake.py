@@ -13,7 +13,7 @@ from common.protocol.exchange import Event, State
 from common.protocol.messages import Armed, Message, Refused, Register, Registered, Scheduled, SyncReply
 from common.rig import GuardedRig
 from common.safety.modes import STILL_LATCHED
-from master.building import Building
+from master.building import BuildingStep
 from master.partner import Partner
 
 # From the choice of the start to the start: a lost message is repeated twice in that time (REPEAT_NS).
@@ -33,7 +33,7 @@ class MasterHandshake:
         rig: GuardedRig,
         wall_ns: int,
         gate: Gate | None,
-        building: Building,
+        building: BuildingStep,
     ) -> None:
         self._lab = lab
         self._building = building

@@ -42,7 +42,7 @@ from common.safety.watchdog import WatchdogFinding
 from common.signals import alike
 from laboratories import kinds
 from laboratories.longest import resting
-from master.building import Building, Outputs
+from master.building import BuildingStep, Outputs
 from master.handshake import MasterHandshake
 from master.limits import MasterLimits
 from master.own import OwnLaboratory
@@ -56,7 +56,7 @@ class MasterLoop(RigLoop):
         self,
         setting: Setting,
         rig: GuardedRig,
-        building: Building,
+        building: BuildingStep,
         links: Mapping[str, LinkModel],
         *,
         session: int,

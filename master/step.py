@@ -7,14 +7,14 @@ from collections.abc import Sequence
 from common.named import maker
 from common.plan.plan import Plan
 from loop import substructure
-from master.building import Building, Outputs
+from master.building import BuildingStep, Outputs
 from models.compiled import bound
 from models.registry import Array
 
 computed = maker(Outputs)
 
 
-class MasterStep(Building):
+class MasterStep(BuildingStep):
     """The numerical substructure with the control of every laboratory; each call computes a tick."""
 
     def __init__(self, plan: Plan, ground: Array, p_delta: float = 0.0) -> None:

@@ -17,7 +17,7 @@ from common.plan.kinds import COLUMN, TABLE
 from common.plan.limits import LimitViolation
 from common.plan.patience import strict
 from common.plan.plan import Plan
-from common.plan.reality import Reality
+from common.reality.reality import Reality
 from common.recording.rows import RowPacker, other
 from common.recording.run import CLOCK
 from common.recording.writer import Recording

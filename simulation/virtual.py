@@ -13,14 +13,14 @@ from common.lab.preflight import Gate
 from common.link.endpoint import Endpoint
 from common.link.memory_link import MemoryHub
 from common.plan.plan import Plan
-from common.plan.reality import Reality
+from common.reality.reality import Reality
 from common.reporting import Report, silent
 from common.roles import MASTER, RECORDER
 from common.terminal.telling import Tell, untold
 from loop import substructure
 from master.assembly import build_loop as build_master
 from master.assembly import serve as serve_master
-from master.building import Building
+from master.building import BuildingStep
 from master.loop import MasterLoop
 from recorder import files
 from recorder.loop import CONSEQUENCE, RecorderLoop
@@ -66,7 +66,7 @@ def assemble(
     *,
     gate: Gate | None = None,
     drifts: Mapping[str, Drift] = SAME_CLOCK,
-    building: Building | None = None,
+    building: BuildingStep | None = None,
 ) -> VirtualTest:
     """Build all laboratories over a link in memory, and a recorder if `output` is given.
 

@@ -8,7 +8,7 @@ from common.host.clock import real
 from common.lab.laboratory import Setting
 from common.lab.preflight import Gate, PreflightCheck
 from common.plan.plan import Plan
-from common.plan.reality import Reality
+from common.reality.reality import Reality
 from common.rig import AtRest, GuardedRig
 from loop import rigs
 from loop.links import link_model

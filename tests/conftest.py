@@ -15,9 +15,9 @@ from hypothesis import settings
 
 from common.host import running
 from common.plan import read as plans
-from common.plan import reality
 from common.plan.patience import strict
 from common.plan.plan import Plan
+from common.reality import reality
 from common.terminal import cli
 from simulation import virtual
 from tests.limited import Left, adopt, children, descendants, end, look

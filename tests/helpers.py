@@ -9,7 +9,7 @@ import numpy as np
 
 from common.plan import read as plans
 from common.plan.plan import Plan
-from common.plan.reality import as_planned
+from common.reality.reality import as_planned
 from simulation import virtual
 from simulation.virtual import VirtualTest
 

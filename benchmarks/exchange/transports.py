@@ -24,7 +24,6 @@ from common.link import security
 from common.link.endpoint import FrameEndpoint
 from common.link.security import Identity
 from common.link.zenoh_link import ZenohLink
-from common.plan import reality
 from common.plan.laboratory_tables import LaboratoryTable, RigTable
 from common.plan.plan import PROTOCOL_VERSION, Plan
 from common.plan.tables import Link, RecordingTable, SafetyTable, Security
@@ -39,6 +38,7 @@ from common.protocol.messages import (
     Scheduled,
     Start,
 )
+from common.reality import reality
 from common.rig import TableCommand
 from slave.assembly import build_loop
 

@@ -21,7 +21,7 @@ from common.lab.surroundings import Surroundings
 from common.link.address import checked, loopback
 from common.link.endpoint import FrameEndpoint
 from common.plan.plan import Plan
-from common.plan.reality import Reality
+from common.reality.reality import Reality
 from common.reporting import Report
 from common.roles import MASTER, OPERATOR, RECORDER, SLAVE, title
 from common.safety.modes import Mode

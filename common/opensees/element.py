@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from common.errors import RemoteProtocolError
 from common.opensees import wire
-from common.opensees.wire import Code, Header, Quantities
+from common.opensees.wire import ClientHeader, MessageCode, Quantities
 
 FITTING = "NewmarkExplicit, CentralDifference or AlphaOS"
 """Integrators of OpenSees that impose each displacement once."""
@@ -59,7 +59,7 @@ class ElementServer:
     def __init__(self, stiffness: Sequence[float]) -> None:
         n = len(stiffness)
         self.phase = Phase.GREETING
-        self.header: Header | None = None
+        self.header: ClientHeader | None = None
         self.steps = 0  # displacements that differ from those before them
         self.commits = 0
         self.wanted = Quantities(displacement=(0.0,) * n)
@@ -68,7 +68,7 @@ class ElementServer:
         ]
         self._measured = Measurement((0.0,) * n, (0.0,) * n, 0.0)
         self._moved = False  # whether displacements have changed in the present step
-        self._asked: Code | None = None  # a request, or the end, that waits for the measurement
+        self._asked: MessageCode | None = None  # a request, or the end, that waits for the measurement
         self._next: bytes = (
             b""  # a message with displacements that waits until the previous ones are measured
         )
@@ -104,7 +104,7 @@ class ElementServer:
     @property
     def ending(self) -> bool:
         """Whether the client has ended, even if its last displacements are not measured yet."""
-        return self.phase is Phase.ENDED or self._asked is Code.END
+        return self.phase is Phase.ENDED or self._asked is MessageCode.END
 
     @property
     def untouched(self) -> bool:
@@ -152,7 +152,7 @@ class ElementServer:
         del self._in[:size]
         return data
 
-    def _greet(self, header: Header) -> None:
+    def _greet(self, header: ClientHeader) -> None:
         """Take the header; raises RemoteProtocolError if it commands or acquires other quantities than there are."""
         n, control, acquired = len(self._measured.force), header.control, header.acquired
         if control.displacement != n:
@@ -176,9 +176,9 @@ class ElementServer:
 
     def _message(self, data: bytes) -> None:
         code = wire.code_in(data)
-        if code is Code.TRIAL:
+        if code is MessageCode.TRIAL:
             self._trial(data)
-        elif code is Code.COMMIT:
+        elif code is MessageCode.COMMIT:
             self.commits += 1
             self._moved = False
         elif code in wire.MATRICES or self.phase is Phase.MEASURED:
@@ -208,22 +208,22 @@ class ElementServer:
         self.wanted, self.phase = values, Phase.WANTED
         self.steps += 1
 
-    def _answer(self, code: Code) -> None:
+    def _answer(self, code: MessageCode) -> None:
         assert self.header is not None  # noqa: S101 - messages follow the header
         found, header = self._measured, self.header
-        if code is Code.END:
+        if code is MessageCode.END:
             self.phase = Phase.ENDED
             return
-        if code is Code.FORCE:
+        if code is MessageCode.FORCE:
             values: Sequence[float] = found.force
-        elif code is Code.ACQUIRE:
+        elif code is MessageCode.ACQUIRE:
             self._moved = False
             values = [
                 *found.displacement[: header.acquired.displacement],
                 *found.force,
                 *(found.time,) * header.acquired.time,
             ]
-        elif code in (Code.STIFFNESS, Code.INITIAL_STIFFNESS):
+        elif code in (MessageCode.STIFFNESS, MessageCode.INITIAL_STIFFNESS):
             values = self._diagonal
         else:
             self._out += self._zeros

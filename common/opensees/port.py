@@ -72,7 +72,7 @@ class ClientError(LostError):
     """A client disconnected, sent nothing, or sent messages that are not valid (exit 4)."""
 
 
-class Port:
+class ElementPort:
     """One port and the client that is served there; `stiffness` (N/m) is that of its degrees of freedom."""
 
     def __init__(self, text: str, stiffness: Sequence[float], say: Say) -> None:
@@ -201,13 +201,13 @@ class Port:
 class Ports:
     """All ports of a test, one for each element."""
 
-    def __init__(self, ports: Sequence[Port]) -> None:
+    def __init__(self, ports: Sequence[ElementPort]) -> None:
         self.ports = ports
         self._one = ports[0] if len(ports) == 1 else None
         self._poll = select.poll()
         for port in ports:
             self._poll.register(port.listener, select.POLLIN)
-        self._polled: dict[int, Port] = {}  # clients by descriptor
+        self._polled: dict[int, ElementPort] = {}  # clients by descriptor
 
     @property
     def servers(self) -> list[ElementServer]:
@@ -218,7 +218,7 @@ class Ports:
         """Process messages and connections, waiting for them at most `seconds`; returns whether there were any.
 
         Raises:
-            ClientError, RevisedError: as `Port.read`.
+            ClientError, RevisedError: as `ElementPort.read`.
         """
         if (
             self._one is not None and self._one.read()

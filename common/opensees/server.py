@@ -28,7 +28,7 @@ ALGORITHMS = (("Newton",), ("KrylovNewton",), ("NewtonLineSearch",), ("ModifiedN
 TOLERANCE, ITERATIONS = 1e-11, 60
 
 
-class Material:
+class MaterialUnderTest:
     """A uniaxial material: deformation (m) as strain, force (N) as stress; `rows` are calls of `uniaxialMaterial`."""
 
     def __init__(self, ops: Any, rows: list[list[Any]]) -> None:
@@ -99,7 +99,7 @@ def main() -> int:
     task = json.loads(sys.argv[1])
     ops: Any = importlib.import_module("openseespy.opensees")
     own = task.get("model")
-    specimen = Model(ops, own, task["options"]) if own else Material(ops, task["materials"])
+    specimen = Model(ops, own, task["options"]) if own else MaterialUnderTest(ops, task["materials"])
     os.write(out, VALUE.pack(0.0))
     source = sys.stdin.buffer
     while head := source.read(COUNT.size):

@@ -25,7 +25,7 @@ NUMBER = 8  # bytes
 MOST_NUMBERS = 4096
 
 
-class Code(IntEnum):
+class MessageCode(IntEnum):
     """The codes of messages to a server."""
 
     TRIAL = 3  # move to these displacements; not answered
@@ -39,9 +39,11 @@ class Code(IntEnum):
     END = 99  # not answered
 
 
-CODES = {float(code): code for code in Code}
+CODES = {float(code): code for code in MessageCode}
 FIRST = struct.Struct("=d")
-MATRICES = frozenset({Code.INITIAL_STIFFNESS, Code.STIFFNESS, Code.DAMPING, Code.MASS})
+MATRICES = frozenset(
+    {MessageCode.INITIAL_STIFFNESS, MessageCode.STIFFNESS, MessageCode.DAMPING, MessageCode.MASS}
+)
 
 
 class Sizes(NamedTuple):
@@ -54,7 +56,7 @@ class Sizes(NamedTuple):
     time: int = 0
 
 
-class Header(NamedTuple):
+class ClientHeader(NamedTuple):
     """The quantities that a client commands and acquires, and the length (`data`) of all messages in numbers."""
 
     control: Sizes
@@ -82,18 +84,18 @@ class Quantities(NamedTuple):
     time: tuple[float, ...] = ()
 
 
-def element(dofs: int, data: int = 256) -> Header:
+def element(dofs: int, data: int = 256) -> ClientHeader:
     """The header of a `genericClient` element with `dofs` degrees of freedom."""
     control = Sizes(displacement=dofs, velocity=dofs, acceleration=dofs, time=1)
-    return Header(control, Sizes(force=dofs), max(data, 3 * dofs + 2, dofs * dofs))
+    return ClientHeader(control, Sizes(force=dofs), max(data, 3 * dofs + 2, dofs * dofs))
 
 
-def header_bytes(header: Header) -> bytes:
+def header_bytes(header: ClientHeader) -> bytes:
     """A header as a client sends it."""
     return HEADER.pack(*header.control, *header.acquired, header.data)
 
 
-def read_header(data: bytes) -> Header:
+def read_header(data: bytes) -> ClientHeader:
     """The header in the first bytes of a connection, exactly `HEADER.size` of them.
 
     Raises:
@@ -101,7 +103,7 @@ def read_header(data: bytes) -> Header:
             byte order.
     """
     numbers = HEADER.unpack(data)
-    header = Header(Sizes(*numbers[:5]), Sizes(*numbers[5:10]), numbers[10])
+    header = ClientHeader(Sizes(*numbers[:5]), Sizes(*numbers[5:10]), numbers[10])
     if min(numbers) < 0 or not header.least <= header.data <= MOST_NUMBERS:
         raise RemoteProtocolError(
             f"the first {HEADER.size} bytes are no header of OpenSees or OpenFresco ({', '.join(map(str, numbers))}): "
@@ -110,7 +112,7 @@ def read_header(data: bytes) -> Header:
     return header
 
 
-def message(header: Header, code: Code, values: Quantities | None = None) -> bytes:
+def message(header: ClientHeader, code: MessageCode, values: Quantities | None = None) -> bytes:
     """A message to a server: a code, followed by the values that the header commands.
 
     Raises:
@@ -129,24 +131,24 @@ def zeros(sizes: Sizes) -> Quantities:
     return Quantities(*((0.0,) * size for size in sizes))
 
 
-def answer(header: Header, values: Sequence[float]) -> bytes:
+def answer(header: ClientHeader, values: Sequence[float]) -> bytes:
     """An answer of a server: the values, padded with zeros."""
     return packed(header, values)
 
 
-def packed(header: Header, numbers: Sequence[float]) -> bytes:
+def packed(header: ClientHeader, numbers: Sequence[float]) -> bytes:
     """Encode numbers as a message padded with zeros; raises ValueError if there are too many."""
     if len(numbers) > header.data:
         raise ValueError(f"{len(numbers)} numbers for a message of {header.data}")
     return struct.pack(f"={len(numbers)}d", *numbers).ljust(header.size, b"\0")
 
 
-def numbers_in(header: Header, data: bytes, count: int, first: int = 0) -> tuple[float, ...]:
+def numbers_in(header: ClientHeader, data: bytes, count: int, first: int = 0) -> tuple[float, ...]:
     """`count` numbers of a message, from the index `first` on."""
     return struct.unpack_from(f"={count}d", data, NUMBER * first)
 
 
-def code_in(data: bytes) -> Code:
+def code_in(data: bytes) -> MessageCode:
     """The code of a message to a server.
 
     Raises:
@@ -159,7 +161,7 @@ def code_in(data: bytes) -> Code:
     return code
 
 
-def commanded(header: Header, data: bytes) -> Quantities:
+def commanded(header: ClientHeader, data: bytes) -> Quantities:
     """The values that a message to a server commands.
 
     Raises:
@@ -168,8 +170,8 @@ def commanded(header: Header, data: bytes) -> Quantities:
     return quantities(header.control, numbers_in(header, data, sum(header.control), first=1))
 
 
-def acquired(header: Header, data: bytes) -> Quantities:
-    """The values of an answer to `Code.ACQUIRE`; raises RemoteProtocolError if one is not finite."""
+def acquired(header: ClientHeader, data: bytes) -> Quantities:
+    """The values of an answer to `MessageCode.ACQUIRE`; raises RemoteProtocolError if one is not finite."""
     return quantities(header.acquired, numbers_in(header, data, sum(header.acquired)))
 
 

@@ -1,1 +1,1 @@
-"""The plan and the reality of a test as files: their tables and keys, their checks, differences between plans."""
+"""The plan of a test as a file: its tables and keys, their checks, differences between plans."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from common.recording.salvage import FileHole
+from common.recording.recover.salvage import FileHole
 
 
 class Missing(NamedTuple):

@@ -16,9 +16,9 @@ from typing import Any, NoReturn
 from common.errors import InputError, RthsError
 from common.host import realtime
 from common.plan import read as plans
-from common.plan import reality as realities
 from common.plan.plan import Plan
-from common.plan.reality import Reality
+from common.reality import reality as realities
+from common.reality.reality import Reality
 from common.reporting import Report
 from common.safety import risks
 from common.terminal.plain_report import PlainReport, plain, say

@@ -125,7 +125,7 @@ class Request(NamedTuple):
     values: Sequence[float] = ()
 
 
-class Answer(NamedTuple):
+class RigAnswer(NamedTuple):
     """The content of a packet from a rig."""
 
     kind: int
@@ -164,10 +164,10 @@ def fault(packet: bytes) -> str:
     return "" if version == VERSION else "version"
 
 
-def unpack(packet: bytes) -> Answer:
+def unpack(packet: bytes) -> RigAnswer:
     """Decode a packet without a fault."""
     _, _, kind, session, seq, channels, state, count, *rest = _ANSWER.unpack(packet)
     values, (text, _) = rest[:VALUES], rest[VALUES:]
     said = text.partition(b"\0")[0].decode(errors="replace")
     clean = "".join(letter if letter.isprintable() else " " for letter in said)
-    return Answer(kind, session, seq, channels, state, tuple(values[: min(count, VALUES)]), clean.strip())
+    return RigAnswer(kind, session, seq, channels, state, tuple(values[: min(count, VALUES)]), clean.strip())

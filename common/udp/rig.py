@@ -16,7 +16,7 @@ from common.signals import Channels
 from common.udp import account as causes
 from common.udp import packets
 from common.udp.account import Account
-from common.udp.packets import Answer, Asked, Request, RigState
+from common.udp.packets import Asked, Request, RigAnswer, RigState
 from common.udp.peer import Peer
 
 ECHOES = 50  # test exchanges before a test: they resolve the 98th percentile and take about 10 ms
@@ -49,13 +49,13 @@ class Echoes(NamedTuple):
 
     round_trips_s: tuple[float, ...]
     lost: int
-    answer: Answer | None  # the last one
+    answer: RigAnswer | None  # the last one
 
 
 def echoes(peer: Peer, terms: Terms, session: int, channels: int) -> Echoes:
     """Do `ECHOES` exchanges that move nothing, after the first one that is answered within `TRIES` attempts."""
     trips: list[float] = []
-    answer: Answer | None = None
+    answer: RigAnswer | None = None
     patience, lost = FIRST_NS, 0
     for seq in range(TRIES + ECHOES):
         sent = time.monotonic_ns()
@@ -76,7 +76,7 @@ def echoes(peer: Peer, terms: Terms, session: int, channels: int) -> Echoes:
     return Echoes(tuple(trips), lost, answer)
 
 
-def answer_to(peer: Peer, session: int, seq: int, deadline: int) -> Answer | None:
+def answer_to(peer: Peer, session: int, seq: int, deadline: int) -> RigAnswer | None:
     """The answer to the packet `seq` of a session, None if it does not arrive before the deadline (ns)."""
     while (packet := peer.receive(deadline)) is not None:
         if not packets.fault(packet):
@@ -120,11 +120,11 @@ class UdpRig:
         self.idle_readings = len(found.answer.values) == self._count
         self._values = self._ready().values
 
-    def _compare(self, answer: Answer) -> None:
+    def _compare(self, answer: RigAnswer) -> None:
         if complaint := compared(answer, self._channels):
             raise RigError(f"{complaint}.")
 
-    def _ready(self) -> Answer:
+    def _ready(self) -> RigAnswer:
         """Request the rig to arm until it answers that it is ready; raises RigError otherwise."""
         packet = self._packet(Asked.ARM)
         end = time.monotonic_ns() + round(self.terms.arm_timeout * 1e9)
@@ -214,7 +214,7 @@ class UdpRig:
             self.account.counts[causes.LATE] += 1
         return False
 
-    def _accepted(self, packet: bytes) -> Answer | None:
+    def _accepted(self, packet: bytes) -> RigAnswer | None:
         """The answer in a packet, None if it must not be used.
 
         Raises:
@@ -256,7 +256,7 @@ def unanswered(terms: Terms) -> str:
     return f"nothing answers at {terms.address}: start the rig's program there, or correct address in {terms.where}"
 
 
-def compared(answer: Answer, channels: int) -> str:
+def compared(answer: RigAnswer, channels: int) -> str:
     """The text of the message on a rig with other channels than the plan's kind of laboratory; empty if they agree."""
     if answer.channels in (0, channels):
         return ""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from common.plan.found import LearnedEntry
+from common.reality.found import LearnedEntry
 from diagnosis.fits.fitting import Fit
 from diagnosis.learned.equations import Equation, equations
 from diagnosis.learned.regression import Regression, regress

@@ -22,7 +22,7 @@ from report.text.progress import Progress
 
 if TYPE_CHECKING:
     from common.recording.run import Run
-    from diagnosis.findings.as_reality import FoundReality
+    from diagnosis.findings.foretelling.as_reality import FoundReality
     from diagnosis.report.records import Report
 
 LAWS = ".npz"  # ending of the file beside the reality: laws that were learned, and how sure all of it is
@@ -122,7 +122,7 @@ def write_found(path: Path, found: FoundReality, force: bool) -> None:
     import numpy as np
     import tomli_w
 
-    from common.plan.spread import KEY
+    from common.reality.spread import KEY
 
     beside = path.with_suffix(LAWS)
     laws = {f"{law.role}.{law.machine}": np.array(law.law) for law in found.learned}
@@ -217,7 +217,7 @@ def diagnosed(
     from common.plan import read as plans
     from common.recording.reader import read
     from diagnosis.diagnose import diagnose
-    from diagnosis.findings.as_reality import as_reality
+    from diagnosis.findings.foretelling.as_reality import as_reality
     from diagnosis.recorded import record
     from diagnosis.recorded.slips import refuse_slips
     from report.gap import wording

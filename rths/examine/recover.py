@@ -29,7 +29,7 @@ def run(args: argparse.Namespace) -> int:
     """Recover a recording; 1 where something of it is lost."""
     output = args.output or args.file.parent / f"{args.file.stem}-recovered.mcap"
     with Progress("recovering"):
-        from common.recording.recovery import recover
+        from common.recording.recover.recovery import recover
 
         found = recover(args.file, output, force=args.force)
     stream = outputs.aside(output)

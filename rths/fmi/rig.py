@@ -169,22 +169,27 @@ class Rig:
 
 
 class Specimen(UnderActuator):
-    """A specimen in an FMU under the emulated actuator: `deformation` (m) is its input, `force` (N) its output."""
+    """A specimen in an FMU under the emulated actuator, of a deformation (m) as input and a force (N) as output.
+
+    `names` gives the FMU's names of `deformation` and `force` where these are others.
+    """
 
     def __init__(
         self,
         interval: float,
         seed: int,
         file: str,
-        deformation: str = "deformation",
-        force: str = "force",
+        names: Mapping[str, str] | None = None,
         start: Mapping[str, Any] | None = None,
         actuator: Mapping[str, Any] | None = None,
         sensors: Mapping[str, Any] | None = None,
         substeps: int = 1,
     ) -> None:
         super().__init__(interval, seed, self._forced, actuator, sensors, substeps)
-        self._fmu = Fmu(file, interval, [deformation], [force], start or {})
+        own = {"deformation": "deformation", "force": "force"} | dict(names or {})
+        if len(own) > 2:
+            raise InputError("names of an FMU's specimen has the keys deformation and force, and no others.")
+        self._fmu = Fmu(file, interval, [own["deformation"]], [own["force"]], start or {})
         self._share = 1.0 / substeps
 
     def _forced(self, way: Array) -> float:

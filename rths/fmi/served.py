@@ -16,7 +16,7 @@ from typing import BinaryIO
 
 from common.errors import RthsError
 from common.plan.read import parse
-from common.plan.reality import Reality, as_planned, from_reality
+from common.reality.reality import Reality, as_planned, from_reality
 from common.rig import GuardedRig, command_of
 from loop import rigs
 

@@ -17,8 +17,8 @@ from common.host.realtime import assign, freeze
 from common.host.stopping import Stopper, Stopping
 from common.lab.preflight import PASSED, Gate, PreflightCheck
 from common.plan.plan import Plan
-from common.plan.reality import Reality
 from common.protocol.exchange import State
+from common.reality.reality import Reality
 from common.roles import MASTER, RECORDER, title
 from common.safety.modes import Mode
 from common.terminal import cli

@@ -14,7 +14,7 @@ from common.host.stopping import Stopper
 from common.lab.preflight import Gate
 from common.opensees import port
 from common.plan.plan import Plan
-from common.plan.reality import Reality
+from common.reality.reality import Reality
 from common.terminal import cli
 from report.text.progress import Progress as Working
 from rths.perform import run as tests

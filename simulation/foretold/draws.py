@@ -10,12 +10,12 @@ from typing import NamedTuple
 import numpy as np
 
 from common.errors import PlanError
-from common.plan import spread as spreads
-from common.plan.found import BUILDING, for_another_building
 from common.plan.plan import Plan
-from common.plan.reality import Entry, Reality, from_reality
-from common.plan.spread import Spread, UncertainParameter
 from common.plan.toml_file import load_tables
+from common.reality import spread as spreads
+from common.reality.found import BUILDING, for_another_building
+from common.reality.reality import Entry, Reality, from_reality
+from common.reality.spread import Spread, UncertainParameter
 from common.roles import MASTER
 from common.terminal.telling import Tell, untold
 from laboratories.effects import CATALOGUE

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.signal import hilbert
 
 from common.plan.plan import Plan
-from common.plan.spread import SeenRange, Spread
+from common.reality.spread import SeenRange, Spread
 from common.roles import MASTER, title
 from laboratories.kinds import kinds_of
 from loop.closed_loop import Rollout

@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 
 import tomli_w
 
-from common.plan.found import BUILDING, LearnedEntry
 from common.plan.kinds import TABLES_OF_KIND, known_kind
 from common.plan.plan import INTERFACE, Plan
-from common.plan.reality import Entry
+from common.reality.found import BUILDING, LearnedEntry
+from common.reality.reality import Entry
 from common.roles import MASTER, name_of, title
 from laboratories import effects
 from laboratories.effects.effect import Effect

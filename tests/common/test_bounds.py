@@ -17,7 +17,7 @@ from common.recording import bounds
 from common.recording.bounds import FREE_RECORDS, RECORD_BYTES, UNPACKED
 from common.recording.reader import Tail, read
 from common.recording.records import HEAD, MESSAGE
-from common.recording.recovery import recover
+from common.recording.recover.recovery import recover
 from common.recording.writer import Recording
 from common.signals import TOPICS, FieldType
 

@@ -11,10 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.errors import PlanError
-from common.plan import building, reality
+from common.plan import building
 from common.plan.laboratory_tables import Actuator, ServoHydraulics
 from common.plan.plan import Plan, ideal
 from common.plan.read import from_tables, parse
+from common.reality import reality
 from tests.helpers import SERVO_PLAN, with_table
 
 

@@ -11,11 +11,12 @@ from common.errors import PlanError
 from common.host.bare_loop import BareLoop
 from common.host.realtime import NOTHING
 from common.lab import lacking
-from common.plan import patience, reality
+from common.plan import patience
 from common.plan import read as plans
 from common.plan.kinds import COLUMN, TABLE
 from common.plan.plan import OVERRUN, Plan
 from common.plan.read import from_tables, parse, with_test
+from common.reality import reality
 from common.terminal import cli
 
 RIGS = {

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from common.errors import PlanError
 from common.plan import read as plans
-from common.plan import reality
 from common.plan.patience import strict
 from common.plan.plan import Plan
 from common.plan.read import from_tables, parse, with_test
+from common.reality import reality
 from common.terminal import cli
 
 

@@ -22,7 +22,7 @@ from mcap.stream_reader import StreamReader, breakup_chunk
 from common.errors import InputError, RthsError
 from common.recording.reader import read
 from common.recording.records import HEAD
-from common.recording.recovery import recover
+from common.recording.recover.recovery import recover
 from common.recording.writer import REPEAT_BYTES, Recording
 from common.signals import TICK_TOPICS, TOPICS, FieldType
 from rths.examine.recover import write_account

@@ -11,7 +11,7 @@ from common.errors import InputError, RigError
 from common.plan import laboratory_tables
 from common.plan.plan import Plan
 from common.plan.plugins import construct, find
-from common.plan.reality import as_planned
+from common.reality.reality import as_planned
 from common.rig import METHODS, ColumnCommand, ColumnMeasurement, GuardedRig
 from loop.links import link_model
 

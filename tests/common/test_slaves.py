@@ -17,9 +17,9 @@ from common.lab.outlet import next_of, pack_nexts
 from common.link import transport
 from common.link.transport import Route, heard, said
 from common.plan import read as plans
-from common.plan import reality
 from common.plan.plan import Plan, ideal
 from common.plan.read import MOST_SLAVES, from_tables, parse, with_test
+from common.reality import reality
 from common.recording.reader import read
 from common.recording.writer import Recording
 from common.signals import default_topics

@@ -10,8 +10,8 @@ import numpy as np
 
 from common.errors import InterlockError, RthsError
 from common.plan import read as plans
-from common.plan import reality
 from common.plan.plan import Plan
+from common.reality import reality
 from common.recording.reader import read
 from common.terminal import cli
 from diagnosis.recorded import record

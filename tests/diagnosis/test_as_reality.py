@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from common.errors import InputError, PlanError
-from common.plan import reality
-from common.plan.found import models_of
 from common.plan.laboratory_tables import CompensatorTable
 from common.plan.plan import Plan
 from common.plan.read import parse
+from common.reality import reality
+from common.reality.found import models_of
 from common.recording.reader import read
 from common.roles import MASTER
 from diagnosis.diagnose import examine
-from diagnosis.findings.as_reality import as_reality, changed
+from diagnosis.findings.foretelling.as_reality import as_reality, changed
 from diagnosis.recorded import record
 from loop.realised import true_slaves, true_system
 from tests.diagnosis.cases import Cases, short

@@ -10,13 +10,13 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from common.plan import reality
 from common.plan.plan import Plan
-from common.plan.reality import Reality
+from common.reality import reality
+from common.reality.reality import Reality
 from common.recording.reader import read
 from diagnosis.diagnose import parts_of
 from diagnosis.findings import readings
-from diagnosis.findings.as_reality import as_reality
+from diagnosis.findings.foretelling.as_reality import as_reality
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.verdict import heard, judge
 from diagnosis.fits import fitting

@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from common.plan import reality
 from common.plan.plan import Plan
 from common.plan.read import with_test
+from common.reality import reality
 from common.recording.reader import read
 from diagnosis.report.records import Report
 from loop import substructure

@@ -39,7 +39,7 @@ def slider(x: Array) -> Array:
     return result
 
 
-class Specimen:
+class MadeSpecimen:
     """A column alone, with forces of a law that the catalogue's first one is not."""
 
     name, role, exact = "column", MASTER, False
@@ -56,7 +56,7 @@ class Specimen:
     def predict(self, system: System) -> Array:
         return replay.column(system, self.motion)[:, None]
 
-    def first(self, ticks: int) -> Specimen:
+    def first(self, ticks: int) -> MadeSpecimen:
         raise NotImplementedError
 
 
@@ -74,7 +74,7 @@ class Driven(ColumnAlone):
     }
 
     def __init__(self) -> None:
-        self.signals, self.nuisances, self.candidates = ("column_force",), (), Specimen.candidates
+        self.signals, self.nuisances, self.candidates = ("column_force",), (), MadeSpecimen.candidates
         self.role = MASTER
         self.inputs = swelling()
         force = forces("pinched", {"stiffness": K, "yield_displacement": LIMIT, **self.TRUE}, self.inputs)
@@ -85,7 +85,7 @@ class Driven(ColumnAlone):
 def first_law(part: Part | None = None) -> Fit:
     group, train = fitting.withheld(TICKS, INTERVAL)
     level = np.array([NOISE])
-    data = Data(part or Specimen(), System(Plan()), level, level, group, train, np.zeros(1))
+    data = Data(part or MadeSpecimen(), System(Plan()), level, level, group, train, np.zeros(1))
     values = {"yield_displacement": 1e-3, "hardening": 0.1, "exponent": 2.0}
     return fitting.fit(data, {"column.yielding": values})
 
@@ -107,7 +107,7 @@ def test_of_several_recordings_the_one_that_goes_farthest_starts_a_law() -> None
     found = laws.path(JoinedPart([near, far]))
     assert found is not None
     np.testing.assert_array_equal(found[0], far.inputs)
-    assert laws.path(Specimen()) is None
+    assert laws.path(MadeSpecimen()) is None
 
 
 def test_the_law_is_picked_and_its_parameters_are_those_of_the_column() -> None:

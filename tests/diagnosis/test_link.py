@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from common.link.mailbox import LinkModel
-from common.plan import reality
 from common.plan.laboratory_tables import RigTable
 from common.plan.plan import Plan
+from common.reality import reality
 from common.recording.reader import read
 from common.recording.run import Run
 from diagnosis.recorded.link import LinkFinding, account, exchange_of

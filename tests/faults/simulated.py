@@ -14,9 +14,9 @@ import numpy as np
 from common.link.transport import TICK
 from common.plan import read as plans
 from common.plan.plan import Plan
-from common.plan.reality import Reality, as_planned
 from common.protocol import codec
 from common.protocol.messages import Message
+from common.reality.reality import Reality, as_planned
 from common.recording.reader import read
 from common.recording.run import Run
 from common.roles import MASTER, SLAVE

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from common.plan.plan import Plan
-from common.plan.reality import Reality, as_planned
+from common.reality.reality import Reality, as_planned
 from common.roles import MASTER, SLAVE
 from rths.__main__ import main
 from simulation.world import Process

@@ -10,7 +10,7 @@ from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
 
 from common.recording.reader import read
-from common.recording.recovery import recover
+from common.recording.recover.recovery import recover
 from common.roles import MASTER, RECORDER, SLAVE
 from tests.faults.rows import passed
 from tests.faults.simulated import Scene

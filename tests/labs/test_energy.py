@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from common.plan import read as plans
-from common.plan import reality
 from common.plan.plan import Plan
+from common.reality import reality
 from common.recording.reader import read
 from common.recording.run import Run
 from common.rig import ColumnMeasurement

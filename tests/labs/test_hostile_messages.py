@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 
 from common.link.endpoint import Received
-from common.plan import reality
 from common.plan.plan import PROTOCOL_VERSION, Plan
 from common.protocol.exchange import State
 from common.protocol.messages import Arm, Register
+from common.reality import reality
 from simulation import virtual
 
 

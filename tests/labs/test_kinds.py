@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from common.plan.plan import Plan
-from common.plan.reality import as_planned
+from common.reality.reality import as_planned
 from common.recording.reader import read
 from common.recording.run import Run
 from common.safety.modes import Mode

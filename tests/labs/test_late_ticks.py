@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common.plan import patience, reality
+from common.plan import patience
 from common.plan import read as plans
 from common.plan.kinds import COLUMN
 from common.plan.plan import Plan
 from common.plan.read import parse
+from common.reality import reality
 from common.recording.reader import read
 from common.recording.run import Run
 from common.roles import MASTER, SLAVE

@@ -13,11 +13,11 @@ import pytest
 
 from common.errors import InterlockError
 from common.plan import read as plans
-from common.plan import reality
 from common.plan.plan import Plan, ideal
 from common.plan.read import from_tables, with_test
-from common.plan.reality import Reality, from_reality
 from common.plan.tables import Limits
+from common.reality import reality
+from common.reality.reality import Reality, from_reality
 from common.recording.reader import read
 from common.recording.run import Run
 from common.terminal import cli

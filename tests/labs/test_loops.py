@@ -12,13 +12,13 @@ import pytest
 from common.errors import InputError, InterlockError, LostError, RigError, RthsError
 from common.lab.laboratory import REPEAT_NS
 from common.link.endpoint import Received
-from common.plan import reality
 from common.plan.laboratory_tables import RigTable
 from common.plan.plan import PROTOCOL_VERSION, Plan
 from common.plan.read import from_tables, with_test
-from common.plan.reality import Reality
 from common.protocol.exchange import State
 from common.protocol.messages import Command, Feedback, Register, Stop, SyncReply, Trip
+from common.reality import reality
+from common.reality.reality import Reality
 from common.recording.reader import read
 from common.recording.run import Run
 from common.safety.modes import Mode

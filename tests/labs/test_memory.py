@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from common.lab.outlet import kept_seconds
-from common.plan import reality
 from common.plan.plan import Plan
+from common.reality import reality
 from laboratories.sensors.noise import BLOCK
 from simulation import virtual
 from tests.helpers import with_table

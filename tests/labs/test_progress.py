@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from common.plan import read as plans
-from common.plan import reality
 from common.plan.plan import Plan
+from common.reality import reality
 from common.recording.reader import read
 from simulation import virtual
 from tests.helpers import ROOT

@@ -11,9 +11,9 @@ import pytest
 
 from common.errors import EmergencyStopError, RigError
 from common.link.endpoint import Received
-from common.plan import reality
 from common.plan.plan import Plan
 from common.protocol.messages import Answer, Operator
+from common.reality import reality
 from common.recording.reader import read
 from common.recording.run import Run
 from common.safety.modes import Mode

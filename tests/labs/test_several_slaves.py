@@ -13,14 +13,14 @@ from common.errors import InputError, InterlockError, LostError, RigError
 from common.lab.laboratory import Setting
 from common.link.endpoint import Received
 from common.plan import read as plans
-from common.plan import reality
 from common.plan.laboratory_tables import RigTable
 from common.plan.patience import strict
 from common.plan.plan import PROTOCOL_VERSION, Plan
 from common.plan.read import from_tables, with_test
-from common.plan.reality import Reality
 from common.protocol.exchange import State
 from common.protocol.messages import Arm, Feedback, Recorder, Register, Start, Sync, Waiting
+from common.reality import reality
+from common.reality.reality import Reality
 from common.recording.reader import read
 from common.recording.run import Run
 from common.terminal import cli

@@ -19,7 +19,7 @@ from common.plan.laboratory_tables import LaboratoryTable, RigTable
 from common.plan.patience import strict
 from common.plan.plan import Plan
 from common.plan.read import load, parse
-from common.plan.reality import as_planned, from_reality
+from common.reality.reality import as_planned, from_reality
 from common.recording.reader import read
 from common.recording.run import Run
 from common.roles import MASTER

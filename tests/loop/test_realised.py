@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from common.errors import InputError, PlanError, RthsError
-from common.plan import reality
 from common.plan.plan import Plan
 from common.plan.read import from_tables, parse, with_test
-from common.plan.reality import Reality
+from common.reality import reality
+from common.reality.reality import Reality
 from common.recording.reader import read
 from common.recording.run import Run
 from common.roles import MASTER, SLAVE, kind_of

@@ -13,9 +13,9 @@ from common import signals
 from common.lab import outlet
 from common.lab.outlet import PIECE, Inlet
 from common.link.memory_link import MemoryEndpoint
-from common.plan import reality
 from common.plan.plan import Plan
 from common.protocol.messages import Finished, Message, Samples
+from common.reality import reality
 from common.recording.reader import read
 from common.recording.rows import Item, RowPacker
 from recorder.items import Items

@@ -15,9 +15,9 @@ from common.errors import EmergencyStopError, IncompleteError, InputError, Inter
 from common.host.clock import MonotonicClock, VirtualClock
 from common.lab.outlet import PIECE
 from common.link.memory_link import MemoryEndpoint
-from common.plan import reality
 from common.plan.plan import Plan
 from common.protocol.messages import Samples
+from common.reality import reality
 from common.recording.reader import read
 from common.recording.rows import Item, RowPacker
 from common.recording.writer import Recording

@@ -15,8 +15,8 @@ from mcap.stream_reader import StreamReader
 
 from common.link.zenoh_link import listenable
 from common.plan import read as plans
-from common.plan import reality
 from common.plan.plan import Plan
+from common.reality import reality
 from simulation import virtual
 from tests.helpers import PATIENT, ROOT
 from tests.processes import environment, tied

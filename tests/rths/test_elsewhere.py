@@ -19,11 +19,11 @@ from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
 from common import signals
-from common.plan import reality
 from common.plan.read import from_tables
+from common.reality import reality
 from common.recording.checksums import CHECKSUMS
 from common.recording.reader import read
-from common.recording.recovery import recover
+from common.recording.recover.recovery import recover
 from common.recording.run import Run
 from common.recording.writer import Recording
 from common.roles import kind_of, latency_topic, ramp_topic

@@ -14,7 +14,7 @@ import pytest
 
 from common.errors import InputError, RigError
 from common.plan.read import parse
-from common.plan.reality import as_planned, from_reality
+from common.reality.reality import as_planned, from_reality
 from common.recording.reader import read
 from common.recording.run import Run
 from common.rig import ColumnCommand, command_of

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from common.lab.preflight import Gate, RefusedError
-from common.plan import reality
 from common.plan.laboratory_tables import CompensatorTable
 from common.plan.plan import Plan
 from common.plan.read import with_test
+from common.reality import reality
 from common.recording.reader import read
 from common.recording.run import Run
 from rths.__main__ import parser_for

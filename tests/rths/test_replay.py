@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from common.plan.read import load, with_test
-from common.plan.reality import as_planned
+from common.reality.reality import as_planned
 from common.recording.reader import read
 from common.recording.run import Run
 from rths.examine import replay

@@ -19,10 +19,10 @@ from common.host.clock import VirtualClock
 from common.lab.drive import longest_leave
 from common.lab.laboratory import Setting
 from common.link.memory_link import MemoryHub
-from common.plan import reality
 from common.plan.laboratory_tables import RigTable
 from common.plan.plan import Plan
 from common.protocol.exchange import State
+from common.reality import reality
 from common.safety.ramp import MotionRamp
 from laboratories.longest import resting
 from recorder.loop import RecorderLoop

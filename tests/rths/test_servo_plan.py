@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common.plan import reality
 from common.plan.read import parse
+from common.reality import reality
 from common.recording.reader import read
 from common.recording.run import Run
 from diagnosis.recorded import record

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common.plan import reality
 from common.plan.plan import Plan
 from common.plan.read import from_tables
+from common.reality import reality
 from common.recording.reader import read
 from report.text import tabular
 from simulation import virtual

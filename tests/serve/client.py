@@ -8,10 +8,10 @@ import time
 from collections.abc import Callable, Sequence
 
 from common.opensees import wire
-from common.opensees.wire import Code, Header, Quantities, Sizes
+from common.opensees.wire import ClientHeader, MessageCode, Quantities, Sizes
 
 HOST = "127.0.0.1"
-FRESCO = Header(Sizes(displacement=1), Sizes(displacement=1, force=1, time=1), 256)
+FRESCO = ClientHeader(Sizes(displacement=1), Sizes(displacement=1, force=1, time=1), 256)
 PATIENCE_S = 20.0
 
 
@@ -24,7 +24,7 @@ def free_port() -> int:
 class Element:
     """What a `genericClient` element of OpenSees does with its socket."""
 
-    def __init__(self, port: int, header: Header | None = None) -> None:
+    def __init__(self, port: int, header: ClientHeader | None = None) -> None:
         self.header = header or wire.element(1)
         end = time.monotonic() + PATIENCE_S
         while True:
@@ -43,7 +43,7 @@ class Element:
         """Send some bytes."""
         self.socket.sendall(data)
 
-    def say(self, code: Code, places: Sequence[float] = (), t: float = 0.0) -> None:
+    def say(self, code: MessageCode, places: Sequence[float] = (), t: float = 0.0) -> None:
         """Send a message."""
         sizes = self.header.control
         zeros = (0.0,) * sizes.displacement
@@ -71,15 +71,15 @@ class Element:
     def step(self, places: Sequence[float], t: float = 0.0) -> tuple[float, ...]:
         """One step as NewmarkExplicit makes it: the forces (N) at displacements (m)."""
         n = len(places)
-        self.say(Code.TRIAL, places, t)
-        self.say(Code.DAMPING)
+        self.say(MessageCode.TRIAL, places, t)
+        self.say(MessageCode.DAMPING)
         self.answer(n * n)
-        self.say(Code.FORCE, places, t)
+        self.say(MessageCode.FORCE, places, t)
         forces = self.answer(n)
-        self.say(Code.DAMPING)
+        self.say(MessageCode.DAMPING)
         self.answer(n * n)
-        self.say(Code.TRIAL, places, t)
-        self.say(Code.COMMIT, places, t)
+        self.say(MessageCode.TRIAL, places, t)
+        self.say(MessageCode.COMMIT, places, t)
         return forces
 
     def steps(self, count: int, dt: float = 0.002, dofs: int = 1) -> list[tuple[float, ...]]:

@@ -11,7 +11,7 @@ from common.errors import RthsError
 from common.lab.laboratory import Laboratory
 from common.plan.plan import Plan
 from common.plan.read import parse
-from common.plan.reality import as_planned
+from common.reality.reality import as_planned
 from common.recording.reader import read
 from common.recording.run import Run
 from master.assembly import warm_up_served

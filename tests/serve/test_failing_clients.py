@@ -22,7 +22,7 @@ import numpy as np
 import pytest
 
 from common.opensees import wire
-from common.opensees.wire import Code, Header, Sizes
+from common.opensees.wire import ClientHeader, MessageCode, Sizes
 from tests.helpers import ROOT
 from tests.serve.client import FRESCO, HOST, Element
 from tests.serve.serving import Served, Ticking, serve
@@ -48,20 +48,20 @@ def closes(port: int) -> None:
 
 def closes_within_a_message(port: int) -> None:
     client = begun(port)
-    client.raw(wire.message(client.header, Code.COMMIT)[:1000])
+    client.raw(wire.message(client.header, MessageCode.COMMIT)[:1000])
     client.close()
 
 
 def closes_while_the_laboratory_moves(port: int) -> None:
     client = begun(port)
-    client.say(Code.TRIAL, NEXT)
+    client.say(MessageCode.TRIAL, NEXT)
     client.close()
 
 
 def closes_as_it_waits_for_the_force(port: int) -> None:
     client = begun(port)
-    client.say(Code.TRIAL, NEXT)
-    client.say(Code.FORCE, NEXT)
+    client.say(MessageCode.TRIAL, NEXT)
+    client.say(MessageCode.FORCE, NEXT)
     client.close()
 
 
@@ -92,17 +92,17 @@ def stalls(port: int) -> None:
 
 def stalls_within_a_message(port: int) -> None:
     client = begun(port)
-    client.raw(wire.message(client.header, Code.TRIAL)[:1000])
+    client.raw(wire.message(client.header, MessageCode.TRIAL)[:1000])
 
 
 def stalls_while_the_laboratory_moves(port: int) -> None:
-    begun(port).say(Code.TRIAL, NEXT)
+    begun(port).say(MessageCode.TRIAL, NEXT)
 
 
 def stalls_behind_the_force(port: int) -> None:
     client = begun(port)
-    client.say(Code.TRIAL, NEXT)
-    client.say(Code.FORCE, NEXT)
+    client.say(MessageCode.TRIAL, NEXT)
+    client.say(MessageCode.FORCE, NEXT)
     client.answer(1)
 
 
@@ -111,7 +111,7 @@ def asks_for_nothing_but_damping(port: int) -> None:
     client.socket.settimeout(0.5)
     with contextlib.suppress(OSError):  # turned away, or its own buffer is full
         for _ in range(100_000):
-            client.say(Code.DAMPING)
+            client.say(MessageCode.DAMPING)
 
 
 def wants_something_unknown(port: int) -> None:
@@ -125,11 +125,11 @@ def has_no_code(port: int) -> None:
 
 
 def diverges(port: int) -> None:
-    begun(port).say(Code.TRIAL, [math.nan])
+    begun(port).say(MessageCode.TRIAL, [math.nan])
 
 
 def runs_away(port: int) -> None:
-    begun(port).say(Code.TRIAL, [math.inf])
+    begun(port).say(MessageCode.TRIAL, [math.inf])
 
 
 def babbles(port: int) -> None:
@@ -142,18 +142,18 @@ def is_another_program(port: int) -> None:
 
 def revises(port: int) -> None:
     client = begun(port)
-    client.say(Code.TRIAL, NEXT)
-    client.say(Code.FORCE, NEXT)
+    client.say(MessageCode.TRIAL, NEXT)
+    client.say(MessageCode.FORCE, NEXT)
     client.answer(1)
-    client.say(Code.TRIAL, [1.1 * NEXT[0]])
+    client.say(MessageCode.TRIAL, [1.1 * NEXT[0]])
 
 
 def goes_too_far(port: int) -> None:
-    begun(port).say(Code.TRIAL, [0.2])
+    begun(port).say(MessageCode.TRIAL, [0.2])
 
 
 def leaps(port: int) -> None:
-    begun(port).say(Code.TRIAL, [0.02])
+    begun(port).say(MessageCode.TRIAL, [0.02])
 
 
 CLOSED = "is lost: it closed the connection without saying that its analysis is over"
@@ -240,7 +240,7 @@ def test_a_second_client_is_turned_away_and_the_first_goes_on(tmp_path: Path) ->
             client.step([1e-4 * (i + 1)])
         assert other.recv(1) == b""
         other.close()
-        client.say(Code.END)
+        client.say(MessageCode.END)
         client.close()
 
     served = serve(two, tmp_path, pace=Ticking())
@@ -263,7 +263,7 @@ def test_a_flood_of_clients_is_turned_away_and_told_of_ten_times(tmp_path: Path)
             client.step([1e-4 * (i + 1)])
             if i % 8 == 0:
                 others += [socket.create_connection((HOST, port), timeout=20.0) for _ in range(3)]
-        client.say(Code.END)
+        client.say(MessageCode.END)
         for one in (*others, client.socket):
             one.close()
 
@@ -279,7 +279,7 @@ def test_a_flood_of_clients_is_turned_away_and_told_of_ten_times(tmp_path: Path)
         (wire.header_bytes(wire.element(3)), "3 degrees of freedom, but 1 of the laboratories answer here"),
         (struct.pack(">11i", 1, 1, 1, 0, 1, 0, 0, 0, 1, 0, 256), "order of bytes"),
         (b"GET / HTTP/1.1\r\nHost: 127.0.0.1:8090\r\n\r\n....", "no header"),
-        (wire.header_bytes(Header(Sizes(force=1), Sizes(force=1), 256)), "0 degrees of freedom"),
+        (wire.header_bytes(ClientHeader(Sizes(force=1), Sizes(force=1), 256)), "0 degrees of freedom"),
     ],
     ids=["degrees of freedom", "order of bytes", "another program", "forces"],
 )
@@ -313,7 +313,7 @@ def test_a_client_that_leaves_before_it_moves_anything_makes_room_for_the_next(
             client = Element(port)
             client.step([0.0])
             if early == "ends":
-                client.say(Code.END)
+                client.say(MessageCode.END)
             client.close()
         ends(port)
 
@@ -332,7 +332,7 @@ def ends(port: int) -> None:
         except OSError:
             client.close()
             continue
-        client.say(Code.END)
+        client.say(MessageCode.END)
         client.close()
         return
 
@@ -344,10 +344,10 @@ def test_openfresco_is_served_by_the_same_port(tmp_path: Path) -> None:
     def script(port: int) -> None:
         client = Element(port, FRESCO)
         for i in range(STEPS):
-            client.say(Code.TRIAL, [1e-4 * i])
-            client.say(Code.ACQUIRE, [1e-4 * i])
+            client.say(MessageCode.TRIAL, [1e-4 * i])
+            client.say(MessageCode.ACQUIRE, [1e-4 * i])
             found.append(client.answer(3))
-        client.say(Code.END)
+        client.say(MessageCode.END)
         client.close()
 
     served = serve(script, tmp_path)

@@ -17,7 +17,7 @@ from common.errors import InterlockError
 from common.opensees.process import INTERPRETER
 from common.plan.plan import Plan
 from common.plan.read import with_test
-from common.plan.reality import as_planned
+from common.reality.reality import as_planned
 from common.recording.reader import read
 from master.client import AsFastAsItGoes, ClientBuilding
 from simulation import virtual

@@ -11,10 +11,10 @@ import tomli_w
 
 from common.errors import InputError, PlanError
 from common.plan import read as plans
-from common.plan.found import building_of, models_of
 from common.plan.plan import Plan
-from common.plan.reality import from_reality
-from common.plan.spread import SeenRange, Spread, UncertainParameter
+from common.reality.found import building_of, models_of
+from common.reality.reality import from_reality
+from common.reality.spread import SeenRange, Spread, UncertainParameter
 from common.recording.reader import read
 from common.roles import MASTER
 from common.terminal import cli

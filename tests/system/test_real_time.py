@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from common.plan import read as plans
-from common.plan import reality
+from common.reality import reality
 from common.recording.reader import read
 from common.recording.run import Run
 from simulation import virtual

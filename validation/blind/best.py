@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from common.plan.plan import Plan
-from common.plan.reality import Reality
+from common.reality.reality import Reality
 from common.recording.reader import read
 from common.recording.run import Run
 from diagnosis.report.records import Report

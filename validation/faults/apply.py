@@ -12,7 +12,7 @@ from common.link.transport import TICK
 from common.plan import read as plans
 from common.plan.patience import strict
 from common.plan.plan import Plan
-from common.plan.reality import as_planned
+from common.reality.reality import as_planned
 from common.terminal import cli
 from simulation.world import Drift
 from validation.faults import hostile

@@ -13,7 +13,7 @@ from common.lab.drive import longest_leave
 from common.lab.laboratory import Setting
 from common.plan.laboratory_tables import RigTable
 from common.plan.plan import Plan
-from common.plan.reality import Reality
+from common.reality.reality import Reality
 from common.reporting import Report
 from common.roles import MASTER, RECORDER
 from loop import substructure

@@ -13,8 +13,8 @@ from common.lab.preflight import Gate
 from common.plan import read as plans
 from common.plan.laboratory_tables import Actuator, CompensatorTable, Control, TableCompensator
 from common.plan.plan import Plan, ideal
-from common.plan.reality import as_planned
 from common.plan.tables import GroundMotionTable
+from common.reality.reality import as_planned
 from common.recording.reader import read
 from common.recording.run import Run
 from common.terminal import cli

@@ -11,14 +11,14 @@ from hypothesis import strategies as st
 from common.errors import RemoteProtocolError
 from common.opensees import wire
 from common.opensees.element import ElementServer, Measurement, Phase, RevisedError
-from common.opensees.wire import Code, Header, Quantities, Sizes
+from common.opensees.wire import ClientHeader, MessageCode, Quantities, Sizes
 
 HEADER = wire.element(1)
-FRESCO = Header(Sizes(displacement=1), Sizes(displacement=1, force=1, time=1), 256)
+FRESCO = ClientHeader(Sizes(displacement=1), Sizes(displacement=1, force=1, time=1), 256)
 K = 5e6
 
 
-def said(code: Code, x: float = 0.0, header: Header = HEADER) -> bytes:
+def said(code: MessageCode, x: float = 0.0, header: ClientHeader = HEADER) -> bytes:
     n = header.control
     return wire.message(
         header,
@@ -27,7 +27,7 @@ def said(code: Code, x: float = 0.0, header: Header = HEADER) -> bytes:
     )
 
 
-def server(header: Header = HEADER, stiffness: Sequence[float] = (K,)) -> ElementServer:
+def server(header: ClientHeader = HEADER, stiffness: Sequence[float] = (K,)) -> ElementServer:
     found = ElementServer(stiffness)
     found.take(wire.header_bytes(header))
     return found
@@ -38,7 +38,7 @@ def moved(one: ElementServer, force: float) -> None:
     one.measured(Measurement(x, (force,), 0.5))
 
 
-def answers(one: ElementServer, header: Header = HEADER, count: int = 1) -> list[tuple[float, ...]]:
+def answers(one: ElementServer, header: ClientHeader = HEADER, count: int = 1) -> list[tuple[float, ...]]:
     data = one.outgoing()
     return [
         wire.numbers_in(header, data[place : place + header.size], count)
@@ -48,7 +48,7 @@ def answers(one: ElementServer, header: Header = HEADER, count: int = 1) -> list
 
 def test_matrices_are_answered_from_memory() -> None:
     one = server(wire.element(2), (K, 3.0))
-    for code in (Code.INITIAL_STIFFNESS, Code.STIFFNESS, Code.DAMPING, Code.MASS):
+    for code in (MessageCode.INITIAL_STIFFNESS, MessageCode.STIFFNESS, MessageCode.DAMPING, MessageCode.MASS):
         one.take(said(code, header=wire.element(2)))
     diagonal, none = (K, 0.0, 0.0, 3.0), (0.0,) * 4
     assert answers(one, wire.element(2), 4) == [diagonal, diagonal, none, none]
@@ -56,14 +56,14 @@ def test_matrices_are_answered_from_memory() -> None:
 
 def test_at_rest_the_force_is_zero_and_nothing_is_wanted() -> None:
     one = server()
-    one.take(said(Code.TRIAL) + said(Code.FORCE))
+    one.take(said(MessageCode.TRIAL) + said(MessageCode.FORCE))
     assert answers(one) == [(0.0,)]
     assert one.phase is Phase.MEASURED
 
 
 def test_a_force_waits_for_its_measurement() -> None:
     one = server()
-    one.take(said(Code.TRIAL, 1e-3) + said(Code.DAMPING) + said(Code.FORCE))
+    one.take(said(MessageCode.TRIAL, 1e-3) + said(MessageCode.DAMPING) + said(MessageCode.FORCE))
     assert one.phase is Phase.WANTED
     assert one.waits
     assert answers(one) == [(0.0,)]  # of the damping
@@ -78,46 +78,58 @@ def test_a_step_of_newmark_explicit_moves_once() -> None:
     """The trials after the solution repeat the displacement, with other velocities."""
     one = server()
     for step in range(1, 4):
-        one.take(said(Code.TRIAL, step * 1e-3) + said(Code.FORCE))
+        one.take(said(MessageCode.TRIAL, step * 1e-3) + said(MessageCode.FORCE))
         moved(one, float(step))
-        one.take(said(Code.TRIAL, step * 1e-3) + said(Code.COMMIT))
+        one.take(said(MessageCode.TRIAL, step * 1e-3) + said(MessageCode.COMMIT))
     assert answers(one) == [(1.0,), (2.0,), (3.0,)]
     assert (one.steps, one.commits) == (3, 3)
 
 
 def test_a_step_of_central_difference_commits_before_it_asks_for_the_force() -> None:
     one = server()
-    one.take(said(Code.TRIAL, 1e-3) + said(Code.COMMIT) + said(Code.TRIAL, 1e-3) + said(Code.FORCE))
+    one.take(
+        said(MessageCode.TRIAL, 1e-3)
+        + said(MessageCode.COMMIT)
+        + said(MessageCode.TRIAL, 1e-3)
+        + said(MessageCode.FORCE)
+    )
     moved(one, 4.0)
     assert answers(one) == [(4.0,)]
-    one.take(said(Code.TRIAL, 2e-3) + said(Code.COMMIT))
+    one.take(said(MessageCode.TRIAL, 2e-3) + said(MessageCode.COMMIT))
     assert one.phase is Phase.WANTED
 
 
 def test_a_revised_displacement_is_refused_with_integrators_that_fit() -> None:
     one = server()
-    one.take(said(Code.TRIAL, 1e-3) + said(Code.FORCE))
+    one.take(said(MessageCode.TRIAL, 1e-3) + said(MessageCode.FORCE))
     moved(one, 1.0)
     with pytest.raises(RevisedError, match=r"1 mm to 1\.1 mm.*NewmarkExplicit, CentralDifference or AlphaOS"):
-        one.take(said(Code.TRIAL, 1.1e-3))
+        one.take(said(MessageCode.TRIAL, 1.1e-3))
 
 
 def test_a_revised_displacement_is_refused_before_it_is_imposed_too() -> None:
     """Whether the laboratories had the time to move does not decide."""
     one = server()
     with pytest.raises(RevisedError):
-        one.take(said(Code.TRIAL, 1e-3) + said(Code.TRIAL, 2e-3))
+        one.take(said(MessageCode.TRIAL, 1e-3) + said(MessageCode.TRIAL, 2e-3))
 
 
 def test_the_rounding_of_an_iteration_revises_nothing() -> None:
     one = server()
-    one.take(said(Code.TRIAL, 1e-3) + said(Code.TRIAL, 1e-3 * (1.0 + 1e-11)) + said(Code.FORCE))
+    one.take(
+        said(MessageCode.TRIAL, 1e-3)
+        + said(MessageCode.TRIAL, 1e-3 * (1.0 + 1e-11))
+        + said(MessageCode.FORCE)
+    )
     assert one.wanted.displacement == (1e-3,)
 
 
 def test_displacements_of_a_client_that_does_not_wait_come_one_after_the_other() -> None:
     one = server()
-    one.take(b"".join(said(Code.TRIAL, x) + said(Code.COMMIT) for x in (1e-3, 2e-3, 3e-3)) + said(Code.END))
+    one.take(
+        b"".join(said(MessageCode.TRIAL, x) + said(MessageCode.COMMIT) for x in (1e-3, 2e-3, 3e-3))
+        + said(MessageCode.END)
+    )
     found = []
     while one.phase is Phase.WANTED:
         found.append(one.wanted.displacement[0])
@@ -128,9 +140,9 @@ def test_displacements_of_a_client_that_does_not_wait_come_one_after_the_other()
 
 def test_openfresco_acquires_all_that_its_header_says_and_commits_nothing() -> None:
     one = server(FRESCO)
-    one.take(said(Code.TRIAL, 0.0, FRESCO) + said(Code.ACQUIRE, 0.0, FRESCO))
+    one.take(said(MessageCode.TRIAL, 0.0, FRESCO) + said(MessageCode.ACQUIRE, 0.0, FRESCO))
     for x in (1e-3, 2e-3):
-        one.take(said(Code.TRIAL, x, FRESCO) + said(Code.ACQUIRE, x, FRESCO))
+        one.take(said(MessageCode.TRIAL, x, FRESCO) + said(MessageCode.ACQUIRE, x, FRESCO))
         one.impose()
         one.measured(Measurement((x,), (K * x,), 0.25))
     assert answers(one, FRESCO, 3) == [(0.0, 0.0, 0.0), (1e-3, K * 1e-3, 0.25), (2e-3, K * 2e-3, 0.25)]
@@ -138,14 +150,14 @@ def test_openfresco_acquires_all_that_its_header_says_and_commits_nothing() -> N
 
 def test_the_end_is_the_end() -> None:
     one = server()
-    one.take(said(Code.END) + said(Code.FORCE))
+    one.take(said(MessageCode.END) + said(MessageCode.FORCE))
     assert one.phase is Phase.ENDED
     assert not one.outgoing()
 
 
 def test_the_last_displacements_are_imposed_before_the_end() -> None:
     one = server()
-    one.take(said(Code.TRIAL, 1e-3) + said(Code.COMMIT) + said(Code.END))
+    one.take(said(MessageCode.TRIAL, 1e-3) + said(MessageCode.COMMIT) + said(MessageCode.END))
     assert one.wanted.displacement == (1e-3,)
     assert one.ending
     moved(one, 1.0)
@@ -156,26 +168,31 @@ def test_the_last_displacements_are_imposed_before_the_end() -> None:
     ("header", "says"),
     [
         (wire.element(2), "2 degrees of freedom, but 1 of the laboratories"),
-        (Header(Sizes(displacement=1, force=1), Sizes(force=1), 256), "commands forces"),
-        (Header(Sizes(displacement=1), Sizes(velocity=1, force=1), 256), "acquires velocities"),
-        (Header(Sizes(displacement=1), Sizes(displacement=1), 256), "acquires 0 forces"),
-        (Header(Sizes(displacement=1, time=2), Sizes(force=1), 256), "acquires 1 forces"),
+        (ClientHeader(Sizes(displacement=1, force=1), Sizes(force=1), 256), "commands forces"),
+        (ClientHeader(Sizes(displacement=1), Sizes(velocity=1, force=1), 256), "acquires velocities"),
+        (ClientHeader(Sizes(displacement=1), Sizes(displacement=1), 256), "acquires 0 forces"),
+        (ClientHeader(Sizes(displacement=1, time=2), Sizes(force=1), 256), "acquires 1 forces"),
     ],
 )
-def test_a_client_that_wants_what_there_is_not_is_refused(header: Header, says: str) -> None:
+def test_a_client_that_wants_what_there_is_not_is_refused(header: ClientHeader, says: str) -> None:
     with pytest.raises(RemoteProtocolError, match=says):
         server(header)
 
 
 def test_messages_too_short_for_a_matrix_are_refused() -> None:
-    header = Header(Sizes(displacement=5), Sizes(force=5), 24)
+    header = ClientHeader(Sizes(displacement=5), Sizes(force=5), 24)
     with pytest.raises(RemoteProtocolError, match="5 times 5"):
         server(header, (K,) * 5)
 
 
 @given(st.lists(st.integers(1, 7), min_size=1, max_size=8))
 def test_how_the_bytes_are_cut_changes_nothing(lengths: list[int]) -> None:
-    data = wire.header_bytes(HEADER) + said(Code.TRIAL, 1e-3) + said(Code.MASS) + said(Code.FORCE)
+    data = (
+        wire.header_bytes(HEADER)
+        + said(MessageCode.TRIAL, 1e-3)
+        + said(MessageCode.MASS)
+        + said(MessageCode.FORCE)
+    )
     one, place = ElementServer([K]), 0
     for length in lengths:
         one.take(data[place : place + 97 * length])

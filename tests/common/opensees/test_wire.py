@@ -10,12 +10,14 @@ from hypothesis import strategies as st
 
 from common.errors import RemoteProtocolError
 from common.opensees import wire
-from common.opensees.wire import Code, Header, Quantities, Sizes
+from common.opensees.wire import ClientHeader, MessageCode, Quantities, Sizes
 
 COUNTS = st.integers(0, 6)
 SIZES = st.builds(Sizes, COUNTS, COUNTS, COUNTS, COUNTS, st.integers(0, 1))
 HEADERS = st.builds(
-    lambda control, acquired, more: Header(control, acquired, max(1 + sum(control), sum(acquired)) + more),
+    lambda control, acquired, more: ClientHeader(
+        control, acquired, max(1 + sum(control), sum(acquired)) + more
+    ),
     SIZES,
     SIZES,
     st.integers(0, 300),
@@ -34,13 +36,13 @@ def test_the_header_of_an_element_is_what_opensees_sends() -> None:
 
 
 @given(HEADERS)
-def test_headers_come_back(header: Header) -> None:
+def test_headers_come_back(header: ClientHeader) -> None:
     assert wire.read_header(wire.header_bytes(header)) == header
 
 
 @given(st.data())
 def test_commanded_values_come_back_bit_by_bit(data: st.DataObject) -> None:
-    header, code = data.draw(HEADERS), data.draw(st.sampled_from(Code))
+    header, code = data.draw(HEADERS), data.draw(st.sampled_from(MessageCode))
     values = data.draw(values_of(header.control))
     sent = wire.message(header, code, values)
     assert len(sent) == header.size
@@ -70,7 +72,7 @@ def test_any_first_bytes_are_a_header_or_are_refused(data: bytes) -> None:
 def test_any_bytes_are_a_message_or_are_refused(data: bytes) -> None:
     header = wire.element(4, data=16)
     try:
-        assert wire.code_in(data) in Code
+        assert wire.code_in(data) in MessageCode
         wire.commanded(header, data)
     except RemoteProtocolError:
         pass
@@ -79,7 +81,7 @@ def test_any_bytes_are_a_message_or_are_refused(data: bytes) -> None:
 def test_a_value_that_is_not_finite_is_refused() -> None:
     header = wire.element(1)
     for bad in (float("nan"), float("inf"), float("-inf")):
-        sent = wire.message(header, Code.TRIAL, Quantities((bad,), (0.0,), (0.0,), (), (0.0,)))
+        sent = wire.message(header, MessageCode.TRIAL, Quantities((bad,), (0.0,), (0.0,), (), (0.0,)))
         with pytest.raises(RemoteProtocolError, match="not finite"):
             wire.commanded(header, sent)
 
@@ -87,7 +89,7 @@ def test_a_value_that_is_not_finite_is_refused() -> None:
 def test_large_values_are_finite_although_their_sum_is_not() -> None:
     header = wire.element(1)
     values = Quantities((1.7e308,), (1.7e308,), (1.7e308,), (), (0.0,))
-    assert wire.commanded(header, wire.message(header, Code.TRIAL, values)) == values
+    assert wire.commanded(header, wire.message(header, MessageCode.TRIAL, values)) == values
 
 
 def test_the_other_order_of_bytes_is_refused() -> None:
@@ -98,6 +100,6 @@ def test_the_other_order_of_bytes_is_refused() -> None:
 def test_numbers_that_do_not_fit_the_header_are_a_fault_of_the_caller() -> None:
     header = wire.element(1)
     with pytest.raises(ValueError, match="2 values of displacement"):
-        wire.message(header, Code.TRIAL, Quantities((0.0, 0.0), (0.0,), (0.0,), (), (0.0,)))
+        wire.message(header, MessageCode.TRIAL, Quantities((0.0, 0.0), (0.0,), (0.0,), (), (0.0,)))
     with pytest.raises(ValueError, match="257 numbers"):
         wire.answer(header, [0.0] * 257)

@@ -10,7 +10,7 @@ import pytest
 from common.errors import InputError, PlanError
 from common.plan.plan import Plan
 from common.plan.read import from_tables
-from common.plan.reality import Reality, from_reality
+from common.reality.reality import Reality, from_reality
 from laboratories import effects
 from laboratories.effects.sites import of_plan
 from loop.realised import true_slaves, true_system

@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 from common.link.transport import TICK
-from common.plan.reality import as_planned
 from common.protocol import codec
+from common.reality.reality import as_planned
 from common.safety.modes import Mode
 from tests.helpers import with_table, without_recorder
 from tests.shapes import plan_of

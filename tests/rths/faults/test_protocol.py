@@ -19,11 +19,11 @@ from common.lab.laboratory import Setting
 from common.link.endpoint import Received
 from common.plan.plan import PROTOCOL_VERSION, Plan
 from common.plan.read import load, with_test
-from common.plan.reality import as_planned
 from common.protocol import messages
 from common.protocol.codec import MESSAGES
 from common.protocol.exchange import FINAL, TRANSITIONS, State
 from common.protocol.messages import Message
+from common.reality.reality import as_planned
 from common.roles import MASTER, RECORDER, SLAVE
 from common.terminal import cli
 from master import assembly as master_assembly

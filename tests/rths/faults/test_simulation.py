@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from common.plan.plan import Plan
-from common.plan.reality import as_planned
 from common.protocol.codec import Reject
+from common.reality.reality import as_planned
 from common.recording.reader import read
 from common.roles import MASTER, SLAVE
 from simulation.world import Drift

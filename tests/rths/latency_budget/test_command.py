@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 
-from common.plan import reality
 from common.plan.plan import Plan
 from common.plan.read import with_test
+from common.reality import reality
 from simulation import virtual
 from tests.helpers import ROOT
 

@@ -16,9 +16,9 @@ from bokeh.document import Document
 
 from common.errors import EmergencyStopError
 from common.host.clock import VirtualClock
-from common.plan import reality
 from common.plan.plan import Plan
 from common.plan.read import load, with_test
+from common.reality import reality
 from common.recording.reader import Tail, length, read
 from common.recording.run import Run
 from common.recording.writer import Recording

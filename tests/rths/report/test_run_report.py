@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common.plan import reality
 from common.plan.read import from_tables
+from common.reality import reality
 from common.recording.reader import read
 from common.recording.run import Run
 from common.terminal.telling import untold

@@ -12,7 +12,7 @@ import pytest
 
 from common.errors import InputError
 from common.plan import read as plans
-from common.plan import reality as realities
+from common.reality import reality as realities
 from common.roles import MASTER
 from common.terminal import cli
 from diagnosis.report import read

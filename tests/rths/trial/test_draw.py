@@ -15,7 +15,7 @@ import pytest
 
 from common.errors import InputError
 from common.plan import read as plans
-from common.plan import reality as realities
+from common.reality import reality as realities
 from common.roles import MASTER, SLAVE
 from laboratories.effects.effect import Effect, Parameter
 from laboratories.effects.reading import SIGNALS

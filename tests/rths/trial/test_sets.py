@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from common.plan import read as plans
-from common.plan import reality as realities
+from common.reality import reality as realities
 from diagnosis.report import read as read_report
 from tests import opensees
 from tests.rths.diagnosis_report.reports import bare

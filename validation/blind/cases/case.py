@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from common.plan import read as plans
-from common.plan import reality as realities
 from common.plan.kinds import COLUMN, TABLE
-from common.plan.reality import Reality
+from common.reality import reality as realities
+from common.reality.reality import Reality
 from common.roles import MASTER, SLAVE, name_of
 from validation.blind.library import MATERIAL, MATERIAL_LAB, REPLACED, parts_of, rig_of
 

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from common.plan import reality as realities
 from common.plan.kinds import TABLES_OF_KIND, known_kind
 from common.plan.plan import Plan
 from common.plan.schema import plain
+from common.reality import reality as realities
 from common.roles import MASTER, SLAVE, name_of
 from laboratories.kind import Kind
 from laboratories.kinds import KINDS, kind_of, kinds_of

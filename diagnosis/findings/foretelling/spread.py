@@ -9,7 +9,7 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.signal import hilbert
 
-from common.plan.spread import ByRole, SeenRange, Spread, UncertainParameter
+from common.reality.spread import ByRole, SeenRange, Spread, UncertainParameter
 from common.roles import MASTER
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.gaps import RecordingGaps, held_out

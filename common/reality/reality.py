@@ -12,7 +12,6 @@ from typing import Any
 
 from common.errors import PlanError
 from common.plan.building import OF_FOPDT
-from common.plan.found import LearnedEntry, check_found, learned
 from common.plan.kinds import TABLES_OF_KIND, known_kind
 from common.plan.laboratory_tables import RigTable
 from common.plan.plan import Plan
@@ -20,6 +19,7 @@ from common.plan.plugins import checked
 from common.plan.read import from_tables
 from common.plan.schema import fill, nearest
 from common.plan.toml_file import load_tables
+from common.reality.found import LearnedEntry, check_found, learned
 from common.roles import MASTER, SLAVE, slave_role
 
 Entry = tuple[str, Mapping[str, float]]  # name of an effect of the catalogue, and its parameters

@@ -18,7 +18,7 @@ from common.recording.account import Recovery, Topic
 from common.recording.bounds import Bounds
 from common.recording.checksums import CHECKSUMS, checksum, fits, opened, sealed
 from common.recording.records import HEAD, MESSAGE, GrowingFile, inner, parsed, summary, written
-from common.recording.salvage import FileHole, WholeRecord, judge, survey
+from common.recording.recover.salvage import FileHole, WholeRecord, judge, survey
 from common.recording.writer import CHUNK_SIZE
 from common.roles import ramps_of
 from common.terminal import outputs

@@ -6,14 +6,14 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from common.errors import InputError
-from common.plan.found import LearnedEntry, building_of, models_of
 from common.plan.kinds import TABLES_OF_KIND, known_kind
 from common.plan.plan import Plan
-from common.plan.reality import OF_LABORATORY, TRUE_TABLES
-from common.plan.spread import Spread
+from common.reality.found import LearnedEntry, building_of, models_of
+from common.reality.reality import OF_LABORATORY, TRUE_TABLES
+from common.reality.spread import Spread
 from common.roles import MASTER, name_of
+from diagnosis.findings.foretelling.spread import spread
 from diagnosis.findings.found import Diagnosis, laid
-from diagnosis.findings.spread import spread
 from diagnosis.recorded.record import Record
 from laboratories.effects.sites import LINK
 from models.system import System
