@@ -18,7 +18,7 @@ from loop.links import link_model
 from loop.nominal import preflight as nominal
 from loop.realised import true_system
 from master.building import BuildingStep, Outputs
-from master.client import ClientBuilding, Follower, RealTime, compensator
+from master.client import ClientBuilding, CoupledLaboratory, RealTime, compensator
 from master.limits import MasterLimits
 from master.loop import MasterLoop
 from master.own import OwnLaboratory
@@ -124,7 +124,7 @@ def warm_up_served(reality: Reality) -> None:
     plan = reality.plan
     compensator(plan)
     for kind in kinds.kinds_of(plan).values():
-        Follower(kind.coupling(plan), plan.test.interval, 1).resists(0.0)
+        CoupledLaboratory(kind.coupling(plan), plan.test.interval, 1).resists(0.0)
     of_own(reality, Outputs(0.0, 0.0, 0.0, 0.0, [(0.0,) * substructure.SENT_VALUES for _ in plan.roles], []))
 
 

@@ -88,7 +88,7 @@ class AsFastAsItGoes:
             raise ClientError(f"No displacement has come from the client for {self._seconds:g} s.")
 
 
-class Follower:
+class CoupledLaboratory:
     """One laboratory of an element: converts the element's displacement into a target, and the force back."""
 
     def __init__(self, coupling: Coupling, interval: float, intervals: int) -> None:
@@ -139,7 +139,7 @@ class ClientBuilding(BuildingStep):
     def __init__(self, plan: Plan, addresses: Sequence[str], pace: Pace, report: Report = silent) -> None:
         interval, self._intervals = plan.test.interval, plan.structure.intervals
         couplings = couplings_of(plan)
-        self._labs = [Follower(one, interval, self._intervals) for one in couplings.values()]
+        self._labs = [CoupledLaboratory(one, interval, self._intervals) for one in couplings.values()]
         self._own = self._labs[0] if MASTER in couplings else None
         self._ramp = self._intervals - int(self._intervals > 1 and bool(plan.roles))
         self._compensator = compensator(plan)

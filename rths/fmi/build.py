@@ -25,7 +25,7 @@ EXPONENTS |= {"m/s": {"m": 1, "s": -1}, "m/s²": {"m": 1, "s": -2}}
 PLATFORM = f"{ {'AMD64': 'x86_64', 'arm64': 'aarch64'}.get(platform.machine(), platform.machine()) }-linux"
 
 
-class Wanted(NamedTuple):
+class AskedFor(NamedTuple):
     """What an FMU shall be."""
 
     name: str
@@ -39,7 +39,7 @@ class Wanted(NamedTuple):
     resources: Mapping[str, str]  # texts by file name
 
 
-def build(wanted: Wanted, path: Path) -> None:
+def build(wanted: AskedFor, path: Path) -> None:
     """Write an FMU for this machine.
 
     Raises:
@@ -76,7 +76,7 @@ def build(wanted: Wanted, path: Path) -> None:
                 archive.writestr(f"resources/{name}", text)
 
 
-def description(wanted: Wanted, token: str) -> bytes:
+def description(wanted: AskedFor, token: str) -> bytes:
     """The model description."""
     root = Xml.Element(
         "fmiModelDescription",
@@ -115,7 +115,7 @@ def description(wanted: Wanted, token: str) -> bytes:
     return found
 
 
-def units(root: Xml.Element, wanted: Wanted) -> None:
+def units(root: Xml.Element, wanted: AskedFor) -> None:
     """The units of all variables; one that is not known has no exponents."""
     table = Xml.SubElement(root, "UnitDefinitions")
     for name in dict.fromkeys(["s", *(row.unit for row in (*wanted.inputs, *wanted.outputs) if row.unit)]):
@@ -124,7 +124,7 @@ def units(root: Xml.Element, wanted: Wanted) -> None:
             Xml.SubElement(unit, "BaseUnit", {base: str(power) for base, power in EXPONENTS[name].items()})
 
 
-def variables(root: Xml.Element, wanted: Wanted) -> None:
+def variables(root: Xml.Element, wanted: AskedFor) -> None:
     """Time, seed, inputs and outputs."""
     table = Xml.SubElement(root, "ModelVariables")
     time = {"name": "time", "valueReference": "0", "causality": "independent", "variability": "continuous"}

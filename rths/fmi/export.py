@@ -38,7 +38,7 @@ def export(plan_name: Path, path: Path, lab: str, reality_path: Path | None) -> 
         folders["reality_folder"] = str(reality_path.parent.resolve())
         texts[served.REALITY] = text_of(reality_path, "reality")
     texts[served.ROLE] = json.dumps(folders)
-    wanted = build.Wanted(
+    wanted = build.AskedFor(
         f"{plan.test.name}_{role}",
         kind.says,
         (channels.command, *([channels.effort] if channels.effort else [])),

@@ -21,7 +21,7 @@ from models.ground_motion import GroundMotion
 from models.registry import Array
 from simulation.foretold import rest
 from simulation.foretold.draws import Ensemble, FoundLaboratories, ensemble
-from simulation.foretold.rest import Reach
+from simulation.foretold.rest import RangeSeen
 
 HELD = 0.9  # share of the time that a band is to hold
 LOW, HIGH = 0.5 * (1.0 - HELD), 0.5 * (1.0 + HELD)
@@ -58,7 +58,7 @@ class Prediction:
     peaks: dict[str, PeakBand]  # by signal as recordings name them
     drifts: dict[int, PeakBand]  # by storey that a laboratory follows
     limits: dict[str, LimitChance]
-    reaches: dict[str, Reach]  # by role
+    reaches: dict[str, RangeSeen]  # by role
     draws: int
     diverged: int
     sentences: tuple[str, ...]
@@ -115,7 +115,7 @@ def about(found: FoundLaboratories, drawn: Ensemble, count: int) -> list[str]:
 
 
 def erring(
-    found: FoundLaboratories, plan: Plan, drawn: Ensemble, reach: Mapping[str, Reach]
+    found: FoundLaboratories, plan: Plan, drawn: Ensemble, reach: Mapping[str, RangeSeen]
 ) -> list[Rollout]:
     """The rollouts with what was left unexplained as an error of their signals."""
     random = np.random.default_rng([plan.test.seed, 1])

@@ -33,7 +33,7 @@ NEW = 0.1
 
 
 @dataclass(frozen=True)
-class Reach:
+class RangeSeen:
     """How far a laboratory's predicted motion leaves what was seen of it."""
 
     role: str
@@ -48,7 +48,7 @@ class Reach:
         return float(self.ratios[-1]) if self.ratios.size else 0.0
 
 
-def reaches(plan: Plan, rollout: Rollout, spread: Spread) -> dict[str, Reach]:
+def reaches(plan: Plan, rollout: Rollout, spread: Spread) -> dict[str, RangeSeen]:
     """How far every laboratory leaves what was seen of it, by role."""
     columns, result = by_role(plan, rollout), {}
     for role, kind in kinds_of(plan).items():
@@ -64,7 +64,7 @@ def reaches(plan: Plan, rollout: Rollout, spread: Spread) -> dict[str, Reach]:
             farthest = max(ratios, key=lambda name: float(ratios[name][-1]))
             target = columns[role][kind.channels.target.name]
             share = energy_outside(target, seen, plan.test.interval)
-            result[role] = Reach(role, farthest, np.max(list(ratios.values()), axis=0), seen.band, share)
+            result[role] = RangeSeen(role, farthest, np.max(list(ratios.values()), axis=0), seen.band, share)
     return result
 
 
@@ -77,7 +77,7 @@ def energy_outside(target: Array, seen: SeenRange, interval: float) -> float:
     return float(energy[(frequencies < low) | (frequencies > high)].sum()) / total if total > 0.0 else 0.0
 
 
-def growth(of: Mapping[str, Reach], role: str, tolerance: float) -> tuple[Array | float, Array | float]:
+def growth(of: Mapping[str, RangeSeen], role: str, tolerance: float) -> tuple[Array | float, Array | float]:
     """By what the share left of a signal of a role is multiplied at every tick, and what is added to it.
 
     Beyond the amplitudes seen a share grows as the amplitude does. A part of the `tolerance` of the plan's nominal
@@ -113,7 +113,7 @@ def errors(series: Array, share: Array | float, random: np.random.Generator) -> 
     return result
 
 
-def sentences(of: Mapping[str, Reach], interval: float) -> list[str]:
+def sentences(of: Mapping[str, RangeSeen], interval: float) -> list[str]:
     """Where a prediction leaves what was seen, in sentences."""
     result = []
     for role, one in of.items():

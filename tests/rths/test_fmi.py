@@ -163,7 +163,7 @@ def test_a_loop_with_fmus_as_rigs_gives_the_bits_of_the_emulated_loop(
 def elastic(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An FMU of an elastic specimen, a program of its own."""
     path = tmp_path_factory.mktemp("elastic") / "elastic.fmu"
-    wanted = build.Wanted(
+    wanted = build.AskedFor(
         "elastic",
         "an elastic column",
         [Signal("deformation", "m", "deformation")],

@@ -118,7 +118,7 @@ def test_a_test_that_leaves_what_was_seen_is_said(found: Prediction) -> None:
 
 
 def test_what_is_left_grows_with_the_amplitude_beyond_what_was_seen() -> None:
-    reach = rest.Reach(MASTER, "x", np.array([0.5, 1.0, 2.0]), (0.0, 9.0), 0.0)
+    reach = rest.RangeSeen(MASTER, "x", np.array([0.5, 1.0, 2.0]), (0.0, 9.0), 0.0)
     far, more = rest.growth({MASTER: reach}, MASTER, 0.02)
     np.testing.assert_allclose(far, [1.0, 1.0, 2.0])
     np.testing.assert_allclose(more, [0.0, 0.0, 0.02 * rest.NEW])
