@@ -44,7 +44,7 @@ def with_learned(system: System, given: LearnedEntry) -> System:
     if not hasattr(machine, "learned"):
         raise InputError(
             f"machine of [[learned]] is '{given.machine}', which follows no learned law: "
-            "give actuator, column or damper."
+            "give actuator, column, table or damper."
         )
     return system.laid(given.machine, learned=given.law)
 

@@ -25,9 +25,7 @@ class LearnedEntry(NamedTuple):
     """A law of `models.preisach` that a machine of one laboratory follows beside its model."""
 
     role: str
-    machine: (
-        str  # `column`, `actuator` or `damper`: a part of `models.system.Effects` with the field `learned`
-    )
+    machine: str  # `actuator`, `column`, `table` or `damper`: a part of `models.system.Effects` with the field `learned`
     law: tuple[float, ...]
 
 

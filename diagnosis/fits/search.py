@@ -327,9 +327,17 @@ class Searcher:
         return self.with_stop(fit, fits)
 
     def in_best_laws(self, fits: list[Fit]) -> list[Fit]:
-        """The fits, best first, with effects under other laws where the best leaves a gap and these leave less."""
+        """The fits, best first, with effects under other laws where the best leaves a gap and these leave less.
+
+        The best one is first fitted to its end under its own law: another law would else explain what that fit has
+        not reached yet.
+        """
         if not fits or remaining(fits[0]) < SLIGHT:
             return fits
+        if len(fits[0].data.catalogue[fits[0].names[-1]].laws) > 1:
+            fits = sorted([self.polished(fits[0]), *fits[1:]], key=lambda item: item.cost)
+            if remaining(fits[0]) < SLIGHT:
+                return fits
         least = excess(fits[0])
         better = [laws.in_best_law(item) if excess(item) <= FARTHEST * least else item for item in fits]
         return sorted(better, key=lambda item: item.cost)

@@ -69,7 +69,7 @@ def test_laws_are_read_from_the_file_beside(tmp_path: Path) -> None:
     assert true_system(truth).effects.column.learned == tuple(law.tolist())
     assert true_slaves(truth)["slave"].effects.column.learned == ()
     with pytest.raises(InputError, match="follows no learned law"):
-        true_system(replace(truth, learned=(truth.learned[0]._replace(machine="table"),)))
+        true_system(replace(truth, learned=(truth.learned[0]._replace(machine="link"),)))
 
 
 @pytest.mark.parametrize(

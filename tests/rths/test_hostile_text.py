@@ -177,7 +177,7 @@ def test_a_command_prints_the_text_of_a_recording_as_letters(
 ) -> None:
     monkeypatch.setattr(drawing, "PICTURES", {})
     if verb == "diagnose":  # its search takes a minute and prints nothing of the recording
-        monkeypatch.setattr("rths.examine.diagnose.diagnose_slaves", said_of)
+        monkeypatch.setattr("rths.examine.diagnose.diagnosed", lambda *_, **__: (said_of(), None))
     if verb == "identify":
         monkeypatch.setattr("report.facts.identification.identify", identified)
     call(verb, hostile, *(word.format(tmp=tmp_path, file=hostile) for word in PRINTING[verb]))

@@ -97,7 +97,7 @@ def test_semicolons_decimal_commas_a_preamble_and_a_row_of_units(bring: Any, cap
     assert np.allclose(run.columns["master"]["column_displacement"], 1e-3 * LATE, atol=1e-11)
     assert "units, from the row below the names: actuator_command in mm" in capsys.readouterr().out
     assert bring(text.partition("\n")[2], rows)[0] == 2
-    assert "a map says what separator, decimal sign and rows to skip it has" in capsys.readouterr().err
+    assert "a map can give its separator, decimal sign and rows to skip" in capsys.readouterr().err
 
 
 def test_start_and_stop_cut_the_data(bring: Any) -> None:

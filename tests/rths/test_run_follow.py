@@ -169,7 +169,9 @@ def test_a_wish_while_a_rig_arms_leaves_it_the_time_that_the_others_would_wait_f
     note(said("slave", State.REGISTERED), arming, doing)
     program(tmp_path, "slave", DEAF)
     processes.start("slave", [])
-    assert f"as it arms (slave: arming its rig, at most {given:g} s)" in answer(processes, doing)
+    assert f"while it arms or is on its ramp to rest (slave: arming its rig, at most {given:g} s)" in answer(
+        processes, doing
+    )
     times = Times(arming, {}, wish=21.0)
     assert times.asked["slave"] == near(21.0)
     assert times.killed["slave"] == near(20.0 + given + LEAVE_S + KILL_S)

@@ -143,7 +143,7 @@ def test_a_recording_that_was_cut_off_says_so_on_top(
     ticks = read(cut).ticks("master")
     assert 0 < ticks < 2000
     assert text.index("This recording was cut off before its end") < text.index("Verdict")
-    assert "rths recover cut.mcap makes a finished one of it" in text
+    assert "rths recover cut.mcap makes a finished recording of it" in text
     assert f"Of the 2000 ticks planned it holds {ticks} of the master" in text
     assert "The recording does not say how the test ended." in text
 
@@ -156,7 +156,7 @@ def test_a_damaged_recording_says_so_on_top(virtual_recording: Path, tmp_path: P
     assert run.damage
     text = check_alone(undrawn(run)).text
     assert text.index(f"This recording is damaged {run.damage}") < text.index("Verdict")
-    assert "rths recover damaged.mcap saves what is whole behind it" in text
+    assert "rths recover damaged.mcap saves the intact data behind it" in text
 
 
 def test_imported_data_with_few_signals(call: Any, capsys: Any, tmp_path: Path) -> None:

@@ -442,7 +442,7 @@ def test_noise_is_white_and_of_its_level_and_follows_the_seed() -> None:
         ({"effects": [effect("column.friction")]}, "needs the parameter force"),
         ({"effects": [{"name": "column.friction", "values": {}}]}, "Unknown key 'values'"),
         ({"effects": "column.friction"}, "list of tables"),
-        ({"actuator": {"time_constant": 0.0}}, "above 0 s"),
+        ({"actuator": {"time_constant": 0.0}}, "must be greater than 0 s"),
         ({"column": {"model": "bouc_wen"}}, "is linear"),
     ],
 )
