@@ -25,7 +25,7 @@ class LearnedEntry(NamedTuple):
     """A law of `models.preisach` that a machine of one laboratory follows beside its model."""
 
     role: str
-    machine: str  # `actuator`, `column`, `table` or `damper`: a part of `models.system.Effects` with the field `learned`
+    machine: str  # `actuator`, `column`, `table` or `damper`: part of `models.system.Effects` with a field `learned`
     law: tuple[float, ...]
 
 
