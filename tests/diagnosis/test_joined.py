@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from common.errors import InputError
-from common.recording.reader import read
+from diagnosis.diagnose import judged
 from diagnosis.findings.verdict import intervals
 from diagnosis.fits import fitting
+from diagnosis.fits.scales import Scales
 from diagnosis.recorded.joined import JoinedPart, joined, refuse_others
 from diagnosis.recorded.parts import Building
 from diagnosis.recorded.record import Record
 from models.system import System
-from rths.examine.diagnose import diagnose_slaves
 from tests.diagnosis.cases import Cases, lab_a, lab_b
 
 FRICTION = {"damper.friction": {"force": 3.0, "velocity": 1e-6}}
@@ -83,7 +83,8 @@ def test_a_second_recording_narrows_the_interval(cases: Cases) -> None:
 
 
 def test_a_cause_in_one_recording_only_explains_not_both(cases: Cases) -> None:
-    clean, stuck = cases.file(duration=4.0), cases.file(FRICTION, duration=4.0)
-    report = diagnose_slaves(read(stuck), more=[clean])[""].plain()
-    assert report["status"] != "explained"
-    assert any(clean.name in text for text in report["warnings"])
+    clean, stuck = cases.record(duration=4.0), cases.record(FRICTION, duration=4.0)
+    part = joined(lab_b(stuck), [lab_b(clean)], 4)
+    part.candidates = tuple(effect for effect in part.candidates if effect.name in FRICTION)
+    data = fitting.prepare(part, stuck)
+    assert judged(data, Scales(stuck)).outcome != "explained"
