@@ -7,11 +7,9 @@ real and in virtual time.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import chain
 from typing import Any
 
 from common.errors import InterlockError, LostError, RigError
-from common.host import lateness
 from common.lab.descent import Descent
 from common.lab.laboratory import Laboratory, Setting
 from common.lab.operation import obey
@@ -39,7 +37,6 @@ from common.rig import GuardedRig
 from common.roles import CLIENT, MASTER, RECORDER
 from common.safety.modes import Turn
 from common.safety.watchdog import WatchdogFinding
-from common.signals import alike
 from laboratories import kinds
 from laboratories.longest import resting
 from master.building import BuildingStep, Outputs
@@ -47,6 +44,7 @@ from master.handshake import MasterHandshake
 from master.limits import MasterLimits
 from master.own import OwnLaboratory
 from master.partner import Partner
+from master.partners import Partners
 
 
 class MasterLoop(RigLoop):
@@ -68,11 +66,8 @@ class MasterLoop(RigLoop):
         self._own = OwnLaboratory(plan)
         descent = Descent(lab, rig, self._own.ramp, self._own.zero, self._own.channels)
         super().__init__(lab, rig, descent, self._limits.standing)
-        channels = {role: kinds.kind_of(plan, role).channels for role in plan.roles}
-        self.partners = {role: Partner(role, self.lab, links[role], channels[role]) for role in plan.roles}
-        self._groups = [[self.partners[role] for role in roles] for roles in alike(channels).values()]
-        lab.endpoint.expect({role: len(one.names) for role, one in channels.items()})
-        self._partners = tuple(self.partners.values())
+        self._together = Partners(lab, links)
+        self.partners, self._partners = self._together.by_role, self._together.all
         self._building = building
         wall_ns = epoch_ns - setting.clock.now()
         self._handshake = MasterHandshake(self.lab, self._partners, rig, wall_ns, gate, building)
@@ -83,7 +78,6 @@ class MasterLoop(RigLoop):
         self._digest = plan.digest()
         # the rest of an interval after the share for which a slave waits
         self._wait_ns = round((1.0 - plan.link.wait_share) * self.lab.interval_ns)
-        self._late = lateness.LateTicks()
         self._others_rest = resting(plan)
         self.lab.enter(session)
         building.join(lab, self._partners)
@@ -151,7 +145,7 @@ class MasterLoop(RigLoop):
         late = after > 0 and wake >= lab.tick_ns(tick + 1)
         held = late and not lab.plan.makes_good
         forces = [partner.begin(tick, wake) for partner in self._partners]
-        self._tell_late(tick - 1)
+        self._together.tell_late(tick - 1)
         if self._alarmed(tick, after, late=late):
             self.ease(tick)
             return
@@ -207,12 +201,7 @@ class MasterLoop(RigLoop):
 
     def _finding(self, tick: int) -> tuple[WatchdogFinding, str]:
         """The worst finding of the watchdogs on the building and the slaves, and the name of the first that has it."""
-        worst, who = self._building.look(tick), CLIENT
-        for partner in self._partners:
-            found = partner.look(tick)
-            if found > worst:
-                worst, who = found, partner.title
-        return worst, who
+        return self._together.look(tick, self._building.look(tick), CLIENT)
 
     def _write(self, wanted: Any, outputs: Outputs, *, held: bool) -> None:
         """Write the tick's command to the rig, or the last one again if the tick is too late (`held`)."""
@@ -223,19 +212,6 @@ class MasterLoop(RigLoop):
         self._descent.wrote(self._command)
         self._rig.write(self._command)
         self._limits.written(self._command)
-
-    def _tell_late(self, tick: int) -> None:
-        """Warn if too many ticks up to this one, which has just been judged, were late with any slave.
-
-        A delay or loss by a link plug-in belongs to the simulated network, and does not count.
-        """
-        late = False
-        for partner in self._partners:  # a generator for `any` takes twice as long
-            late = late or partner.account.late_last
-        if tick >= 0 and (count := self._late.take(tick, late=late)):
-            self.lab.note(
-                "late", lateness.sentence(count), level="warning", tick=tick, values={"late": float(count)}
-            )
 
     def _begin(self, now: int) -> None:
         """The first tick."""
@@ -265,27 +241,15 @@ class MasterLoop(RigLoop):
             *before,
             *self._own.row(outputs, self._command, measured),
             *after,
-            *self._exchanged(tick),
+            *self._together.row(tick),
         )
         lab.outlet.add("master", log_ns, publish_ns, values)
 
-    def _exchanged(self, tick: int) -> list[float]:
-        """The values used and sent; slaves with the same channels share each signal, with a value for each slave."""
-        found: list[float] = []
-        for group in self._groups:
-            if len(group) == 1:
-                found += group[0].row(tick)
-            else:
-                found += chain.from_iterable(zip(*(partner.row(tick) for partner in group), strict=True))
-        return found
-
     def _watch(self, tick: int, now: int) -> None:
         """End the test if a slave or the recorder is silent for too long or cannot go on."""
-        for partner in self._partners:
-            if now - partner.heard_ns > self.lab.loss_ns:
-                self.lab.lost(f"The {partner.title}", self.lab.plan.link.loss_timeout, tick)
-                return
-        if self.lab.plan.recording.required:
+        if (partner := self._together.silent(now)) is not None:
+            self.lab.lost(f"The {partner.title}", self.lab.plan.link.loss_timeout, tick)
+        elif self.lab.plan.recording.required:
             self._watch_recorder(tick, now)
 
     def _watch_recorder(self, tick: int, now: int) -> None:
@@ -335,10 +299,7 @@ class MasterLoop(RigLoop):
         self.disarm_rig()
         self._building.leave()
         if self.ticks:
-            for partner in self._partners:
-                partner.account.finish(self.ticks - 1, self.lab.clock.now())
-                text, values = partner.exchanged()
-                self.lab.note("exchange", text, tick=self.ticks, values=values)
+            self._together.finish(self.ticks)
 
     @property
     def left(self) -> bool:
@@ -378,27 +339,8 @@ class MasterLoop(RigLoop):
 
     @property
     def progress(self) -> dict[str, float]:
-        """The figures of the progress report: a storey's drift (m), forces (N), round trip (s), missed deadlines.
-
-        For several slaves with the same channels it is the largest magnitude of force, and for all slaves the longest
-        round trip and the largest number of missed deadlines.
-        """
-        accounts = [partner.account for partner in self._partners]
-        forces = self._own.force(self._measured)
-        for group in self._groups:
-            name = group[0].channels.force
-            several = [partner.force for partner in group]
-            found = several[0] if len(several) == 1 else max(map(abs, several))
-            forces[f"{name}_used" if name in forces else name] = found
-        exchange = (
-            {
-                "round_trip": max(account.round_trip for account in accounts),
-                "missed": float(max(account.missed for account in accounts)),
-            }
-            if accounts
-            else {}
-        )
-        return {"drift": self._drift, **forces, **exchange}
+        """The figures of the progress report: a storey's drift (m) and those of all laboratories."""
+        return {"drift": self._drift} | self._together.progress(self._own.force(self._measured))
 
     # -- pacing -----------------------------------------------------------------------------------
 
@@ -416,10 +358,7 @@ class MasterLoop(RigLoop):
 
     def heard(self, tick: int) -> bool:
         """Whether every slave's feedback of the tick before has come."""
-        for partner in self._partners:  # noqa: SIM110 - a generator for `all` takes twice as long
-            if not partner.heard(tick - 1):
-                return False
-        return True
+        return self._together.heard(tick - 1)
 
     def finish(self) -> None:
         """All ticks are done."""
