@@ -292,8 +292,8 @@ class Bench:
             self.recorder = self.start("recorder", module=self._recorder)
             self.master = self.start("master")
             self.until(AT)
-        except BaseException:
-            self.__exit__(None, None, None)
+        except BaseException as error:
+            self.__exit__(type(error), error, None)
             raise
         return self
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from common.errors import EmergencyStopError
 from common.plan.plan import Plan
+from common.plan.read import from_tables
 from common.rig import ColumnMeasurement, TableMeasurement
 from laboratories.column.kind import COLUMN
 from laboratories.emulated import EmulatedLab
@@ -79,11 +80,16 @@ class Log:
         return Written(table["ns"], table["displacement"], table["force"])
 
 
+def ticking(interval: float) -> Plan:
+    """The default plan, whose laboratories advance by this interval (s) with each command."""
+    return from_tables({"test": {"interval": interval}}, Path())
+
+
 class Column(EmulatedLab):
     """Laboratory A with a log."""
 
     def __init__(self, interval: float, seed: int, log: str) -> None:
-        super().__init__(COLUMN, System(Plan()), seed)
+        super().__init__(COLUMN, System(ticking(interval)), seed)
         self._log = Log(Path(log))
 
     def read(self) -> ColumnMeasurement:
@@ -105,7 +111,7 @@ class Table(EmulatedLab):
     """Laboratory B with a log."""
 
     def __init__(self, interval: float, seed: int, log: str) -> None:
-        super().__init__(TABLE, System(Plan()), seed)
+        super().__init__(TABLE, System(ticking(interval)), seed)
         self._log = Log(Path(log))
 
     def read(self) -> TableMeasurement:
