@@ -153,6 +153,7 @@ class GuardedRig:
         self._at_rest = at_rest
         self._twin = twin
         self._rig = rig
+        self._remote = rig if isinstance(rig, UdpRig) else None
         self._hidden = hidden
         self._name = name
         self._measurement = measurement
@@ -178,7 +179,7 @@ class GuardedRig:
     @property
     def missed(self) -> int:
         """Intervals in a row in which a rig in another process has not answered in time; 0 of any other rig."""
-        return self._rig.missed if isinstance(self._rig, UdpRig) else 0
+        return 0 if self._remote is None else self._remote.missed
 
     @property
     def exchanged(self) -> Account | None:
@@ -208,6 +209,22 @@ class GuardedRig:
 
     def read(self) -> Any:
         """The measurements as the NamedTuple; raises RigError where they are no finite numbers of the right count."""
+        numbers: Any
+        if self._twin is None:
+            numbers = self._numbers()
+        else:
+            try:
+                numbers = self._rig.read()  # an emulated rig gives a tuple of floats
+            except ANYTHING as error:  # the user gets a sentence
+                raise self._failure("read", error) from error
+        if len(numbers) != self._count:
+            raise RigError(self._complaint(numbers))
+        if not math.isfinite(sum(numbers)):
+            raise RigError(f"{self._name}: read() returned {numbers}, which is not finite.")
+        return self._reading(numbers)
+
+    def _numbers(self) -> tuple[float, ...]:
+        """What the rig reads, as numbers; raises RigError where it fails or returns anything else."""
         begun = 0
         if self._time is not None:
             self._time.tick()
@@ -221,14 +238,9 @@ class GuardedRig:
         if self._time is not None:
             self._time.took("read", self._now() - begun)
         try:
-            numbers = tuple(map(float, values))
+            return tuple(map(float, values))
         except (TypeError, ValueError, OverflowError):
             raise RigError(self._complaint(values)) from None
-        if len(numbers) != self._count:
-            raise RigError(self._complaint(values))
-        if not math.isfinite(sum(numbers)):
-            raise RigError(f"{self._name}: read() returned {numbers}, which is not finite.")
-        return self._reading(numbers)
 
     def write(self, command: Any) -> None:
         """Apply a command; raises RigError where the rig fails."""

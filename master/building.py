@@ -7,7 +7,7 @@ from typing import NamedTuple, Protocol
 
 from common.lab.laboratory import Laboratory
 from common.protocol.messages import Feedback
-from common.safety.watchdog import WatchdogFinding
+from common.safety.watchdog import FINE, WatchdogFinding
 from common.signals import OF_STOREYS
 
 Sent = tuple[float, ...]  # target m, motor force N, and the rates of the target m/s, m/s², m/s³
@@ -24,11 +24,11 @@ class Outputs(NamedTuple):
     command: float  # of its transfer system, m
     effort: float  # of its motor, N
     sent: Sequence[Sent]  # to each slave, in the plan's order
-    storeys: list[float]  # signal by signal (`common.signals.OF_STOREYS`) the values of all storeys
+    storeys: Sequence[float]  # signal by signal (`common.signals.OF_STOREYS`) the values of all storeys
     held: bool = False  # whether every laboratory keeps its present command
 
     @property
-    def of_storeys(self) -> dict[str, list[float]]:
+    def of_storeys(self) -> dict[str, Sequence[float]]:
         """The values of every storey by signal."""
         n = len(self.storeys) // len(OF_STOREYS)
         return {name: self.storeys[place * n : (place + 1) * n] for place, name in enumerate(OF_STOREYS)}
@@ -73,7 +73,7 @@ class BuildingStep:
 
     def look(self, tick: int) -> WatchdogFinding:
         """The watchdog's finding on the building, at a tick that is not late."""
-        return WatchdogFinding.FINE
+        return FINE
 
     def recorded(self, outputs: Outputs) -> tuple[Sequence[float], Sequence[float]]:
         """Its values in a row of the recording: those before and those after the values of the master's laboratory."""

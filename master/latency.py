@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
 
 from common.host.clock_offset import ClockOffset
 from common.lab.laboratory import Laboratory
@@ -20,22 +19,38 @@ from common.protocol.messages import Feedback
 
 NAN = math.nan
 
+Answered = tuple[float, float, float, float, float, float, int, int, int, int]
 
-@dataclass(slots=True)
+
 class LatencyRow:
     """The master's stamps of a tick; `sent_ns` is 0 if no command was sent, `used_ns` is 0 until the next tick."""
 
-    tick: int
-    wake_ns: int
-    ready_ns: int  # when the command's values were computed
-    sent_ns: int  # when its frame was handed to the link
-    age: float  # s, of the feedback that the tick used
-    used_ns: int = 0
-    missed: bool = False
-    feedback: Feedback | None = None
-    received_ns: int = 0
-    decoded_ns: int = 0  # when the feedback was decoded
-    extra: float = 0.0  # s, delay of the feedback by a link plug-in
+    __slots__ = (
+        "age",
+        "decoded_ns",
+        "extra",
+        "feedback",
+        "missed",
+        "ready_ns",
+        "received_ns",
+        "sent_ns",
+        "tick",
+        "used_ns",
+        "wake_ns",
+    )
+
+    def __init__(self, tick: int, wake_ns: int, ready_ns: int, sent_ns: int, age: float) -> None:
+        self.tick = tick
+        self.wake_ns = wake_ns
+        self.ready_ns = ready_ns  # when the command's values were computed
+        self.sent_ns = sent_ns  # when its frame was handed to the link
+        self.age = age  # s, of the feedback that the tick used
+        self.used_ns = 0
+        self.missed = False
+        self.feedback: Feedback | None = None
+        self.received_ns = 0
+        self.decoded_ns = 0  # when the feedback was decoded
+        self.extra = 0.0  # s, delay of the feedback by a link plug-in
 
 
 class LatencyAccount:
@@ -67,10 +82,11 @@ class LatencyAccount:
     def answer(self, feedback: Feedback, received_ns: int, decoded_ns: int, extra: float | None) -> None:
         """Take a feedback, which a link plug-in delays by `extra` (s), or loses where it is None."""
         self._compare_clocks(feedback, received_ns)
-        self._named = max(self._named, feedback.command_seq)
-        if feedback.heard_seq >= feedback.seq > self._prompt:
-            self._prompt = feedback.seq
-        row = self._rows.get(feedback.command_seq)
+        named, seq = feedback.command_seq, feedback.seq
+        self._named = named if named > self._named else self._named
+        if feedback.heard_seq >= seq > self._prompt:
+            self._prompt = seq
+        row = self._rows.get(named)
         if row is None or not feedback.command_received_ns or extra is None:
             return
         row.feedback, row.extra = feedback, extra
@@ -81,9 +97,10 @@ class LatencyAccount:
 
     def _compare_clocks(self, feedback: Feedback, received_ns: int) -> None:
         """Add an exchange of stamps for the command that the slave has received last."""
-        while self._on_the_way and self._on_the_way[0][0] <= feedback.heard_seq:
-            tick, sent_ns = self._on_the_way.popleft()
-            if tick == feedback.heard_seq:
+        on_the_way, heard = self._on_the_way, feedback.heard_seq
+        while on_the_way and on_the_way[0][0] <= heard:
+            tick, sent_ns = on_the_way.popleft()
+            if tick == heard:
                 self._offset.add(sent_ns, feedback.heard_ns, feedback.sent_ns, received_ns)
 
     def close(self, tick: int, used_ns: int) -> None:
@@ -91,10 +108,10 @@ class LatencyAccount:
         row = self._rows.get(tick)
         if row is not None and not row.used_ns:
             row.used_ns = used_ns
-            late = row.wake_ns >= self._lab.tick_ns(tick + 1)
-            row.missed = late or row.sent_ns == 0 or not self._in_time(row)
+            late = row.sent_ns == 0 or row.wake_ns >= self._lab.tick_ns(tick + 1)
+            row.missed = late or not self._in_time(row)
             self.missed += row.missed
-            self.late_last = late or row.sent_ns == 0 or self._prompt < tick
+            self.late_last = late or self._prompt < tick
         self._write(used_ns, everything=False)
 
     def finish(self, tick: int, used_ns: int) -> None:
@@ -110,66 +127,72 @@ class LatencyAccount:
 
     def _write(self, now: int, *, everything: bool) -> None:
         """Write the rows of past ticks in order, up to the first row that a later feedback may still complete."""
-        while self._rows:
-            row = next(iter(self._rows.values()))
-            known = row.feedback is not None or row.sent_ns == 0 or row.tick < self._named
+        rows = self._rows
+        for tick in tuple(rows):
+            row = rows[tick]
+            known = row.feedback is not None or row.sent_ns == 0 or tick < self._named
             if not row.used_ns or not (known or everything):
                 return
-            del self._rows[row.tick]
+            del rows[tick]
             if self._lab.recorded:
                 self._record(row, now)
 
     def _record(self, row: LatencyRow, now: int) -> None:
-        lab, sent = self._lab, row.sent_ns != 0
-        at, offset = lab.tick_ns(row.tick), self._offset.at(row.wake_ns)
-        answered, stamps = segments(row, offset) if row.feedback is not None else UNANSWERED
-        there, in_slave, computing, back, round_trip, decoding = answered
+        lab, tick, wake, ready, sent = self._lab, row.tick, row.wake_ns, row.ready_ns, row.sent_ns
+        at, offset = lab.tick_ns(tick), self._offset.at(wake)
+        there, in_slave, computing, back, round_trip, decoding, received, started, replied, returned = (
+            UNANSWERED if row.feedback is None else answered(row, row.feedback, offset)
+        )
         values = (
-            row.tick,
-            (row.wake_ns - at) * 1e-9,
-            (row.ready_ns - row.wake_ns) * 1e-9 if sent else NAN,
+            tick,
+            (wake - at) * 1e-9,
+            (ready - wake) * 1e-9 if sent else NAN,
             there,
             in_slave,
             back,
             round_trip,
             offset * 1e-9,
-            self._offset.bound_at(row.wake_ns) * 1e-9,
+            self._offset.bound_at(wake) * 1e-9,
             row.missed,
-            (row.sent_ns - row.ready_ns) * 1e-9 if sent else NAN,
+            (sent - ready) * 1e-9 if sent else NAN,
             computing,
             decoding,
             row.age,
             at,
-            row.wake_ns,
-            row.sent_ns,
-            *stamps,
+            wake,
+            sent,
+            received,
+            started,
+            replied,
+            returned,
             row.used_ns,
         )
-        log_ns = lab.unix_ns(row.tick)
+        log_ns = lab.unix_ns(tick)
         lab.outlet.add(self._topic, log_ns, lab.epoch_ns + now - lab.start_ns, values)
 
 
-# six segments (s) and four stamps (ns) of a tick that no feedback answers, in the order of `segments`
-UNANSWERED = ((NAN,) * 6, (0,) * 4)
+# six segments (s) and four stamps (ns) of a tick that no feedback answers, in the order of `answered`
+UNANSWERED: Answered = (NAN, NAN, NAN, NAN, NAN, NAN, 0, 0, 0, 0)
 
 
-def segments(row: LatencyRow, offset: int) -> tuple[tuple[float, ...], tuple[int, ...]]:
-    """The segments (s) of an answered tick, and its stamps (ns) as they were read.
+def answered(row: LatencyRow, feedback: Feedback, offset: int) -> Answered:
+    """The segments (s) of a tick that a feedback answers, and its stamps (ns) as they were read.
 
     The segments are command one way, time in the slave, computation in it, feedback one way, round trip, decoding. The
     stamps are command received, slave started, feedback sent, received. `offset` (ns) is slave clock minus master
     clock.
     """
-    feedback = row.feedback
-    assert feedback is not None  # noqa: S101 - the caller has checked it
-    received, started, sent = feedback.command_received_ns, feedback.started_ns, feedback.sent_ns
-    back = row.received_ns
-    found = (
-        (received - offset - row.sent_ns) * 1e-9,
-        (sent - received) * 1e-9,
-        (sent - started) * 1e-9,
-        (back - sent + offset) * 1e-9,
-        (back - row.sent_ns) * 1e-9,
-        (row.decoded_ns - back) * 1e-9,
+    received, started, replied = feedback.command_received_ns, feedback.started_ns, feedback.sent_ns
+    sent, returned = row.sent_ns, row.received_ns
+    return (
+        (received - offset - sent) * 1e-9,
+        (replied - received) * 1e-9,
+        (replied - started) * 1e-9,
+        (returned - replied + offset) * 1e-9,
+        (returned - sent) * 1e-9,
+        (row.decoded_ns - returned) * 1e-9,
+        received,
+        started,
+        replied,
+        returned,
     )
-    return found, (received, started, sent, back)

@@ -35,7 +35,7 @@ class MasterLimits:
         self, measured: tuple[float, ...], wanted: tuple[float, ...], outputs: Outputs
     ) -> LimitViolation | Standstill | None:
         """The first value beyond its limit, None where there is none; `wanted` is the command for its own rig."""
-        sent = chain.from_iterable(outputs.sent)
+        sent = outputs.sent[0] if len(outputs.sent) == 1 else chain.from_iterable(outputs.sent)
         beyond = self._tick.violation(outputs.target, *measured, *wanted, *sent, *outputs.storeys)
         energy = self._energy.violation(measured, outputs) if self._energy else None
         return beyond or energy

@@ -46,6 +46,8 @@ from master.own import OwnLaboratory
 from master.partner import Partner
 from master.partners import Partners
 
+SCHEDULED = State.SCHEDULED  # compared in every tick: an attribute of an enumeration takes 60 ns
+
 
 class MasterLoop(RigLoop):
     """The master in a test; `links` are the plug-ins that delay the messages of each slave, by role."""
@@ -139,7 +141,7 @@ class MasterLoop(RigLoop):
         lab = self.lab
         wake = lab.clock.now()
         lab.tick = tick
-        if lab.exchange.state is State.SCHEDULED:
+        if lab.exchange.state is SCHEDULED:
             self._begin(wake)
         after = wake - lab.tick_ns(tick)
         late = after > 0 and wake >= lab.tick_ns(tick + 1)
@@ -348,9 +350,10 @@ class MasterLoop(RigLoop):
         """When a tick begins if nothing is late, ns."""
         return self.lab.tick_ns(tick)
 
-    def earliest(self, tick: int) -> int:
-        """A tick begins at its nominal time, ns."""
-        return self.lab.tick_ns(tick)
+    def begins(self, tick: int) -> tuple[int, int]:
+        """A tick begins at its nominal time, ns, and never earlier."""
+        nominal = self.lab.tick_ns(tick)
+        return nominal, nominal
 
     def latest(self, tick: int) -> int:
         """Until when a tick waits for the feedbacks of the tick before, ns: shortly after its nominal time."""

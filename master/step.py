@@ -33,10 +33,9 @@ class MasterStep(BuildingStep):
         for place, used in enumerate(forces):
             self._forces[place] = used
         self._advance(tick, position, force)
-        row = self._output.tolist()
-        sent = [tuple(row[place]) for place in self._sent]
-        ground, target, command, effort = row[: substructure.OF_SLAVES]
-        return computed((ground, target, command, effort, sent, row[self._end :], False))
+        row = tuple(self._output.tolist())
+        sent = [row[place] for place in self._sent]
+        return computed((*row[: substructure.OF_SLAVES], sent, row[self._end :], False))
 
     def recorded(self, outputs: Outputs) -> tuple[Sequence[float], Sequence[float]]:
         """The ground and the storeys' motion, and their numerical forces."""

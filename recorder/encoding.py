@@ -7,12 +7,12 @@ virtual time has some forty thousand messages per second. In proto3 a field that
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from operator import ne
+from operator import itemgetter, ne
 
 import numpy as np
 import numpy.typing as npt
 
-from common.recording.chunks import Block
+from common.recording.chunks import Block, Entries
 from common.recording.rows import STAMPS, Item, is_plain, layouts
 from common.signals import FieldType, Signal
 from models.compiled import jit_apart
@@ -27,6 +27,7 @@ LONGEST = 12  # largest number of bytes of a field without its numbers: a tag of
 MOST = 10  # largest number of bytes of a number: that of a negative one
 VARINT, DOUBLE, PACKED = 0, 1, 2  # how a field's value is stored: the low three bits of its tag
 END, OF_DOUBLE, OF_COUNT, OF_INDEX, OF_STAMP, OF_FLAG = range(6)
+FIRST = itemgetter(0)  # place of a channel's first message, by which the channels of a block are ordered
 KIND, COUNT = range(2)  # columns of a table of fields
 
 KINDS: Mapping[FieldType, int] = {
@@ -83,20 +84,26 @@ class RowEncoder:
     def _room(self, rows: int) -> None:
         self._entries = np.zeros((rows, 2), dtype=np.int64)
         self._records = np.zeros(rows * self._most, dtype=np.uint8)
-        self._size = np.zeros(1, dtype=np.int64)
+        self._ends = np.zeros(len(self._channels) + 3, dtype=np.int64)
 
     def encode(self, items: Sequence[Item]) -> Block:
         """The encoded messages of items, whose topics must be plain."""
         if len(items) > len(self._entries):
             self._room(2 * len(items))
         rows, places = self._table.gathered(*zip(*items, strict=True))
-        pack(rows, places, self._table.fields, self._numbers, self._records, self._entries, self._size)
-        channels = self._channels
-        return Block(
-            self._records[: self._size[0]].data,
-            [channels[place] for place in places.tolist()],
-            self._entries[: len(items)].tolist(),
-        )
+        pack(rows, places, self._table.fields, self._numbers, self._records, self._entries, self._ends)
+        *ends, first, last, size = self._ends.tolist()
+        return Block(self._records[:size].data, self._dealt(ends), first, last)
+
+    def _dealt(self, ends: Sequence[int]) -> dict[int, Entries]:
+        """The entries of each channel, which stand topic by topic; the channel of the first message comes first."""
+        begins = [0, *ends[:-1]]
+        found = [
+            (self._entries.item(begin, 1), channel, self._entries[begin:end])
+            for channel, begin, end in zip(self._channels, begins, ends, strict=True)
+            if end > begin
+        ]
+        return {channel: entries for _, channel, entries in sorted(found, key=FIRST)}
 
 
 @jit_apart
@@ -215,13 +222,21 @@ def pack(
     channels: Numbers,
     out: ByteArray,
     entries: Numbers,
-    size: Numbers,
+    ends: Numbers,
 ) -> None:
-    """Write MCAP records of rows into `out`, their log times and offsets into `entries`, the total into `size`."""
+    """Write MCAP records of rows into `out`, their log times and offsets topic by topic into `entries`.
+
+    `ends` receives the end of each topic's entries and, at its own end, earliest and latest log time, and the number of
+    bytes in `out`.
+    """
+    divide(topics, ends)
     begin = at = 0
+    first = last = whole(rows, 0, 8)
     for row in range(topics.shape[0]):
-        topic, start = topics[row], at
-        entries[row, 0], entries[row, 1] = whole(rows, begin, 8), start
+        topic, start, time = topics[row], at, whole(rows, begin, 8)
+        entries[ends[topic], 0], entries[ends[topic], 1] = time, start
+        ends[topic] += 1
+        first, last = min(first, time), max(last, time)
         copied(rows, begin, out, start + HEAD - STAMPS, STAMPS)
         copied(rows, begin + STAMPS, out, start + PREFIX + 2, 4)  # the sequence is the tick
         begin, at = put_fields(rows, begin + STAMPS, fields[topic], out, start + HEAD)
@@ -229,7 +244,17 @@ def pack(
         for place in range(8):
             out[start + 1 + place] = ((at - start - PREFIX) >> (8 * place)) & 255
         out[start + PREFIX], out[start + PREFIX + 1] = channels[topic] & 255, channels[topic] >> 8
-    size[0] = at
+    ends[-3], ends[-2], ends[-1] = first, last, at
+
+
+@jit_apart
+def divide(topics: ByteArray, ends: Numbers) -> None:
+    """Write into `ends` where the entries of each topic begin; `pack` moves each of them on to its end."""
+    ends[:] = 0
+    for row in range(topics.shape[0]):
+        ends[topics[row] + 1] += 1
+    for topic in range(1, ends.shape[0]):
+        ends[topic] += ends[topic - 1]
 
 
 @jit_apart

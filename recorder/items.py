@@ -17,6 +17,7 @@ from recorder.encoding import RowTable
 
 Check = Callable[[Any], bool]
 
+TUPLES, TEXTS, BYTES, PAIRS = {tuple}, {str}, {bytes}, {2}  # types of items and their parts; parts of an item
 STAMPS = range(2**63)  # log and publish time, ns
 INTEGERS = {
     FieldType.COUNT: range(2**32),
@@ -80,12 +81,12 @@ class Items:
 
 def columns(found: Any) -> tuple[tuple[str, ...], tuple[bytes, ...]] | None:
     """The topics and the rows of a tuple of at most `PIECE` items; None where a value is anything else."""
-    if type(found) is not tuple or not 0 < len(found) <= PIECE or set(map(type, found)) != {tuple}:
+    if type(found) is not tuple or not 0 < len(found) <= PIECE or {*map(type, found)} != TUPLES:
         return None
-    if set(map(len, found)) != {2}:
+    if {*map(len, found)} != PAIRS:
         return None
     topics, rows = zip(*found, strict=True)
-    return (topics, rows) if set(map(type, topics)) == {str} and set(map(type, rows)) == {bytes} else None
+    return (topics, rows) if {*map(type, topics)} == TEXTS and {*map(type, rows)} == BYTES else None
 
 
 def checks(rows: tuple[Signal, ...], plan: Plan) -> list[Check]:

@@ -72,18 +72,20 @@ class FileSink:
         if self.failure:
             self.dropped += len(items)
             return
-        at_once, plain, numbers = False, self._encoder.sizes, self._numbers
+        at_once, sizes, numbers, held = False, self._encoder.sizes, self._numbers, self._held
         for item in items:
             topic, row = item
-            if topic in plain:
+            if topic in sizes:
                 numbers.append(item)
-                self._held += len(row)
+                held += sizes[topic]
                 continue
             at_once = at_once or topic == AT_ONCE
             self._encode()
+            held = 0
             log_ns, publish_ns, *values = values_of(row)
             self._recording.add(topic, log_ns, publish_ns, values)
-        if self._held >= BLOCK_BYTES:
+        self._held = held
+        if held >= BLOCK_BYTES:
             self._encode()
         self.keep_up(at_once=at_once)
 

@@ -88,8 +88,8 @@ class World:
         Nearly all events are turns of processes. If the next event is one, this switches to that process directly;
         the scheduler's greenlet does all other events.
         """
-        heap = self.heap
-        while self._pause is None and heap[0][2] is take_turn and heap[0][0] <= self.limit:
+        heap, limit = self.heap, self.limit
+        while self._pause is None and heap[0][2] is take_turn and heap[0][0] <= limit:
             self.time, _, _, (other, token) = heappop(heap)
             if other.may_go_on(token):
                 if other is not process:
@@ -115,6 +115,7 @@ class Process:
         self._listening = False
         self._token = 0  # number of the latest wait; turns of earlier waits are ignored
         self._thread: greenlet.greenlet | None = None
+        self.go_on: Callable[[], object]  # switches to its greenlet; given by `start`
         self._woken: list[Callable[[], None]] = []
 
     # -- clock ------------------------------------------------------------------------------------
@@ -137,8 +138,6 @@ class Process:
 
     def reached(self, local: int) -> int:
         """World time at which its clock shows a time, ns."""
-        if not self._ppb:
-            return local - self._offset
         time = (local - self._offset) * PPB // (PPB + self._ppb)
         while self.local(time) < local:
             time += 1
@@ -146,7 +145,7 @@ class Process:
 
     def sleep_until(self, deadline: int) -> None:
         """Sleep until its own clock shows `deadline`, ns; returns at once if that has passed."""
-        until = self.reached(deadline)
+        until = self.reached(deadline) if self._ppb else deadline - self._offset
         if self.ahead or until > self.world.time:
             self._wait(until)
 
@@ -163,6 +162,7 @@ class Process:
             self._end()
 
         self._thread = greenlet.greenlet(guarded)
+        self.go_on = self._thread.switch
         self._token += 1
         self.world.alive += 1
         self.world.at(at, take_turn, self, self._token)
@@ -199,8 +199,8 @@ class Process:
         if until <= world.limit and (not heap or heap[0][0] > until):
             world.time = until  # there is no earlier event, so that no switch is necessary
             return
-        self._token += 1
-        heappush(heap, (until, world.next_order(), take_turn, (self, self._token)))  # as `at` does
+        token = self._token = self._token + 1
+        heappush(heap, (until, world.next_order(), take_turn, (self, token)))  # as `at` does
         world.switch_from(self)
 
     def wake(self) -> None:
@@ -218,11 +218,6 @@ class Process:
             return False
         self._token += 1
         return True
-
-    def go_on(self) -> None:
-        """Switch to its greenlet."""
-        assert self._thread is not None  # noqa: S101 - it was started
-        self._thread.switch()
 
     # -- actions on the process -------------------------------------------------------------------
 

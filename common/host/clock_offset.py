@@ -85,16 +85,16 @@ class ClockOffset:
         """Other clock minus own clock at a time of the own clock, ns."""
         if self._origin is None:
             return 0
-        if now_ns != self._asked:  # a loop asks several times for the same moment
-            self._asked, self._value = now_ns, self._at(now_ns, *self._origin)
-        return self._value
-
-    def _at(self, now_ns: int, start: int, first: int) -> int:
+        if now_ns == self._asked:  # a loop asks several times for the same moment
+            return self._value
+        start, first = self._origin
         now = now_ns - start
         value = self._level + self._slope * (now - self._centre)
         wander = MAX_DRIFT * abs(now - self._seen)
         low, high = self._low - wander, self._high + wander
-        return first + round(low if value < low else high if value > high else value)
+        found = first + round(low if value < low else high if value > high else value)
+        self._asked, self._value = now_ns, found
+        return found
 
     def bound_at(self, now_ns: int) -> int:
         """Largest possible error of `at`, ns; grows by `MAX_DRIFT` and the slope until the next minimum is seen.
@@ -107,7 +107,8 @@ class ClockOffset:
         start, first = self._origin
         wander = MAX_DRIFT * abs(now_ns - start - self._seen)
         value = self.at(now_ns) - first
-        return math.ceil(max(self._high - value, value - self._low) + wander)
+        above, below = self._high - value, value - self._low
+        return math.ceil((above if above > below else below) + wander)
 
     def add(self, t1: int, t2: int, t3: int, t4: int) -> None:
         """Take in one exchange; stamps in ns. An exchange received before it was sent is ignored."""
@@ -117,28 +118,27 @@ class ClockOffset:
         self._newest, self._asked = t4, None
         if trip <= self._shortest:  # of equal ones the newest
             self._shortest = trip
-            self._keep(t1, t2, t3, t4)
+            self._keep(t1, t4, trip, t2 - t1 + t3 - t4)
         self._in_block += 1
         if self._in_block >= self._length:
             self._minima.append(Minimum(*self._best))
             self._shortest, self._in_block = math.inf, 0
             self._fit()
 
-    def _keep(self, t1: int, t2: int, t3: int, t4: int) -> None:
-        """Take an exchange as the best one of its block so far."""
+    def _keep(self, t1: int, t4: int, trip: int, twice: int) -> None:
+        """Take an exchange as the best one of its block so far; `twice` is double its offset, ns.
+
+        The interval, widened to hold at the time of the exchange, is intersected with that of the exchange.
+        """
         if self._origin is None:
-            self._origin = ((t1 + t4) // 2, (t2 - t1 + t3 - t4) // 2)
+            self._origin = ((t1 + t4) // 2, twice // 2)
         start, first = self._origin
-        trip = (t4 - t1) - (t3 - t2)
-        reach = max(trip + MAX_DRIFT * (t4 - t1), 0.0) / 2 + RESOLUTION
-        time, offset = (t1 + t4 - 2 * start) / 2, (t2 - t1 + t3 - t4 - 2 * first) / 2
+        error = trip + MAX_DRIFT * (t4 - t1)
+        reach = error / 2 + RESOLUTION if error > 0.0 else RESOLUTION
+        time, offset = (t1 + t4 - 2 * start) / 2, (twice - 2 * first) / 2
         self._best = time, offset, reach
-        self._narrow(time, offset, reach)
         if not self._minima:
             self._centre, self._level = time, offset
-
-    def _narrow(self, time: float, offset: float, reach: float) -> None:
-        """Intersect the interval, widened to hold at `time`, with that of an exchange."""
         wander = MAX_DRIFT * abs(time - self._seen)
         low, high = offset - reach, offset + reach
         oldest, latest = self._low - wander, self._high + wander

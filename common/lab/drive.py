@@ -40,8 +40,8 @@ class DrivenLoop(Protocol):
     def poll(self) -> None:
         """Take the next step of the handshake."""
 
-    def earliest(self, tick: int) -> int:
-        """When a tick may begin, ns."""
+    def begins(self, tick: int) -> tuple[int, int]:
+        """When a tick may begin at the earliest, and when it begins if nothing is late, ns."""
 
     def latest(self, tick: int) -> int:
         """When a tick begins even if its message has not come, ns."""
@@ -197,8 +197,9 @@ def wait(loop: DrivenLoop, tick: int) -> None:
     A laboratory that was held up reports its own overrun before it reads how the others have reacted to it.
     """
     lab, clock = loop.lab, loop.lab.clock
-    clock.sleep_until(loop.earliest(tick))
-    late = clock.now() - loop.nominal(tick)
+    earliest, nominal = loop.begins(tick)
+    clock.sleep_until(earliest)
+    late = clock.now() - nominal
     if late > 0 and lab.running and tick < lab.plan.ticks and lab.overrun(late, tick):
         return
     take_all(loop)

@@ -292,8 +292,9 @@ class Laboratory:
 
     def send_samples(self, *, everything: bool = False) -> None:
         """Send the full pieces of the stream to the recorder, or `everything`."""
-        for piece in self.outlet.pieces(everything=everything):
-            self.endpoint.send(piece)
+        if everything or self.outlet.due:
+            for piece in self.outlet.pieces(everything=everything):
+                self.endpoint.send(piece)
 
     @property
     def recorded(self) -> bool:

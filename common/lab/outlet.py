@@ -15,7 +15,7 @@ import msgpack
 
 from common.plan.plan import Plan
 from common.protocol.messages import Finished, Message, Resend, Samples
-from common.recording.rows import Item, RowPacker
+from common.recording.rows import Item, RowPacker, other
 from common.roles import MASTER
 
 PIECE = 16  # items: at 500 ticks per second a piece leaves every 16 to 32 ms, so the file has it within 0.1 s
@@ -32,6 +32,7 @@ EARLY = (
     4_000  # pieces that wait for a missing one: at 16 items each more than the minute that the sender keeps
 )
 EARLY_BYTES = 32 << 20  # of them, half of what the sender keeps; what does not fit is asked for again
+PACKER = msgpack.Packer()  # kept, because `msgpack.packb` allocates a buffer of a megabyte at every call
 BURST = 5  # pieces sent again at one request: they leave between ticks, and each takes some 50 µs
 
 
@@ -56,30 +57,33 @@ class Outlet:
         self._session = session
         self._lab = lab
         self._kept = kept
-        self._item = rows.item
+        self._rows = rows.rows
         self._pending: list[Item] = []
         self._sent: deque[Samples] = deque()  # consecutive: each begins where the one before ends
         self._sent_bytes = 0
         self._hurry = False
         self.total = 0
+        self.due = False  # whether a message is to be sent now
 
     def add(self, topic: str, log_ns: int, publish_ns: int, values: tuple[Any, ...]) -> None:
         """Queue one item."""
-        self._pending.append(self._item(topic, log_ns, publish_ns, values))
-        if topic == AT_ONCE:
-            self._hurry = True
+        pending, row = self._pending, self._rows.get(topic)
+        if row is None:
+            pending.append(other(topic, log_ns, publish_ns, values))
+            self._hurry = self._hurry or topic == AT_ONCE
+        else:
+            pending.append((topic, row(log_ns, publish_ns, *values)))
+        self.due = self._hurry or len(pending) >= PIECE
         self.total += 1
 
     def pieces(self, *, everything: bool = False) -> list[Message]:
         """The messages to send now: full pieces, or `everything` that waits, as is done for an event."""
         messages: list[Message] = []
-        if len(self._pending) < PIECE and not everything and not self._hurry:
-            return messages
-        everything, self._hurry = everything or self._hurry, False
+        everything, self._hurry, self.due = everything or self._hurry, False, False
         while len(self._pending) >= PIECE or (everything and self._pending):
             items, self._pending = self._pending[:PIECE], self._pending[PIECE:]
             first = self.total - len(self._pending) - len(items)
-            piece = Samples(self._session, self._lab, first, msgpack.packb(items))
+            piece = Samples(self._session, self._lab, first, PACKER.pack(items))
             self._keep(piece)
             messages.append(piece)
         return messages

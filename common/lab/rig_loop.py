@@ -18,6 +18,9 @@ from common.safety.watchdog import WatchdogFinding
 # as often: the default `loss_timeout` of 1 s then has twenty of them.
 SAY_NS = REPEAT_NS // 2
 
+# names of their own for what every tick compares: an attribute of an enumeration takes 60 ns
+RAMP, HOLD, HOLDING = WatchdogFinding.RAMP, WatchdogFinding.HOLD, Mode.HOLDING
+
 
 class RigLoop:
     """A loop around one rig; the subclass defines a tick and the messages about the test's end.
@@ -34,6 +37,7 @@ class RigLoop:
         lab.watch(rig)
         self._descent = descent
         self._standing = standing
+        self._most_missed = lab.plan.safety.hold_after
         self._disarmed = False
         self._said_ns = -REPEAT_NS
 
@@ -68,12 +72,12 @@ class RigLoop:
         if late:  # the messages may have come while this loop was held up
             return False
         finding, who = self._finding(tick)
-        if finding is WatchdogFinding.RAMP:
+        if finding is RAMP:
             lab.silent(who, tick)
             return True
-        if finding is WatchdogFinding.HOLD or self._rig.missed >= lab.plan.safety.hold_after:
+        if finding is HOLD or self._rig.missed >= self._most_missed:
             lab.safety.follow(Turn.HOLD)
-        elif lab.safety.mode is Mode.HOLDING:
+        elif lab.safety.mode is HOLDING:
             lab.safety.take(Turn.RESUME)
         return False
 

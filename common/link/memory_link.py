@@ -58,8 +58,9 @@ class MemoryEndpoint:
         hearers = self._hearers.get(route)
         if hearers is None:
             hearers = self._hearers[route] = self._hub.hearers(self._role, *route)
+        role = self._role
         for hearer in hearers:
-            hearer.arrive(message, self._role)
+            hearer.arrive(message, role)
         return self.clock.now()
 
     def arrive(self, message: Message, role: str) -> None:
@@ -70,9 +71,10 @@ class MemoryEndpoint:
 
     def receive(self, timeout: float = 0.0) -> Received | None:
         """The next message, waiting at most `timeout` s for it; None where there is none."""
-        if not self._queue and timeout > 0.0:
+        queue = self._queue
+        if not queue and timeout > 0.0:
             self.clock.listen(round(timeout * 1e9))
-        return self._queue.popleft() if self._queue else None
+        return queue.popleft() if queue else None
 
     def news(self, now_ns: int) -> dict[str, Any] | None:
         """None: without frames none is rejected."""

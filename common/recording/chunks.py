@@ -5,9 +5,10 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable
 from functools import partial
-from itertools import chain
 from typing import NamedTuple
 
+import numpy as np
+import numpy.typing as npt
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import Message, MessageIndex, Statistics
@@ -18,25 +19,32 @@ BUILDER, STATISTICS = "_Writer__chunk_builder", "_Writer__statistics"
 MESSAGE = struct.Struct("<BQHIQQ")  # opcode, length of the record, channel, sequence, log and publish time
 INDEX = struct.Struct("<BQHI")  # opcode, length of the record, channel, bytes of the entries
 PREFIX = 9  # bytes of opcode and length, which the length does not count
-ENTRY = 16  # bytes of an entry: log time and place
+ENTRY = struct.Struct("<QQ")  # of an index: log time, and place in the chunk
+
+Entries = npt.NDArray[np.int64]  # (n, 2): log time (ns) of each message, and its offset in a block
 
 
 class Block(NamedTuple):
     """Encoded messages, one after the other."""
 
     records: memoryview  # the records as a chunk holds them
-    channels: list[int]  # channel number of each message
-    entries: list[list[int]]  # log time (ns) of each message, and its offset in `records`
+    entries: dict[int, Entries]  # by channel number, in the order of their first messages
+    first: int  # the earliest and the latest log time, ns
+    last: int
 
 
 class PackedIndex(MessageIndex):
-    """The index of one channel's messages in a chunk."""
+    """The index of one channel's messages in a chunk: its entries as bytes."""
+
+    def __init__(self, channel: int) -> None:
+        super().__init__(channel, [])
+        self.entries = bytearray()
 
     def write(self, stream: RecordBuilder) -> None:
         """Write the index as one record."""
-        size = ENTRY * len(self.records)
+        size = len(self.entries)
         head = INDEX.pack(Opcode.MESSAGE_INDEX, INDEX.size - PREFIX + size, self.channel_id, size)
-        stream.write(head + struct.pack(f"<{2 * len(self.records)}Q", *chain.from_iterable(self.records)))
+        stream.write(head + self.entries)
 
 
 class PackedChunks(ChunkBuilder):
@@ -47,10 +55,7 @@ class PackedChunks(ChunkBuilder):
         log_ns, channel = message.log_time, message.channel_id
         self.message_start_time = min(self.message_start_time, log_ns) if self.num_messages else log_ns
         self.message_end_time = max(self.message_end_time, log_ns)
-        index = self.message_indices.get(channel)
-        if index is None:
-            index = self.message_indices[channel] = PackedIndex(channel, [])
-        index.records.append((log_ns, self.record_writer.count))
+        self.index(channel).entries += ENTRY.pack(log_ns, self.record_writer.count)
         self.num_messages += 1
         length = MESSAGE.size - PREFIX + len(message.data)
         head = MESSAGE.pack(Opcode.MESSAGE, length, channel, message.sequence, log_ns, message.publish_time)
@@ -58,13 +63,7 @@ class PackedChunks(ChunkBuilder):
 
     def add_block(self, block: Block, statistics: Statistics) -> None:
         """Add encoded messages, and count them in the statistics."""
-        base, indices, counts = (
-            self.record_writer.count,
-            self.message_indices,
-            statistics.channel_message_counts,
-        )
-        times = [log_ns for log_ns, _ in block.entries]
-        first, last = min(times), max(times)
+        first, last, counts = block.first, block.last, statistics.channel_message_counts
         if not self.num_messages:
             self.message_start_time = first
         if not statistics.message_count:
@@ -73,15 +72,21 @@ class PackedChunks(ChunkBuilder):
         statistics.message_start_time = min(statistics.message_start_time, first)
         self.message_end_time = max(self.message_end_time, last)
         statistics.message_end_time = max(statistics.message_end_time, last)
-        for channel, (log_ns, place) in zip(block.channels, block.entries, strict=True):
-            index = indices.get(channel)
-            if index is None:
-                index = indices[channel] = PackedIndex(channel, [])
-            index.records.append((log_ns, base + place))
-            counts[channel] += 1
-        self.num_messages += len(times)
-        statistics.message_count += len(times)
+        base, added = np.array([0, self.record_writer.count]), 0
+        for channel, entries in block.entries.items():
+            self.index(channel).entries += (entries + base).tobytes()
+            counts[channel] += len(entries)
+            added += len(entries)
+        self.num_messages += added
+        statistics.message_count += added
         self.record_writer.write(block.records)
+
+    def index(self, channel: int) -> PackedIndex:
+        """The index of a channel's messages in the chunk that is being built."""
+        found = self.message_indices.get(channel)
+        if type(found) is not PackedIndex:
+            found = self.message_indices[channel] = PackedIndex(channel)
+        return found
 
 
 def pack_messages(writer: Writer, most: int) -> Callable[[Block], None]:
@@ -106,8 +111,11 @@ def pack_messages(writer: Writer, most: int) -> Callable[[Block], None]:
 
 def add_apart(writer: Writer, block: Block) -> None:
     """Add encoded messages one by one through the library's public functions."""
-    ends = [place for _, place in block.entries[1:]] + [len(block.records)]
-    for (_, place), end in zip(block.entries, ends, strict=True):
-        _, _, channel, sequence, log_ns, publish_ns = MESSAGE.unpack_from(block.records, place)
-        data = bytes(block.records[place + MESSAGE.size : end])
-        writer.add_message(channel, log_ns, data, publish_ns, sequence)
+    place = 0
+    while place < len(block.records):
+        _, length, channel, sequence, log_ns, publish_ns = MESSAGE.unpack_from(block.records, place)
+        end = place + PREFIX + length
+        writer.add_message(
+            channel, log_ns, bytes(block.records[place + MESSAGE.size : end]), publish_ns, sequence
+        )
+        place = end

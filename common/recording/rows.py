@@ -47,16 +47,17 @@ class RowPacker:
     """Packs values into items; `storeys` is the building's number of storeys."""
 
     def __init__(self, topics: Mapping[str, Sequence[Signal]], storeys: int) -> None:
-        self._pack: dict[str, Callable[..., bytes]] = {
+        # by plain topic: the row of log time, publish time and all its numbers
+        self.rows: dict[str, Callable[..., bytes]] = {
             topic: found.pack for topic, found in layouts(topics, storeys).items()
         }
 
     def item(self, topic: str, log_ns: int, publish_ns: int, values: Iterable[Any]) -> Item:
         """An item; for a plain topic `values` are all its numbers, those of storeys one by one."""
-        pack = self._pack.get(topic)
-        if pack is None:
+        row = self.rows.get(topic)
+        if row is None:
             return other(topic, log_ns, publish_ns, values)
-        return topic, pack(log_ns, publish_ns, *values)
+        return topic, row(log_ns, publish_ns, *values)
 
 
 def other(topic: str, log_ns: int, publish_ns: int, values: Iterable[Any]) -> Item:

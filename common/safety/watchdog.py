@@ -19,6 +19,7 @@ class WatchdogFinding(IntEnum):
     RAMP = 2
 
 
+FINE = WatchdogFinding.FINE  # of nearly every tick: an attribute of an enumeration takes 60 ns
 ROUND_TRIP = 2  # intervals by which an echo may lag behind a message, because it has travelled both ways
 
 
@@ -51,7 +52,7 @@ class Watchdog:
         if fresh and echo > self._echo >= 0:  # as in nearly every tick
             self._unheard = self._unechoed = 0
             self._seq, self._echo = seq, echo
-            return WatchdogFinding.FINE
+            return FINE
         self._unheard = 0 if fresh else self._unheard + 1
         self._unechoed = 0 if fresh and echo > self._echo else self._unechoed + 1
         if fresh:
@@ -59,4 +60,4 @@ class Watchdog:
         begun, missed = self._seq >= 0 and self._echo >= 0, self.missed
         if missed >= (self._ramp if begun else max(self._ramp, self._age)):
             return WatchdogFinding.RAMP
-        return WatchdogFinding.HOLD if missed >= self._hold and begun else WatchdogFinding.FINE
+        return WatchdogFinding.HOLD if missed >= self._hold and begun else FINE

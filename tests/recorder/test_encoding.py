@@ -80,10 +80,13 @@ def test_rows_are_encoded_as_protobufs_own_library_does_it(shape: str, data: st.
     items, records = [item for item, _ in drawn], [record for _, record in drawn]
     block = recorded.encoder.encode(items)
     assert bytes(block.records) == b"".join(records)
-    assert block.channels == [recorded.channels[topic] for topic, _ in items]
     places = [sum(map(len, records[:place])) for place in range(len(items))]
     times = [HEAD.unpack_from(row)[0] for _, row in items]
-    assert block.entries == [[time, place] for time, place in zip(times, places, strict=True)]
+    expected: dict[int, list[list[int]]] = {}
+    for (topic, _), time, place in zip(items, times, places, strict=True):
+        expected.setdefault(recorded.channels[topic], []).append([time, place])
+    assert [(channel, entries.tolist()) for channel, entries in block.entries.items()] == [*expected.items()]
+    assert (block.first, block.last) == (min(times), max(times))
 
 
 def write(path: Path, *, rows: bool) -> None:
