@@ -16,6 +16,8 @@ from common.reality.found import BUILDING, LearnedEntry
 from common.reality.reality import Entry
 from common.roles import MASTER, name_of, title
 from laboratories import effects
+from laboratories.column.as_table import as_table
+from laboratories.effects import sites
 from laboratories.effects.effect import Effect
 from laboratories.kinds import kinds_of
 from models.system import Effects, System
@@ -42,27 +44,43 @@ def update(found: FoundLaboratories, plan: Plan) -> UpdatedPlan:
     whole = replace(found.truth.plan, ground_motion=plan.ground_motion, tolerances=plan.tolerances)
     unsaid = [f"{name} is of another building than this plan's." for name in found.left_out]
     for role in (MASTER, *plan.roles):
-        own = effects.of_role(plan, role)
+        own, noise = effects.of_role(plan, role), found.spread.noise.get(role, {})
         for entry in found.truth.of(role).effects:
-            if entry[0] in own:
-                whole, sentence = laid(whole, role, entry, own[entry[0]])
-                unsaid += [sentence] if sentence else []
-        whole, sentence = with_noise(whole, plan, role, found.spread.noise.get(role, {}))
+            effect = own.get(entry[0])
+            if (
+                effect is None
+                or role != holder(plan, role, effect)
+                or (effect.random and effect.signal in noise)
+            ):
+                continue
+            whole, sentence = laid(whole, role, entry, effect)
+            unsaid += [sentence] if sentence else []
+        whole, sentence = with_noise(whole, plan, role, noise)
         unsaid += [sentence] if sentence else []
     unsaid += [learned(law) for law in found.truth.learned]
     return UpdatedPlan(whole, tuple(differences(plan, whole)), tuple(dict.fromkeys(unsaid)))
 
 
+def holder(plan: Plan, role: str, effect: Effect) -> str:
+    """The role at which an effect that reaches `role` is said: those of the building are once the master's."""
+    if effect.site in sites.BUILDING:
+        return MASTER
+    return next(iter(plan.roles), role) if effect.site == sites.LINK and role == MASTER else role
+
+
 def laid(whole: Plan, role: str, entry: Entry, effect: Effect) -> tuple[Plan, str]:
-    """The plan with an effect, where it changes nothing but parameters of a plan; otherwise a sentence on it."""
+    """The plan with an effect, where parameters of a plan can say it; otherwise a sentence on it."""
     name, values = entry
-    if effect.random:
-        return whole, ""
     system = effect.apply(System(whole.of(role)), **effect.values(values))
-    if system.effects == Effects() and system.plan.ground_motion == whole.ground_motion:
+    column, left = as_table(system.plan.column, system.effects.column)
+    system = replace(
+        system, plan=replace(system.plan, column=column), effects=replace(system.effects, column=left)
+    )
+    if not effect.random and system.effects == Effects() and system.plan.ground_motion == whole.ground_motion:
         return merged(whole, role, system.plan), ""
     given = ", ".join(f"{key} = {value:.6g}" for key, value in values.items())
-    return whole, f"{name} ({given}) of the {title(role)} is no parameter of a plan."
+    where = "" if effect.site in sites.BUILDING else f" of the {title(role)}"
+    return whole, f"{name} ({given}){where} is no parameter of a plan."
 
 
 def learned(law: LearnedEntry) -> str:
@@ -117,6 +135,8 @@ def differences(before: Plan, after: Plan) -> list[str]:
                 for row in rows(f"{path}.{key}" if path else key, one.get(key), other[key])
             ]
         said = text(one), text(other)
+        if one is None:
+            return [f"{path}: {said[1]}, which the plan does not have"]
         return [f"{path}: {said[0]} → {said[1]}"] if said[0] != said[1] else []
 
     return rows("", before.tables(), after.tables())

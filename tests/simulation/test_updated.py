@@ -5,10 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from common.plan import read as plans
+from common.plan.plan import Plan
 from common.plan.read import parse
+from common.reality.reality import as_planned, from_reality
+from common.reality.spread import Spread
+from laboratories.effects import CATALOGUE, sites
+from loop.of_reality import really
 from simulation.foretold import draws
 from simulation.foretold.draws import FoundLaboratories
 from simulation.updated import nominal, trials
@@ -42,6 +48,64 @@ def test_a_plan_says_what_its_language_can_and_lists_the_rest(
     text = nominal.toml(updated, "found.toml", tmp_path)
     assert text.startswith("# Nominal models as found: found.toml.\n# Not said here: column.friction")
     assert parse(text, tmp_path).actuator == updated.plan.actuator
+
+
+def of_one(plan: Plan, name: str, **values: float) -> FoundLaboratories:
+    """What was found is one effect of the catalogue."""
+    held = sites.holders(plan, CATALOGUE[name].site)
+    entry = {"name": name, **values} | ({"laboratory": held[0]} if held else {})
+    return FoundLaboratories(from_reality({"effect": [entry]}, plan, Path()), Spread())
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_every_effect_is_said_in_the_plan_or_listed_once(name: str) -> None:
+    sizes = {one.name: one.sizes[-1] if one.sizes else one.null for one in CATALOGUE[name].parameters}
+    plan = short()
+    updated = nominal.update(
+        of_one(plan, name, **{key: x for key, x in sizes.items() if np.isfinite(x)}), plan
+    )
+    assert bool(updated.said) != bool(updated.unsaid)
+    assert (updated.plan != plan) == bool(updated.said)
+    assert len(updated.unsaid) <= 1
+    assert all(name in sentence for sentence in updated.unsaid)
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        *(
+            ("column.yielding", {"yield_displacement": 1e-3, "hardening": 0.1, "law": law})
+            for law in (0.0, 1.0, 3.0)
+        ),
+        ("column.self_centring", {"displacement": 1e-3}),
+        ("column.viscous", {"coefficient": 4e4}),
+        ("column.inertia", {"mass": 600.0}),
+        ("structure.mass", {"factor": 1.1}),
+    ],
+)
+def test_a_plan_that_says_an_effect_gives_the_same_test(name: str, values: dict[str, float]) -> None:
+    plan = short(1.5, scale=0.3)
+    found = of_one(plan, name, **values)
+    updated = nominal.update(found, plan)
+    assert not updated.unsaid
+    as_found, said, planned = (
+        really(truth, noise=False).master["column_force"]
+        for truth in (found.truth, as_planned(updated.plan), as_planned(plan))
+    )
+    np.testing.assert_allclose(said, as_found, rtol=0.0, atol=1e-9 * np.max(np.abs(as_found)))
+    assert np.max(np.abs(planned - as_found)) > 1e-3 * np.max(np.abs(as_found))
+
+
+def test_only_the_first_of_two_laws_of_a_column_is_said() -> None:
+    plan = short()
+    laws = [
+        {"name": "column.yielding", "yield_displacement": 1e-3},
+        {"name": "column.self_centring", "displacement": 2e-3},
+    ]
+    updated = nominal.update(FoundLaboratories(from_reality({"effect": laws}, plan, Path()), Spread()), plan)
+    assert updated.plan.column.model == "bouc_wen"
+    assert "column.yield_displacement: 0.001, which the plan does not have" in updated.said
+    assert [sentence.split()[0] for sentence in updated.unsaid] == ["column.self_centring"]
 
 
 def test_noise_that_differs_from_the_plan_is_said(tmp_path: Path) -> None:

@@ -1,0 +1,59 @@
+"""Effects on a column's specimen as keys of the plan's table [column], where it has them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from common.errors import InputError
+from common.plan.laboratory_tables import Column
+from laboratories.column.specimen import LAWS, yielding
+from models import specimens
+from models.registry import Array
+from models.specimens import SPECIMENS
+from models.system import ColumnEffects
+
+LINEAR, CENTRING = "linear", "self_centring"  # models of a column
+# Fields of `ColumnEffects` that describe one law in the place of the linear column.
+OF_YIELDING = (
+    "yield_displacement",
+    "hardening",
+    "exponent",
+    "law",
+    "unloading",
+    "first_bend",
+    "second_stiffness",
+    "pinch_force",
+    "pinch_displacement",
+    "damage",
+)
+OF_CENTRING = ("centring", "centring_hardening", "centring_loop")
+
+
+def as_table(column: Column, effects: ColumnEffects) -> tuple[Column, ColumnEffects]:
+    """The table of a column with the effects that its keys can say, and the effects that are left."""
+    column = replace(column, damping=column.damping + effects.viscous, mass=column.mass + effects.inertia)
+    left = replace(effects, viscous=0.0, inertia=0.0)
+    yields, centres = np.isfinite(left.yield_displacement), np.isfinite(left.centring)
+    if column.model != LINEAR or yields == centres:  # a column follows one law alone
+        return column, left
+    name, values = LAWS[int(left.law)], yielding(column.stiffness, left)
+    if centres:
+        name = CENTRING
+        values = np.array([column.stiffness, left.centring, left.centring_hardening, left.centring_loop])
+    given = parameters(name, values)
+    try:
+        specimens.pack(name, stiffness=column.stiffness, **given)
+    except InputError:  # a value that the effect may have and the model may not
+        return column, left
+    null = ColumnEffects()
+    fields = OF_CENTRING if centres else OF_YIELDING
+    left = replace(left, **{field: getattr(null, field) for field in fields})
+    return replace(column, model=name, parameters=given), left
+
+
+def parameters(name: str, values: Array) -> dict[str, float]:
+    """The parameters of a specimen's model beside the stiffness by name, from its kernel's own order."""
+    named = dict(zip(SPECIMENS[name].params._fields, values.tolist(), strict=True))
+    return {key: value for key, value in named.items() if key != "stiffness"}
