@@ -72,7 +72,9 @@ def against_prediction(args: argparse.Namespace) -> int:
 
     found = held.held(read(Path(args.a)), read(args.predicted))
     if args.json:
-        sys.stdout.write(json.dumps(held.plain(found)) + "\n")
+        from report.foretold import said
+
+        sys.stdout.write(json.dumps(held.plain(found) | {"sentences": said.sentences(found)}) + "\n")
     else:
         show_held(found)
     return 0 if found.held else 1
@@ -80,6 +82,7 @@ def against_prediction(args: argparse.Namespace) -> int:
 
 def show_held(found: Held) -> None:
     """How a recording lay in a prediction, as text."""
+    from report.foretold import said
     from report.text.terminal import table
 
     rows = [["signal", "inside", "first left", "times left", "farthest", "at"]]
@@ -89,7 +92,7 @@ def show_held(found: Held) -> None:
         rows.append([name, f"{100 * one.inside:.0f} %", first, str(len(one.departures)), *far])
     sys.stdout.write(f"{found.ticks} ticks in common; the band is of 90 % of the time\n\n")
     table(rows)
-    sys.stdout.write("\n" + "".join(f"{shown(text)}\n" for text in found.sentences))
+    sys.stdout.write("\n" + "".join(f"{shown(text)}\n" for text in said.sentences(found)))
 
 
 def compare(a: ComparedRun, b: ComparedRun) -> dict[str, Any]:

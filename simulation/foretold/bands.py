@@ -238,8 +238,14 @@ def plain(found: Prediction) -> dict[str, Any]:
         "peak_drifts": {str(storey): one._asdict() for storey, one in found.drifts.items()},
         "limits": limits,
         "beyond_seen": {
-            role: {"signal": one.signal, "ratio": one.ratio, "energy_outside": one.outside}
+            role: {
+                "signal": one.signal,
+                "ratio": one.ratio,
+                "since": one.since(found.plan.test.interval),
+                "energy_outside": one.outside,
+            }
             for role, one in found.reaches.items()
         },
+        "readings": {role: list(kind.channels.names) for role, kind in kinds.kinds_of(found.plan).items()},
         "sentences": list(found.sentences),
     }

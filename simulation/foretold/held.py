@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from common.errors import InputError
 from common.recording.run import Run, Values
-from common.roles import MASTER, name_of, title
+from common.roles import MASTER, name_of
 from simulation.foretold import file
 from simulation.foretold.bands import HELD
-from simulation.foretold.rest import BEYOND
+from simulation.foretold.shape import ErrorShape, shape_of
 
 # Share of the time inside a band of 90 %, over all signals, below which a prediction has not held: of one test the
 # shares scatter, since what is left of a signal rises and falls slowly.
@@ -45,6 +46,16 @@ class HeldSignal(NamedTuple):
     farthest: float  # largest distance from the band over its half width, 0 where it was never left
     farthest_at: float  # s
     unit: str
+    peak: float  # largest magnitude that was measured
+    shape: ErrorShape  # of its error against the median that was foretold
+
+
+class Band(NamedTuple):
+    """A signal as it was foretold, each (ticks, storeys or slaves)."""
+
+    low: Values
+    median: Values
+    high: Values
 
 
 class Held(NamedTuple):
@@ -54,7 +65,8 @@ class Held(NamedTuple):
     signals: dict[str, HeldSignal]
     inside: float  # mean share over the signals
     held: bool  # whether the prediction held
-    sentences: tuple[str, ...]
+    figures: Mapping[str, Any]  # what the prediction says of itself
+    same_plan: bool  # whether the test was recorded under the plan that was foretold
 
 
 def held(measured: Run, predicted: Run) -> Held:
@@ -76,13 +88,12 @@ def held(measured: Run, predicted: Run) -> Held:
         raise InputError(f"{measured.path} and {predicted.path} have no tick and signal in common.")
     inside = float(np.mean([one.inside for one in found.values()]))
     fine = inside >= ENOUGH and all(one.inside >= LEAST for one in found.values())
-    said = verdict(found, inside, figures, fine=fine)
-    return Held(ticks, found, inside, fine, (*said, *of_plans(measured, predicted)))
+    return Held(ticks, found, inside, fine, figures, same_plan(measured, predicted))
 
 
 def of_topic(measured: Run, predicted: Run, topic: str) -> tuple[int, dict[str, HeldSignal]]:
     """The ticks in common and the signals of one topic by name, those of a named slave as `NAME.signal`."""
-    ends = [file.band_topic(end, topic) for end in (file.LOWER, file.UPPER)]
+    ends = [*(file.band_topic(end, topic) for end in (file.LOWER, file.UPPER)), topic]
     ticks, mine, theirs = np.intersect1d(
         measured.sequences[topic], predicted.sequences[ends[0]], return_indices=True
     )
@@ -91,21 +102,22 @@ def of_topic(measured: Run, predicted: Run, topic: str) -> tuple[int, dict[str, 
     times = measured.columns[topic]["t"][mine]
     result = {}
     for name, unit in measured.units[topic].items():
-        low, high = (predicted.columns[end].get(name) for end in ends)
+        low, high, median = (predicted.columns[end].get(name) for end in ends)
         values = measured.columns[topic].get(name)
-        if unit in ("", "s") or low is None or high is None or values is None:
+        if unit in ("", "s") or low is None or high is None or median is None or values is None:
             continue
         if values.shape[1:] != low.shape[1:] or not np.issubdtype(values.dtype, np.floating):
             continue
-        lower, upper = (end[theirs].reshape(ticks.size, -1) for end in (low, high))
-        if np.max(upper - lower) > NARROW * max(float(np.max(np.abs(upper))), 1e-300):
+        band = Band(*(end[theirs].reshape(ticks.size, -1) for end in (low, median, high)))
+        if np.max(band.high - band.low) > NARROW * max(float(np.max(np.abs(band.high))), 1e-300):
             label = f"{name_of(topic)}.{name}" if name_of(topic) else name
-            result[label] = of_signal(times, values[mine].reshape(ticks.size, -1), lower, upper, topic, unit)
+            result[label] = of_signal(times, values[mine].reshape(ticks.size, -1), band, topic, unit)
     return int(ticks.size), result
 
 
-def of_signal(t: Values, values: Values, low: Values, high: Values, topic: str, unit: str) -> HeldSignal:
+def of_signal(t: Values, values: Values, band: Band, topic: str, unit: str) -> HeldSignal:
     """One signal, (ticks, storeys or slaves)."""
+    low, median, high = band
     half = 0.5 * (high - low)
     usual = float(np.median(half)) or float(np.max(half))
     beyond = np.maximum(np.maximum(low - values, values - high), 0.0)
@@ -114,7 +126,14 @@ def of_signal(t: Values, values: Values, low: Values, high: Values, topic: str, 
     share = float(np.mean(beyond <= 0.0))
     at = int(np.argmax(distance))
     return HeldSignal(
-        topic, share, tuple(departures(t, outside, distance)), float(distance[at]), float(t[at]), unit
+        topic,
+        share,
+        tuple(departures(t, outside, distance)),
+        float(distance[at]),
+        float(t[at]),
+        unit,
+        float(np.max(np.abs(values))),
+        shape_of(values, median, t),
     )
 
 
@@ -142,47 +161,10 @@ def departures(t: Values, outside: Values, distance: Values) -> list[Departure]:
     ]
 
 
-def of_plans(measured: Run, predicted: Run) -> list[str]:
-    """A sentence where the test had another plan than the one that was foretold."""
-    plans = [run.metadata.get("plan", {}).get("digest") for run in (measured, predicted)]
-    if plans[0] == plans[1]:
-        return []
-    return [
-        "The test was recorded under another plan than the one that was foretold: a difference between the plans is a "
-        "part of what lies outside."
-    ]
-
-
-def verdict(found: dict[str, HeldSignal], inside: float, figures: dict[str, Any], *, fine: bool) -> list[str]:
-    """What the comparison says."""
-    if fine:
-        return [f"The prediction held: {100 * inside:.0f} % of the time was inside its band."]
-    first = min(
-        (one for one in found.items() if one[1].departures and one[1].inside < ENOUGH),
-        key=lambda one: one[1].departures[0].start,
-        default=None,
-    )
-    said = f"The prediction did not hold: {100 * inside:.0f} % of the time was inside its band"
-    if first is None:
-        return [f"{said}, by short departures as of noise: the sensors are noisier than they were."]
-    name, signal = first
-    left = f"{said}; {name} left it first, at t = {signal.departures[0].start:.2f} s."
-    return [left, what_it_says(signal, figures)]
-
-
-def what_it_says(signal: HeldSignal, figures: dict[str, Any]) -> str:
-    """What follows from a signal outside its band."""
-    where = title(signal.topic)
-    ratio = float(figures.get("beyond_seen", {}).get(signal.topic, {}).get("ratio", 0.0))
-    if ratio > BEYOND:
-        return (
-            f"The laboratory of the {where} was foretold up to {ratio:.2g} times the largest motion seen before, and "
-            "what was found does not hold there: diagnose both recordings together, rths diagnose FIRST THIS."
-        )
-    return (
-        f"The test stayed within what was seen in the laboratory of the {where}: it has changed since, or has an "
-        "effect that the first recording did not show; diagnose this recording."
-    )
+def same_plan(measured: Run, predicted: Run) -> bool:
+    """Whether a test was recorded under the plan that was foretold."""
+    one, other = (run.metadata.get("plan", {}).get("digest") for run in (measured, predicted))
+    return bool(one == other)
 
 
 def plain(found: Held) -> dict[str, Any]:
@@ -196,9 +178,10 @@ def plain(found: Held) -> dict[str, Any]:
                 "inside": one.inside,
                 "farthest": one.farthest,
                 "farthest_at": one.farthest_at,
+                "peak": one.peak,
+                "error": one.shape._asdict(),
                 "outside": [departure._asdict() for departure in one.departures],
             }
             for name, one in found.signals.items()
         },
-        "sentences": list(found.sentences),
     }

@@ -47,6 +47,10 @@ class RangeSeen:
         """The largest ratio of the test."""
         return float(self.ratios[-1]) if self.ratios.size else 0.0
 
+    def since(self, interval: float) -> float | None:
+        """The time (s) from which on the motion is beyond what was seen; None where it never is."""
+        return float(np.argmax(self.ratios > BEYOND)) * interval if self.ratio > BEYOND else None
+
 
 def reaches(plan: Plan, rollout: Rollout, spread: Spread) -> dict[str, RangeSeen]:
     """How far every laboratory leaves what was seen of it, by role."""
@@ -117,8 +121,8 @@ def sentences(of: Mapping[str, RangeSeen], interval: float) -> list[str]:
     """Where a prediction leaves what was seen, in sentences."""
     result = []
     for role, one in of.items():
-        if one.ratio > BEYOND:
-            at = float(np.argmax(one.ratios > BEYOND)) * interval
+        at = one.since(interval)
+        if at is not None:
             result.append(
                 f"In the laboratory of the {title(role)} {one.signal} reaches {one.ratio:.2g} times the largest value "
                 f"seen in the diagnosed recording, from t = {at:.2f} s on: beyond what was seen the band is wider, and "

@@ -20,9 +20,10 @@ from common.roles import MASTER
 from common.terminal import cli
 from loop import substructure
 from loop.of_reality import really, rolled_out
+from report.foretold import said
 from rths.__main__ import main
 from rths.prepare.simulate import write as record
-from simulation.foretold import bands, draws, file, held, rest
+from simulation.foretold import bands, draws, file, held, rest, shape
 from simulation.foretold.bands import Prediction
 
 FRICTION = UncertainParameter("slave", "force", "damper.friction", least=0.0, most=100.0)
@@ -148,14 +149,64 @@ def test_a_prediction_is_a_recording_that_a_test_is_compared_with(
         )
     same = held.held(read(folder / "as_found.mcap"), run)
     assert same.held
-    assert "The prediction held" in same.sentences[0]
+    assert "The prediction held" in said.sentences(same)[0]
     other = held.held(read(folder / "other.mcap"), run)
     assert not other.held
-    assert "times the largest motion seen before" in other.sentences[1]
+    told = said.sentences(other)
+    assert "Of the laboratories' readings column_" in told[1]
+    assert "of the master was then still within what was seen" in told[3]
+    assert "peaks lie in their bands; farthest outside: " in told[4]
     assert cli.guarded(lambda: held_code(folder, "other")) == 1
     assert "The prediction did not hold" in capsys.readouterr().out
     with pytest.raises(InputError, match="is no prediction"):
         held.held(run, read(folder / "other.mcap"))
+
+
+@pytest.mark.parametrize(
+    ("kind", "factor"), [("offset", 0.4), ("drift", 0.3), ("size", -0.2), ("delay", 0.01), ("noise", 0.3)]
+)
+def test_the_shape_of_an_error_is_found(kind: str, factor: float) -> None:
+    t = np.linspace(0.0, 6.0, 3001)
+    median = np.sin(5.0 * t)[:, None]
+    wrong = {
+        "offset": np.full_like(median, factor),
+        "drift": factor * t[:, None],
+        "size": factor * median,
+        "delay": -factor * 5.0 * np.cos(5.0 * t)[:, None],
+        "noise": factor * np.random.default_rng(1).standard_normal(median.shape),
+    }
+    found = shape.shape_of(median + wrong[kind] + 1e-3 * np.cos(40.0 * t)[:, None], median, t)
+    assert found.kind == kind
+    assert found.factor == pytest.approx(factor, rel=0.05)
+    assert found.share > 0.95
+    assert shape.shape_of(median, median, t).kind == shape.NONE
+
+
+FAR = {"beyond_seen": {"slave": {"ratio": 1.6, "since": 2.0}}}
+ELSEWHERE = {"beyond_seen": {"slave": {"ratio": 1.0, "since": None, "energy_outside": 0.2}}}
+
+
+@pytest.mark.parametrize(
+    ("figures", "start", "kind", "says"),
+    [
+        (FAR, 2.5, "size", "was then beyond the largest motion seen before, by up to 1.6 times"),
+        (FAR, 1.5, "delay", "was then still within what was seen"),
+        (ELSEWHERE, 1.5, "", "moved at other frequencies than were seen"),
+        (FAR, 2.5, "noise", "So the sensor is noisier than it was."),
+    ],
+)
+def test_what_follows_from_a_signal_outside_its_band(
+    figures: dict[str, Any], start: float, kind: str, says: str
+) -> None:
+    wrong = shape.ErrorShape(kind, 0.01, 0.9 if kind else 0.2)
+    left = held.Departure(start, start + 1.0, 3.0)
+    signal = held.HeldSignal("slave", 0.4, (left,), 3.0, start, "N", 9.0, wrong)
+    told = said.sentences(held.Held(100, {"damper_force": signal}, 0.4, False, figures, False))
+    assert "40 % of the time was inside its band, of 90 % foretold" in told[0]
+    assert f"damper_force left its band first, at t = {start:.2f} s" in told[1]
+    assert ("No offset, drift" in told[2]) == (not kind)
+    assert says in told[3]
+    assert "under another plan" in told[-1]
 
 
 def held_code(folder: Path, name: str) -> int:
