@@ -109,5 +109,8 @@ def read(plain: Mapping[str, Any], covariance: NDArray[np.float64]) -> Spread:
 
 
 def numbers(given: Mapping[str, Any]) -> dict[str, float]:
-    """Numbers by name."""
-    return {name: float(value) for name, value in given.items()}
+    """Numbers by name; raises ValueError where one is negative or not finite."""
+    result = {name: float(value) for name, value in given.items()}
+    if not all(0.0 <= value < math.inf for value in result.values()):
+        raise ValueError("a size is negative or not finite")
+    return result

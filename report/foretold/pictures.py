@@ -18,7 +18,7 @@ from report.text.formats import axis_scale
 from simulation.foretold.bands import Prediction
 
 ROW = 1.35  # inches, the height of one signal's axes
-CAPTION = "Median and band of 90 % of the laboratories drawn."
+CAPTION = "The laboratories as found, and the band of 90 % of those drawn."
 
 
 def histories(found: Prediction) -> DrawnPicture:
@@ -34,9 +34,9 @@ def png(found: Prediction, width: float) -> tuple[bytes, tuple[int, int]]:
     shown = rows(found)
     canvas = figure.figure(width, 0.45 + ROW * len(shown))
     axes = canvas.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
-    time = np.arange(found.median.ticks, dtype=np.float64) * found.plan.test.interval
+    time = np.arange(found.middle.ticks, dtype=np.float64) * found.plan.test.interval
     for axis, (label, unit, role, name) in zip(axes, shown, strict=True):
-        row(axis, time, [series(one, role, name) for one in (found.low, found.median, found.high)], unit)
+        row(axis, time, [series(one, role, name) for one in (found.low, found.middle, found.high)], unit)
         axis.set_ylabel(f"{label}\n{axis_scale(peak(found, role, name), unit)[1]}")
         axis.margins(x=0.01)
     axes[-1].set_xlabel("time, s")
@@ -48,11 +48,11 @@ def png(found: Prediction, width: float) -> tuple[bytes, tuple[int, int]]:
 
 
 def row(axis: Any, time: Array, ends: list[Array], unit: str) -> None:
-    """One signal: its band and its median."""
+    """One signal: its band and the laboratories as found."""
     factor = axis_scale(float(max(np.max(np.abs(one)) for one in ends)), unit)[0]
-    low, median, high = (factor * one for one in ends)
+    low, middle, high = (factor * one for one in ends)
     axis.fill_between(time, low, high, color=figure.COLOURS[5], alpha=0.6, linewidth=0)
-    axis.plot(time, median, color=figure.COLOURS[0], linewidth=0.6)
+    axis.plot(time, middle, color=figure.COLOURS[0], linewidth=0.6)
 
 
 def series(rollout: Rollout, role: str, name: str) -> Array:

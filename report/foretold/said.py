@@ -61,7 +61,7 @@ def of_first(found: Held, name: str, one: HeldSignal) -> list[str]:
         how = f"No offset, drift, size, delay or noise explains most of the error of {name}: its form is another one."
         return [left, how, what_it_says(found, one.topic, start)]
     share = f"{100.0 * one.shape.share:.0f} % of its error"
-    how = f"Against the median that was foretold {in_words(one.shape, one.unit)}, which is {share}."
+    how = f"Against what was foretold {in_words(one.shape, one.unit)}, which is {share}."
     follows = f"So {NOISIER}" if one.shape.kind == "noise" else what_it_says(found, one.topic, start)
     return [left, how, follows]
 

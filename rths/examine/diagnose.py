@@ -183,11 +183,19 @@ def diagnose_file(path: Path, *, validate: Sequence[Path] = ()) -> Report:
     return next(iter(diagnose_slaves(read(path), validate=validate).values()))
 
 
-def diagnose_recording(path: Path, validate: Sequence[Path] = ()) -> dict[str, Report]:
-    """The reports on a recording by the name of the slave, as `diagnose_slaves`; raises InputError likewise."""
+def diagnose_recording(
+    path: Path, validate: Sequence[Path] = (), found: Path | None = None
+) -> dict[str, Report]:
+    """The reports on a recording by the name of the slave, as `diagnose_slaves`; raises InputError likewise.
+
+    What was found is written into the file `found` and the one beside it, if given.
+    """
     from common.recording.reader import read
 
-    return diagnose_slaves(read(path), validate=validate)
+    reports, reality = diagnosed(read(path), validate=validate)
+    if found:
+        write_found(found, reality(), force=True)
+    return reports
 
 
 def diagnose_slaves(recording: Run, **options: Any) -> dict[str, Report]:

@@ -32,7 +32,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--draws", type=int, default=DRAWS, metavar="N", help=f"laboratories to draw (default: {DRAWS})"
     )
     cli.output_argument(
-        parser, "FILE", "write median and band as a recording, for viewers and rths compare --predicted"
+        parser,
+        "FILE",
+        "write the test as foretold and its band as a recording, for viewers and rths compare --predicted",
     )
     parser.add_argument("--html", type=Path, metavar="OUT", help="write the prediction as one HTML page")
     parser.add_argument(

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
     from validation.blind.cases.basis import TrialBasis
     from validation.blind.cases.case import Case
+    from validation.blind.predicted.foretell import ForetoldCase
+    from validation.blind.predicted.next_test import NextTest
     from validation.blind.record import RecordedCase
     from validation.blind.results.measures import Measure
     from validation.blind.results.scoring import Outcome
@@ -67,7 +69,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=DIAGNOSIS,
         metavar="MODULE:FUNCTION",
         help="judge another diagnosis: a function from a recording's path to a diagnosis.report.records.Report, "
-        "or to one by the name of each slave",
+        "or to one by the name of each slave; with --predict it also takes `found`, the path of the reality to write",
+    )
+    parser.add_argument(
+        "--predict",
+        action="store_true",
+        help="also foretell the next test of each case with what was found, play it, and judge the prediction",
     )
     cli.output_argument(
         parser,
@@ -84,6 +91,8 @@ def run(args: argparse.Namespace) -> int:
     """Draw, record, diagnose and score the cases; 1 where a goal is missed, which takes more than a few cases."""
     from validation.blind.cases.basis import basis
     from validation.blind.draw import draw
+    from validation.blind.predicted.next_test import next_test
+    from validation.blind.predicted.results import measures as of_predictions
     from validation.blind.results.measures import measures
     from validation.blind.results.scoring import judge_all
 
@@ -101,13 +110,16 @@ def run(args: argparse.Namespace) -> int:
         outcomes = judge_all(cases, recorded, answers)
         if args.keep:
             keep(cases, recorded, Path(place), folder)
-        found = write(folder, outcomes, about)
+        following = [next_test(case, args.seed, args.set, trial) for case in cases] if args.predict else []
+        foretold = foretell_cases(following, recorded, Path(place), args, progress.tell)
+        found = write(folder, outcomes, about, foretold)
+    table = [*measures(outcomes), *(of_predictions(foretold) if foretold else ())]
     if args.json:
         sys.stdout.write(json.dumps(found) + "\n")
     else:
-        show(measures(outcomes), outcomes)
+        show(table, outcomes, foretold)
         sys.stdout.write(f"page: {folder / 'index.html'}\n")
-    return 1 if any(item.passed is False for item in measures(outcomes)) else 0
+    return 1 if any(item.passed is False for item in table) else 0
 
 
 def said_of(args: argparse.Namespace, trial: TrialBasis) -> str:
@@ -173,7 +185,29 @@ def diagnose_cases(folder: Path, total: int, args: argparse.Namespace, tell: Tel
     def done(_name: str) -> None:
         tell("diagnosed", next(count), total)
 
-    return dict(diagnose_all(folder, jobs=args.jobs, dask=args.dask, diagnosis=args.diagnosis, done=done))
+    found = folder if args.predict else None
+    return diagnose_all(
+        folder, jobs=args.jobs, dask=args.dask, diagnosis=args.diagnosis, done=done, found=found
+    )
+
+
+def foretell_cases(
+    following: Sequence[NextTest],
+    recorded: dict[int, RecordedCase],
+    place: Path,
+    args: argparse.Namespace,
+    tell: Tell,
+) -> list[ForetoldCase]:
+    """The predictions of all next tests, judged, in the order of the cases; `place` has what was found."""
+    from validation.blind.predicted.foretell import foretell_all
+
+    work = [(one, (place / recorded[one.case.index].name).with_suffix(".toml")) for one in following]
+    done: list[ForetoldCase] = []
+    tell("foretold", 0, len(work))
+    for item in foretell_all(work, args.jobs, args.output if args.keep else None):
+        done.append(item)
+        tell("foretold", len(done), len(work))
+    return sorted(done, key=lambda item: item.index)
 
 
 def keep(cases: Iterable[Case], recorded: dict[int, RecordedCase], place: Path, folder: Path) -> None:
@@ -190,20 +224,26 @@ def keep(cases: Iterable[Case], recorded: dict[int, RecordedCase], place: Path, 
         (kept / "reality.toml").write_text(tomli_w.dumps(case.reality()), encoding="utf-8")
 
 
-def write(folder: Path, outcomes: Sequence[Outcome], about: str) -> dict[str, Any]:
+def write(
+    folder: Path, outcomes: Sequence[Outcome], about: str, foretold: Sequence[ForetoldCase]
+) -> dict[str, Any]:
     """The page and the results in a folder; the results."""
+    from validation.blind.predicted.results import results as of_predictions
     from validation.blind.results.measures import results
     from validation.blind.results.page import page
 
     found = {"version": 1, "about": about, **results(outcomes)}
-    (folder / "index.html").write_text(page(outcomes, about), encoding="utf-8")
+    if foretold:
+        found["predictions"] = of_predictions(foretold)
+    (folder / "index.html").write_text(page(outcomes, about, foretold), encoding="utf-8")
     (folder / "results.json").write_text(json.dumps(found, indent=1), encoding="utf-8")
     return found
 
 
-def show(table: Sequence[Measure], outcomes: Sequence[Outcome]) -> None:
-    """Write the measures, the table of cases, and a line on each case whose answer is wrong."""
+def show(table: Sequence[Measure], outcomes: Sequence[Outcome], foretold: Sequence[ForetoldCase]) -> None:
+    """Write the measures, the table of cases, that of predictions, and a line on each case whose answer is wrong."""
     from report.text import terminal
+    from validation.blind.predicted import results
     from validation.blind.results.page import hidden, number
     from validation.blind.results.rows import HEAD, case_rows
 
@@ -212,6 +252,9 @@ def show(table: Sequence[Measure], outcomes: Sequence[Outcome]) -> None:
     terminal.table(rows)
     sys.stdout.write("\n")
     terminal.table([list(HEAD), *(list(item.cells) for item in case_rows(outcomes))])
+    if foretold:
+        sys.stdout.write("\n")
+        terminal.table([list(results.HEAD), *(list(results.cells(item)) for item in foretold)])
     wrong = [item for item in outcomes if not item.right]
     sys.stdout.write(f"\n{len(outcomes) - len(wrong)} of {len(outcomes)} cases right\n")
     for item in wrong:

@@ -53,7 +53,7 @@ class Prediction:
 
     plan: Plan
     low: Rollout
-    median: Rollout
+    middle: Rollout  # of the laboratories as found, without noise
     high: Rollout
     peaks: dict[str, PeakBand]  # by signal as recordings name them
     drifts: dict[int, PeakBand]  # by storey that a laboratory follows
@@ -71,21 +71,21 @@ def predict(found: FoundLaboratories, plan: Plan, count: int = DRAWS, tell: Tell
     Raises:
         InputError: too few of them reach the end of the test for a band.
     """
+    if count < LEAST:
+        raise InputError(f"{count} laboratories are too few for a band: draw {LEAST} at least.")
     drawn = ensemble(found, count, tell)
     if len(drawn.drawn) < LEAST:
         raise InputError(
             f"Nothing can be foretold: in {drawn.diverged} of {count} laboratories drawn from what was found the test "
             "is unstable; choose another compensator or a weaker motion."
-            if drawn.diverged
-            else f"{count} laboratories are too few for a band: draw {LEAST} at least."
         )
     reach = rest.reaches(plan, drawn.central, found.spread)
     rollouts = erring(found, plan, drawn, reach)
-    low, median, high = (quantile(drawn.central, rollouts, level) for level in (LOW, 0.5, HIGH))
+    low, high = (quantile(drawn.central, rollouts, level) for level in (LOW, HIGH))
     return Prediction(
         plan,
         low,
-        median,
+        drawn.central,
         high,
         peaks(plan, rollouts),
         drifts(plan, rollouts),

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from common.errors import PlanError
+from common.errors import InputError, PlanError
 from common.plan.plan import Plan
 from common.plan.toml_file import load_tables
 from common.reality import spread as spreads
@@ -64,12 +64,32 @@ def load(path: Path, plan: Plan) -> FoundLaboratories:
     try:
         kept, gone = for_another_building(tables, plan)
         spread = spreads.beside(tables, path.parent)
+        check(spread, plan)
         found = FoundLaboratories(from_reality(kept, plan, path.parent), spread, tuple(gone))
-    except PlanError as error:
+        refuse_plugins(found.truth)
+        drawn(found, np.zeros(len(spread.parameters)), 0)
+    except InputError as error:
         raise PlanError(f"The reality {path}: {error}") from None
-    refuse_plugins(found.truth)
-    drawn(found, np.zeros(len(spread.parameters)), 0)
     return found
+
+
+def check(spread: Spread, plan: Plan) -> None:
+    """Raise PlanError where what is known of the errors is of laboratories that the plan does not have."""
+    kinds = kinds_of(plan)
+    known = {
+        f"{role}.{BUILDING}.{one.name}" for role in (MASTER, *plan.roles) for one in fields(plan.structure)
+    }
+    for role, kind in kinds.items():
+        parameters = [name for machine in kind.machines(plan.of(role)) for name in machine.parameters]
+        known |= {f"{role}.{name}" for name in (*kind.channels.names, *parameters)}
+    named = [f"{role}.{name}" for role, levels in spread.noise.items() for name in levels]
+    named += [f"{one.laboratory}.{one.parameter}" for one in spread.parameters if not one.effect]
+    for name in named:
+        if name not in known:
+            raise PlanError(
+                f"what is known of its errors is of '{name}', which the plan does not have: give the plan that it was "
+                "found with."
+            )
 
 
 def ensemble(found: FoundLaboratories, count: int, tell: Tell = untold) -> Ensemble:

@@ -1,4 +1,4 @@
-"""A prediction as a recording: its median on the topics of a test, its band on topics of their own beside them."""
+"""A prediction as a recording: the test as foretold on its own topics, its band on topics of their own beside them."""
 
 from __future__ import annotations
 
@@ -38,12 +38,17 @@ def write(path: Path, found: Prediction, source: str) -> None:
     recording.metadata(
         ABOUT, {"band": repr(HELD), "found": source, "figures": json.dumps(plain(found), allow_nan=False)}
     )
-    ends = {"": found.median, LOWER: found.low, UPPER: found.high}
+    ends = {"": found.middle, LOWER: found.low, UPPER: found.high}
     for same_tick in zip(*(rows(plan, rollout) for rollout in ends.values()), strict=True):
         for end, (topic, values) in zip(ends, same_tick, strict=True):
             at = plan.tick_ns(values[0])
             recording.add(band_topic(end, topic) if end else topic, at, at, values)
-    recording.close({"outcome": "simulation", "cause": "prediction: median and band of drawn laboratories"})
+    recording.close(
+        {
+            "outcome": "simulation",
+            "cause": "prediction: laboratories as found, band of those drawn",
+        }
+    )
 
 
 def about(run: Run) -> dict[str, object]:

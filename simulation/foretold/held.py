@@ -47,14 +47,14 @@ class HeldSignal(NamedTuple):
     farthest_at: float  # s
     unit: str
     peak: float  # largest magnitude that was measured
-    shape: ErrorShape  # of its error against the median that was foretold
+    shape: ErrorShape  # of its error against what was foretold
 
 
 class Band(NamedTuple):
     """A signal as it was foretold, each (ticks, storeys or slaves)."""
 
     low: Values
-    median: Values
+    middle: Values
     high: Values
 
 
@@ -76,6 +76,10 @@ def held(measured: Run, predicted: Run) -> Held:
         InputError: the one is no prediction, or they have no tick and signal in common.
     """
     figures = file.about(predicted)
+    if file.ABOUT in measured.metadata:
+        raise InputError(
+            f"{measured.path} is itself a prediction: give the recording of the test that was played."
+        )
     found: dict[str, HeldSignal] = {}
     ticks = 0
     for topic in (MASTER, *measured.roles):
@@ -102,13 +106,13 @@ def of_topic(measured: Run, predicted: Run, topic: str) -> tuple[int, dict[str, 
     times = measured.columns[topic]["t"][mine]
     result = {}
     for name, unit in measured.units[topic].items():
-        low, high, median = (predicted.columns[end].get(name) for end in ends)
+        low, high, middle = (predicted.columns[end].get(name) for end in ends)
         values = measured.columns[topic].get(name)
-        if unit in ("", "s") or low is None or high is None or median is None or values is None:
+        if unit in ("", "s") or low is None or high is None or middle is None or values is None:
             continue
         if values.shape[1:] != low.shape[1:] or not np.issubdtype(values.dtype, np.floating):
             continue
-        band = Band(*(end[theirs].reshape(ticks.size, -1) for end in (low, median, high)))
+        band = Band(*(end[theirs].reshape(ticks.size, -1) for end in (low, middle, high)))
         if np.max(band.high - band.low) > NARROW * max(float(np.max(np.abs(band.high))), 1e-300):
             label = f"{name_of(topic)}.{name}" if name_of(topic) else name
             result[label] = of_signal(times, values[mine].reshape(ticks.size, -1), band, topic, unit)
@@ -117,7 +121,7 @@ def of_topic(measured: Run, predicted: Run, topic: str) -> tuple[int, dict[str, 
 
 def of_signal(t: Values, values: Values, band: Band, topic: str, unit: str) -> HeldSignal:
     """One signal, (ticks, storeys or slaves)."""
-    low, median, high = band
+    low, middle, high = band
     half = 0.5 * (high - low)
     usual = float(np.median(half)) or float(np.max(half))
     beyond = np.maximum(np.maximum(low - values, values - high), 0.0)
@@ -133,7 +137,7 @@ def of_signal(t: Values, values: Values, band: Band, topic: str, unit: str) -> H
         float(t[at]),
         unit,
         float(np.max(np.abs(values))),
-        shape_of(values, median, t),
+        shape_of(values, middle, t),
     )
 
 

@@ -12,28 +12,28 @@ NONE = ""
 
 
 class ErrorShape(NamedTuple):
-    """What explains most of a signal's error against the median that was foretold."""
+    """What explains most of a signal's error against what was foretold."""
 
     kind: str  # offset, drift, size, delay or noise; empty where there is no error
     factor: float  # SI: offset, drift per second, relative change of size, delay in s, rms of the noise
     share: float  # of the error's energy
 
 
-def shape_of(values: Values, median: Values, t: Values) -> ErrorShape:
-    """The shape that explains most of values - median, both (ticks, storeys or slaves).
+def shape_of(values: Values, foretold: Values, t: Values) -> ErrorShape:
+    """The shape that explains most of values - foretold, both (ticks, storeys or slaves).
 
-    Size is the factor of the median, delay that of its time derivative. White noise is what differs from tick to tick:
-    half of the energy of the differences of successive errors.
+    Size is the factor of what was foretold, delay that of its time derivative. White noise is what differs from tick
+    to tick: half of the energy of the differences of successive errors.
     """
-    error = values - median
+    error = values - foretold
     power = float(np.sum(error**2))
     if t.size < 3 or not power > 0.0:
         return ErrorShape(NONE, 0.0, 0.0)
     shapes = {
         "offset": np.ones_like(error),
         "drift": np.broadcast_to((t - t[0])[:, None], error.shape),
-        "size": median,
-        "delay": -np.gradient(median, t, axis=0),
+        "size": foretold,
+        "delay": -np.gradient(foretold, t, axis=0),
     }
     found = [ErrorShape(name, *fit(error, shape, power)) for name, shape in shapes.items()]
     white = min(0.5 * float(np.sum(np.diff(error, axis=0) ** 2)), power)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -137,7 +139,7 @@ def test_a_prediction_is_a_recording_that_a_test_is_compared_with(
     path, plan = folder / "next.mcap", short(scale=0.2)
     file.write(path, found, "found.toml")
     run = read(path)
-    np.testing.assert_array_equal(run.columns[MASTER]["column_force"], found.median.master["column_force"])
+    np.testing.assert_array_equal(run.columns[MASTER]["column_force"], found.middle.master["column_force"])
     for name, more in (("as_found", {}), ("other", {"column": {"stiffness": 1.0e7}})):
         truth = from_reality(tables(plan, seed=5, **more), plan, folder)
         record(
@@ -158,6 +160,8 @@ def test_a_prediction_is_a_recording_that_a_test_is_compared_with(
     assert "peaks lie in their bands; farthest outside: " in told[4]
     assert cli.guarded(lambda: held_code(folder, "other")) == 1
     assert "The prediction did not hold" in capsys.readouterr().out
+    with pytest.raises(InputError, match="is itself a prediction"):
+        held.held(run, run)
     with pytest.raises(InputError, match="is no prediction"):
         held.held(run, read(folder / "other.mcap"))
 
@@ -227,6 +231,36 @@ def test_another_building_leaves_out_what_is_of_the_first(tmp_path: Path) -> Non
     assert laboratories.truth.plan.structure == plan.structure
     with pytest.raises(PlanError, match="another building"):
         from_reality(tables(short(), structure={"stiffness": 26e6}), plan, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "says"),
+    [
+        ({"noise": {"slave": {"damper_force": math.nan}}}, "Cannot read what"),
+        ({"rest": {"slave": {"damper_force": -1.0}}}, "Cannot read what"),
+        ({"covariance": np.zeros((3, 3))}, "Cannot read what"),
+        (
+            {"noise": {"slave": {"damper_farce": 1.0}}},
+            "of 'slave.damper_farce', which the plan does not have",
+        ),
+        ({"noise": {"slave.east": {"damper_force": 1.0}}}, "of 'slave.east.damper_force', which"),
+        (
+            {"parameters": (FRICTION, STIFFNESS._replace(parameter="column.stifness"))},
+            "'master.column.stifness'",
+        ),
+    ],
+)
+def test_what_is_said_of_errors_is_checked(wrong: dict[str, Any], says: str, tmp_path: Path) -> None:
+    path = written(tmp_path, short())
+    with (tmp_path / "found.npz").open("wb") as stream:
+        np.savez(stream, **replace(SPREAD, **wrong).arrays())  # type: ignore[arg-type]
+    with pytest.raises(PlanError, match=f"The reality .*found.toml: .*{says}"):
+        draws.load(path, short())
+
+
+def test_too_few_draws_make_no_band(folder: Path) -> None:
+    with pytest.raises(InputError, match="19 laboratories are too few for a band: draw 20 at least"):
+        bands.predict(draws.load(folder / "found.toml", short()), short(), 19)
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -16,7 +17,7 @@ from typing import NamedTuple
 from common.errors import InputError
 from diagnosis.report import read
 from diagnosis.report.records import Report
-from validation.blind.worker import DIAGNOSIS
+from validation.blind.worker import DIAGNOSIS, ENDINGS
 
 HOME = Path(__file__).resolve().parents[2]
 KEPT = ("PATH", "HOME", "LANG", "LC_ALL", "TMPDIR", "NUMBA_CACHE_DIR", "SYSTEMROOT")
@@ -42,8 +43,11 @@ def diagnose_all(
     dask: str = "",
     diagnosis: str = DIAGNOSIS,
     done: Callable[[str], None] = lambda _name: None,
+    found: Path | None = None,
 ) -> dict[str, DiagnosisAnswer]:
     """Answers by the name of the recording; `done` is called with the name of each finished one.
+
+    What was found in each recording is written into the folder `found`, if given.
 
     Raises:
         InputError: the process failed.
@@ -51,8 +55,11 @@ def diagnose_all(
     with tempfile.TemporaryDirectory(prefix="rths-blind-") as place:
         out = Path(place) / "reports"
         words = [str(folder), str(out), "--jobs", str(jobs), "--diagnosis", diagnosis]
-        words += ["--dask", dask] if dask else []
+        words += (["--dask", dask] if dask else []) + (["--found"] if found else [])
         _work(words, Path(place), jobs, done)
+        if found is not None:
+            for path in (one for one in out.iterdir() if one.suffix in ENDINGS):
+                shutil.copy(path, found / path.name)
         return {f"{path.stem}.mcap": _answer(path) for path in sorted(out.glob("*.json"))}
 
 

@@ -23,6 +23,7 @@ from diagnosis.report.records import Report
 from validation.spread import spread
 
 OTHER = ".other"  # suffix of a recording of the same laboratories, on which the finding is judged
+ENDINGS = (".toml", ".npz")  # of the two files that say what was found in a recording
 DIAGNOSIS = "rths.examine.diagnose:diagnose_recording"
 
 
@@ -37,15 +38,20 @@ def find(reference: str) -> Any:
         ) from None
 
 
-def diagnose(path: Path, reference: str, out: Path) -> str:
-    """Diagnose one recording into `out`, and return its name. Where a diagnosis fails, the file has its error."""
+def diagnose(path: Path, reference: str, out: Path, found: bool = False) -> str:
+    """Diagnose one recording into `out`, and return its name. Where a diagnosis fails, the file has its error.
+
+    With `found` the function also gets the path of a reality file that it is to write.
+    """
     function = find(reference)
     started = time.perf_counter()
     try:
         other = path.with_suffix(OTHER)
-        more = {"validate": [other]} if other.exists() else {}
-        found: Report | Mapping[str, Report] = function(path, **more)
-        reports = {"": found} if isinstance(found, Report) else found
+        more: dict[str, Any] = {"validate": [other]} if other.exists() else {}
+        if found:
+            more["found"] = out / f"{path.stem}{ENDINGS[0]}"
+        given: Report | Mapping[str, Report] = function(path, **more)
+        reports = {"": given} if isinstance(given, Report) else given
         answer: dict[str, Any] = {"reports": {name: report.plain() for name, report in reports.items()}}
     except RthsError as error:
         answer = {"error": str(error)}
@@ -61,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
     """Diagnose every recording of a folder."""
     find(args.diagnosis)
     args.out.mkdir(parents=True, exist_ok=True)
-    work = partial(diagnose, reference=args.diagnosis, out=args.out)
+    work = partial(diagnose, reference=args.diagnosis, out=args.out, found=args.found)
     for name in spread(work, sorted(args.folder.glob("*.mcap")), args.jobs, args.dask):
         sys.stdout.write(f"{name}\n")
         sys.stdout.flush()
@@ -77,6 +83,7 @@ def main() -> int:
     parser.add_argument("out", type=Path)
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--dask", default="")
+    parser.add_argument("--found", action="store_true", help="also write what was found: OUT/<name>.toml")
     parser.add_argument("--diagnosis", default=DIAGNOSIS, metavar="MODULE:FUNCTION")
     args = parser.parse_args()
     return cli.guarded(lambda: run(args))

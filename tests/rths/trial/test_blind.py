@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import importlib
 import json
+import math
 import os
 import signal
 import sys
@@ -14,15 +15,21 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from common.errors import InputError
+from common.plan import read as plans
+from common.reality.found import building_of, models_of
+from common.reality.spread import Spread, UncertainParameter
 from common.recording.reader import read
 from common.roles import MASTER, SLAVE
 from common.terminal import cli
+from diagnosis.findings.foretelling.as_reality import FoundReality
 from diagnosis.report.read import report as read_report
 from diagnosis.report.records import Report
 from laboratories.effects import CATALOGUE
+from rths.examine.diagnose import write_found
 from rths.prove import blind
 from tests.rths.diagnosis_report.reports import bare
 from validation.blind import library as libraries
@@ -31,6 +38,9 @@ from validation.blind.cases.case import Case
 from validation.blind.draw import draw as draw_of
 from validation.blind.judge import diagnose_all
 from validation.blind.library import Library
+from validation.blind.predicted import results as predictions
+from validation.blind.predicted.foretell import foretell
+from validation.blind.predicted.next_test import next_test
 from validation.blind.record import record, record_all
 from validation.spread import spread
 
@@ -63,6 +73,17 @@ def spy(path: Path) -> Report:
 def broken(_path: Path) -> Report:
     """A diagnosis that fails."""
     raise ValueError("nothing works")
+
+
+def as_planned(path: Path, found: Path) -> Report:
+    """A diagnosis that finds the laboratories as planned, with parameters known to a percent."""
+    run = read(path)
+    plan = plans.parse(run.metadata["plan"]["toml"], Path())
+    noise = {MASTER: {name: getattr(plan.sensors, name) for name in ("column_displacement", "column_force")}}
+    origin = {"models": models_of(plan), "building": building_of(plan)}
+    spread = Spread((UncertainParameter(MASTER, "column.stiffness"),), np.array([[1e-4]]), noise)
+    write_found(found, FoundReality({"found": origin}, (), spread), force=True)
+    return read_report(bare("no_gap"))
 
 
 @pytest.fixture(autouse=True)
@@ -125,6 +146,51 @@ def test_a_failing_diagnosis_does_not_take_the_others_with_it(tmp_path: Path) ->
     assert [item.error for item in answers.values()] == ["ValueError: nothing works"] * 2
     with pytest.raises(InputError, match=r"diagnoses failed: There is no diagnosis 'rths\.nowhere:x'"):
         diagnose_all(tmp_path, diagnosis="rths.nowhere:x")
+
+
+def test_the_next_test_of_every_case_is_foretold_and_judged(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code = command(
+        "--cases", "1", "--set", "tune", "--only", "catalogue", "--effects", "damper.friction,column.stiffness",
+        "--duration", "1.5", "--predict", "--keep", "--diagnosis", f"{HERE}:as_planned", "-o", str(tmp_path / "out"),
+    )  # fmt: skip
+    out = capsys.readouterr().out
+    found = json.loads((tmp_path / "out" / "results.json").read_text())["predictions"]
+    assert code == 0  # too few cases to say that a goal is missed
+    assert "prediction: error after / before, median" in out
+    assert "Predictions of the next test" in (tmp_path / "out" / "index.html").read_text()
+    assert [one["goal"] for one in found["measures"]] == ["≤ 0.100", "≤ 0.500", "85.0 % to 95.0 %"]
+    for one in found["cases"]:
+        assert one["ratio"] == pytest.approx(1.0, abs=0.1)  # nothing was found, so nothing is foretold better
+        assert 0.0 < one["inside"] < 1.0
+        assert 0.5 <= one["stronger"] <= 2.0
+        kept = tmp_path / "out" / f"case-{one['index']:05d}"
+        records = {
+            tomllib.loads(read(kept / f"{name}.mcap").metadata["plan"]["toml"])["ground_motion"]["record"]
+            for name in ("recording", "next")
+        }
+        assert len(records) == 2
+        assert {path.name for path in kept.iterdir()} >= {"found.toml", "found.npz", "predicted.mcap"}
+
+
+def test_a_next_test_is_the_same_every_time_and_a_failed_prediction_counts(tmp_path: Path) -> None:
+    trial = basis(duration=1.5, library=LIBRARY)
+    (case,) = cases(1, "catalogue")
+    one = next_test(case, 3, "tune", trial)
+    assert one == next_test(case, 3, "tune", trial)
+    assert one.case.seed != case.seed
+    outcome = foretell((one, tmp_path / "none.toml"))
+    assert "No such file" in outcome.error
+    assert outcome.ratio == math.inf
+    median, worst, inside = predictions.measures([outcome])
+    assert (median.value, worst.value, inside.count) == (math.inf, math.inf, 0)
+
+
+def test_the_goal_of_a_mean_share_is_judged_by_its_interval() -> None:
+    assert predictions.share_inside([0.9, 0.91, 0.89, 0.9]).passed is True
+    assert predictions.share_inside([0.99, 1.0, 0.98, 0.99]).passed is False
+    assert predictions.share_inside([0.7, 1.0]).passed is None
 
 
 def test_the_command_scores_and_keeps(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -56,6 +56,8 @@ class Measure:
         """The goal in words."""
         if self.least is None and self.most is None:
             return ""
+        if self.least is not None and self.most is not None:
+            return f"{self.shown(self.least)} to {self.shown(self.most)}"
         sign, limit = ("≥", self.least) if self.least is not None else ("≤", self.most)
         return f"{sign} {self.shown(limit)}"
 

@@ -10,6 +10,8 @@ from report.gap.wording import STATUS
 from report.page import data_uri, frame, render
 from report.pictures.figure import COLOURS, figure
 from report.text.formats import MISSING, quantity
+from validation.blind.predicted import results as predictions
+from validation.blind.predicted.foretell import ForetoldCase
 from validation.blind.results.measures import (
     Bin,
     Matrix,
@@ -35,8 +37,8 @@ class Image(NamedTuple):
     caption: str
 
 
-def page(outcomes: Sequence[Outcome], about: str) -> str:
-    """The HTML text; `about` says how the cases were made."""
+def page(outcomes: Sequence[Outcome], about: str, foretold: Sequence[ForetoldCase] = ()) -> str:
+    """The HTML text; `about` says how the cases were made, `foretold` are their predictions."""
     wrong = [item for item in outcomes if not item.right]
     body = render(
         "blind.html",
@@ -44,9 +46,11 @@ def page(outcomes: Sequence[Outcome], about: str) -> str:
         about=about,
         right=len(outcomes) - len(wrong),
         count=len(outcomes),
-        measures=measures(outcomes),
+        measures=[*measures(outcomes), *(predictions.measures(foretold) if foretold else ())],
         row_head=HEAD,
         rows=[item.cells for item in case_rows(outcomes)],
+        foretold_head=predictions.HEAD,
+        foretold=[predictions.cells(item) for item in foretold],
         matrices=matrices(outcomes),
         curves=curves(outcomes),
         names=CASE,

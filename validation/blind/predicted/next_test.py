@@ -1,0 +1,87 @@
+"""The next test of a case: another motion, half to twice as strong, played in the same hidden laboratories."""
+
+from __future__ import annotations
+
+import secrets
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from common.errors import InputError, InterlockError
+from common.plan import read as plans
+from common.recording.reader import read
+from common.recording.run import Run
+from models.ground_motion.motions import MOTIONS
+from validation.blind import lots
+from validation.blind.cases.basis import TrialBasis, log_uniform
+from validation.blind.cases.case import Case, levels, reality
+from validation.blind.logger.loggers import LOGGERS
+from validation.blind.logger.relogging import relog
+from validation.blind.oracle import RANDOM
+
+# Peak drift of the linear building over that of the first test.
+STRONGER = (0.5, 2.0)
+
+
+@dataclass(frozen=True)
+class NextTest:
+    """A case with the plan of its next test, and with another draw of the noise."""
+
+    case: Case
+    stronger: float  # peak drift of the linear building over that of the diagnosed test
+
+
+@dataclass(frozen=True)
+class PlayedTest:
+    """The next test as it was recorded, and as sensors without noise would have recorded it."""
+
+    recording: Path
+    silent: Run
+    stopped: str  # why it ended early, empty where it was completed
+
+
+def next_test(case: Case, seed: int, set_: str, trial: TrialBasis) -> NextTest:
+    """The next test of a case; the motion is neither that of the diagnosed test nor that of its validation."""
+    lot = (seed, set_, case.index)
+    plan = plans.from_tables(case.plan, Path())
+    first, damper = plan.ground_motion, plan.control.amd
+    seen = {first.record, case.other.get("ground_motion", {}).get("record")}
+    record = lots.chosen((name for name in MOTIONS if name not in seen), *lot, "next motion")
+    stronger = log_uniform(lots.generator(*lot, "next scale"), *STRONGER)
+    scale = (
+        stronger * first.scale * trial.drift(first.record, damper=damper) / trial.drift(record, damper=damper)
+    )
+    tables = plan.tables()
+    tables["ground_motion"] = {"record": record, "scale": round(scale, 4)}
+    noise = int(lots.generator(*lot, "next noise").integers(2**31))
+    return NextTest(replace(case, plan=tables, seed=noise, other={}), stronger)
+
+
+def play(following: NextTest, folder: Path) -> PlayedTest:
+    """Play a next test in virtual time, once as it is and once without any noise; a limit may end it early."""
+    case = following.case
+    path = folder / f"{secrets.token_hex(8)}.mcap"
+    silent, played = path.with_suffix(".silent"), path.with_suffix(".true") if case.logger else path
+    stopped = driven(case, played, without_noise=False)
+    if case.logger:
+        plan = plans.from_tables(case.plan, Path())
+        relog(played, path, plan, LOGGERS[case.logger], levels(case.truths), case.seed)
+        played.unlink()
+    driven(case, silent, without_noise=True)
+    run = read(silent)
+    silent.unlink()
+    return PlayedTest(path, run, stopped)
+
+
+def driven(case: Case, path: Path, *, without_noise: bool) -> str:
+    """Record the test of a case; why a limit ended it, empty where it was completed.
+
+    Without noise, effects that are noise are left out as well: nobody can foretell a draw of them.
+    """
+    from simulation import virtual
+
+    laid = tuple(item for item in case.laid if not (without_noise and item.name.endswith(RANDOM)))
+    plan = plans.from_tables(case.plan, Path())
+    ended = virtual.run(virtual.assemble(plan, reality(case, laid, silent=without_noise), path), lambda: "")
+    if ended is not None and not isinstance(ended, InterlockError):
+        raise InputError(f"The next test of case {case.index} cannot be recorded: {ended}")
+    return str(ended or "")

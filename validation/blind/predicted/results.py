@@ -1,0 +1,77 @@
+"""The quality of predictions over many cases: measures with their goals, and a row for each case."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from report.text.formats import MISSING, percent, quantity
+from validation.blind.predicted.foretell import ForetoldCase
+from validation.blind.results.measures import Measure, as_plain, quantile
+
+HEAD = ("case", "kind", "hidden", "next test", "before", "after", "after / before", "inside", "remarks")
+# The goals: what is left of the error in the median and in the worst tenth of the cases, and the share of the time
+# that bands of 90 % hold, over cases.
+MEDIAN, WORST_TENTH = 0.1, 0.5
+HELD = (0.85, 0.95)
+SURE = 1.96  # standard errors of a mean on both sides, for an interval of 95 %
+
+
+def measures(cases: Sequence[ForetoldCase]) -> list[Measure]:
+    """The table; a prediction that could not be made counts as the worst."""
+    ratios = [one.ratio for one in cases]
+    return [
+        quantile("prediction: error after / before, median", ratios, most=MEDIAN),
+        quantile("prediction: error after / before, worst tenth", ratios, 0.9, most=WORST_TENTH),
+        share_inside([one.inside for one in cases if not math.isnan(one.inside)]),
+    ]
+
+
+def share_inside(shares: Sequence[float]) -> Measure:
+    """Mean share of the time inside the bands; the goal is judged by the interval of the mean."""
+    name, (least, most) = "prediction: time inside the band of 90 %, mean", HELD
+    if not shares:
+        return Measure(name, math.nan, math.nan, math.nan, 0, rate=True, least=least, most=most)
+    mean = float(np.mean(shares))
+    error = SURE * float(np.std(shares, ddof=1)) / math.sqrt(len(shares)) if len(shares) > 1 else math.inf
+    low, high = (float(np.quantile(shares, q)) for q in (0.1, 0.9))
+    within = least <= mean - error and mean + error <= most
+    beyond = mean + error < least or mean - error > most
+    passed = True if within else False if beyond else None
+    return Measure(name, mean, low, high, len(shares), rate=True, least=least, most=most, passed=passed)
+
+
+def cells(one: ForetoldCase) -> tuple[str, ...]:
+    """The row of a case in words."""
+    remarks = [one.error, f"stopped: {one.stopped}" if one.stopped else "", beyond(one)]
+    return (
+        str(one.index),
+        one.kind,
+        " and ".join(one.truth) or "clean",
+        f"{one.motion}, {one.stronger:.2f} ×",
+        percent(one.before, 2),
+        percent(one.after, 2) if math.isfinite(one.after) else MISSING,
+        quantity(one.ratio, "") if math.isfinite(one.ratio) else MISSING,
+        percent(one.inside, 0) if not math.isnan(one.inside) else MISSING,
+        "; ".join(filter(None, remarks)),
+    )
+
+
+def beyond(one: ForetoldCase) -> str:
+    """Where the prediction says that the test leaves what was seen."""
+    parts = [f"{role} {ratio:.2g} × the amplitude" for role, ratio in one.farther.items()]
+    parts += [f"{role} {percent(share, 0)} at other frequencies" for role, share in one.elsewhere.items()]
+    return f"said beyond what was seen: {', '.join(parts)}" if parts else ""
+
+
+def results(cases: Sequence[ForetoldCase]) -> dict[str, Any]:
+    """Everything that is written as JSON."""
+    from dataclasses import asdict
+
+    table = [asdict(item) | {"goal": item.goal, "verdict": item.verdict} for item in measures(cases)]
+    rows = [asdict(one) | {"ratio": one.ratio} for one in cases]
+    plain: dict[str, Any] = as_plain({"measures": table, "cases": rows})
+    return plain
