@@ -161,7 +161,7 @@ class Laboratories:
     def _sample(self, tick: int) -> None:
         master, slave = self.labs
         for lab, topic in ((master, "master"), (master, "latency"), (slave, "slave")):
-            lab.outlet.add(topic, tick, tick, (tick, *self._pools[topic][tick % POOL]))
+            lab.outlet.add(topic, (tick, tick, tick, *self._pools[topic][tick % POOL]))
 
     def finish(self, recorder: subprocess.Popen[bytes]) -> float:
         """Send the lengths of the streams until the recorder has ended, at most for `END_S`; returns the s it took."""

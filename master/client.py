@@ -212,7 +212,7 @@ class ClientBuilding(BuildingStep):
     def _record_early(self, lab: Laboratory) -> None:
         at = lab.unix_ns(0)
         for text in self._early:
-            lab.outlet.add("event", at, at, (0.0, lab.name, "warning", "client", text, {}))
+            lab.outlet.add("event", (at, at, 0.0, lab.name, "warning", "client", text, {}))
         self._early = []
 
     def _hand_back(self, tick: int, position: float, force: float, forces: Sequence[float]) -> None:

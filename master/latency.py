@@ -144,6 +144,8 @@ class LatencyAccount:
             UNANSWERED if row.feedback is None else answered(row, row.feedback, offset)
         )
         values = (
+            lab.unix_ns(tick),
+            lab.epoch_ns + now - lab.start_ns,
             tick,
             (wake - at) * 1e-9,
             (ready - wake) * 1e-9 if sent else NAN,
@@ -167,8 +169,7 @@ class LatencyAccount:
             returned,
             row.used_ns,
         )
-        log_ns = lab.unix_ns(tick)
-        lab.outlet.add(self._topic, log_ns, lab.epoch_ns + now - lab.start_ns, values)
+        lab.outlet.add(self._topic, values)
 
 
 # six segments (s) and four stamps (ns) of a tick that no feedback answers, in the order of `answered`

@@ -146,7 +146,7 @@ class MasterLoop(RigLoop):
         after = wake - lab.tick_ns(tick)
         late = after > 0 and wake >= lab.tick_ns(tick + 1)
         held = late and not lab.plan.makes_good
-        forces = [partner.begin(tick, wake) for partner in self._partners]
+        forces = self._together.begin(tick, wake)
         self._together.tell_late(tick - 1)
         if self._alarmed(tick, after, late=late):
             self.ease(tick)
@@ -238,6 +238,8 @@ class MasterLoop(RigLoop):
         publish_ns = lab.epoch_ns + (self._sent_ns or lab.clock.now()) - lab.start_ns
         before, after = self._building.recorded(outputs)
         values = (
+            log_ns,
+            publish_ns,
             tick,
             tick * lab.plan.test.interval,
             *before,
@@ -245,7 +247,7 @@ class MasterLoop(RigLoop):
             *after,
             *self._together.row(tick),
         )
-        lab.outlet.add("master", log_ns, publish_ns, values)
+        lab.outlet.add("master", values)
 
     def _watch(self, tick: int, now: int) -> None:
         """End the test if a slave or the recorder is silent for too long or cannot go on."""

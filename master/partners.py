@@ -34,6 +34,13 @@ class Partners:
                 return False
         return True
 
+    def begin(self, tick: int, now: int) -> list[float]:
+        """Begin a tick; returns the forces (N) that it uses, those of the newest feedbacks available."""
+        forces: list[float] = []
+        for partner in self.all:  # a comprehension is a function call more
+            forces.append(partner.begin(tick, now))
+        return forces
+
     def silent(self, now: int) -> Partner | None:
         """The first slave that has been silent for longer than the plan's `loss_timeout`, if there is one."""
         for partner in self.all:

@@ -240,6 +240,8 @@ class SlaveLoop(RigLoop):
         log_ns = lab.unix_ns(tick)
         publish_ns = log_ns + sent_ns - self.tick_ns(tick)
         values = (
+            log_ns,
+            publish_ns,
             tick,
             tick * lab.plan.test.interval,
             command.seq,
@@ -251,7 +253,7 @@ class SlaveLoop(RigLoop):
             command.acceleration,
             command.jerk,
         )
-        lab.outlet.add(lab.name, log_ns, publish_ns, values)
+        lab.outlet.add(lab.name, values)
 
     # -- end --------------------------------------------------------------------------------------
 

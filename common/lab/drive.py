@@ -150,7 +150,8 @@ def run(loop: DrivenLoop, stopping: Callable[[], str]) -> int:
         if not lab.running:
             return tick
         loop.tick(tick)
-        lab.send_samples()
+        if lab.outlet.due:
+            lab.send_samples()
         if lab.clock.now() - reported >= PROGRESS_NS:
             reported = lab.clock.now()
             lab.tell_news(tick)

@@ -112,7 +112,7 @@ class Laboratory:
         """Record and report an event."""
         t = tick * self.plan.test.interval
         at = self.unix_ns(tick)
-        self.outlet.add("event", at, at, (t, self.name, level, code, text, dict(values)))
+        self.outlet.add("event", (at, at, t, self.name, level, code, text, dict(values)))
         self.report(
             "event", {"t": t, "lab": self.name, "level": level, "code": code, "text": text} | dict(values)
         )
@@ -122,7 +122,7 @@ class Laboratory:
         if details := getattr(error, "details", ""):
             at = self.unix_ns(tick)
             t = tick * self.plan.test.interval
-            self.outlet.add("event", at, at, (t, self.name, "info", "traceback", details, {}))
+            self.outlet.add("event", (at, at, t, self.name, "info", "traceback", details, {}))
 
     def _turned(self, before: Mode, turn: Turn, after: Mode) -> None:
         """Report a change of the safety mode, and record it once the start is agreed and it has a test time."""
@@ -146,7 +146,7 @@ class Laboratory:
         if self.recorded:
             at = self.unix_ns(tick)
             t = tick * self.plan.test.interval
-            self.outlet.add(topic, at, at, (tick, t, self.safety.mode.value, *values))
+            self.outlet.add(topic, (at, at, tick, t, self.safety.mode.value, *values))
 
     def at_rest(self, tick: int, values: Mapping[str, float]) -> None:
         """Take note that the rig is at rest; `values` hold the ramp's duration (s), travel (m) and last command."""
@@ -292,9 +292,8 @@ class Laboratory:
 
     def send_samples(self, *, everything: bool = False) -> None:
         """Send the full pieces of the stream to the recorder, or `everything`."""
-        if everything or self.outlet.due:
-            for piece in self.outlet.pieces(everything=everything):
-                self.endpoint.send(piece)
+        for piece in self.outlet.pieces(everything=everything):
+            self.endpoint.send(piece)
 
     @property
     def recorded(self) -> bool:

@@ -65,14 +65,14 @@ class Outlet:
         self.total = 0
         self.due = False  # whether a message is to be sent now
 
-    def add(self, topic: str, log_ns: int, publish_ns: int, values: tuple[Any, ...]) -> None:
-        """Queue one item."""
+    def add(self, topic: str, values: tuple[Any, ...]) -> None:
+        """Queue one item, whose values are log time, publish time (ns) and those of its signals."""
         pending, row = self._pending, self._rows.get(topic)
         if row is None:
-            pending.append(other(topic, log_ns, publish_ns, values))
+            pending.append(other(topic, values))
             self._hurry = self._hurry or topic == AT_ONCE
         else:
-            pending.append((topic, row(log_ns, publish_ns, *values)))
+            pending.append((topic, row(*values)))
         self.due = self._hurry or len(pending) >= PIECE
         self.total += 1
 

@@ -56,13 +56,13 @@ class RowPacker:
         """An item; for a plain topic `values` are all its numbers, those of storeys one by one."""
         row = self.rows.get(topic)
         if row is None:
-            return other(topic, log_ns, publish_ns, values)
+            return other(topic, (log_ns, publish_ns, *values))
         return topic, row(log_ns, publish_ns, *values)
 
 
-def other(topic: str, log_ns: int, publish_ns: int, values: Iterable[Any]) -> Item:
-    """An item of a topic that is not plain."""
-    return topic, msgpack.packb((log_ns, publish_ns, *values))
+def other(topic: str, values: tuple[Any, ...]) -> Item:
+    """An item of a topic that is not plain; `values` are log time, publish time (ns) and those of its signals."""
+    return topic, msgpack.packb(values)
 
 
 def values_of(row: bytes) -> list[Any]:

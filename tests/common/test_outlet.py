@@ -21,7 +21,7 @@ def filled(count: int, kept: float = math.inf) -> tuple[Outlet, list[Samples]]:
     outlet = Outlet(1, "master", kept, ROWS)
     pieces: list[Any] = []
     for number in range(count):
-        outlet.add("master", number, number, (number, 0.5))
+        outlet.add("master", (number, number, number, 0.5))
         pieces += outlet.pieces()
     pieces += outlet.pieces(everything=True)
     return outlet, pieces
@@ -56,9 +56,9 @@ def test_whatever_is_lost_swapped_or_repeated_the_stream_comes_whole_and_in_orde
 def test_pieces_leave_when_they_are_full() -> None:
     outlet = Outlet(1, "slave", math.inf, ROWS)
     for number in range(PIECE - 1):
-        outlet.add("slave", 0, 0, (number,))
+        outlet.add("slave", (0, 0, number))
     assert outlet.pieces() == []
-    outlet.add("slave", 0, 0, (PIECE - 1,))
+    outlet.add("slave", (0, 0, PIECE - 1))
     assert len(outlet.pieces()) == 1
 
 
