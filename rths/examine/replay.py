@@ -93,17 +93,20 @@ def planned(recording: Run, place: str | None = None) -> Plan:
 
 def replay_master(recording: Run, plan: Plan, tell: Tell = untold) -> dict[str, Match]:
     """The building and the commands to all laboratories, from the first tick to the first that is missing."""
+    import numpy as np
+
     from laboratories import kinds
     from master.step import MasterStep
 
-    columns = {name: values.tolist() for name, values in recording.columns[MASTER].items()}
+    recorded = recording.columns[MASTER]
+    columns = {name: values.tolist() for name, values in recorded.items()}
     step, host = MasterStep(plan, ground_of(recording)), kinds.own(plan)
     own = host.channels if host else None
     felt = [columns[name] for name in (own.position, own.force)] if own else []
     used, names = forces_used(plan, columns), ComputedSignals(plan)
     held = held_ticks(recording, columns[own.command.name] if own else [])
     matches: dict[str, Match] = {}
-    command = dict.fromkeys(names.held, 0.0)
+    command: dict[str, Any] = {name: np.zeros(recorded[name].shape[1:]) for name in names.held}
     for tick, seq in enumerate(columns["seq"]):
         if seq != tick:
             break

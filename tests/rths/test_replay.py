@@ -13,6 +13,7 @@ from common.plan.read import load, with_test
 from common.reality.reality import as_planned
 from common.recording.reader import read
 from common.recording.run import Run
+from common.terminal.cli import plan_path
 from rths.examine import replay
 from simulation import virtual
 from tests.helpers import ROOT
@@ -59,3 +60,17 @@ def test_one_bit_of_it_is_found(topic: str, name: str, differs: str, device: Pat
 def test_a_master_alone_held_still_where_its_command_is_the_one_before() -> None:
     alone = Run(Path("a.mcap"), roles=())
     assert replay.held_ticks(alone, [0.1, 0.2, 0.2, 0.3]) == {2}
+
+
+def test_ticks_held_before_any_command_to_several_slaves(tmp_path: Path) -> None:
+    plan = with_test(load(plan_path("two_dampers")), duration=0.1)
+    assert virtual.run(virtual.assemble(plan, as_planned(plan), tmp_path / "a.mcap"), str) is None
+    found = read(tmp_path / "a.mcap")
+    names = replay.ComputedSignals(plan).held
+    for topic in ("latency.roof", "latency.middle"):
+        found.columns[topic]["command_sent_ns"][:2] = 0
+    for name in names:
+        found.columns["master"][name][:2] = 0.0
+    matches = replay.replay_master(found, plan)
+    assert found.columns["master"]["table_target"].shape == (50, 2)
+    assert not any(match.differing for match in matches.values())
