@@ -29,6 +29,9 @@ VARINT, DOUBLE, PACKED = 0, 1, 2  # how a field's value is stored: the low three
 END, OF_DOUBLE, OF_COUNT, OF_INDEX, OF_STAMP, OF_FLAG = range(6)
 FIRST = itemgetter(0)  # place of a channel's first message, by which the channels of a block are ordered
 KIND, COUNT = range(2)  # columns of a table of fields
+PEAK, TICK = range(2)  # columns of a table of peaks: the bits of the largest magnitude, and its tick
+# The bits of a number without its sign order as magnitudes do; those of what is no number lie above those of infinity.
+MAGNITUDE, INFINITE = (1 << 63) - 1, 0x7FF0000000000000
 
 KINDS: Mapping[FieldType, int] = {
     FieldType.NUMBER: OF_DOUBLE,
@@ -75,11 +78,25 @@ class RowEncoder:
         self.sizes = self._table.sizes
         self._channels = [channels[topic] for topic in self._table.names]
         self._numbers = np.array(self._channels, dtype=np.int64)
+        self._names = {
+            topic: [row.name for row in rows if row.kind in (FieldType.NUMBER, FieldType.STOREYS)]
+            for topic, rows in topics.items()
+            if topic in self.sizes
+        }
         counts = self._table.fields[:, :, COUNT]
+        self._peaks = np.zeros((*counts.shape, 2), dtype=np.int64)
         self._most = HEAD + int(np.max(np.sum(LONGEST + MOST * counts, axis=1), initial=0))
         self._room(16)
         for topic, size in list(self.sizes.items())[:1]:  # compiles or loads the kernel before a test begins
             self.encode([(topic, bytes(size))])
+
+    def peaks(self, topic: str) -> dict[str, tuple[float, int]]:
+        """The largest magnitude of each real quantity of a plain topic so far, and its first tick, by name."""
+        place = self._table.names.index(topic)
+        real = self._table.fields[place, :, KIND] == OF_DOUBLE
+        found = self._peaks[place, real]
+        peaks = found[:, PEAK].copy().view(np.float64).tolist()
+        return dict(zip(self._names[topic], zip(peaks, found[:, TICK].tolist(), strict=True), strict=True))
 
     def _room(self, rows: int) -> None:
         self._entries = np.zeros((rows, 2), dtype=np.int64)
@@ -92,6 +109,7 @@ class RowEncoder:
             self._room(2 * len(items))
         rows, places = self._table.gathered(*zip(*items, strict=True))
         pack(rows, places, self._table.fields, self._numbers, self._records, self._entries, self._ends)
+        note_peaks(rows, places, self._table.fields, self._peaks)
         *ends, first, last, size = self._ends.tolist()
         return Block(self._records[:size].data, self._dealt(ends), first, last)
 
@@ -255,6 +273,25 @@ def divide(topics: ByteArray, ends: Numbers) -> None:
         ends[topics[row] + 1] += 1
     for topic in range(1, ends.shape[0]):
         ends[topic] += ends[topic - 1]
+
+
+@jit_apart
+def note_peaks(rows: ByteArray, topics: ByteArray, fields: Numbers, peaks: Numbers) -> None:
+    """Note in `peaks` the real quantities of rows that are larger than all before; a NaN is not."""
+    begin = 0
+    for row in range(topics.shape[0]):
+        begin += STAMPS
+        tick = whole(rows, begin, 4)
+        for field in range(fields.shape[1]):
+            kind = fields[topics[row], field, KIND]
+            if kind == END:
+                break
+            for _ in range(fields[topics[row], field, COUNT]):
+                if kind == OF_DOUBLE:
+                    bits = whole(rows, begin, 8) & MAGNITUDE
+                    if bits <= INFINITE and bits > peaks[topics[row], field, PEAK]:
+                        peaks[topics[row], field, PEAK], peaks[topics[row], field, TICK] = bits, tick
+                begin += size_of(kind)
 
 
 @jit_apart

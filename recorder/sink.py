@@ -9,8 +9,9 @@ from typing import Protocol
 from common.host.clock import Clock
 from common.lab.outlet import AT_ONCE
 from common.recording.rows import Item, values_of
-from common.recording.run import MACHINES
+from common.recording.run import MACHINES, PEAKS
 from common.recording.writer import Recording
+from common.roles import MASTER, SLAVE, kind_of
 from recorder.encoding import RowEncoder
 
 FLUSH_NS = (
@@ -110,6 +111,15 @@ class FileSink:
         except OSError as error:
             self.failure = f"the disk cannot be written ({error.strerror})."
 
+    def _peaks(self) -> dict[str, str]:
+        """The peak of each real quantity of the laboratories, and its tick, by topic and name."""
+        return {
+            f"{topic}/{name}": f"{peak!r} {tick}"
+            for topic in self._encoder.sizes
+            if kind_of(topic) in (MASTER, SLAVE)
+            for name, (peak, tick) in self._encoder.peaks(topic).items()
+        }
+
     def close(self, summary: dict[str, str], machines: dict[str, str]) -> None:
         """Finish the file; after a failure it stays readable up to that point."""
         try:
@@ -117,6 +127,7 @@ class FileSink:
                 self._encode()
                 if machines:
                     self._recording.metadata(MACHINES, machines)
+                self._recording.metadata(PEAKS, self._peaks())
                 self._recording.close(summary)
                 return
         except OSError as error:

@@ -38,13 +38,15 @@ LOOK_BYTES = 1 << 20  # of the file per look: some seconds of a test, decoded in
 WANTED = frozenset({Opcode.CHUNK, Opcode.METADATA, Opcode.ATTACHMENT})
 
 
-def read(path: Path) -> Run:
+def read(path: Path, *, messages: bool = True) -> Run:
     """Read a recording, finished or cut off.
+
+    Without `messages` the columns stay empty and there are no events; every chunk is still checked for damage.
 
     Raises:
         InputError: the file cannot be read, is no MCAP file, or holds nothing of a hybrid test.
     """
-    with Tail(path) as tail:
+    with Tail(path, messages=messages) as tail:
         tail.open()
         run = tail.look(inf)
     if tail.place <= len(MCAP0_MAGIC) and (tail.damage or not tail.place):
@@ -85,8 +87,9 @@ class Tail:
     was read, and `finished` whether the recorder has closed the file.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, messages: bool = True) -> None:
         self.path = path
+        self._unpacked = unpacked if messages else definitions
         self.place = 0
         self.finished = self.behind = False
         self.damage = self.cause = ""
@@ -150,7 +153,7 @@ class Tail:
             return
         try:
             for found in self._wanted(source, self.place + most):
-                for record in list(unpacked(parsed(found), self._bounds)):
+                for record in list(self._unpacked(parsed(found), self._bounds)):
                     self._contents.take(record, run)
         except DAMAGE as error:
             self._end(f"at byte {self.place}")
@@ -199,4 +202,22 @@ def unpacked(record: McapRecord, bounds: Bounds) -> Iterator[McapRecord]:
             channel, sequence, log_ns, publish_ns = MESSAGE.unpack_from(found, HEAD.size)
             yield Message(channel, log_ns, found[HEAD.size + MESSAGE.size :], publish_ns, sequence)
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+            yield parsed(found)
+
+
+def definitions(record: McapRecord, bounds: Bounds) -> Iterator[McapRecord]:
+    """The definitions before the first message of a chunk, whose content is checked whole, or the record itself.
+
+    Raises:
+        ValueError, InputError: as `unpacked`.
+    """
+    if not isinstance(record, Chunk):
+        yield record
+        return
+    data = content(record)
+    bounds.unpack(len(data))
+    for opcode, found in inner(data):
+        if opcode == Opcode.MESSAGE:
+            return
+        if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             yield parsed(found)

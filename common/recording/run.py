@@ -16,6 +16,7 @@ from common.roles import LATENCY, MASTER, SLAVE, latency_topic, title
 Values = NDArray[Any]
 
 GROUND = "ground_motion"
+PEAKS = "peaks"  # metadata: the largest magnitude of each quantity (SI) and its tick, by topic and name
 CLOCK = "clock"  # metadata: `kind`, virtual or real
 MACHINES = "real_time"  # metadata: real-time settings and load of the laboratories' machines, and the bare timing loop
 

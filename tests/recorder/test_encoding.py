@@ -147,3 +147,24 @@ def test_topics_with_texts_or_tables_are_no_rows_of_numbers() -> None:
 def test_a_number_that_its_field_cannot_hold_is_no_row() -> None:
     with pytest.raises(struct.error):
         RowPacker(TOPICS, 1).item("slave", 0, 0, (2**32, 0.0, -1, *[0.0] * 10))
+
+
+def test_peaks_are_the_largest_magnitudes_of_all_rows() -> None:
+    encoder, packer = RowEncoder(TOPICS, CHANNELS, 2), RowPacker(TOPICS, 2)
+    names = [row.name for row in TOPICS["master"] for _ in range(row.count(2))]
+    rows = [
+        {"displacement": (0.5, -0.2), "column_force": float("nan")},
+        {"displacement": (0.1, -2.0), "column_force": -3.0},
+        {"displacement": (2.0, 0.0), "column_force": 2.0},
+    ]
+    for tick, row in enumerate(rows):
+        given: dict[str, Any] = {"seq": tick} | row
+        values = [given.get(name, 0) for name in dict.fromkeys(names)]
+        flat = []
+        for name, value in zip(dict.fromkeys(names), values, strict=True):
+            flat += list(value) if isinstance(value, tuple) else [value] * names.count(name)
+        encoder.encode([packer.item("master", tick, tick, flat)])
+    found = encoder.peaks("master")
+    assert found["displacement"] == (2.0, 1)
+    assert found["column_force"] == (3.0, 1)
+    assert found["velocity"] == (0.0, 0)

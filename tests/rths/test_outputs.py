@@ -29,6 +29,7 @@ WRITES = {
     "blind": ((), "-o"),
     "benchmark2020": ((), "-o"),
     "benchmark2020, a plan": (("--plan", "1"), "-o"),
+    "catalog": (("show",), "--html"),
     "diagnose": (("{recording}",), "--html"),
     "diagnose, JSON": (("{recording}",), "--json"),
     "import": (("{plan}", "--map", "{plan}"), "-o"),
