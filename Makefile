@@ -8,7 +8,7 @@ FAULT_TESTS := tests/faults tests/system/faults tests/system/test_recording_faul
 # the tests start hundreds of interpreters, which find this checkout compiled, whatever the user's shell says of bytecode
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: setup run test tested check slow faults soak matrix opensees fmi docs site benchmark blind clean
+.PHONY: setup run test tested check slow faults soak matrix opensees fmi cluster docs site benchmark blind clean
 
 setup: $(READY)
 
@@ -60,6 +60,10 @@ opensees: setup
 # what loads FMUs, and the peer of their tests, which skip without it
 fmi: setup
 	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --require-hashes -r fmi.lock
+
+# what spreads work over the machines of a Dask cluster (--dask), and its tests, which skip without it
+cluster: setup
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --require-hashes -r cluster.lock
 
 docs: setup
 	$(BIN)/python -m docs.generate

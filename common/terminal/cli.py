@@ -131,6 +131,19 @@ def output_argument(parser: argparse.ArgumentParser, metavar: str, text: str, **
     parser.add_argument("-o", "--output", type=Path, metavar=metavar, help=text, **options)
 
 
+def workers_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options that say how work is spread."""
+    parser.add_argument(
+        "--jobs", type=int, default=1, metavar="N", help="number of processes; -1 for one per processor"
+    )
+    parser.add_argument(
+        "--dask",
+        default="",
+        metavar="ADDRESS",
+        help="spread the work over the Dask cluster whose scheduler has this address",
+    )
+
+
 def words(text: str) -> list[str]:
     """A comma-separated list as the value of an option."""
     return [word.strip() for word in text.split(",") if word.strip()]

@@ -14,6 +14,7 @@ from laboratories.checks import PATIENCE
 from laboratories.kind import Kind
 from laboratories.kinds import kinds_of
 from laboratories.limits import quantities
+from models.compiled import jit
 from models.registry import Array
 
 ENERGIES = ("numerical_drift", "error_energy")  # sums over a whole test, which only the running test checks
@@ -58,6 +59,77 @@ def magnitudes(plan: Plan, columns: Mapping[str, Mapping[str, Array]]) -> dict[s
                 top = largest(values)
                 found[name] = np.maximum(found[name], top) if name in found else top
     return {name: found[name] for name in most(plan) if name in found}
+
+
+def peaks(plan: Plan, columns: Mapping[str, Mapping[str, Array]]) -> dict[str, float]:
+    """The largest value of each of the `magnitudes`, in a tenth of their time."""
+    found: dict[str, float] = {}
+    with_units = [{name: columns[MASTER][name] for name in OF_STOREYS if name in RULES}]
+    for role, kind in kinds_of(plan).items():
+        with_units.append({name: columns[role][name] for name in quantities(kind) if name in columns[role]})
+        for name, value in derived_peaks(plan, kind, columns[role], own=role == MASTER).items():
+            found[name] = max(found.get(name, 0.0), value)
+    for every in with_units:
+        for name, values in every.items():
+            found[name] = max(found.get(name, 0.0), peak(values))
+    return {name: found[name] for name in most(plan) if name in found}
+
+
+def derived_peaks(plan: Plan, kind: Kind, columns: Mapping[str, Array], *, own: bool) -> dict[str, float]:
+    """The largest magnitudes of what `derived` gives."""
+    interval, limited, channels = plan.test.interval, kind.limited, kind.channels
+    step, second = largest_steps(columns[channels.command.name])
+    target = columns[channels.target.name]
+    found = {
+        limited.step: step,
+        limited.velocity: step / interval,
+        limited.acceleration: second / interval**2,
+        limited.error: largest_lasting(columns[channels.position], target, 0 if own else 1),
+    }
+    if channels.effort:
+        found[limited.effort_step] = largest_steps(columns[channels.effort.name])[0]
+    return {name: value for name, value in found.items() if name}
+
+
+def peak(values: Array) -> float:
+    """The largest magnitude of a signal (ticks,) or of several (ticks, n)."""
+    if values.ndim == 1:
+        return float(largest_of(values))
+    return max((float(largest_of(values[:, place])) for place in range(values.shape[1])), default=0.0)
+
+
+@jit
+def largest_of(values: Array) -> float:
+    """The largest magnitude of values (n,), 0 of none."""
+    found = 0.0
+    for tick in range(values.size):
+        found = max(found, abs(values[tick]))
+    return found
+
+
+@jit
+def largest_steps(values: Array) -> tuple[float, float]:
+    """The largest magnitudes of first and second differences of values (n,), from rest."""
+    first, second, last, step = 0.0, 0.0, 0.0, 0.0
+    for tick in range(values.size):
+        now = values[tick] - last
+        first = max(first, abs(now))
+        second = max(second, abs(now - step))
+        last, step = values[tick], now
+    return first, second
+
+
+@jit
+def largest_lasting(position: Array, target: Array, late: int) -> float:
+    """The largest error (n,) that lasts `PATIENCE` intervals; the target is that of `late` intervals before."""
+    found = 0.0
+    for tick in range(PATIENCE - 1, position.size):
+        least = np.inf
+        for before in range(tick - PATIENCE + 1, tick + 1):
+            wanted = target[before - late] if before >= late else 0.0
+            least = min(least, abs(position[before] - wanted))
+        found = max(found, least)
+    return found
 
 
 def derived(plan: Plan, kind: Kind, columns: Mapping[str, Array], *, own: bool) -> dict[str, Array]:

@@ -142,22 +142,17 @@ def said_of(args: argparse.Namespace, trial: TrialBasis) -> str:
 
 def check(args: argparse.Namespace) -> None:
     """Raise InputError for values out of range and for missing parts, before any work is done."""
+    from simulation.workers import pool
     from validation.blind.judge import diagnose_all
-    from validation.spread import needed
 
     for name, value, fits, wanted in (
         ("--cases", args.cases, args.cases >= 1, "at least 1"),
         ("--seed", args.seed, args.seed >= 0, "at least 0"),
         ("--duration", args.duration, 1.0 <= args.duration <= 600.0, "between 1 and 600 s"),
-        ("--jobs", args.jobs, args.jobs >= 1 or args.jobs == -1, "at least 1, or -1 for all processors"),
     ):
         if not fits:
             raise InputError(f"{name} is {value}, but must be {wanted}.")
-    if args.jobs != 1:
-        needed("joblib", "--jobs")
-    if args.dask:
-        needed("joblib", "--dask")
-        needed("dask.distributed", "--dask")
+    pool.check(args.jobs, args.dask)
     if args.diagnosis != DIAGNOSIS:
         with tempfile.TemporaryDirectory(prefix="rths-nothing-") as folder:
             diagnose_all(Path(folder), diagnosis=args.diagnosis)

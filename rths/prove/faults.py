@@ -50,8 +50,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Draw schedules, simulate them and check the invariants; 1 where one is violated."""
+    from simulation.workers.pool import spread
     from validation.faults.trial import play
-    from validation.spread import spread
 
     chosen = schedules(args)
     started, results = time.monotonic(), []
@@ -71,8 +71,8 @@ def run(args: argparse.Namespace) -> int:
 
 def schedules(args: argparse.Namespace) -> list[Schedule]:
     """The schedules to play; raises InputError for values out of range."""
+    from simulation.workers import pool
     from validation.faults.schedule import draw, parse
-    from validation.spread import needed
 
     alone = args.seed is not None and args.schedules is None
     count = 1 if alone else MANY if args.schedules is None else args.schedules
@@ -81,12 +81,10 @@ def schedules(args: argparse.Namespace) -> list[Schedule]:
         ("--seed", seed, seed >= 0, "at least 0"),
         ("--schedules", count, count >= 1, "at least 1"),
         ("--duration", args.duration, args.duration is None or 1.0 <= args.duration <= 600.0, "1 to 600 s"),
-        ("--jobs", args.jobs, args.jobs >= 1 or args.jobs == -1, "at least 1, or -1 for all processors"),
     ):
         if not fits:
             raise InputError(f"{name} is {value}, but must be {wanted}.")
-    if args.jobs != 1:
-        needed("joblib", "--jobs")
+    pool.check(args.jobs, "")
     if args.schedule is not None:
         return [parse(args.schedule)]
     return [draw(one, args.duration, recorded=args.recorded) for one in range(seed, seed + count)]

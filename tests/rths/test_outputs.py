@@ -20,6 +20,8 @@ WRITES = {
     "predict": (("default", "--found", "{plan}"), "-o"),
     "predict, a page": (("default", "--found", "{plan}"), "--html"),
     "update": (("default", "--found", "{plan}"), "-o"),
+    "sweep": (("{plan}",), "-o"),
+    "fragility": (("{plan}", "--quantity", "displacement", "--limit", "1"), "--html"),
     "bench": (("damper", "default"), "-o"),
     "report": (("{recording}",), "-o"),
     "recover": (("{recording}",), "-o"),

@@ -14,6 +14,7 @@ import numpy as np
 from common.errors import InputError, InterlockError
 from common.plan import read as plans
 from common.recording.reader import read
+from simulation.workers.pool import spread
 from validation.blind.best import gaps, silent_run
 from validation.blind.cases.case import Case, levels, reality
 from validation.blind.logger.loggers import LOGGERS
@@ -21,7 +22,6 @@ from validation.blind.logger.relogging import relog
 from validation.blind.oracle import separation
 from validation.blind.size import sizes
 from validation.blind.worker import OTHER
-from validation.spread import spread
 
 
 @dataclass(frozen=True)

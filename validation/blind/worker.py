@@ -20,7 +20,7 @@ from typing import Any
 from common.errors import InputError, RthsError
 from common.terminal import cli
 from diagnosis.report.records import Report
-from validation.spread import spread
+from simulation.workers.pool import spread
 
 OTHER = ".other"  # suffix of a recording of the same laboratories, on which the finding is judged
 ENDINGS = (".toml", ".npz")  # of the two files that say what was found in a recording

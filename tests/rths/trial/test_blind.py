@@ -7,9 +7,7 @@ import importlib
 import json
 import math
 import os
-import signal
 import sys
-import time
 import tomllib
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -42,7 +40,6 @@ from validation.blind.predicted import results as predictions
 from validation.blind.predicted.foretell import foretell
 from validation.blind.predicted.next_test import next_test
 from validation.blind.record import record, record_all
-from validation.spread import spread
 
 HERE = "tests.rths.trial.test_blind"
 LIBRARY = Library(
@@ -253,40 +250,22 @@ def without(package: str) -> Callable[[str], Any]:
 
 
 @pytest.mark.parametrize(
-    ("words", "package"), [(("--jobs", "2"), "joblib"), (("--dask", "tcp://127.0.0.1:1"), "dask")]
+    ("words", "package", "how"),
+    [
+        (("--jobs", "2"), "joblib", "install it"),
+        (("--dask", "tcp://127.0.0.1:1"), "distributed", "`make cluster` installs it"),
+    ],
 )
 def test_a_missing_package_is_one_sentence(
     words: tuple[str, ...],
     package: str,
+    how: str,
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("validation.spread.importlib.import_module", without(package))
+    monkeypatch.setattr("simulation.workers.needed.importlib.import_module", without(package))
     assert command(*words, "-o", str(tmp_path)) == 2
     assert capsys.readouterr().err == (
-        f"rths: {words[0]} needs the package {package}: install it, or omit the option.\n"
+        f"rths: {words[0]} needs the package {package}: {how}, or omit the option.\n"
     )
-
-
-def hears_ctrl_c(_: int) -> bool:
-    return signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])
-
-
-def test_ctrl_c_is_for_the_process_that_spreads_the_work_alone() -> None:
-    assert list(spread(hears_ctrl_c, range(4), jobs=2)) == [False] * 4
-    assert hears_ctrl_c(0)
-
-
-@pytest.mark.filterwarnings("ignore:.*cancelled:UserWarning")  # joblib says so
-def test_work_that_nobody_wants_any_more_is_not_waited_for() -> None:
-    began = time.monotonic()
-    results = spread(time.sleep, [0.0, 0.0, 100.0, 100.0], jobs=2)
-    next(results)
-    results.close()  # type: ignore[attr-defined]
-    assert time.monotonic() - began < 60.0
-
-
-def test_work_is_spread_over_processes() -> None:
-    pytest.importorskip("joblib")
-    assert sorted(spread(abs, [-3, 2, -1], jobs=2)) == [1, 2, 3]

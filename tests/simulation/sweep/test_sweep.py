@@ -1,0 +1,187 @@
+"""The tests of a sweep are those that their plans describe, in the order of the file, and the same for all workers."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pyarrow import parquet
+
+from common.errors import InputError
+from common.plan import read as plans
+from loop import substructure
+from loop.closed_loop import simulate
+from loop.nominal import limited
+from loop.signals import by_role
+from models.ground_motion.motions import FOLDER
+from simulation.sweep import definition, luggage, measures, play, rows, table
+from simulation.sweep.intensity import spectral_acceleration
+from simulation.workers.parts import Way
+from tests.helpers import ROOT
+
+SWEEP = """
+seed = 3
+draws = 2
+noise = true
+[[motion]]
+record = "records/own.AT2"
+scales = [0.1, 0.2]
+[[motion]]
+[parameters]
+"test.duration" = [0.4]
+"control.amd" = [true, false]
+[drawn]
+structure.damping = { dispersion = 0.3 }
+[intensity]
+period = 0.5
+[[compensator]]
+[[compensator]]
+name = "a weak one"
+kind = "pid"
+proportional = 0.5
+integral = 0.0
+derivative = 0.0
+"""
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / "sweep.toml"
+    path.write_text(SWEEP)
+    (tmp_path / "records").mkdir()
+    shutil.copy(FOLDER / "RSN77_SFERN_PUL164.AT2", tmp_path / "records" / "own.AT2")
+    return path
+
+
+def test_the_rows_are_the_tests_of_their_plans(file: Path, tmp_path: Path) -> None:
+    sweep = definition.load(file)
+    made = table.table(tmp_path / "a.parquet", sweep, Way())
+    assert made.num_rows == sweep.rows == 2 * 2 * 3 * 2
+    for number in (0, 13, 23):
+        found = {name: made.column(name)[number].as_py() for name in made.column_names}
+        plan = rows.plan_of(sweep, rows.row(sweep, number))
+        base = tmp_path if found["motion"] == "records/own.AT2" else sweep.plan.base
+        at = plans.from_tables(plan.written(), base)
+        assert found["plan"] == at.digest()
+        ground = substructure.ground_rows(at, substructure.motion(at))
+        rollout = simulate(at, ground, seed=at.test.seed)
+        floors = rollout.master["displacement"]
+        assert found["peak_drift"] == float(np.max(np.abs(floors)))
+        assert found["pga"] == float(np.max(np.abs(ground[0])))
+        tops = limited.magnitudes(at, by_role(at, rollout))
+        assert {name: found[name] for name in tops} == {
+            name: float(np.max(top)) for name, top in tops.items()
+        }
+        assert found["limit_share"] == max(
+            found[name] / value for name, value in limited.most(at).items() if name in tops
+        )
+    assert made.column("compensator").to_pylist() == ["as planned"] * 12 + ["a weak one"] * 12
+    assert made.column("control.amd").to_pylist() == 2 * ([True] * 6 + [False] * 6)
+    assert made.column("scale").to_pylist()[:6] == [0.1, 0.1, 0.2, 0.2, 0.1, 0.1]
+    dampings = made.column("structure.damping").to_pylist()
+    assert len(set(dampings)) == 2
+    assert dampings[:2] * 12 == dampings
+
+
+@pytest.mark.parametrize("name", ["default", "single_site", "two_columns", "two_storeys"])
+def test_peaks_are_the_largest_of_the_magnitudes(name: str) -> None:
+    plan = plans.load(ROOT / "rths" / "plans" / f"{name}.toml").with_ticks(400)
+    rollout = simulate(plan, substructure.ground_rows(plan, substructure.motion(plan)), seed=1)
+    columns = by_role(plan, rollout)
+    every = limited.magnitudes(plan, columns)
+    assert limited.peaks(plan, columns) == {name: float(np.max(values)) for name, values in every.items()}
+
+
+def test_the_same_bytes_for_one_worker_for_two_and_for_one_that_goes_on(
+    file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(play, "SIZE", 64)
+    sweep = definition.load(file)
+    sweep = definition.from_tables(
+        {
+            "draws": 70,
+            "motion": [{"scales": [0.1, 0.2]}],
+            "parameters": {"test.duration": [0.01]},
+            "noise": True,
+        },
+        sweep.base,
+    )
+    paths = [tmp_path / f"{name}.parquet" for name in ("one", "two", "again")]
+    table.table(paths[0], sweep, Way(1))
+    table.table(paths[1], sweep, Way(2))
+    real = play.batch
+
+    def stopped(task: play.Task) -> object:
+        if task.number == 1:
+            raise KeyboardInterrupt
+        return real(task)
+
+    monkeypatch.setattr(table, "batch", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        table.table(paths[2], sweep, Way(1))
+    monkeypatch.setattr(table, "batch", real)
+    table.table(paths[2], sweep, Way(1))
+    assert len({path.read_bytes() for path in paths}) == 1
+    assert parquet.read_table(paths[0]).column("row").to_pylist() == list(range(140))
+
+
+def test_files_travel_with_the_tests(file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    given = luggage.packed(definition.load(file))
+    shutil.rmtree(tmp_path / "records")
+    file.unlink()
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    found = play.batch(play.Task(given, given.digest, 0))
+    assert len(found.columns["row"]) == 24
+    assert found.columns["record"][0].startswith("file own.AT2, digest ")
+
+
+def test_a_loop_that_diverges_passes_every_limit() -> None:
+    plan = plans.load(ROOT / "rths" / "plans" / "default.toml")
+    changed = plans.from_tables(
+        plan.written()
+        | {"compensator": {"kind": "pid", "proportional": 50.0, "integral": 0.0, "derivative": 0.0}},
+        plan.base,
+    )
+    rollout = simulate(changed, substructure.ground_rows(changed, substructure.motion(changed)))
+    found = measures.measured(changed, rollout)
+    assert found["outcome"] == measures.DIVERGED
+    assert found["peak_drift"] == found["limit_share"] == np.inf
+
+
+def test_spectral_acceleration_of_a_sine_at_resonance() -> None:
+    """The stationary response of an oscillator of ratio ζ is 1/(2ζ) times the excitation."""
+    interval, period, ratio = 0.002, 0.5, 0.05
+    t = interval * np.arange(20_000)
+    ground = np.sin(2.0 * np.pi * t / period)
+    assert spectral_acceleration(ground, interval, period, ratio) == pytest.approx(10.0, rel=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("change", "complaint"),
+    [
+        ("colour = 1\n", "Unknown entry 'colour'"),
+        ('plan = "no.toml"\n', "Cannot read the plan"),
+        ('reality = "no.toml"\n', "Cannot read the reality"),
+        ("[parameters]\n'structure.mas' = [1.0]\n", "no key 'structure.mas': did you mean structure.mass\\?"),
+        ("[parameters]\nstructure.mass = 1.0\n", "'structure.mass' in \\[parameters\\] is 1.0, but must be a list"),
+        ("[parameters]\nstructure.mass = [-1.0]\n", "mass in \\[structure\\] is -1.0, but must be above 0 kg"),
+        ("[drawn]\nstructure.mass = { dispersion = 0.1, distribution = 'beta' }\n", "must be one of lognormal"),
+        ("[drawn]\ncolumn.mass = { dispersion = 0.1 }\n", "only a number other than 0 can be drawn about"),
+        ("draws = 5\n", "draws is 5, but nothing is drawn"),
+        ("[[motion]]\nrecord = 'el_centro'\n", "did you mean el_centro_1940_ns"),
+        ("[[motion]]\nscales = { from = 1.0, to = 0.5, count = 3 }\n", "from must be above 0 and below to"),
+        ("[[motion]]\nscales = [0.0]\n", "scales holds 0.0, but must hold numbers above 0"),
+        ("[[compensator]]\nlead = 0.1\n", "kind is missing"),
+        ("[[compensator]]\n[[compensator]]\n", "Two \\[\\[compensator\\]\\] are called 'as planned'"),
+        ("draws = 1000000\nnoise = true\n[[motion]]\nscales = {from=0.1, to=1.0, count=99}\n", "at most 10,000,000"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_swept_is_said_in_one_sentence(change: str, complaint: str, tmp_path: Path) -> None:
+    file = tmp_path / "sweep.toml"
+    file.write_text(change)
+    with pytest.raises(InputError, match=complaint) as error:
+        table.table(tmp_path / "a.parquet", definition.load(file), Way())
+    assert str(error.value).count("\n") == 0
+    assert list(tmp_path.iterdir()) == [file]
