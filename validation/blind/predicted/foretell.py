@@ -30,11 +30,11 @@ from models.registry import Array
 from report.foretold import said
 from simulation.foretold import bands, draws, file, held
 from simulation.foretold.rest import BEYOND, OUTSIDE
+from simulation.workers.pool import spread
 from validation.blind.cases.names import CaseNames
 from validation.blind.predicted.next_test import NextTest, PlayedTest, play
 from validation.blind.size import levels
 from validation.blind.worker import ENDINGS
-from validation.spread import spread
 
 
 @dataclass(frozen=True)
