@@ -25,6 +25,7 @@ table_velocity = inf
 table_step = inf
 damper_step = inf
 table_acceleration = 1000.0
+damper_stroke = 10.0
 """
 
 # for tests of something else on machines that are shared: a laboratory that is held up goes on, though its rig jumps

@@ -36,6 +36,7 @@ def test_shipped_plans_bear_pauses_and_are_strict_beside_a_rig(name: str) -> Non
     assert shipped.link.loss_timeout > (safety.overrun + safety.ramp_after) * interval
     assert patience.strict(shipped).safety == Plan().safety
     assert patience.strict(shipped).preflight.lost == 0
+    assert patience.strict(shipped).limits.damper_stroke == Plan().limits.damper_stroke
 
 
 @pytest.mark.parametrize(
@@ -88,6 +89,7 @@ def test_a_reality_changes_no_figure(tmp_path: Path) -> None:
         ("[link]\nloss_timeout = 1.0", "link.loss_timeout", 1.0),
         ("[preflight]\nlost = 0", "preflight.lost", 0),
         ("[limits]\ntable_step = 0.01", "limits.table_step", 0.01),
+        ("[limits]\ndamper_stroke = 0.4", "limits.damper_stroke", 0.4),
     ],
 )
 def test_what_is_written_out_holds_as_written(text: str, name: str, value: float) -> None:

@@ -24,6 +24,7 @@ from validation.faults.lab import Simulation, Surrounding
 
 EMULATED = parse("[test]\nduration = 2.6\n", Path())
 PAUSE = 0.05  # s
+SWINGS = 1.7  # s, the damper moves fast and the motor pushes on
 STRONG = (0.9, 1.4, 1.65, 1.9, 2.2, 2.4)  # s, up to the strongest motion of the record
 
 
@@ -68,6 +69,15 @@ def test_an_emulation_bears_pauses_of_50_ms_and_counts_them(
     column = run.columns["master"]["column_displacement"]
     still = undisturbed.columns["master"]["column_displacement"]
     assert np.max(np.abs(column - still)) < 0.2 * np.max(np.abs(still))  # the damper alone is late
+
+
+def test_an_emulation_bears_the_swing_of_the_damper_while_the_master_stands_still_for_half_a_second(
+    tmp_path: Path,
+) -> None:
+    run = played(EMULATED, tmp_path / "a.mcap", {MASTER: (SWINGS,)}, seconds=0.5)
+    assert run.metadata["summary"]["cause"] == "completed"
+    stroke = np.max(np.abs(run.columns["slave"]["damper_stroke"]))
+    assert patience.standard("limits.damper_stroke") < stroke < EMULATED.limits.damper_stroke
 
 
 # a plan, its slave, and the limits on how the command of that slave moves, beside a rig
