@@ -61,6 +61,11 @@ class Timing:
             math.nan
         )  # s, median round trip of the newest look, and the longest of all
 
+    @property
+    def instant(self) -> bool:
+        """Whether messages take no time at all, as in virtual time."""
+        return self.longest == 0.0
+
     def add(self, columns: Mapping[str, Values]) -> None:
         """Take in some ticks."""
         trips = columns["round_trip"][np.isfinite(columns["round_trip"])]

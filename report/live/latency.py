@@ -1,4 +1,4 @@
-"""Round trip: the newest ones over time, and the histogram of all."""
+"""Round trip: the newest ones over time, and the histogram of all; neither in virtual time, where it is zero."""
 
 from __future__ import annotations
 
@@ -47,6 +47,9 @@ class Latency:
     def update(self, feed: Feed, role: str) -> None:
         """Show the histogram of a slave's exchange, and the interval once it is known."""
         timing = feed.timing(role)
+        for figure in self.parts.values():
+            if figure.visible == timing.instant:
+                figure.visible = not timing.instant
         new = timing.ticks - self._shown[1]
         if role != self._shown[0] or new >= (1 if feed.ended else EVERY):
             self._shown = (role, timing.ticks)

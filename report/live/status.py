@@ -11,7 +11,7 @@ from common.lab.operation import EMERGENCY
 from common.roles import title
 from common.safety.modes import LATCHED, Mode
 from common.terminal.plain_report import microseconds
-from report.live.feed import SILENT_NS, Feed
+from report.live.feed import SILENT_NS, Feed, Timing
 from report.page import block_of
 from report.pictures.figure import COLOURS
 from report.text.formats import percent
@@ -80,16 +80,19 @@ def tiles(feed: Feed, role: str) -> str:
     facts += [
         ("test time", f"{feed.t:.1f}{duration} s", "", ""),
     ]
-    facts += (
-        []
-        if not role
-        else [
-            ("late ticks", f"{timing.late}{share}", ORANGE if timing.late else "", ""),
-            ("round trip", f"{microseconds(timing.newest).strip()} µs", "", ""),
-            ("longest round trip", f"{microseconds(timing.longest).strip()} µs", "", ""),
-        ]
-    )
+    if role:
+        facts += [("late ticks", f"{timing.late}{share}", ORANGE if timing.late else "", ""), *trips(timing)]
     return str(block_of("live.html", "tiles", heading(feed), facts))
+
+
+def trips(timing: Timing) -> list[tuple[str, str, str, str]]:
+    """The facts on round trips; in virtual time that messages take none."""
+    if timing.instant:
+        return [("round trip", "0 (virtual time)", "", "")]
+    return [
+        ("round trip", f"{microseconds(timing.newest).strip()} µs", "", ""),
+        ("longest round trip", f"{microseconds(timing.longest).strip()} µs", "", ""),
+    ]
 
 
 def heading(feed: Feed) -> str:

@@ -16,7 +16,7 @@ from tests.helpers import ROOT
 
 pytestmark = pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine (Debian: chromium)")
 
-PLOTS = 7
+PLOTS = 5  # of the motion; those of the round trip are hidden in virtual time
 WIDE, NARROW = 1280, 390  # of a screen, CSS pixels
 SECONDS = 4.0  # in which the recording grows
 # colours that a plot's canvas holds, as many as make a drawing: the canvases are in shadow trees
@@ -84,21 +84,24 @@ def test_a_test_is_seen_while_it_runs_and_after_its_end_on_any_screen(
         page.wait("document.title === 'default: live'")
         page.wait(f"({TEXT})().includes('running')")
         page.wait("document.title === 'default: ended'", 40.0)
-        check(page, WIDE, url, tmp_path)
+        assert faults(page, WIDE, url, tmp_path) == []
     with open_page(url, NARROW, 844) as page:
         page.wait("document.title === 'default: ended'")
-        check(page, NARROW, url, tmp_path)
+        assert faults(page, NARROW, url, tmp_path) == []
 
 
-def check(page: Page, width: int, url: str, folder: Path) -> None:
-    """Every plot has its curve, nothing is wider than the window, nothing complained of or fetched from elsewhere."""
+def faults(page: Page, width: int, url: str, folder: Path) -> list[str]:
+    """What is wrong with the page of an ended test: plots without a curve, its width, its complaints, foreign hosts."""
     page.wait(f"({TEXT})().includes('running → ramping (end)')")
     drawings = [set(colours) & CURVES for colours in page.evaluate(DRAWN) if len(colours) > 5]
-    assert len(drawings) >= PLOTS
-    assert (
-        sum(bool(curves) for curves in drawings) >= PLOTS - 1
-    )  # in virtual time no round trip is above zero
-    assert page.evaluate("document.documentElement.scrollWidth") <= width
-    assert page.screenshot(folder / "page.png").stat().st_size > 20_000
-    assert page.errors == []
-    assert {request.split("/")[2] for request in page.requests} == {url.split("/")[2]}
+    curves = sum(map(bool, drawings))
+    wide = page.evaluate("document.documentElement.scrollWidth")
+    hosts = {request.split("/")[2] for request in page.requests}
+    return [
+        *[f"{len(drawings)} plots" for _ in range(len(drawings) < PLOTS)],
+        *[f"{curves} plots have a curve" for _ in range(curves < PLOTS)],
+        *[f"{wide} pixels wide" for _ in range(wide > width)],
+        *["an empty picture" for _ in range(page.screenshot(folder / "page.png").stat().st_size <= 20_000)],
+        *page.errors,
+        *(hosts - {url.split("/")[2]}),
+    ]

@@ -23,7 +23,7 @@ from common.recording.reader import Tail, length, read
 from common.recording.run import Run
 from common.recording.writer import Recording
 from common.signals import TOPICS
-from report.live.feed import EDGES, POINTS, POINTS_WHOLE, SILENT_NS, Feed
+from report.live.feed import EDGES, POINTS, POINTS_WHOLE, SILENT_NS, Feed, Timing
 from report.live.page import Page
 from report.live.standing import Standing
 from report.live.status import heading, listing
@@ -124,6 +124,22 @@ def test_late_ticks_and_the_histogram_count_every_tick(growing: Growing, virtual
     trips = run.columns["latency"]["round_trip"]
     assert tops[tops >= 1].sum() == np.isfinite(trips).sum()
     assert f"{np.count_nonzero(run.columns['latency']['deadline_missed'])} (" in growing.text
+
+
+def test_round_trips_are_not_drawn_in_virtual_time_where_they_are_zero(growing: Growing) -> None:
+    growing.to(0.0)
+    assert all(figure.visible for figure in growing.page.plots.values())
+    growing.to(1.0)
+    assert "0 (virtual time)" in growing.text
+    hidden = {name for name, figure in growing.page.plots.items() if not figure.visible}
+    assert hidden == {"trips", "histogram"}
+
+
+def test_round_trips_of_real_time_are_drawn() -> None:
+    timing = Timing()
+    assert not timing.instant  # before anything is known
+    timing.add({"round_trip": np.array([0.0, 2e-4]), "deadline_missed": np.array([False, False])})
+    assert not timing.instant
 
 
 def test_events_and_modes_are_shown(growing: Growing) -> None:
