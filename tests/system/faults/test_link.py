@@ -178,6 +178,7 @@ def test_f10_a_link_that_loses_one_way(machines: Network, tmp_path: Path) -> Non
                 "slave": judge(run, bench, "slave", ["watchdog"]),
                 "master": judge(run, bench, "master", ["watchdog", "remote_trip"]),
             }
+        assert found["slave"].cause == "watchdog"
         row("F10", "one-way loss, master to slave", "nftables at the slave's input, udp", found)
 
     undisturbed(scenario, tmp_path)

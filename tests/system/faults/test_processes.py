@@ -33,6 +33,7 @@ def test_f20_a_killed_slave_brings_the_master_to_rest(tmp_path: Path) -> None:
             bench.slave.signal(signal.SIGKILL)
             bench.rest("master")
             found = {"master": judge(bench.finish("master"), bench, "master", ["watchdog"])}
+        assert found["master"].cause == "watchdog"
         state = "master safe; the killed one's rig is left to its own watchdog"
         passed("F20", "slave killed", "kill -9 of its process", state, *worst(found), evidence(found))
 
@@ -50,6 +51,7 @@ def test_f21_a_master_that_is_held_up_finds_both_at_rest(tmp_path: Path) -> None
                 "slave": judge(run, bench, "slave", ["watchdog"]),
                 "master": judge(run, bench, "master", ["overrun", "remote_trip"], most=HOLD + 2 * WATCHDOG),
             }
+        assert found["slave"].cause == "watchdog"
         passed(
             "F21",
             f"master held up {HOLD * 1e3:.0f} ms",
