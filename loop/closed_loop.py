@@ -25,7 +25,7 @@ from laboratories.kinds import kinds_of
 from laboratories.sensors import noise
 from laboratories.table.kind import TABLE
 from laboratories.table.model import TableLab
-from loop import site, substructure
+from loop import assembly, site, substructure
 from loop.site import Site
 from loop.substructure import (
     COMMAND,
@@ -181,7 +181,7 @@ def at_rest(
     """The closed loop before its first tick; `slaves`, `exchange` and `errors` of the readings by role."""
     plan, count = master.plan, len(slaves)
     ticks = plan.ticks
-    building = substructure.build(plan, ground, master.effects.p_delta, slaves=count > 0)
+    building = assembly.build(plan, ground, master.effects.p_delta, slaves=count > 0)
     traffic = Traffic(
         np.zeros((ticks, building.output.size)),
         np.zeros(building.output.size),

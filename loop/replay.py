@@ -15,7 +15,7 @@ from laboratories.column.specimen import Specimen
 from laboratories.kind import Kind
 from laboratories.sensors import readings
 from laboratories.sensors.readings import Readings
-from loop import site, substructure
+from loop import assembly, site, substructure
 from loop.site import Site
 from loop.substructure import Substructure
 from models.compiled import jit
@@ -74,7 +74,7 @@ def building(
 
     `dampers` are the dampers' forces (N) used, (ticks,), or (ticks, slaves) where there are several.
     """
-    arrays = substructure.build(system.plan, ground, system.effects.p_delta)
+    arrays = assembly.build(system.plan, ground, system.effects.p_delta)
     result = np.zeros((force.size, arrays.output.size))
     roles = system.plan.roles
     play_building(arrays, displacement, force, dampers.reshape(force.size, len(roles)), result)

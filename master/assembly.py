@@ -18,7 +18,9 @@ from loop.links import link_model
 from loop.nominal import preflight as nominal
 from loop.realised import true_system
 from master.building import BuildingStep, Outputs
-from master.client import ClientBuilding, CoupledLaboratory, RealTime, compensator
+from master.client.building import ClientBuilding, compensator
+from master.client.coupled import CoupledLaboratory
+from master.client.pace import RealTime
 from master.limits import MasterLimits
 from master.loop import MasterLoop
 from master.own import OwnLaboratory

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from common.named import maker
 from common.plan.plan import Plan
-from loop import substructure
+from loop import assembly, substructure
 from master.building import BuildingStep, Outputs
 from models.compiled import bound
 from models.registry import Array
@@ -18,7 +18,7 @@ class MasterStep(BuildingStep):
     """The numerical substructure with the control of every laboratory; each call computes a tick."""
 
     def __init__(self, plan: Plan, ground: Array, p_delta: float = 0.0) -> None:
-        building = substructure.build(plan, ground, p_delta)
+        building = assembly.build(plan, ground, p_delta)
         self._output = building.output
         self._forces = substructure.forces(building)
         width, first = substructure.SENT_VALUES, substructure.OF_SLAVES

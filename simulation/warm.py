@@ -15,7 +15,7 @@ from common.signals import default_topics
 from laboratories import completeness, device, kinds
 from laboratories.limits import TickLimits
 from laboratories.sensors import readings
-from loop import replay, site, substructure
+from loop import assembly, replay, site, substructure
 from loop.closed_loop import simulate
 from loop.nominal.response import response
 from models import cache, compensators, energy_balance, force_correction
@@ -56,7 +56,7 @@ def closed_loops(plan: Plan, ground: Array) -> None:
 
 def ticks(plan: Plan, ground: Array) -> None:
     """The kernels that the loops call at every tick."""
-    bound(substructure.enter, substructure.build(plan, ground), 0, 0.0, 0.0)
+    bound(substructure.enter, assembly.build(plan, ground), 0, 0.0, 0.0)
     balance = energy_balance.build(plan.test.interval, 0.5, 1.0, 1.0, np.ones(1), np.ones(2))
     bound(energy_balance.enter, balance, 0.0, 0.0, 0.0, 0.0)
     for kind in kinds.KINDS.values():

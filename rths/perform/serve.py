@@ -20,7 +20,7 @@ from report.text.progress import Progress as Working
 from rths.perform import run as tests
 
 if TYPE_CHECKING:
-    from master.client import ClientBuilding
+    from master.client.building import ClientBuilding
 
 PATIENCE_S = 60.0  # for a client's next displacement in virtual time: a step of a large model takes seconds
 
@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
 
 def checked(plan: Plan, addresses: Sequence[str]) -> None:
     """Raise InputError where elements cannot be served at these addresses, before anything starts."""
-    from master.client import check_count
+    from master.client.building import check_count
 
     check_count(addresses, len(plan.kinds))
     for text in addresses:
@@ -67,7 +67,8 @@ def in_virtual_time(
 ) -> RthsError | None:
     """The test in this process, as fast as the client asks; the error that ended it."""
     from master.assembly import warm_up_served
-    from master.client import AsFastAsItGoes, ClientBuilding
+    from master.client.building import ClientBuilding
+    from master.client.pace import AsFastAsItGoes
     from simulation import virtual
 
     said = tests.before_the_start(plan, output, gate)

@@ -21,8 +21,8 @@ from report.run import drawing
 from report.text.progress import Progress as Working
 from report.text.terminal import RunProgress, table
 from rths.__main__ import VERBS
+from rths.perform.follow import tell
 from rths.perform.processes import TEXT, Said
-from rths.perform.run import tell
 from tests.rths.diagnosis_report.reports import bare
 
 READABLE = "µ²λ–Ωé"

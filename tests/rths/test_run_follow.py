@@ -28,8 +28,8 @@ from laboratories.longest import resting
 from recorder.loop import RecorderLoop
 from report.text.terminal import RunProgress
 from rths.perform.ending import KILL_S, LEAVE_S, MARGIN_S, SILENCE_S, WRITE_S, Ending, verdict
+from rths.perform.follow import answer, follow, note
 from rths.perform.processes import Leash, Processes, Said, understood
-from rths.perform.run import answer, follow, note
 from simulation import virtual
 
 NAMES = ("master", "slave", "recorder")

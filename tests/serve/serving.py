@@ -15,7 +15,8 @@ from common.reality.reality import as_planned
 from common.recording.reader import read
 from common.recording.run import Run
 from master.assembly import warm_up_served
-from master.client import AsFastAsItGoes, ClientBuilding, Pace
+from master.client.building import ClientBuilding
+from master.client.pace import AsFastAsItGoes, Pace
 from simulation import virtual
 from tests.serve.client import PATIENCE_S, Script, free_port
 

@@ -19,7 +19,8 @@ from common.plan.plan import Plan
 from common.plan.read import with_test
 from common.reality.reality import as_planned
 from common.recording.reader import read
-from master.client import AsFastAsItGoes, ClientBuilding
+from master.client.building import ClientBuilding
+from master.client.pace import AsFastAsItGoes
 from simulation import virtual
 from tests.helpers import ROOT
 from tests.opensees import lacking

@@ -14,8 +14,8 @@ import pytest
 from common.plan.plan import Plan
 from report.text.terminal import RunProgress
 from rths.perform.ending import Ending
+from rths.perform.follow import follow
 from rths.perform.live_child import READY, View
-from rths.perform.run import follow
 
 
 def told(view: View, seconds: float = 40.0) -> str:

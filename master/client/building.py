@@ -9,124 +9,28 @@ forces belong to it.
 from __future__ import annotations
 
 import math
-import time
-from collections import deque
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol
-
-import numpy as np
+from typing import Any
 
 from common.errors import InputError, InterlockError
 from common.lab.laboratory import Laboratory
 from common.opensees.element import Measurement, Phase, RevisedError
-from common.opensees.port import ClientError, ElementPort, Ports
+from common.opensees.port import ElementPort, Ports
 from common.plan.plan import Plan
 from common.reporting import Report, silent
 from common.roles import MASTER
 from common.safety.watchdog import Watchdog, WatchdogFinding
-from laboratories import kinds
-from laboratories.kind import Coupling, Follows
-from loop import substructure
+from laboratories.kind import Coupling
+from loop import assembly
 from master.building import Answering, BuildingStep, Outputs
-from models import compensators, force_correction
+from master.client.coupled import CoupledLaboratory, couplings_of
+from master.client.pace import SLICE_S, Pace
+from models import compensators
 from models.compiled import bound
 
-SLICE_S = (
-    0.1  # longest delay of a request to stop while virtual time stands still; an operator does not notice it
-)
-SCALE = (
-    1e-6  # relative difference of the client's step from the plan's that is rounding of the client's times
-)
+# relative difference of the client's step from the plan's that is rounding of the client's times
+SCALE = 1e-6
 NOTHING = math.nan  # recorded where a tick has no value
-
-
-class Pace(Protocol):
-    """The time that a tick waits for the client."""
-
-    settles: bool  # whether the client is answered in the time after the commands of a tick
-
-    def until(self, lab: Laboratory, tick: int) -> Callable[[], float]:
-        """A function that returns the remaining time (s) to wait in a tick; 0 or less if it has passed."""
-
-    def over(self) -> None:
-        """Called when that time has passed; raises ClientError if that ends the test at once."""
-
-
-class RealTime:
-    """A tick waits for the plan's share of the interval; longer silences are judged by the watchdog."""
-
-    settles = True
-
-    def __init__(self, plan: Plan) -> None:
-        self._share_ns = round(plan.link.wait_share * plan.test.interval * 1e9)
-
-    def until(self, lab: Laboratory, tick: int) -> Callable[[], float]:
-        """The remaining part of the plan's share of the interval, which begins at the tick's nominal time."""
-        now, end = lab.clock.now, lab.tick_ns(tick) + self._share_ns
-        return lambda: (end - now()) * 1e-9
-
-    def over(self) -> None:
-        """Do nothing: the laboratories hold, and the watchdog decides when to ramp."""
-
-
-class AsFastAsItGoes:
-    """Virtual time stands still until the client sends or a stop is requested, at most for `seconds` of wall time."""
-
-    settles = False
-
-    def __init__(self, seconds: float, stopping: Callable[[], str]) -> None:
-        self._seconds, self._stopping = seconds, stopping
-
-    def until(self, lab: Laboratory, tick: int) -> Callable[[], float]:
-        """The remaining time, in slices so that a request to stop is noticed."""
-        end = time.monotonic() + self._seconds
-        return lambda: 0.0 if self._stopping() else min(end - time.monotonic(), SLICE_S)
-
-    def over(self) -> None:
-        """End the test, because the client sends nothing."""
-        if not self._stopping():
-            raise ClientError(f"No displacement has come from the client for {self._seconds:g} s.")
-
-
-class CoupledLaboratory:
-    """One laboratory of an element: converts the element's displacement into a target, and the force back."""
-
-    def __init__(self, coupling: Coupling, interval: float, intervals: int) -> None:
-        self.coupling = coupling
-        self.sign = 1.0 if coupling.follows is Follows.DRIFT else -1.0  # OpenSees takes forces that resist
-        self.target = 0.0
-        self._interval, self._intervals = interval, intervals
-        self._past: deque[float] = deque([0.0] * 3, maxlen=3)  # targets before the present one, newest first
-        chosen = coupling.correction
-        self._filter = force_correction.coefficients(chosen, interval)
-        self._filtered = np.zeros(force_correction.CORRECTED + 1)
-        self._delayed: float | None = 0.0 if chosen.unit_delay else None
-
-    def follow(self, displacement: float) -> tuple[float, float, float, float, float]:
-        """The target (m) for the end of the interval, the motor's force (N), and the target's rates (m/s, m/s², m/s³).
-
-        Over one interval the first two rates are backward differences of second order, the third of first order. Over
-        several intervals the motion is a ramp, of which only the velocity is not zero.
-        """
-        target, h = self.coupling.ratio * displacement, self._interval
-        x1, x2, x3 = self._past
-        velocity, acceleration, jerk = (target - self.target) / h, 0.0, 0.0
-        if self._intervals == 1:
-            x0, x1, x2, x3 = target, self.target, x1, x2
-            velocity = (3.0 * x0 - 4.0 * x1 + x2) / (2.0 * h)
-            acceleration = (2.0 * x0 - 5.0 * x1 + 4.0 * x2 - x3) / h**2
-            jerk = (x0 - 3.0 * x1 + 3.0 * x2 - x3) / h**3
-        self._past.appendleft(self.target)
-        self.target = target
-        effort = self.coupling.effort * velocity / self.coupling.ratio
-        return target, effort, velocity, acceleration, jerk
-
-    def resists(self, force: float) -> float:
-        """The element's resisting force (N) from the measured force (N), with the plan's force correction."""
-        corrected: float = force_correction.step(*self._filter, self._filtered, force)
-        if self._delayed is not None:
-            corrected, self._delayed = self._delayed, corrected
-        return self.sign * self.coupling.scale * corrected
 
 
 class ClientBuilding(BuildingStep):
@@ -365,14 +269,9 @@ class ClientBuilding(BuildingStep):
             raise InterlockError(str(error)) from None
 
 
-def couplings_of(plan: Plan) -> dict[str, Coupling]:
-    """The coupling of every laboratory by role, in the order of an element's degrees of freedom."""
-    return {role: kind.coupling(plan.of(role)) for role, kind in kinds.kinds_of(plan).items()}
-
-
 def compensator(plan: Plan) -> Callable[..., float]:
     """The compensator of the master's own laboratory, as `compensators.enter`; without one it does nothing."""
-    built = substructure.own_compensator(plan)
+    built = assembly.own_compensator(plan)
     return bound(compensators.enter, built, *compensators.STILL, plan.test.interval)
 
 

@@ -1,0 +1,62 @@
+"""The time that a tick waits for a client: a share of the interval, or virtual time stands still until it sends."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Protocol
+
+from common.lab.laboratory import Laboratory
+from common.opensees.port import ClientError
+from common.plan.plan import Plan
+
+# longest delay of a request to stop while virtual time stands still; an operator does not notice it
+SLICE_S = 0.1
+
+
+class Pace(Protocol):
+    """The time that a tick waits for the client."""
+
+    settles: bool  # whether the client is answered in the time after the commands of a tick
+
+    def until(self, lab: Laboratory, tick: int) -> Callable[[], float]:
+        """A function that returns the remaining time (s) to wait in a tick; 0 or less if it has passed."""
+
+    def over(self) -> None:
+        """Called when that time has passed; raises ClientError if that ends the test at once."""
+
+
+class RealTime:
+    """A tick waits for the plan's share of the interval; longer silences are judged by the watchdog."""
+
+    settles = True
+
+    def __init__(self, plan: Plan) -> None:
+        self._share_ns = round(plan.link.wait_share * plan.test.interval * 1e9)
+
+    def until(self, lab: Laboratory, tick: int) -> Callable[[], float]:
+        """The remaining part of the plan's share of the interval, which begins at the tick's nominal time."""
+        now, end = lab.clock.now, lab.tick_ns(tick) + self._share_ns
+        return lambda: (end - now()) * 1e-9
+
+    def over(self) -> None:
+        """Do nothing: the laboratories hold, and the watchdog decides when to ramp."""
+
+
+class AsFastAsItGoes:
+    """Virtual time stands still until the client sends or a stop is requested, at most for `seconds` of wall time."""
+
+    settles = False
+
+    def __init__(self, seconds: float, stopping: Callable[[], str]) -> None:
+        self._seconds, self._stopping = seconds, stopping
+
+    def until(self, lab: Laboratory, tick: int) -> Callable[[], float]:
+        """The remaining time, in slices so that a request to stop is noticed."""
+        end = time.monotonic() + self._seconds
+        return lambda: 0.0 if self._stopping() else min(end - time.monotonic(), SLICE_S)
+
+    def over(self) -> None:
+        """End the test, because the client sends nothing."""
+        if not self._stopping():
+            raise ClientError(f"No displacement has come from the client for {self._seconds:g} s.")

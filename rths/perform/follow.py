@@ -1,0 +1,131 @@
+"""The processes of a test while they run: their reports are shown, and each is stopped when its time has come."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from common.host.stopping import Stopping
+from common.lab.preflight import PASSED
+from common.protocol.exchange import State
+from common.roles import MASTER, title
+from common.safety.modes import Mode
+from report.text.terminal import RunProgress
+
+if TYPE_CHECKING:
+    from rths.perform.ending import Ending
+    from rths.perform.live_child import View
+    from rths.perform.processes import Processes, Said
+
+POLL_S = 0.1  # s between two looks at the processes: a user does not notice the delay
+AGREED = State.SCHEDULED.value  # state in which the master reports that all processes know the start
+# Codes of events that go into the recording only: the terminal shows them before the start or in the summary.
+UNSAID = ("patience", "machine", "bare_loop", "mode", "exchange", PASSED)
+
+
+def follow(
+    processes: Processes,
+    ending: Ending,
+    progress: RunProgress,
+    stopping: Stopping,
+    view: View | None = None,
+) -> None:
+    """Show the reports of the processes, and stop those whose time has come, until all have ended.
+
+    A second Ctrl-C changes nothing; the answer to it says what the processes are doing.
+    """
+    from rths.perform.ending import killed
+
+    answered = 1
+    doing: dict[str, str] = {}
+    while not processes.all_ended():
+        said = processes.said(POLL_S)
+        if said is not None:
+            tell(said, progress)
+            note(said, ending, doing)
+        if view is not None and (news := view.news()):
+            progress.say(news)
+        for name in stop(processes, ending, stopping()):
+            progress.say(killed(name))
+        if stopping.presses > answered:
+            answered = stopping.presses
+            progress.say(answer(processes, doing))
+
+
+def note(said: Said, ending: Ending, doing: dict[str, str]) -> None:
+    """Take note of a report that concerns the end of a test; `doing` says which laboratories arm or come to rest."""
+    match said.data:
+        case {"kind": "state", "state": state} if said.process == MASTER and state == AGREED:
+            ending.agreed = True
+        case {"kind": "state", "state": State.REGISTERED.value}:
+            doing[said.process] = f"arming its rig, at most {ending.arming:g} s"
+            ending.arms(said.process, time.monotonic())
+        case {"kind": "state", "state": State.ARMED.value}:
+            doing.pop(said.process, None)
+            ending.armed(said.process, time.monotonic())
+        case {"kind": "mode", "mode": mode}:
+            doing.pop(said.process, None)
+            if mode == Mode.RAMPING.value:
+                doing[said.process] = "coming to rest"
+                ending.rests(said.process, time.monotonic())
+        case {"kind": "resting", "left": float(left), "text": text}:
+            doing[said.process] = str(text)
+            ending.rests(said.process, time.monotonic(), left)
+        case _:
+            pass
+
+
+def answer(processes: Processes, doing: Mapping[str, str]) -> str:
+    """The answer to a second Ctrl-C: what the processes are doing, which is not cut short."""
+    there = [name for name in processes.names if name not in processes.ended()]
+    if resting := [f"{title(name)}: {text}" for name, text in doing.items() if name in there]:
+        return (
+            "already stopping; no laboratory is killed while it arms or is on its ramp to rest "
+            f"({'; '.join(resting)})"
+        )
+    return (
+        f"already stopping; waiting for {' and '.join(map(title, there)) or 'no process'} to leave in order"
+    )
+
+
+def end_all(processes: Processes, ending: Ending) -> None:
+    """End the processes in order if this program has failed, so that no rig is left in mid-motion."""
+    doing: dict[str, str] = {}
+    while not processes.all_ended():
+        if (said := processes.said(POLL_S)) is not None:
+            note(said, ending, doing)
+        stop(processes, ending, "this program failed.")
+
+
+def tell(said: Said, progress: RunProgress) -> None:
+    """Show one report if it is meant for the user."""
+    match said.data:
+        case {"kind": "progress"} if said.process == MASTER:
+            progress.show(said.data)
+        case {"kind": "mode", "lab": lab, "mode": mode}:
+            progress.mode(lab, mode)
+        case {"kind": "event", "code": "real_time", "missing": missing} if missing:
+            pass  # pre-flight reported it if there is a rig; an emulation does not need it
+        case {"kind": "event", "level": "error", "code": code, "lab": lab}:
+            progress.say(f"{lab}: ends the test ({code})")  # the full sentence is this command's last line
+        case {"kind": "event", "code": code, "lab": lab, "text": text} if code not in UNSAID:
+            progress.say(f"{lab}: {text}")
+        case {"kind": "text", "text": text}:
+            progress.say(f"{said.process}: {text}")
+        case _:
+            pass
+
+
+def stop(processes: Processes, ending: Ending, wish: str) -> list[str]:
+    """Ask or kill the processes whose time has come; names of those that were killed."""
+    gone = []
+    now, ended = time.monotonic(), processes.ended()
+    ending.look(now, wish, processes.names, ended)
+    for name in processes.names:
+        if name not in ended and now >= ending.ask_at(name):
+            processes.ask(name)
+        if name not in ended and now >= ending.kill_at(name):
+            processes.kill(name)
+            gone.append(name)
+    return gone
