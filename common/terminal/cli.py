@@ -131,10 +131,14 @@ def output_argument(parser: argparse.ArgumentParser, metavar: str, text: str, **
     parser.add_argument("-o", "--output", type=Path, metavar=metavar, help=text, **options)
 
 
-def workers_arguments(parser: argparse.ArgumentParser) -> None:
-    """The options that say how work is spread."""
+def workers_arguments(parser: argparse.ArgumentParser, jobs: int = 1) -> None:
+    """The options that say how work is spread; `jobs` is the number of processes where none is given."""
     parser.add_argument(
-        "--jobs", type=int, default=1, metavar="N", help="number of processes; -1 for one per processor"
+        "--jobs",
+        type=int,
+        default=jobs,
+        metavar="N",
+        help=f"number of processes; -1 for one per processor (default: {'1' if jobs == 1 else 'one per processor'})",
     )
     parser.add_argument(
         "--dask",

@@ -14,7 +14,7 @@ import shutil
 import stat
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
 from typing import TextIO
 
@@ -196,8 +196,10 @@ def free_name(folder: Path, stem: str, ending: str) -> Iterator[Path]:
 
 
 @contextlib.contextmanager
-def folder(path: Path, force: bool = False) -> Iterator[Path]:
+def folder(path: Path, force: bool = False, besides: Collection[str] = ()) -> Iterator[Path]:
     """A folder for the files of a command, created if there is none; it is removed if it was created and stays empty.
+
+    What is called as one of `besides` may be in it.
 
     Raises:
         InputError: there are files in it and `force` is not given, or none can be written there.
@@ -205,7 +207,7 @@ def folder(path: Path, force: bool = False) -> Iterator[Path]:
     made = not path.exists()
     try:
         path.mkdir(parents=True, exist_ok=True)
-        empty = not any(path.iterdir())
+        empty = all(one.name in besides for one in path.iterdir())
     except OSError as error:
         raise InputError(
             f"Cannot write into {path}: {error.strerror}; give another folder with -o."

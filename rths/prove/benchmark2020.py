@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 MOST_PLANTS = 1000  # fifty times the benchmark's own 20: hours of computing
 PROCESSORS = len(os.sched_getaffinity(0))
-USUAL = {"plants": 20, "seed": 2020, "only": None, "jobs": PROCESSORS, "json": False}
+USUAL = {"plants": 20, "seed": 2020, "only": None, "jobs": PROCESSORS, "dask": "", "json": False}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -36,17 +36,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--only", type=cli.words, metavar="NAME,…", help="only these settings of the compensators"
     )
-    parser.add_argument(
-        "--jobs",
-        type=int,
-        default=PROCESSORS,
-        metavar="N",
-        help="tests at once (default: one per processor)",
-    )
+    cli.workers_arguments(parser, jobs=PROCESSORS)
     cli.output_argument(
         parser,
         "FOLDER",
-        "folder for page, pictures and results.json (default: runs/benchmark2020); with --plan the plan's file",
+        "folder for page, pictures and results (default: runs/benchmark2020); with --plan the plan's file",
     )
     parser.add_argument(
         "--plan",
@@ -66,13 +60,19 @@ def run(args: argparse.Namespace) -> int:
     check(args)
     if args.plan is not None:
         return write_plan(args)
+    from simulation.workers.parts import ENDING, Way
+    from validation.benchmark2020.spreading import TABLE
+
     settings = chosen(args.only)
-    place = outputs.folder(args.output or Path("runs/benchmark2020"), args.force)
+    going_on = (f"{TABLE}{ENDING}",)  # of a command that was interrupted
+    place = outputs.folder(args.output or Path("runs/benchmark2020"), args.force, besides=going_on)
     with place as folder, Progress("benchmark") as progress:
         from validation.benchmark2020 import evidence, figures, page, text
         from validation.proof import draw_all
 
-        found = evidence.gather(settings, args.plants, args.seed, args.jobs, progress.tell)
+        found = evidence.gather(
+            folder, settings, args.plants, args.seed, Way(args.jobs, args.dask), progress.tell
+        )
         progress.tell("figures")
         pictures = draw_all(figures.wanted(found), found, folder)
         checks = evidence.checks(found)
@@ -89,6 +89,8 @@ def run(args: argparse.Namespace) -> int:
 
 def check(args: argparse.Namespace) -> None:
     """Raise InputError for values out of range and for options that contradict each other."""
+    from simulation.workers import pool
+
     if args.plan is not None:
         for name, unused in USUAL.items():
             if getattr(args, name) != unused:
@@ -101,10 +103,10 @@ def check(args: argparse.Namespace) -> None:
     for name, value, fits, wanted in (
         ("--plants", args.plants, 0 <= args.plants <= MOST_PLANTS, f"between 0 and {MOST_PLANTS}"),
         ("--seed", args.seed, args.seed >= 0, "at least 0"),
-        ("--jobs", args.jobs, args.jobs >= 1, "at least 1"),
     ):
         if not fits:
             raise InputError(f"{name} is {value}, but must be {wanted}.")
+    pool.check(args.jobs, args.dask)
 
 
 def chosen(only: list[str] | None) -> dict[str, CompensatorTable]:

@@ -67,7 +67,7 @@ def about(sweep: Sweep, given: Luggage) -> dict[str, Any]:
         "drawn": {name: vars(one) for name, one in sweep.drawn.items()},
         "intensity": vars(sweep.intensity),
         "files": given.digest,
-        "versions": versions(),
+        "version": versions(),
     }
 
 

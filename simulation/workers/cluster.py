@@ -37,7 +37,7 @@ def spread(function: Callable[[Item], Result], items: Sequence[Item], address: s
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what it logs is said in one sentence below
     with connected(distributed, address) as client:
         waiting = iter(items)
-        running = distributed.as_completed()
+        running = distributed.as_completed(loop=client.loop)
         for item in waiting:
             running.add(submit(client, function, item))
             if running.count() == WINDOW:

@@ -25,7 +25,8 @@ from common.terminal.telling import Tell, untold
 from simulation.workers.pool import spread
 
 ABOUT = "about.json"
-ENDING = ".arrow"
+ENDING = ".parts"  # of the folder beside a table
+PART = ".arrow"
 NEW = ".new"
 ROWS = 65536  # of a row group, so that a reader of a few columns reads a few pages
 
@@ -55,13 +56,13 @@ class Parts:
         self.count = count
         for path in folder.glob(f"*{NEW}"):
             path.unlink()
-        self.there = {int(path.stem) for path in folder.glob(f"*{ENDING}")}
+        self.there = {int(path.stem) for path in folder.glob(f"*{PART}")}
 
     def add(self, batch: Batch) -> None:
         """Keep a batch; a second one of the same number changes nothing."""
         if batch.number in self.there:
             return
-        path = self.folder / f"{batch.number:07d}{ENDING}"
+        path = self.folder / f"{batch.number:07d}{PART}"
         new = path.with_suffix(NEW)
         feather.write_feather(pa.table(batch.columns, schema=self.schema), new, compression="lz4")
         synced(new)
@@ -71,7 +72,7 @@ class Parts:
 
     def table(self) -> pa.Table:
         """All rows, in the order of the batches."""
-        paths = [self.folder / f"{number:07d}{ENDING}" for number in range(self.count)]
+        paths = [self.folder / f"{number:07d}{PART}" for number in range(self.count)]
         return pa.concat_tables([feather.read_table(path, memory_map=False) for path in paths])
 
 
@@ -96,7 +97,7 @@ def parts(
         InputError: parts of another table are there and `force` is not given, another process is at work on them, or
             none can be written.
     """
-    folder = table.with_name(f"{table.name}.parts")
+    folder = table.with_name(f"{table.name}{ENDING}")
     try:
         with opened(folder, table, json.dumps(about, indent=1, sort_keys=True), force):
             found = Parts(folder, schema, count)

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import NamedTuple
 
 from common.plan.laboratory_tables import CompensatorTable
 from common.terminal.telling import Tell
 from report.text.formats import percent
+from simulation.workers.parts import Way
 from validation.benchmark2020.critical import Critical, critical_delays
 from validation.benchmark2020.late_force import SETTING, LateForceTest, late_forces
-from validation.benchmark2020.problem import CASES, FORCE, MOTIONS, SETTINGS
+from validation.benchmark2020.problem import FORCE, SETTINGS
 from validation.benchmark2020.published import CRITICAL_DELAYS, TABLE_3
-from validation.benchmark2020.runs import NOMINAL, CellResult, Stage, on_el_centro, stage, sweep
+from validation.benchmark2020.runs import NOMINAL, CellResult, Stage, on_el_centro, stage
+from validation.benchmark2020.spreading import PAIRS, played
 
 SAMPLE = "sample"
 # By which a cell may differ from the published one, whose sensor noise was another draw: one point, and for J1 (s) one
@@ -74,17 +77,17 @@ class BenchmarkEvidence(NamedTuple):
 
 
 def gather(
-    settings: Mapping[str, CompensatorTable], plants: int, seed: int, jobs: int, tell: Tell
+    folder: Path, settings: Mapping[str, CompensatorTable], plants: int, seed: int, way: Way, tell: Tell
 ) -> BenchmarkEvidence:
-    """All tests of the benchmark, `jobs` at a time."""
+    """All tests of the benchmark, whose table stands in the folder."""
     tell("critical delays", 0, 0)
     critical = critical_delays()
+    results = played(folder, settings, plants, seed, way, tell)
     stages = []
-    for place, (case, motion) in enumerate((case, motion) for motion in MOTIONS for case in CASES):
-        tell("references", place, len(CASES) * len(MOTIONS))
+    for place, (case, motion) in enumerate(PAIRS):
+        tell("references", place, len(PAIRS))
         stages.append(stage(case, motion, plants, seed))
     late = late_forces(stages, tell)
-    results = sweep(stages, settings, jobs, tell, len(stages) * (1 + plants) * len(settings))
     summaries = [
         summary(name, chosen.kind, [item for item in results if item.setting == name], stages)
         for name, chosen in settings.items()

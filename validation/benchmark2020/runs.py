@@ -1,19 +1,15 @@
-"""Tests of the benchmark, many at once: every setting on every case, motion and plant."""
+"""One test of the benchmark: a setting on a case, a motion and a plant."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
-from common.plan.laboratory_tables import CompensatorTable
 from common.plan.plan import Plan
 from common.roles import MASTER
-from common.terminal.telling import Tell, untold
 from laboratories.column import specimen
 from laboratories.column.kind import COLUMN
 from laboratories.sensors import noise
@@ -30,7 +26,6 @@ from validation.benchmark2020.problem import (
     PartitionCase,
     draw,
     planned,
-    with_compensator,
     with_plant,
 )
 
@@ -134,34 +129,6 @@ def unstable(on: Stage, setting: str, plant: int) -> CellResult:
         worst,
         worst,
     )
-
-
-def sweep(
-    stages: Iterable[Stage],
-    settings: Mapping[str, CompensatorTable],
-    jobs: int,
-    tell: Tell = untold,
-    total: int = 0,
-) -> list[CellResult]:
-    """Test every setting on every plant of every stage, `jobs` at once: kernels release the interpreter's lock."""
-    results: list[CellResult] = []
-    with threadpool_limits(1), ThreadPoolExecutor(jobs) as pool:
-        for on in stages:
-            tests = [(name, plant) for plant in range(len(on.plants)) for name in settings]
-            for result in pool.map(one_of(on, settings), tests):
-                results.append(result)
-                tell("tests", len(results), total)
-    return results
-
-
-def one_of(on: Stage, settings: Mapping[str, CompensatorTable]) -> Callable[[tuple[str, int]], CellResult]:
-    """A function that tests a setting, given by name, on a plant, given by number."""
-
-    def test(asked: tuple[str, int]) -> CellResult:
-        name, plant = asked
-        return play(on, name, with_compensator(on.plants[plant], settings[name]), plant)[0]
-
-    return test
 
 
 def on_el_centro(results: Iterable[CellResult], setting: str) -> list[CellResult]:

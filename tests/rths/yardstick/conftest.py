@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import pytest
 
 from common.terminal.telling import untold
+from simulation.workers.parts import Way
 from validation.benchmark2020 import evidence, figures, late_force, page, text
 from validation.benchmark2020.evidence import BenchmarkEvidence
 from validation.benchmark2020.problem import SETTINGS
@@ -30,7 +31,7 @@ def played(tmp_path_factory: pytest.TempPathFactory) -> Played:
     settings = {name: SETTINGS[name] for name in ("sample", "amb", "ats", "none")}
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(late_force, "DELAYS", (0.0, 1e-3, 2e-3, 10e-3))
-        found = evidence.gather(settings, 1, 2020, 2, untold)
+        found = evidence.gather(folder, settings, 1, 2020, Way(), untold)
     checks = evidence.checks(found)
     pictures = draw_all(figures.wanted(found), found, folder)
     place = folder / "index.html"

@@ -16,7 +16,7 @@ from validation.benchmark2020.problem import CASES, EL_CENTRO, SETTINGS, planned
     ("words", "complaint"),
     [
         (("--plants", "-1"), "--plants is -1, but must be between 0 and 1000."),
-        (("--jobs", "0"), "--jobs is 0, but must be at least 1."),
+        (("--jobs", "0"), "--jobs is 0, but must be at least 1, or -1 for all processors."),
         (("--seed", "-3"), "--seed is -3, but must be at least 0."),
         (("--only", "amp"), "Unknown setting 'amp' of the compensators"),
         (("--plan", "5"), "--plan is 5, but must be a case of the benchmark, 1 to 4."),
@@ -65,4 +65,4 @@ def test_the_command_writes_a_page_pictures_and_results(
     assert [item["setting"] for item in found["settings"]] == ["amb"]
     assert found["settings"][0]["plants"] is None
     names = {path.name for path in folder.iterdir()}
-    assert names == {"index.html", "results.json", "compensators.png", "late_force.png"}
+    assert names == {"index.html", "results.json", "results.parquet", "compensators.png", "late_force.png"}
