@@ -39,7 +39,7 @@ VERBS = {
     "layout": "make a layout file with which Foxglove and Lichtblick show a recording",
     "replay": "compute a recording's commands again and compare them to the last bit",
     "catalog": "catalogue recordings: list them, find some by what happened in them, note something beside one",
-    "compare": "compare two recordings or simulations signal by signal",
+    "compare": "compare two recordings or simulations signal by signal, or several side by side",
     "reproduce": "compute the seed paper's numbers and figures again",
     "benchmark2020": "run the field's public benchmark problem of 2020 with every compensator",
     "diagnose": "find the sim-to-real gap of a recording: where it lies, its cause, how far it closes",

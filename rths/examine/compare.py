@@ -1,27 +1,52 @@
-"""`rths compare`: two recordings or simulations, signal by signal."""
+"""`rths compare`: two recordings or simulations signal by signal, or several recordings side by side."""
 
 from __future__ import annotations
 
 import argparse
 import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 from common.errors import InputError
-from common.terminal import cli
+from common.terminal import cli, outputs
 from common.terminal.printable import shown
 from report.text.progress import Progress
 
 if TYPE_CHECKING:
+    from report.text.terminal import TitledTable
     from simulation.foretold.held import Held
     from simulation.source import ComparedRun
+
+TABLES = (".csv", ".parquet")  # formats that hold the texts of a column
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `compare`."""
     parser.add_argument("a", metavar="A", help="a recording, or a plan, which is then simulated")
     parser.add_argument("b", metavar="B", nargs="?", help="the other recording or plan")
+    parser.add_argument(
+        "more",
+        metavar="MORE",
+        nargs="*",
+        help="further recordings: then peaks, tracking and plans of all are listed",
+    )
+    parser.add_argument(
+        "--signals",
+        type=cli.words,
+        default=[],
+        metavar="NAME,NAME",
+        help="the signals that are listed and drawn of several recordings, each with a unit if you like: "
+        "drift:mm,column_force (default: drifts, positions and forces)",
+    )
+    parser.add_argument(
+        "--html", type=Path, metavar="OUT", help="write a page on the recordings, with their histories"
+    )
+    cli.output_argument(
+        parser, "OUT", "write the signals of all recordings over the time since the start: .csv or .parquet"
+    )
+    cli.force_argument(parser)
     parser.add_argument(
         "--predicted",
         type=Path,
@@ -42,6 +67,8 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("Give A something to be compared with: B, or --predicted FILE, not both.")
     if args.predicted:
         return against_prediction(args)
+    if args.more or args.html or args.output or args.signals:
+        return side_by_side(args)
     with Progress("comparing") as progress:
         from simulation.source import columns
 
@@ -63,8 +90,70 @@ def run(args: argparse.Namespace) -> int:
     return 1 if beyond else 0
 
 
+def side_by_side(args: argparse.Namespace) -> int:
+    """List several recordings beside each other, and write their page and their table."""
+    if args.tolerance is not None:
+        raise InputError(
+            "--tolerance is of two recordings signal by signal: leave out further ones and outputs."
+        )
+    paths = [Path(name) for name in (args.a, args.b, *args.more)]
+    check_outputs(args, paths)
+    with Progress("comparing") as progress:
+        from report.several import page, runs, tables
+
+        found = runs.several(paths, progress.tell)
+        signals = runs.chosen(found, args.signals)
+        if not signals:
+            raise InputError(
+                "The recordings have no drift, position or force: choose with --signals what is compared."
+            )
+        if args.html:
+            progress.tell("page", 0, 0)
+            outputs.write_text(args.html, page.page(found, signals), args.force)
+        if args.output:
+            write_table(args, *tables.long(found, signals))
+    stream = outputs.aside(args.output, args.html)
+    if args.json:
+        stream.write(json.dumps(tables.plain(found, signals)) + "\n")
+        return 0
+    write_tables(tables.all_of(found, signals), stream)
+    return 0
+
+
+def check_outputs(args: argparse.Namespace, inputs: Sequence[Path]) -> None:
+    """Raise InputError where an output cannot be written, before any work is done."""
+    if args.output and args.output.suffix.lower() not in TABLES:
+        raise InputError(f"Cannot write {args.output}: give a file that ends in {' or '.join(TABLES)}.")
+    if args.html and args.html == args.output:
+        raise InputError("--html and -o name one file: give each a file of its own.")
+    for path in filter(None, (args.html, args.output)):
+        outputs.checked(path, args.force, inputs)
+
+
+def write_table(args: argparse.Namespace, columns: Any, units: dict[str, str]) -> None:
+    """The histories as a table of numbers."""
+    from report.text import tabular
+
+    with outputs.writing(args.output, args.force) as path:
+        tabular.write(path, columns, units)
+
+
+def write_tables(listed: Sequence[TitledTable], stream: TextIO) -> None:
+    """Tables as text."""
+    from report.text.terminal import table
+
+    for one in listed:
+        stream.write(f"{shown(one.title)}\n\n")
+        table([list(one.head), *map(list, one.rows)], stream)
+        stream.write("\n")
+
+
 def against_prediction(args: argparse.Namespace) -> int:
     """Say what of a recording lay outside the band that was foretold; 1 where the prediction did not hold."""
+    if args.html or args.output or args.signals:
+        raise InputError(
+            "--html, -o and --signals are of several recordings: leave them out with --predicted."
+        )
     if args.tolerance is not None:
         raise InputError("--tolerance is of two recordings: leave it out with --predicted, which has a band.")
     from common.recording.reader import read

@@ -32,6 +32,8 @@ WRITES = {
     "benchmark2020": ((), "-o"),
     "benchmark2020, a plan": (("--plan", "1"), "-o"),
     "catalog": (("show",), "--html"),
+    "compare": (("{recording}", "{plan}"), "-o"),
+    "compare, a page": (("{recording}", "{plan}"), "--html"),
     "diagnose": (("{recording}",), "--html"),
     "diagnose, JSON": (("{recording}",), "--json"),
     "import": (("{plan}", "--map", "{plan}"), "-o"),

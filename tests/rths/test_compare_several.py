@@ -1,0 +1,102 @@
+"""Several recordings side by side: tables, page, histories for other programs."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from pyarrow import parquet
+
+from common.plan.plan import Plan
+from common.plan.read import with_test
+from common.reality.reality import as_planned
+from common.recording.reader import read
+from report.several import runs
+from simulation import virtual
+from tests.rths.report.pages import check_in_browser
+
+
+@pytest.fixture(scope="module")
+def three(virtual_recording: Path, short_plan: Plan, tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """The short test at two scales, and shorter."""
+    folder = tmp_path_factory.mktemp("three")
+    found = [virtual_recording]
+    for name, scale, duration in (("strong", 0.2, 2.0), ("brief", 0.1, 1.0)):
+        plan = with_test(short_plan, scale=scale, duration=duration)
+        path = folder / f"{name}.mcap"
+        assert virtual.run(virtual.assemble(plan, as_planned(plan), path), str) is None
+        found.append(path)
+    return found
+
+
+def test_figures_of_all_are_those_of_each(call: Any, capsys: Any, three: list[Path]) -> None:
+    assert call("compare", *three, "--json") == 0
+    found = json.loads(capsys.readouterr().out)
+    assert [one["recording"] for one in found] == ["short", "strong", "brief"]
+    for path, one in zip(three, found, strict=True):
+        columns = read(path).columns["master"]
+        assert one["peaks"]["column_force"] == np.abs(columns["column_force"]).max()
+        assert one["peaks"]["drift"] == np.abs(columns["displacement"]).max()
+    assert found[0]["nrmse"]["drift"] == 0.0
+    assert found[1]["nrmse"]["drift"] == pytest.approx(1.0, abs=0.02)  # twice the motion
+    assert found[2]["nrmse"]["drift"] < 0.02  # the same motion but for the sensors' noise
+    assert found[1]["plan"]["ground_motion.scale"] == "0.2"
+
+
+def test_tables_have_the_units_and_keys_asked_for(call: Any, capsys: Any, three: list[Path]) -> None:
+    assert call("compare", *three, "--signals", "drift:mm,column_force:kN") == 0
+    lines = [line.split() for line in capsys.readouterr().out.splitlines()]
+    assert ["recording", "outcome", "motion", "scale", "drift", "column_force"] in lines
+    drift = np.abs(read(three[0]).columns["master"]["displacement"]).max() * 1e3
+    assert next(line for line in lines if line[:1] == ["short"])[-4:-2] == [f"{drift:.4g}", "mm"]
+    assert ["ground_motion.scale", "default", "0.2", "default"] in lines
+
+
+def test_histories_go_to_other_programs(call: Any, three: list[Path], tmp_path: Path) -> None:
+    out = tmp_path / "all.parquet"
+    assert call("compare", *three, "--signals", "column_force:kN", "-o", out) == 0
+    table = parquet.read_table(out)
+    assert table.schema.field("column_force").metadata == {b"unit": b"kN"}
+    names, force = table["recording"].to_pylist(), table["column_force"].to_numpy()
+    expected = read(three[1]).columns["master"]["column_force"]
+    assert force[[name == "strong" for name in names]] == pytest.approx(expected / 1e3, rel=1e-12)
+
+
+def test_the_page_fits_screens_phones_and_paper(call: Any, three: list[Path], tmp_path: Path) -> None:
+    page = tmp_path / "all.html"
+    assert call("compare", *three, "--html", page) == 0
+    check_in_browser(page, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--signals", "drft"), "No recording has a signal 'drft': did you mean drift?"),
+        (("--signals", "drift:kN"), "--signals drift is in kN, which does not fit"),
+        (("-o", "all.mat"), "Cannot write all.mat: give a file that ends in .csv or .parquet."),
+        (("--tolerance", "0.1"), "--tolerance is of two recordings"),
+        (("--html", "a.csv", "-o", "a.csv"), "--html and -o name one file"),
+        (("nowhere.mcap",), "Cannot read the recording nowhere.mcap"),
+    ],
+)
+def test_wrong_words_get_one_sentence(
+    call: Any, capsys: Any, three: list[Path], words: tuple[str, ...], said: str
+) -> None:
+    assert call("compare", *three, *words) == 2
+    error = capsys.readouterr().err.splitlines()[-1]
+    assert said in error
+
+
+def test_more_than_can_be_told_apart_are_refused(call: Any, capsys: Any, three: list[Path]) -> None:
+    assert call("compare", *three, three[0]) == 2
+    assert "given twice" in capsys.readouterr().err
+    assert call("compare", *(f"{number}.mcap" for number in range(runs.MOST + 1))) == 2
+    assert "at most 50" in capsys.readouterr().err
+
+
+def test_files_of_one_name_are_told_apart_by_their_folders() -> None:
+    assert runs.labelled([Path("a/x.mcap"), Path("b/x.mcap")]) == ["a/x", "b/x"]
+    assert runs.labelled([Path("a/x.mcap"), Path("b/y.mcap")]) == ["x", "y"]
