@@ -33,7 +33,9 @@ check: setup
 test: setup
 	$(MAKE) --no-print-directory -j 2 check tested
 
+# kernels that a change has made outdated are compiled once, before two processes would compile each of them
 tested: setup
+	$(BIN)/python -m simulation.warm
 	$(BIN)/pytest -n 2 --dist worksteal -m "not slow and not faults and not soak"
 
 # what takes long or needs a machine that does little else; one worker: where a test hangs beyond reach the others get another

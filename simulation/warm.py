@@ -85,5 +85,6 @@ def of_users(drive: Array) -> None:
 
 
 if __name__ == "__main__":
-    compile_all()
+    if not cache.warm():
+        compile_all()
     sys.stderr.write(f"kernels compiled into {cache.folder()}\n")
