@@ -1,0 +1,133 @@
+"""Effects of the actuator against closed forms and other solvers."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from common.plan.laboratory_tables import Actuator
+from models.system import ActuatorEffects, ColumnEffects
+from tests.laboratories.effects.histories import DT, SHORT, Array, K, ramped, run_a, there_and_back, tones
+
+DIRECT = Actuator(gain=1.0, delay=0.0, time_constant=0.0)
+
+
+@pytest.mark.parametrize("gain", [1.0, 0.9])
+@pytest.mark.parametrize(
+    ("limit", "band"), [(0.02, 0.0), (math.inf, 4e-4), (0.03, 4e-4)], ids=["limit", "band", "both"]
+)
+def test_the_servo_loop_solves_its_equation_with_limit_and_dead_band(
+    limit: float, band: float, gain: float
+) -> None:
+    actuator = Actuator(gain=gain, delay=0.0133, time_constant=0.030)
+    command = tones(400, size=1.5e-3)
+    more = ActuatorEffects(velocity_limit=limit, deadband=band)
+    got = run_a(command, actuator, actuator_effects=more)[:, 0]
+    reached = ramped(command, 0.0133)
+
+    def slope(t: float, y: Array) -> Any:
+        error = gain * reached(t) - y
+        return np.clip((error - np.clip(error, -band / 2, band / 2)) / 0.030, -limit, limit)
+
+    times = DT * np.arange(1, command.size + 1)
+    exact = solve_ivp(slope, (0, times[-1]), [0.0], t_eval=times, max_step=DT / 8, rtol=1e-8, atol=1e-12).y[0]
+    linear = run_a(command, actuator)[:, 0]
+    assert np.max(np.abs(linear - exact)) > 1e-4  # there is something to be seen
+    assert np.max(np.abs(got - exact)) < 2e-3 * np.max(np.abs(exact))
+
+
+def test_the_velocity_limit_is_the_slope_of_a_large_step() -> None:
+    got = run_a(np.full(200, 0.01), actuator_effects=ActuatorEffects(velocity_limit=0.03))[:, 0]
+    slopes = np.diff(got) / DT
+    assert np.max(slopes) == pytest.approx(0.03, rel=1e-9)
+    # e = T·v where the limit lets go: until then 10 mm − 0.9 mm at 30 mm/s
+    assert np.sum(slopes > 0.03 * (1 - 1e-9)) * DT == pytest.approx((0.01 - 0.0009) / 0.03, abs=2 * DT)
+    slow = tones(300, size=1e-5)
+    same = run_a(slow, actuator_effects=ActuatorEffects(velocity_limit=0.03))[:, 0]
+    assert np.allclose(same, run_a(slow)[:, 0], atol=1e-15)
+
+
+@given(width=st.floats(2e-5, 6e-4), compliance=st.sampled_from([0.0, 3e-9, 3e-8]))
+@settings(max_examples=15)
+@example(width=2e-4, compliance=3e-8)
+def test_the_dead_travel_at_a_reversal_is_the_play(width: float, compliance: float) -> None:
+    """Under load too: while the specimen stands still so does its force, and the piston moves the play."""
+    command = there_and_back(2e-3, 1e-3, 500)
+    more = ActuatorEffects(backlash=width, compliance=compliance)
+    got = run_a(command, DIRECT, actuator_effects=more)[:, 0]
+    assert got[498] == pytest.approx((2e-3 - width / 2) / (1.0 + compliance * K), rel=1e-6)
+    moving = np.flatnonzero(got[499:] < got[498] - 1e-12)[0]
+    assert 2e-3 - command[499 + moving] == pytest.approx(width, abs=2.1e-6)
+    assert got[-1] == pytest.approx((1e-3 + width / 2) / (1.0 + compliance * K), rel=1e-6)
+
+
+@given(compliance=st.floats(1e-9, 3e-8))
+@settings(max_examples=10)
+def test_the_compliant_piston_yields_statically(compliance: float) -> None:
+    got = run_a(np.full(400, 2e-3), actuator_effects=ActuatorEffects(compliance=compliance))
+    displacement, force = got[-1]
+    assert displacement == pytest.approx(2e-3 / (1.0 + compliance * K), rel=1e-5)
+    assert force == pytest.approx(K * displacement)
+
+
+def test_the_compliant_piston_goes_with_the_force_of_a_yielding_specimen() -> None:
+    more, compliance = ColumnEffects(yield_displacement=1e-3, hardening=0.05), 1e-8
+    command = tones(800, size=1.5e-3)
+    servo = run_a(command)[:, 0]
+    got = run_a(command, actuator_effects=ActuatorEffects(compliance=compliance), column_effects=more)
+    error = got[:, 0] - (servo - compliance * got[:, 1])
+    assert np.max(np.abs(compliance * got[:, 1])) > 1e-4
+    speed = np.max(np.abs(np.diff(servo))) / DT
+    # within the force that a first stiffness overestimates in one short step
+    assert np.max(np.abs(error)) < compliance * K * speed * SHORT
+
+
+def behind_compliance(servo: Array, compliance: float, friction: float, contact: float) -> Array:
+    """Deformation δ + c·(K·δ + F·s/contact) = servo at each step, the contact sticking or sliding."""
+    before, slider, result = 0.0, 0.0, []
+    for piston in servo:
+        stick = compliance * friction / contact
+        after = (piston + stick * (before - slider)) / (1.0 + compliance * K + stick)
+        moved = slider + after - before
+        if abs(moved) > contact:
+            moved = math.copysign(contact, moved)
+            after = (piston - compliance * math.copysign(friction, moved)) / (1.0 + compliance * K)
+        before, slider = after, moved
+        result.append(after)
+    return np.array(result)
+
+
+STIFF_CONTACT = pytest.mark.xfail(strict=True, reason="c·F/presliding above 1 + c·k: the step is unstable")
+
+
+@pytest.mark.parametrize(
+    ("compliance", "friction"),
+    [
+        (3e-9, 900.0),
+        (1e-8, 900.0),
+        pytest.param(3e-8, 900.0, marks=STIFF_CONTACT),
+        pytest.param(1e-8, 3000.0, marks=STIFF_CONTACT),
+    ],
+)
+def test_friction_behind_a_compliant_piston_is_its_balance(compliance: float, friction: float) -> None:
+    t = np.arange(1, 751) * DT
+    more = ActuatorEffects(compliance=compliance)
+    rubbing = ColumnEffects(friction=friction, presliding=1e-5)
+    command = 2e-3 * np.sin(2.0 * np.pi * 2.0 * t)
+    got = run_a(command, DIRECT, actuator_effects=more, column_effects=rubbing)[:, 0]
+    expected = behind_compliance(command, compliance, friction, 1e-5)
+    assert np.max(np.abs(got - expected)) < 0.1 * compliance * friction
+
+
+def test_the_dead_band_stops_short_by_half_of_it_from_either_side() -> None:
+    for target in (3e-3, -3e-3):
+        got = run_a(np.full(2000, target), actuator_effects=ActuatorEffects(deadband=4e-4))[:, 0]
+        assert got[-1] == pytest.approx(target - math.copysign(2e-4, target), abs=1e-9)
+    inside = run_a(np.full(500, 1.9e-4), actuator_effects=ActuatorEffects(deadband=4e-4))
+    assert not inside.any()

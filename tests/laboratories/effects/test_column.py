@@ -1,0 +1,310 @@
+"""Effects of the specimen against closed forms, energy balances and other solvers."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import quad, solve_ivp, trapezoid
+
+from common.plan.laboratory_tables import Column
+from laboratories.column import specimen
+from models.specimens.fit import forces
+from models.system import ColumnEffects
+from tests.laboratories.effects.histories import DT, SHORT, Array, K, run_a, tones
+
+
+def specimen_under(
+    path: Array, effects: ColumnEffects, step: float = SHORT, column: Column | None = None
+) -> Array:
+    """Force at each deformation of a path, from rest at its first point."""
+    parts = specimen.build(column or Column(stiffness=K), effects)
+    return np.array([specimen.force(parts, float(deformation), step) for deformation in path])
+
+
+def cycles(amplitude: float, frequency: float, count: int = 3) -> tuple[Array, Array]:
+    """Times and deformations of a sine, in short steps, whole cycles."""
+    steps = round(1.0 / (frequency * SHORT))
+    t = np.arange(count * steps + 1) * SHORT
+    return t, amplitude * np.sin(2.0 * np.pi * frequency * t)
+
+
+def last_loop(path: Array, force: Array, frequency: float) -> float:
+    """Energy lost in the last cycle."""
+    steps = round(1.0 / (frequency * SHORT)) + 1
+    return float(trapezoid(force[-steps:], path[-steps:]))
+
+
+@settings(max_examples=15)
+@given(
+    friction=st.floats(100.0, 3000.0),
+    presliding=st.floats(3e-6, 1e-4),
+    amplitude=st.floats(0.5e-3, 4e-3),
+    frequency=st.sampled_from([0.5, 1.0, 2.0, 4.0]),
+)
+def test_column_friction_loses_a_parallelogram(
+    friction: float, presliding: float, amplitude: float, frequency: float
+) -> None:
+    _, path = cycles(amplitude, frequency)
+    force = specimen_under(path, ColumnEffects(friction=friction, presliding=presliding))
+    assert last_loop(path, force, frequency) == pytest.approx(
+        4.0 * friction * (amplitude - presliding), rel=4e-3
+    )
+    assert np.max(np.abs(force - K * path)) == pytest.approx(friction, rel=1e-9)
+
+
+def test_column_friction_is_a_spring_before_it_slides() -> None:
+    effects = ColumnEffects(friction=900.0, presliding=20e-6)
+    path = np.concatenate([np.linspace(0.0, 40e-6, 41), np.linspace(40e-6, -10e-6, 51)[1:]])
+    got = specimen_under(path, effects) - K * path
+    up, down = path[:41], path[41:]
+    assert np.allclose(got[1:41], 900.0 * np.minimum(up[1:] / 20e-6, 1.0), atol=1e-6)
+    # after the reversal the contact first unloads over twice its presliding deformation
+    assert np.allclose(got[41:], 900.0 * np.maximum(1.0 - (40e-6 - down) / 20e-6, -1.0), atol=1e-6)
+
+
+def test_column_friction_that_falls_off_with_speed() -> None:
+    effects = ColumnEffects(friction=900.0, presliding=1e-6, friction_velocity=0.01)
+    for speed in (0.001, 0.01, 0.05):
+        path = np.arange(1, 400) * speed * SHORT
+        got = specimen_under(path, effects) - K * path
+        assert got[-1] == pytest.approx(900.0 * math.tanh(speed / 0.01), rel=1e-6)
+
+
+@pytest.mark.parametrize("hold", [1, 50])
+def test_column_friction_stays_while_the_specimen_does_not_move(hold: int) -> None:
+    path = np.concatenate([np.linspace(0.0, 1e-3, 100), np.full(hold, 1e-3)])
+    got = specimen_under(path, ColumnEffects(friction=900.0)) - K * path
+    assert np.allclose(got[10:], 900.0, rtol=1e-6)
+
+
+@settings(max_examples=10)
+@given(
+    coefficient=st.floats(3e3, 1.5e5),
+    amplitude=st.floats(1e-4, 4e-3),
+    frequency=st.sampled_from([1.0, 2.0, 5.0]),
+)
+def test_the_viscous_column_loses_an_ellipse(coefficient: float, amplitude: float, frequency: float) -> None:
+    _, path = cycles(amplitude, frequency)
+    force = specimen_under(path, ColumnEffects(viscous=coefficient))
+    expected = math.pi * coefficient * 2.0 * math.pi * frequency * amplitude**2
+    assert last_loop(path, force, frequency) == pytest.approx(expected, rel=1e-4)
+
+
+@pytest.mark.parametrize("frequency", [1.0, 2.0, 5.0])
+def test_the_fixtures_inertia_takes_from_the_stiffness(frequency: float) -> None:
+    t, path = cycles(2e-3, frequency)
+    got = specimen_under(path, ColumnEffects(inertia=600.0)) - K * path
+    omega, last = 2.0 * np.pi * frequency, slice(-round(1.0 / (frequency * SHORT)), None)
+    sine, cosine = np.sin(omega * t[last]), np.cos(omega * t[last])
+    in_phase, across = 2.0 * np.mean(got[last] * sine), 2.0 * np.mean(got[last] * cosine)
+    assert in_phase == pytest.approx(-600.0 * omega**2 * 2e-3, rel=1e-3)
+    assert abs(across) < 0.01 * abs(in_phase)
+
+
+def test_inertia_and_viscosity_in_the_laboratory_behind_its_actuator() -> None:
+    """The same two, as the load cell reads them at the ticks while the servo loop moves the specimen.
+
+    There T·ẏ = u − y and T·ÿ = u̇ − ẏ, with u̇ the slope of the ramp that just ended.
+    """
+    command = tones(600, size=1e-3)
+    got = run_a(command, column_effects=ColumnEffects(inertia=2000.0, viscous=40e3))
+    late = np.concatenate([np.zeros(8), command])  # 14 ms are seven ticks
+    u, slope = late[1:][: command.size], np.diff(late)[: command.size] / DT
+    rate = (u - got[:, 0]) / 0.030
+    acceleration = (slope - rate) / 0.030
+    rest = got[:, 1] - K * got[:, 0]
+    for part in (2000.0 * acceleration, 40e3 * rate):
+        assert np.std(part) > 0.1 * np.std(rest)
+    error = rest - 2000.0 * acceleration - 40e3 * rate
+    assert np.std(error) < 0.02 * np.std(rest)
+
+
+@pytest.mark.parametrize("exponent", [1.0, 2.0, 5.0])
+@pytest.mark.parametrize("hardening", [0.0, 0.05])
+def test_the_yielding_column_solves_bouc_and_wens_equation(exponent: float, hardening: float) -> None:
+    limit = 0.8e-3
+    turns = [0.0, 2e-3, -1.5e-3, 1e-3]
+    path = np.concatenate([np.linspace(a, b, 300)[1:] for a, b in itertools.pairwise(turns)])
+    more = ColumnEffects(yield_displacement=limit, hardening=hardening, exponent=exponent)
+    z, before, expected = 0.0, 0.0, []
+    for deformation in path:
+        sign = math.copysign(1.0, deformation - before)
+
+        def slope(_: float, z: Array, sign: float = sign) -> Any:
+            return (1.0 - abs(z) ** exponent * 0.5 * (1.0 + np.sign(z * sign))) / limit
+
+        z = solve_ivp(slope, (before, deformation), [z], rtol=1e-8, atol=1e-10).y[0, -1]
+        before = float(deformation)
+        expected.append(hardening * K * deformation + (1.0 - hardening) * K * limit * z)
+    got = specimen_under(path, more)
+    assert np.max(np.abs(got - expected)) < 2e-5 * K * limit
+
+
+def test_the_yielding_column_is_bilinear_with_a_large_exponent() -> None:
+    limit, hardening, amplitude = 1e-3, 0.05, 3e-3
+    _, path = cycles(amplitude, 1.0)
+    more = ColumnEffects(yield_displacement=limit, hardening=hardening, exponent=200.0)
+    force = specimen_under(path, more)
+    expected = 4.0 * (1.0 - hardening) * K * limit * (amplitude - limit)
+    assert last_loop(path, force, 1.0) == pytest.approx(expected, rel=0.01)
+    assert np.max(force) == pytest.approx(K * (limit + hardening * (amplitude - limit)), rel=0.01)
+
+
+def test_the_degrading_column_remembers_its_largest_deformation() -> None:
+    path = np.concatenate(
+        [np.linspace(0, 1e-3, 50), np.linspace(1e-3, -3e-3, 90), np.linspace(-3e-3, 2e-3, 90)]
+    )
+    got = specimen_under(path, ColumnEffects(degradation=0.4))
+    largest = np.maximum.accumulate(np.abs(path))
+    assert np.allclose(got, K * path * (1.0 - 0.4 * (1.0 - np.exp(-largest / 2e-3))), rtol=1e-12)
+
+
+@given(
+    factor=st.floats(0.05, 0.6),
+    hardening=st.floats(-0.5, 0.3),
+    width=st.floats(3e-4, 3e-3),
+    where=st.floats(0, 5e-3),
+)
+def test_the_pinched_column_is_its_formula_and_odd(
+    factor: float, hardening: float, width: float, where: float
+) -> None:
+    more = ColumnEffects(pinching=factor, pinching_hardening=hardening, pinching_width=width)
+    weight = math.exp(-((where / width) ** 2))
+    expected = K * where * (1.0 - factor * weight + hardening * (1.0 - weight))
+    (got,), (mirrored,) = (specimen_under(np.array([sign * where]), more) for sign in (1.0, -1.0))
+    assert got == pytest.approx(expected, rel=1e-12, abs=1e-9)
+    assert mirrored == -got
+
+
+@given(gap=st.floats(2e-5, 1e-3), where=st.floats(-3e-3, 3e-3))
+def test_the_loose_column_feels_nothing_inside_its_gap(gap: float, where: float) -> None:
+    (got,) = specimen_under(np.array([where]), ColumnEffects(slip=gap))
+    outside = abs(where) - 0.5 * gap
+    assert got == pytest.approx(math.copysign(K * max(outside, 0.0), where), abs=1e-6)
+
+
+def through(*turns: float, steps: int = 400) -> Array:
+    """Deformations from rest through turning points, in short steps."""
+    parts = [np.linspace(a, b, steps)[1:] for a, b in itertools.pairwise((0.0, *turns))]
+    return np.concatenate([[0.0], *parts])
+
+
+def test_the_gap_goes_along_with_a_specimen_that_rests_elsewhere() -> None:
+    gap, limit = 0.4e-3, 1e-3
+    more = ColumnEffects(slip=gap, slip_law=1.0, yield_displacement=limit, hardening=0.0, law=1.0)
+    path = through(3e-3, 0.0)
+    got = specimen_under(path, more)
+    up, back = path[:400], path[400:]
+    loaded = np.clip(up - 0.5 * gap, 0.0, limit)
+    assert np.allclose(got[:400], K * loaded, atol=0.01 * K * limit)
+    # it unloads by the yield displacement, and nothing is felt until the other contact, one gap away
+    left = np.maximum(limit - (3e-3 - back), 0.0)
+    met = np.minimum(back - (3e-3 - limit - gap), 0.0)
+    assert np.allclose(got[400:], K * (left + np.maximum(met, -limit)), atol=0.01 * K * limit)
+
+
+def test_a_gap_where_an_elastic_specimen_rests_is_the_one_around_the_origin() -> None:
+    path = through(2e-3, -1.5e-3, 1e-3, -0.1e-3, 0.5e-3)
+    resting = specimen_under(path, ColumnEffects(slip=0.6e-3, slip_law=1.0))
+    assert np.allclose(resting, specimen_under(path, ColumnEffects(slip=0.6e-3)), atol=0.01 * K * 1e-3)
+
+
+def test_a_specimen_that_is_held_stays_behind_by_half_the_gap() -> None:
+    gap, top = 0.4e-3, 2e-3
+    path = through(top, -top, top)
+    got = specimen_under(path, ColumnEffects(slip=gap, slip_law=2.0))
+    loop = float(trapezoid(got[399:], path[399:]))
+    # a parallelogram, in which the force lags behind: what holds the specimen gives the work
+    assert loop == pytest.approx(-K * 2.0 * gap * (top - 0.5 * gap), rel=0.01)
+    assert got[399] == pytest.approx(K * (top - 0.5 * gap))
+
+
+@given(gap=st.floats(2e-5, 1e-3), share=st.floats(0.05, 1.0), where=st.floats(-3e-3, 3e-3))
+def test_a_part_beside_the_gap_carries_on(gap: float, share: float, where: float) -> None:
+    (got,) = specimen_under(np.array([where]), ColumnEffects(slip=gap, slip_law=3.0, slip_share=share))
+    inside = min(max(where, -0.5 * gap), 0.5 * gap)
+    assert got == pytest.approx(K * (where - share * inside), abs=1e-6)
+
+
+@given(share=st.floats(-0.5, 2.0), bend=st.floats(1e-4, 3e-3), where=st.floats(-4e-3, 4e-3))
+def test_the_hardening_column_is_its_formulas(share: float, bend: float, where: float) -> None:
+    cubic, bent = (
+        specimen_under(
+            np.array([where]), ColumnEffects(stiffening=share, stiffening_law=law, stiffening_bend=bend)
+        )[0]
+        for law in (0.0, 1.0)
+    )
+    assert cubic == pytest.approx(K * where * (1.0 + share * (where / 2e-3) ** 2), abs=1e-6)
+    beyond = math.copysign(max(abs(where) - bend, 0.0), where)
+    assert bent == pytest.approx(K * (where + share * beyond), abs=1e-6)
+
+
+def test_the_self_centring_column_loses_two_flags_and_rests_at_the_origin() -> None:
+    place, loop, amplitude = 1e-3, 0.6, 3e-3
+    _, path = cycles(amplitude, 1.0)
+    more = ColumnEffects(centring=place, centring_hardening=0.1, centring_loop=loop)
+    force = specimen_under(path, more)
+    # between two parallel lines, that both have the stiffness k where they are left and reached
+    height = 0.9 * loop * K * place
+    expected = 2.0 * height * (amplitude - place)
+    assert last_loop(path, force, 1.0) == pytest.approx(expected, rel=0.01)
+    assert abs(specimen_under(through(amplitude, 0.0), more)[-1]) < 1e-6
+
+
+@pytest.mark.parametrize("name", ["trilinear", "pinched"])
+def test_further_laws_of_yielding_are_their_models(name: str) -> None:
+    path = through(2e-3, -3e-3, 2.5e-3, -1e-3)
+    shapes = {"hardening": 0.03, "first_bend": 0.4, "second_stiffness": 0.6}
+    corner = {"pinch_force": 0.3, "pinch_displacement": 0.6, "unloading": 0.2, "damage": 0.05}
+    given = shapes | (corner if name == "pinched" else {})
+    law = float(specimen.LAWS.index(name))
+    more: dict[str, Any] = {"yield_displacement": 1e-3, "law": law, **given}
+    got = specimen_under(path, ColumnEffects(**more))
+    expected = forces(name, {"stiffness": K, "yield_displacement": 1e-3, **given}, path.astype(np.float64))
+    assert np.allclose(got, expected, rtol=1e-9, atol=1e-6)
+
+
+def test_friction_by_direction_and_speed() -> None:
+    more = ColumnEffects(friction=900.0, presliding=1e-6, friction_asymmetry=0.2)
+    path = through(2e-3, -2e-3)
+    got = specimen_under(path, more) - K * path
+    assert got[300] == pytest.approx(1080.0)
+    assert got[-1] == pytest.approx(-720.0)
+    fast = ColumnEffects(friction=900.0, presliding=1e-6, friction_drop=0.3, friction_speed=0.02)
+    for speed in (0.002, 0.02, 0.2):
+        way = np.arange(1, 400) * speed * SHORT
+        rubbing = specimen_under(way, fast)[-1] - K * way[-1]
+        assert rubbing == pytest.approx(900.0 * (1.0 - 0.3 * (1.0 - math.exp(-speed / 0.02))), rel=1e-6)
+
+
+def test_effects_of_the_column_come_on_top_of_any_model() -> None:
+    bilinear = Column(
+        model="bilinear", stiffness=K, parameters={"yield_displacement": 1e-3, "hardening": 0.1}
+    )
+    _, path = cycles(3e-3, 1.0)
+    plain = specimen_under(path, ColumnEffects(), column=bilinear)
+    assert last_loop(path, plain, 1.0) == pytest.approx(4.0 * 0.9 * K * 1e-3 * 2e-3, rel=1e-4)
+    more = specimen_under(path, ColumnEffects(viscous=4e4), column=bilinear)
+    speed = np.diff(path, prepend=path[0]) / SHORT
+    assert np.allclose(more, plain + 4e4 * speed, rtol=1e-9, atol=1e-6)
+
+
+def test_friction_work_by_quadrature_agrees_with_the_loop_under_falling_friction() -> None:
+    """∮ F·tanh(|v|/v0) |dx| of a sine by quadrature, against the specimen's loop."""
+    amplitude, frequency, force, fall = 2e-3, 1.0, 900.0, 0.005
+    omega = 2.0 * math.pi * frequency
+    _, path = cycles(amplitude, frequency)
+    more = ColumnEffects(friction=force, presliding=1e-7, friction_velocity=fall)
+
+    def power(t: float) -> float:
+        v = abs(amplitude * omega * math.cos(omega * t))
+        return force * math.tanh(v / fall) * v
+
+    expected = 4.0 * quad(power, 0.0, 0.25 / frequency)[0]
+    assert last_loop(path, specimen_under(path, more), frequency) == pytest.approx(expected, rel=3e-3)

@@ -1,0 +1,239 @@
+"""Effects of the active mass damper against closed forms, energy balances and other solvers."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp, trapezoid
+
+from common.plan.laboratory_tables import Damper, ShakingTable
+from common.plan.plan import Plan
+from laboratories.effects import lay
+from laboratories.table import model as table_lab
+from models.system import DamperEffects, System, TableEffects
+from tests.laboratories.effects.histories import (
+    ACCELERATION,
+    DT,
+    FORCE,
+    RATE,
+    SHORT,
+    STROKE,
+    STROKE_RATE,
+    Array,
+    phasor,
+    run_b,
+    tones,
+)
+
+
+def released(
+    damper: Damper, effects: DamperEffects, seconds: float, stroke: float = 0.0, rate: float = 0.0
+) -> Array:
+    """Stroke, its velocity and the force of a damper let go on a standing table, at every tick."""
+    lab = table_lab.build(DT, ShakingTable(), damper, None, effects)
+    lab.state[table_lab.STROKE], lab.state[table_lab.STROKE_RATE] = stroke, rate
+    rows = []
+    for _ in range(round(seconds / DT)):
+        _, _, s, force = table_lab.advance(lab, 0.0, 0.0)
+        rows.append((s, lab.state[table_lab.STROKE_RATE], force))
+    return np.array(rows)
+
+
+def peaks(stroke: Array) -> Array:
+    """Turning points, by parabolas through three ticks."""
+    a, b, c = stroke[:-2], stroke[1:-1], stroke[2:]
+    place = np.flatnonzero(((b - a) * (c - b) < 0.0) & (np.abs(b) > 0.0))
+    curve = a[place] - 2.0 * b[place] + c[place]
+    result: Array = b[place] - (c[place] - a[place]) ** 2 / (8.0 * curve)
+    return result
+
+
+@given(friction=st.floats(0.3, 3.0), spring=st.sampled_from([56.8, 500.0, 2000.0]))
+@settings(max_examples=12)
+def test_the_rubbing_damper_decays_on_a_straight_line_and_rests(friction: float, spring: float) -> None:
+    damper = Damper(mass=16.0, stiffness=spring, damping=0.0)
+    zone = friction / spring
+    start = 9.3 * zone
+    period = 2.0 * math.pi * math.sqrt(16.0 / spring)
+    got = released(damper, DamperEffects(friction=friction), 6.0 * period, stroke=start)
+    found = peaks(got[:, 0])
+    expected = np.array([start - 2.0 * zone * half for half in (1, 2, 3, 4)]) * [-1.0, 1.0, -1.0, 1.0]
+    assert np.allclose(found[:4], expected, atol=0.02 * zone)
+    # within the dead zone ±F/k it rests: not one turn more, no creep, and no force that moves anything
+    late = got[round(3.2 * period / DT) :]
+    assert np.max(np.abs(late[:, 0])) <= zone
+    assert np.ptp(late[:, 0]) < 1e-12 * start
+    assert np.max(np.abs(late[:, 1])) < 1e-12
+    assert np.max(np.abs(late[:, 2])) < 1e-9
+
+
+@pytest.mark.parametrize("push", [0.9, -0.9, 1.1])
+def test_the_rubbing_damper_sticks_below_its_friction(push: float) -> None:
+    got = run_b(np.zeros(500), np.full(500, push * 3.0), damper_effects=DamperEffects(friction=3.0))
+    if abs(push) < 1.0:
+        assert np.max(np.abs(got[:, STROKE])) < 1e-8
+        assert np.ptp(got[60:, STROKE]) < 1e-15
+        assert np.max(np.abs(got[60:, FORCE])) < 1e-6
+    else:
+        assert got[-1, STROKE] > 1e-3
+
+
+def test_the_rubbing_damper_loses_its_force_times_the_way() -> None:
+    frequency, friction = 2.0, 3.0
+    t = np.arange(1, 3001) * DT
+    motor = 60.0 * np.sin(2.0 * np.pi * frequency * t)
+    damper = Damper(damping=60.0)  # so that the free vibration is over in time
+    got = run_b(np.zeros(t.size), motor, damper=damper, damper_effects=DamperEffects(friction=friction))
+    last = slice(-round(1.0 / (frequency * DT)) - 1, None)
+    stroke, rate, force = got[last, STROKE], got[last, STROKE_RATE], got[last, FORCE]
+    lagged = phasor(motor, t, frequency, 4.0) / (1.0 + 2j * np.pi * frequency * 0.003)
+    # the motor's command is held from the interval's beginning to its end, where the rows are
+    lagged *= np.exp(1j * np.pi * frequency * DT) * np.sinc(frequency * DT)
+    work = math.pi * (phasor(stroke, t[last], frequency, 0.0).conjugate() * lagged).imag
+    viscous = 60.0 * trapezoid(rate**2, t[last])
+    assert abs(work) - viscous == pytest.approx(2.0 * friction * np.ptp(stroke), rel=0.03)
+    # without motor and inertia the rail would be all of the force: m·s̈ + F = 0 whatever F is made of
+    assert np.max(np.abs(16.0 * np.gradient(rate, DT)[5:-5] + force[5:-5])) < 0.1 * np.max(np.abs(force))
+
+
+def test_friction_that_falls_off_slowly_damps_like_a_dashpot_at_small_speed() -> None:
+    damper = Damper(mass=16.0, stiffness=500.0, damping=0.0)
+    more = DamperEffects(friction=2.0, friction_velocity=0.05)
+    start, period = 1e-4, 2.0 * math.pi * math.sqrt(16.0 / 500.0)
+    found = peaks(released(damper, more, 4.0 * period, stroke=start)[:, 0])
+    dashpot = 2.0 / 0.05  # F·tanh(v/v0) ≈ F/v0·v
+    ratio = dashpot / (2.0 * math.sqrt(500.0 * 16.0))
+    decrement = math.log(found[1] / found[3])
+    assert decrement == pytest.approx(2.0 * math.pi * ratio / math.sqrt(1.0 - ratio**2), rel=0.01)
+
+
+@pytest.mark.parametrize("limit", [35.0, 20.0])
+def test_the_motors_force_is_limited(limit: float) -> None:
+    """A damper without spring and dashpot, and no motor lag: its force is the motor's, the other way."""
+    bare = Damper(mass=16.0, stiffness=0.0, damping=0.0, motor_time_constant=0.0)
+    motor = tones(500, size=30.0)
+    more = DamperEffects(force_limit=limit, gain=1.07)
+    got = run_b(np.zeros(500), motor, damper=bare, damper_effects=more)
+    assert np.allclose(got[:, FORCE], -np.clip(1.07 * motor, -limit, limit), atol=1e-12)
+
+
+def test_the_motors_lag_is_of_first_order() -> None:
+    plan = lay(System(Plan()), [("damper.motor_lag", {"time_constant": 0.008})]).plan
+    damper = dataclasses.replace(plan.damper, stiffness=0.0, damping=0.0)
+    got = run_b(np.zeros(60), np.full(60, 30.0), damper=damper)[:, FORCE]
+    t = DT * np.arange(1, 61)
+    assert np.allclose(got, -30.0 * (1.0 - np.exp(-t / 0.011)), atol=1e-9)
+
+
+@given(force=st.floats(-50.0, 50.0))
+@settings(max_examples=10)
+def test_a_constant_force_moves_the_damper_by_its_statics(force: float) -> None:
+    damper = Damper(damping=60.0)
+    got = run_b(np.zeros(6000), damper=damper, damper_effects=DamperEffects(offset=force))
+    assert got[-1, STROKE] == pytest.approx(force / 56.8, rel=1e-4, abs=1e-9)
+    assert abs(got[-1, FORCE]) < 1e-4 * abs(force) + 1e-9  # nothing is accelerated any more
+    assert got[0, FORCE] == pytest.approx(-force, rel=0.01, abs=1e-9)  # at first all of it is
+    # on a table that yields to it too, it is what a motor without lag would give
+    quick, table = Damper(motor_time_constant=0.0), TableEffects(compliance=2.5e-5)
+    driven = run_b(np.zeros(200), np.full(200, force), damper=quick, table_effects=table)
+    more = DamperEffects(offset=force)
+    pushed = run_b(np.zeros(200), damper=quick, table_effects=table, damper_effects=more)
+    assert np.allclose(pushed, driven, rtol=1e-12, atol=1e-12)
+
+
+FREE = Damper(mass=16.0, stiffness=0.0, damping=0.0)
+
+
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+@pytest.mark.parametrize(("stiffness", "tolerance"), [(500.0, 0.005), (2000.0, 0.005), (20000.0, 0.016)])
+def test_the_end_stop_is_an_elastic_spring(stiffness: float, tolerance: float, direction: float) -> None:
+    stop, speed = 0.02, 0.5 * direction
+    more = DamperEffects(stop_stroke=stop, stop_stiffness=stiffness)
+    got = released(FREE, more, 0.08 + math.pi * math.sqrt(16.0 / stiffness), rate=speed)
+    natural = math.sqrt(stiffness / 16.0)
+    stroke, rate, force = got.T
+    assert rate[-1] == pytest.approx(-speed, rel=tolerance)  # half of it in energy: tolerance·2
+    assert np.max(np.abs(stroke)) == pytest.approx(stop + abs(speed) / natural, rel=5e-3)
+    assert direction * force[np.argmax(np.abs(force))] == pytest.approx(
+        abs(speed) * math.sqrt(stiffness * 16.0), rel=0.02
+    )
+    inside = np.abs(stroke) < stop - 2e-3
+    assert not force[inside].any()
+    beyond = np.maximum(np.abs(stroke) - stop, 0.0)
+    # the force is held over a short step, in which the stroke moves on by as much as speed·0.25 ms
+    assert np.max(np.abs(np.abs(force) - stiffness * beyond)) < stiffness * abs(speed) * SHORT * 1.01
+
+
+@pytest.mark.parametrize(
+    "stiffness",
+    [2000.0, 20000.0],
+)
+def test_a_damper_that_bounces_solves_its_equation(stiffness: float) -> None:
+    stop, start = 0.03, 0.05
+    damper = Damper(mass=16.0, stiffness=56.8, damping=6.0)
+    more = DamperEffects(stop_stroke=stop, stop_stiffness=stiffness)
+
+    def slope(_: float, z: Array) -> list[float]:
+        beyond = z[0] - np.clip(z[0], -stop, stop)
+        return [z[1], (-56.8 * z[0] - 6.0 * z[1] - stiffness * beyond) / 16.0]
+
+    got = released(damper, more, 0.8, stroke=0.0, rate=0.4)
+    times = DT * np.arange(1, got.shape[0] + 1)
+    exact = solve_ivp(slope, (0, times[-1]), [0.0, 0.4], t_eval=times, max_step=1e-3, rtol=1e-9, atol=1e-12).y
+    assert np.max(np.abs(exact[0])) > stop
+    assert np.max(np.abs(got[:, 0] - exact[0])) < 0.02 * start
+    assert np.max(np.abs(got[:, 1] - exact[1])) < 0.02 * 0.4
+
+
+ALL_TABLE = TableEffects(
+    gain=1.05, oil_frequency=16.0, oil_damping=0.1, compliance=6e-6, backlash=4e-4, friction=0.1
+)
+ALL_DAMPER = DamperEffects(
+    gain=0.93, friction=3.0, offset=2.0, force_limit=35.0, stop_stroke=0.03, stop_stiffness=2000.0
+)
+
+
+@pytest.mark.parametrize("table_effects", [TableEffects(), ALL_TABLE], ids=["plain", "everything"])
+@pytest.mark.parametrize(
+    "damper_effects",
+    [
+        DamperEffects(friction=3.0),
+        DamperEffects(stop_stroke=0.02, stop_stiffness=20000.0),
+        DamperEffects(force_limit=20.0, gain=1.1),
+        ALL_DAMPER,
+    ],
+    ids=["friction", "stop", "motor", "everything"],
+)
+def test_the_force_balances_the_motion_with_every_effect(
+    table_effects: TableEffects, damper_effects: DamperEffects
+) -> None:
+    """m·Δ(ṡ + ẏ) = −∫F dt over any stretch: what the damper gains in momentum the table's reading says."""
+    t = np.arange(1, 8001) * SHORT
+    command, motor = 0.01 * np.sin(12.0 * t), 60.0 * np.sin(12.5 * t + 1.0)
+    table = ShakingTable(delay=0.0)
+    got = run_b(command, motor, table, Damper(), table_effects, damper_effects, interval=SHORT)
+    if math.isfinite(damper_effects.stop_stroke):
+        assert np.max(np.abs(got[:, STROKE])) > damper_effects.stop_stroke
+    momentum = 16.0 * (got[:, RATE] + got[:, STROKE_RATE])
+    gained = -np.cumsum(0.5 * (got[1:, FORCE] + got[:-1, FORCE])) * SHORT
+    error = momentum[1:] - momentum[0] - gained
+    assert np.max(np.abs(error)) < 0.005 * np.max(np.abs(momentum))
+
+
+def test_the_platform_s_reading_of_acceleration_is_its_velocitys_slope() -> None:
+    t = np.arange(1, 4001) * SHORT
+    command = 0.01 * np.sin(12.0 * t)
+    got = run_b(
+        command,
+        table=ShakingTable(delay=0.0),
+        table_effects=ALL_TABLE,
+        damper_effects=ALL_DAMPER,
+        interval=SHORT,
+    )
+    change = np.cumsum(0.5 * (got[1:, ACCELERATION] + got[:-1, ACCELERATION])) * SHORT
+    assert np.max(np.abs(got[1:, RATE] - got[0, RATE] - change)) < 0.003 * np.max(np.abs(got[:, RATE]))

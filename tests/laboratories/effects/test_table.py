@@ -1,0 +1,216 @@
+"""Effects of the shaking table against transfer functions, energy balances and other solvers."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp, trapezoid
+
+from common.errors import InputError
+from common.plan.laboratory_tables import Damper, ShakingTable
+from laboratories.table import model as table_lab
+from models import preisach
+from models.system import TableEffects
+from tests.laboratories.effects.histories import (
+    ACCELERATION,
+    DT,
+    FORCE,
+    RATE,
+    SHORT,
+    STROKE,
+    Array,
+    Y,
+    phasor,
+    ramped,
+    run_b,
+    there_and_back,
+    tones,
+)
+
+STILL = Damper(mass=16.0, stiffness=0.0, damping=0.0)
+
+
+def second_order(s: complex, frequency: float, damping: float) -> complex:
+    omega = 2.0 * math.pi * frequency
+    return omega**2 / (s**2 + 2.0 * damping * omega * s + omega**2)
+
+
+@pytest.mark.parametrize("frequency", [1.0, 5.0, 10.0, 15.625])
+@pytest.mark.parametrize("gain", [1.0, 0.93])
+@pytest.mark.parametrize(("oil", "damping"), [(math.inf, 0.1), (16.0, 0.1), (10.0, 0.03), (40.0, 0.3)])
+def test_gain_and_oil_column_are_their_transfer_functions(
+    frequency: float, gain: float, oil: float, damping: float
+) -> None:
+    t = np.arange(1, 3001) * DT
+    command = 5e-3 * np.cos(2.0 * np.pi * frequency * t) * np.minimum(t, 1.0)
+    more = TableEffects(gain=gain, oil_frequency=oil, oil_damping=damping)
+    got = run_b(command, damper=STILL, table_effects=more)
+    s = 2j * math.pi * frequency
+    # straight lines through the samples of a sine carry it with the square of a sinc
+    ramps = np.sinc(frequency * DT) ** 2
+    expected = gain * np.exp(-0.004 * s) * second_order(s, 15.0, 0.7) * 5e-3 * ramps
+    if not math.isinf(oil):
+        expected *= second_order(s, oil, damping)
+    found = phasor(got[:, Y], t, frequency, 4.0)
+    assert abs(found - expected) < 2e-3 * abs(expected)
+    assert phasor(got[:, ACCELERATION], t, frequency, 4.0) == pytest.approx(s**2 * found, rel=2e-2)
+
+
+@pytest.mark.parametrize("compliance", [6e-6, 2.5e-5])
+def test_at_rest_the_damper_does_not_move_the_table_and_in_motion_by_its_force(compliance: float) -> None:
+    frequency = 2.0
+    t = np.arange(1, 3001) * DT
+    motor = 50.0 * np.cos(2.0 * np.pi * frequency * t) * np.minimum(t, 1.0)
+    more, damper = TableEffects(compliance=compliance), Damper(damping=60.0)
+    got = run_b(np.zeros(t.size), motor, damper=damper, table_effects=more)
+    pushed, force = (phasor(got[:, place], t, frequency, 5.0) for place in (Y, FORCE))
+    expected = compliance * second_order(2j * math.pi * frequency, 15.0, 0.7) * force
+    # the motor's held command has harmonics, whose force moves the table hardly
+    assert pushed == pytest.approx(expected, rel=3e-3)
+    pushing = run_b(np.zeros(8000), np.full(8000, 30.0), damper=damper, table_effects=more)
+    assert pushing[-1, STROKE] == pytest.approx(30.0 / 56.8, rel=1e-3)
+    assert abs(pushing[-1, Y]) < 0.01 * compliance * 30.0
+
+
+@pytest.mark.parametrize("motor_lag", [0.003, 0.0])
+@pytest.mark.parametrize("oil", [math.inf, 16.0])
+def test_the_payload_solves_the_coupled_equations(motor_lag: float, oil: float) -> None:
+    ticks, compliance = 300, 2.5e-5
+    table, damper = ShakingTable(), Damper(motor_time_constant=motor_lag)
+    command, motor = tones(ticks, size=5e-3), tones(ticks, seed=2, size=30.0)
+    more = TableEffects(compliance=compliance, oil_frequency=oil, oil_damping=0.1)
+    got = run_b(command, motor, table, damper, more)
+    omega, swing = 2.0 * math.pi * 15.0, 2.0 * math.pi * oil
+    reached = ramped(command, table.delay)
+
+    def force(z: Array, push: float) -> float:
+        return float(56.8 * z[2] + 6.0 * z[3] - (z[4] if motor_lag else push))
+
+    def slope(t: float, z: Array, push: float) -> list[float]:
+        y, rate, _, stroke_rate, lagged, platform, platform_rate = z
+        load = force(z, push)
+        a = omega**2 * (reached(t) + compliance * load - y) - 1.4 * omega * rate
+        felt = a
+        if not math.isinf(oil):
+            felt = swing**2 * (y - platform) - 0.2 * swing * platform_rate
+        turning = (push - lagged) / motor_lag if motor_lag else 0.0
+        return [rate, a, stroke_rate, -load / 16.0 - felt, turning, platform_rate, felt]
+
+    z, exact = np.zeros(7), []
+    for tick, push in enumerate(motor):
+        span = (tick * DT, (tick + 1) * DT)
+        z = solve_ivp(slope, span, z, args=(push,), max_step=DT / 2, rtol=1e-9, atol=1e-13).y[:, -1]
+        top = 0 if math.isinf(oil) else 5
+        exact.append((z[top], slope(span[1], z, push)[1 if top == 0 else 6], z[2], force(z, push)))
+    scale = np.max(np.abs(exact), axis=0)
+    assert np.all(np.max(np.abs(got[:, :4] - exact), axis=0) < 1e-5 * scale)
+
+
+def test_the_tables_play_is_its_dead_travel() -> None:
+    width, command = 1.5e-3, there_and_back(0.02, 0.01, 4000)
+    got = run_b(
+        command, damper=STILL, table=ShakingTable(delay=0.0), table_effects=TableEffects(backlash=width)
+    )[:, Y]
+    plain = run_b(command, damper=STILL, table=ShakingTable(delay=0.0))[:, Y]
+    assert plain[3900] - got[3900] == pytest.approx(width / 2, rel=1e-6)
+    assert plain[-1] - got[-1] == pytest.approx(-width / 2, rel=1e-6)
+    turn = 3999
+    standing = np.flatnonzero(np.abs(got[turn:] - got[turn + 300]) < 1e-8)
+    assert standing.size * DT == pytest.approx(width / (0.01 / (3999 * DT)), abs=0.12)  # it settles first
+
+
+def test_the_table_sticks_below_its_friction() -> None:
+    omega = 2.0 * math.pi * 15.0
+    stuck = 0.95 * 1.0 / omega**2
+    got = run_b(np.full(500, stuck), damper=STILL, table_effects=TableEffects(friction=1.0))
+    assert np.max(np.abs(got[:, Y])) < 1e-8  # less than a millionth of what it would be
+    assert np.ptp(got[20:, Y]) < 1e-18
+    assert np.max(np.abs(got[20:, RATE])) < 1e-15
+    assert np.max(np.abs(got[20:, ACCELERATION])) < 1e-11
+    loose = run_b(np.full(500, 1.2 / 0.95 * stuck), damper=STILL, table_effects=TableEffects(friction=1.0))
+    assert loose[-1, Y] > 0.0
+    assert abs(loose[-1, RATE]) < 1e-12
+
+
+@pytest.mark.parametrize("oil", [math.inf, 25.0])
+def test_table_friction_loses_its_force_times_the_way(oil: float) -> None:
+    friction, frequency, omega = 0.3, 2.0, 2.0 * math.pi * 15.0
+    t = np.arange(1, 8001) * SHORT
+    command = 0.02 * np.sin(2.0 * np.pi * frequency * t)
+    table = ShakingTable(delay=0.0)
+    more = TableEffects(friction=friction, oil_frequency=oil)
+    lab = table_lab.build(SHORT, table, STILL, more)
+    place, rate = (
+        (table_lab.TABLE, table_lab.TABLE_RATE) if math.isinf(oil) else (table_lab.BASE, table_lab.BASE_RATE)
+    )
+    states = []
+    for value in command.tolist():
+        table_lab.advance(lab, value, 0.0)
+        states.append((lab.state[place], lab.state[rate]))
+    y, v = np.array(states).T
+    last = slice(-round(1.0 / (frequency * SHORT)) - 1, None)
+    drive = trapezoid((omega**2 * (command - y))[last], y[last])
+    viscous = trapezoid((1.4 * omega * v**2)[last], t[last])
+    assert drive - viscous == pytest.approx(2.0 * friction * np.ptp(y[last]), rel=0.01)
+
+
+def test_table_friction_falls_off_with_its_velocity() -> None:
+    more = TableEffects(friction=0.5, friction_velocity=0.05)
+    omega, ramp = 2.0 * math.pi * 15.0, 0.02 * DT * np.arange(1, 1001)
+    got = run_b(ramp, table=ShakingTable(delay=0.0), damper=STILL, table_effects=more)
+    # steady: ω²(u − y) = 2ζω·v + a·tanh(v/v0)
+    behind = (1.4 * omega * 0.02 + 0.5 * math.tanh(0.02 / 0.05)) / omega**2
+    assert ramp[-1] - got[-1, Y] == pytest.approx(behind, rel=1e-6)
+
+
+def test_table_friction_by_direction_and_speed() -> None:
+    omega, speed = 2.0 * math.pi * 15.0, 0.02
+    more = TableEffects(friction=0.5, friction_asymmetry=0.2, friction_drop=0.4, friction_speed=0.01)
+    for way, share in ((1.0, 1.2), (-1.0, 0.8)):
+        ramp = way * speed * DT * np.arange(1, 1001)
+        got = run_b(ramp, table=ShakingTable(delay=0.0), damper=STILL, table_effects=more)
+        rubbing = 0.5 * share * (1.0 - 0.4 * (1.0 - math.exp(-speed / 0.01)))
+        behind = (1.4 * omega * speed + rubbing) / omega**2
+        assert way * (ramp[-1] - got[-1, Y]) == pytest.approx(behind, rel=1e-6)
+
+
+def test_a_law_of_the_tables_motion_brakes_it() -> None:
+    """One that says a spring does what a stiffer servo loop with a smaller gain would: ω²·(u − y) − s·y."""
+    omega, spring = 2.0 * math.pi * 15.0, 900.0
+    grid = preisach.pack(preisach.Grid((0.0,), (), ()), 0.02, 1.0)
+    weights = np.zeros(preisach.count(grid))
+    weights[0] = spring * 0.02  # of the play without width, which is the place over the reach
+    more = TableEffects(learned=tuple(np.concatenate([grid, weights]).tolist()))
+    command = tones(800, size=5e-3)
+    got = run_b(command, table=ShakingTable(delay=0.0), damper=STILL, table_effects=more)
+    stiff = math.sqrt(omega**2 + spring)
+    table = ShakingTable(frequency=stiff / (2.0 * math.pi), damping_ratio=0.7 * omega / stiff, delay=0.0)
+    expected = run_b(omega**2 / stiff**2 * command, table=table, damper=STILL)
+    for signal in (Y, ACCELERATION):
+        assert np.std(got[:, signal] - expected[:, signal]) < 0.01 * np.std(expected[:, signal])
+
+
+@pytest.mark.parametrize(
+    ("name", "effects"),
+    [
+        ("compliance", TableEffects(compliance=1e-6)),
+        ("friction", TableEffects(friction=0.1)),
+        ("oil_frequency", TableEffects(oil_frequency=25.0)),
+        ("learned", TableEffects(learned=(0.0,) * 16)),
+    ],
+)
+def test_an_ideal_table_refuses_what_it_cannot_have(name: str, effects: TableEffects) -> None:
+    with pytest.raises(InputError, match=r"ideal table .*cannot have the effect") as caught:
+        table_lab.build(DT, ShakingTable(frequency=math.inf, delay=0.0), Damper(), effects)
+    assert name in str(caught.value)
+    assert str(caught.value).count("\n") == 0
+
+
+def test_an_ideal_table_may_have_gain_and_play() -> None:
+    command = there_and_back(0.02, 0.01, 500)
+    table = ShakingTable(frequency=math.inf, delay=0.0)
+    got = run_b(command, table=table, damper=STILL, table_effects=TableEffects(gain=1.1, backlash=1e-3))[:, Y]
+    assert got[498] == pytest.approx(1.1 * 0.02 - 0.5e-3)
+    assert got[-1] == pytest.approx(1.1 * 0.01 + 0.5e-3)
