@@ -20,7 +20,7 @@ from loop.signals import by_role, signals
 from models.ground_motion import GroundMotion
 from models.registry import Array
 from simulation.foretold import rest
-from simulation.foretold.draws import Ensemble, FoundLaboratories, ensemble
+from simulation.foretold.draws import Ensemble, FoundLaboratories, ensemble, has_random_links
 from simulation.foretold.rest import RangeSeen
 
 HELD = 0.9  # share of the time that a band is to hold
@@ -53,7 +53,7 @@ class Prediction:
 
     plan: Plan
     low: Rollout
-    middle: Rollout  # of the laboratories as found, without noise
+    middle: Rollout  # of the laboratories as found, without noise; where links are random, the median of those drawn
     high: Rollout
     peaks: dict[str, PeakBand]  # by signal as recordings name them
     drifts: dict[int, PeakBand]  # by storey that a laboratory follows
@@ -81,11 +81,12 @@ def predict(found: FoundLaboratories, plan: Plan, count: int = DRAWS, tell: Tell
         )
     reach = rest.reaches(plan, drawn.central, found.spread)
     rollouts = erring(found, plan, drawn, reach)
+    middle = quantile(drawn.central, drawn.drawn, 0.5) if has_random_links(found.truth) else drawn.central
     low, high = (quantile(drawn.central, rollouts, level) for level in (LOW, HIGH))
     return Prediction(
         plan,
         low,
-        drawn.central,
+        middle,
         high,
         peaks(plan, rollouts),
         drifts(plan, rollouts),

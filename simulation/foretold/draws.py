@@ -23,6 +23,7 @@ from laboratories.kind import Kind
 from laboratories.kinds import kinds_of
 from loop import substructure
 from loop.closed_loop import Rollout
+from loop.links import impairment
 from loop.of_reality import refuse_plugins, rolled_out
 from loop.realised import true_system
 from models.ground_motion import GroundMotion
@@ -31,6 +32,7 @@ from models.system import System
 
 # Of one nominal parameter, the largest change that is drawn: its tolerance is a few percent, and it stays positive.
 FARTHEST = 0.5
+LARGEST = 100.0  # logarithm of a factor beyond which every parameter is at its bound
 
 Moves = Mapping[UncertainParameter, float]
 
@@ -112,6 +114,12 @@ def ensemble(found: FoundLaboratories, count: int, tell: Tell = untold) -> Ensem
     return Ensemble(as_found, whole, count - len(whole), motion)
 
 
+def has_random_links(truth: Reality) -> bool:
+    """Whether messages are lost, or late by chance."""
+    links = [impairment(truth.of(role)) for role in truth.plan.roles]
+    return any(link.get("loss") or link.get("jitter") for link in links)
+
+
 def square_root(covariance: Array) -> Array:
     """A matrix (p, p) whose product with its transpose is a covariance; what rounding made negative counts as zero."""
     if not covariance.size:
@@ -171,7 +179,7 @@ def moved(name: str, values: Mapping[str, float], moves: Moves) -> Mapping[str, 
     for one, by in moves.items():
         if one.effect == name and one.parameter in result:
             value = result[one.parameter]
-            value = value * float(np.exp(by)) if one.logarithmic else value + by
+            value = value * float(np.exp(min(by, LARGEST))) if one.logarithmic else value + by
             result[one.parameter] = min(max(value, one.least), one.most)
     return result
 

@@ -221,6 +221,19 @@ def held_code(folder: Path, name: str) -> int:
     return main()
 
 
+def test_where_messages_are_lost_the_line_is_no_single_draw_of_losses(tmp_path: Path) -> None:
+    plan = short()
+    written(tmp_path, plan, effect=[{"name": "link.loss", "probability": 0.3, "burst": 20.0}])
+    laboratories = draws.load(tmp_path / "found.toml", plan)
+    middle = bands.predict(laboratories, plan, 30).middle.master["displacement"]
+    other = [
+        really(replace(laboratories.truth, seed=seed), noise=False).master["displacement"]
+        for seed in range(100, 110)
+    ]
+    usual = np.mean(other, axis=0)
+    assert np.std(middle - usual) < 0.7 * np.mean([np.std(one - usual) for one in other])
+
+
 def test_another_building_leaves_out_what_is_of_the_first(tmp_path: Path) -> None:
     written(tmp_path, short(), structure={"stiffness": 26e6})
     heavier = tmp_path / "heavier.toml"

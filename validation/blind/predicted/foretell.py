@@ -1,7 +1,8 @@
 """What a diagnosis found, judged by the next test that it foretells.
 
 The error of a simulation is the root mean square, over all readings, of rms(simulated - true)/rms(true), where the true
-readings are those without noise. Readings that noise hides are left out.
+readings are those without noise; where messages are lost or late by chance, the mean of several plays. Readings that
+noise hides are left out.
 """
 
 from __future__ import annotations
@@ -21,7 +22,6 @@ from common.plan import read as plans
 from common.plan.plan import Plan
 from common.reality.reality import as_planned
 from common.recording.reader import read
-from common.recording.run import Run
 from laboratories.kinds import kinds_of
 from loop.closed_loop import Rollout
 from loop.of_reality import really
@@ -32,7 +32,7 @@ from simulation.foretold import bands, draws, file, held
 from simulation.foretold.rest import BEYOND, OUTSIDE
 from simulation.workers.pool import spread
 from validation.blind.cases.names import CaseNames
-from validation.blind.predicted.next_test import NextTest, PlayedTest, play
+from validation.blind.predicted.next_test import NextTest, PlayedTest, Readings, play
 from validation.blind.size import levels
 from validation.blind.worker import ENDINGS
 
@@ -121,11 +121,11 @@ def case_levels(following: NextTest, plan: Plan) -> dict[str, dict[str, float]]:
     return {role: levels(following.case, role) for role in kinds_of(plan)}
 
 
-def error(plan: Plan, rollout: Rollout, true: Run, noise: Mapping[str, Mapping[str, float]]) -> float:
+def error(plan: Plan, rollout: Rollout, true: Readings, noise: Mapping[str, Mapping[str, float]]) -> float:
     """The error of a simulation of a test, over the ticks that were recorded; 0 where no reading stands out."""
     columns = by_role(plan, rollout)
     squares = [
-        square(columns[role][name], np.asarray(true.columns[role][name], dtype=np.float64), noise[role][name])
+        square(columns[role][name], true[role][name], noise[role][name])
         for role, kind in kinds_of(plan).items()
         for name in kind.channels.names
     ]
