@@ -53,7 +53,9 @@ class Prediction:
 
     plan: Plan
     low: Rollout
-    middle: Rollout  # of the laboratories as found, without noise; where links are random, the median of those drawn
+    # Of the laboratories as found, without noise; the median of those drawn where links are random, or where the test
+    # of the laboratories as found is unstable.
+    middle: Rollout
     high: Rollout
     peaks: dict[str, PeakBand]  # by signal as recordings name them
     drifts: dict[int, PeakBand]  # by storey that a laboratory follows
@@ -79,10 +81,11 @@ def predict(found: FoundLaboratories, plan: Plan, count: int = DRAWS, tell: Tell
             f"Nothing can be foretold: in {drawn.diverged} of {count} laboratories drawn from what was found the test "
             "is unstable; choose another compensator or a weaker motion."
         )
-    reach = rest.reaches(plan, drawn.central, found.spread)
+    as_found = drawn.central.finite and not has_random_links(found.truth)
+    middle = drawn.central if as_found else quantile(drawn.drawn, 0.5)
+    reach = rest.reaches(plan, middle, found.spread)
     rollouts = erring(found, plan, drawn, reach)
-    middle = quantile(drawn.central, drawn.drawn, 0.5) if has_random_links(found.truth) else drawn.central
-    low, high = (quantile(drawn.central, rollouts, level) for level in (LOW, HIGH))
+    low, high = (quantile(rollouts, level) for level in (LOW, HIGH))
     return Prediction(
         plan,
         low,
@@ -105,6 +108,10 @@ def about(found: FoundLaboratories, drawn: Ensemble, count: int) -> list[str]:
     if found.left_out:
         result.append(
             f"{', '.join(found.left_out)} was found in another building than this plan's and is left out."
+        )
+    if not drawn.central.finite:
+        result.append(
+            "In the laboratories as found the test is unstable: the line foretold is the median of those drawn."
         )
     if drawn.diverged:
         result.append(f"In {drawn.diverged} of {count} laboratories drawn the test is unstable.")
@@ -130,7 +137,7 @@ def erring(
         return series + rest.errors(series, share if np.ndim(share) else float(share), random)
 
     stacked = mapped(drawn.drawn, wrong)
-    return [taken(drawn.central, stacked, place) for place in range(len(drawn.drawn))]
+    return [taken(one, stacked, place) for place, one in enumerate(drawn.drawn)]
 
 
 Stacked = tuple[dict[str, Array], dict[str, dict[str, Array]]]  # of the master and of the slaves by role
@@ -160,7 +167,7 @@ def taken(like: Rollout, stacked: Stacked, place: int) -> Rollout:
     )
 
 
-def quantile(like: Rollout, rollouts: Sequence[Rollout], level: float) -> Rollout:
+def quantile(rollouts: Sequence[Rollout], level: float) -> Rollout:
     """The level below which a share of the draws lies, tick by tick.
 
     Places are those of Weibull, (n + 1)·level: among n draws and one more of the same kind, as often as it says.
@@ -169,7 +176,7 @@ def quantile(like: Rollout, rollouts: Sequence[Rollout], level: float) -> Rollou
     def of_draws(_role: str, _name: str, series: Array) -> Array:
         return np.asarray(np.quantile(series, level, axis=0, method="weibull"))[None]
 
-    return taken(like, mapped(rollouts, of_draws), 0)
+    return taken(rollouts[0], mapped(rollouts, of_draws), 0)
 
 
 def band(values: Sequence[float], unit: str) -> PeakBand:

@@ -234,6 +234,21 @@ def test_where_messages_are_lost_the_line_is_no_single_draw_of_losses(tmp_path: 
     assert np.std(middle - usual) < 0.7 * np.mean([np.std(one - usual) for one in other])
 
 
+def test_where_the_laboratories_as_found_are_unstable_the_line_is_the_median_of_those_drawn(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan = short()
+
+    def short_of_the_end(*words: Any) -> draws.Ensemble:
+        result = draws.ensemble(*words)
+        return result._replace(central=result.central._replace(finite=False, ticks=9, master={}, slaves={}))
+
+    monkeypatch.setattr(bands, "ensemble", short_of_the_end)
+    prediction = bands.predict(draws.load(folder / "found.toml", plan), plan, 20)
+    assert prediction.middle.ticks == plan.ticks
+    assert prediction.sentences[0].startswith("In the laboratories as found the test is unstable")
+
+
 def test_another_building_leaves_out_what_is_of_the_first(tmp_path: Path) -> None:
     written(tmp_path, short(), structure={"stiffness": 26e6})
     heavier = tmp_path / "heavier.toml"
