@@ -31,9 +31,9 @@ class EmulatedLab:
 
     def read(self) -> tuple[float, ...]:
         """The readings at the present tick in the order of the channels, with the sensors' noise."""
-        error, true, sensors = self._noise.row(), self._true, self._readings
         if self._plain:
-            return tuple(map(add, true, error))
+            return tuple(map(add, self._true, self._noise.row()))
+        error, true, sensors = self._noise.row(), self._true, self._readings
         t = self._tick * self._interval
         self._tick += 1
         return tuple(

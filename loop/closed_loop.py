@@ -48,6 +48,11 @@ from models.system import Effects, System
 
 Index = NDArray[np.int64]
 
+# The C library hands freed memory at the end of the heap back to the system where it is more than twice the largest
+# block freed so far, and the 5 MB of a rollout are then fetched anew page by page, which takes half as long as the
+# rollout. This block, freed at once and never written to, raises that limit to 32 MB (M_MMAP_THRESHOLD in mallopt(3)).
+np.empty(16 << 20, dtype=np.uint8)
+
 LARGEST = float(np.finfo(np.float64).max)  # m: no finite command exceeds it
 
 
@@ -111,7 +116,7 @@ class ClosedLoop(NamedTuple):
 
 def on_time(ticks: int) -> MessagesUsed:
     """The exchange without delays: command k is used at tick k, feedback k at tick k + 1."""
-    return MessagesUsed(np.arange(ticks), np.arange(ticks) - 1)
+    return MessagesUsed(np.arange(ticks), np.arange(-1, ticks - 1))
 
 
 def simulate(
@@ -178,22 +183,31 @@ def at_rest(
     exchange: Mapping[str, MessagesUsed],
     errors: Mapping[str, Array],
 ) -> ClosedLoop:
-    """The closed loop before its first tick; `slaves`, `exchange` and `errors` of the readings by role."""
+    """The closed loop before its first tick; `slaves`, `exchange` and `errors` of the readings by role.
+
+    Rows of its results hold anything until `roll` has filled them.
+    """
     plan, count = master.plan, len(slaves)
     ticks = plan.ticks
     building = assembly.build(plan, ground, master.effects.p_delta, slaves=count > 0)
     traffic = Traffic(
-        np.zeros((ticks, building.output.size)),
+        np.empty((ticks, building.output.size)),
         np.zeros(building.output.size),
-        np.zeros((ticks, count)),
-        np.zeros((ticks, count)),
-        np.array([exchange[role].command for role in slaves], dtype=np.int64).reshape(count, ticks),
-        np.array([exchange[role].feedback for role in slaves], dtype=np.int64).reshape(count, ticks),
+        np.empty((ticks, count)),
+        np.empty((ticks, count)),
+        side_by_side([exchange[role].command for role in slaves], ticks),
+        side_by_side([exchange[role].feedback for role in slaves], ticks),
     )
     hosted = kinds_of(plan)
     followers = [follower(hosted[role], system, errors[role]) for role, system in slaves.items()]
     mine, followers = compiled(own(hosted.get(MASTER), master, errors.get(MASTER)), followers)
     return ClosedLoop(building, mine, tuple(followers), traffic)
+
+
+def side_by_side(numbers: Sequence[Index], ticks: int) -> Index:
+    """The numbers (ticks,) of each slave as rows (slaves, ticks); those of a single slave are not copied."""
+    whole = numbers[0] if len(numbers) == 1 else numbers
+    return np.ascontiguousarray(whole, dtype=np.int64).reshape(len(numbers), ticks)
 
 
 def compiled(mine: MasterLaboratory, slaves: list[Slave]) -> tuple[MasterLaboratory, list[Slave]]:
@@ -239,7 +253,7 @@ def follower(kind: Kind, system: System, errors: Array) -> Slave:
         site.build(kind, system, errors),
         compensators.build(chosen.kind, chosen.parameters, plan.test.interval, chosen.where),
         *channels(kind),
-        np.zeros(ticks),
+        np.empty(ticks),
         np.zeros(1),
     )
 

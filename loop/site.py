@@ -29,10 +29,13 @@ class Site(NamedTuple):
 
 
 def build(kind: Kind, system: System, errors: Array) -> Site:
-    """A laboratory of a system at rest, for as many ticks as `errors` (ticks, channels) has rows."""
+    """A laboratory of a system at rest, for as many ticks as `errors` (ticks, channels) has rows.
+
+    Rows of the readings that have not been played yet hold anything: to set them to zero takes as long as 300 ticks.
+    """
     sensors = readings.build(system.plan.test.interval, kind.channels.names, system.effects.sensors)
     return Site(
-        kind.build(system), sensors, errors, np.zeros(len(kind.channels.names)), np.zeros(errors.shape)
+        kind.build(system), sensors, errors, np.zeros(len(kind.channels.names)), np.empty(errors.shape)
     )
 
 
