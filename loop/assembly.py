@@ -44,6 +44,12 @@ def build(plan: Plan, rows: Array, p_delta: float = 0.0, *, slaves: bool = True)
             "The plan's building is a client's, so there is none to compute: leave out model in [structure], or start "
             "the test with rths serve."
         )
+    if plan.foreign:
+        raise InputError(
+            f"'{plan.structure.model}' computes the plan's building, which only a running test does: use rths run, "
+            "with --virtual on a virtual clock, or leave out model in [structure] for the linear building of its "
+            "tables."
+        )
     mass, n, interval = np.array(plan.structure.mass), plan.storeys, plan.test.interval
     columns, method = numerical_columns(plan), integration(plan)
     hosted = {role: kind for role, kind in kinds_of(plan).items() if slaves or role == MASTER}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import secrets
 from collections.abc import Sequence
 
+from common.foreign import PATIENCE_S, file_of
 from common.host.clock import real, unix_ns
 from common.lab.laboratory import Setting
 from common.lab.preflight import Gate, PreflightCheck
@@ -12,15 +13,17 @@ from common.plan.plan import Plan
 from common.reality.reality import Reality
 from common.rig import AtRest, GuardedRig
 from common.roles import MASTER
+from common.signals import OF_STOREYS
 from laboratories import kinds
-from loop import rigs, substructure
+from loop import foreign, rigs, substructure
 from loop.links import link_model
 from loop.nominal import preflight as nominal
 from loop.realised import true_system
 from master.building import BuildingStep, Outputs
 from master.client.building import ClientBuilding, compensator
 from master.client.coupled import CoupledLaboratory
-from master.client.pace import RealTime
+from master.client.pace import AsFastAsItGoes, RealTime
+from master.foreign import ForeignBuilding
 from master.limits import MasterLimits
 from master.loop import MasterLoop
 from master.own import OwnLaboratory
@@ -31,7 +34,7 @@ from models.system import System
 
 def preflight(plan: Plan) -> list[PreflightCheck]:
     """The checks of the plan by nominal models; raises InputError where a model or parameter is not valid."""
-    return nominal.checks(plan)
+    return [*nominal.checks(plan), *foreign.checked(plan)]
 
 
 def build_rig(reality: Reality, at_rest: AtRest | None = None, *, paced: bool = False) -> GuardedRig:
@@ -44,10 +47,13 @@ def build_rig(reality: Reality, at_rest: AtRest | None = None, *, paced: bool = 
 
 def check(reality: Reality) -> None:
     """Raise InputError where the laboratory could not be built, without constructing or moving the rig."""
-    if reality.plan.served:
+    if reality.plan.served or reality.plan.foreign:
         compensator(reality.plan)
     else:
         master_step(reality)
+    if reality.plan.foreign:
+        file_of(reality.plan.structure.model, reality.plan.base)
+        foreign.stiffnesses(reality.plan)
     rigs.check(reality, MASTER)
 
 
@@ -75,8 +81,16 @@ def build_loop(
     With a `gate` the sensors of its rig must pass their check.
     """
     warm_up(reality)
-    step = master_step(reality)
+    step = foreign_building(reality, setting) if reality.plan.foreign else master_step(reality)
     return serve(setting, reality, building=step, session=session, epoch_ns=epoch_ns, gate=gate)
+
+
+def foreign_building(reality: Reality, setting: Setting) -> ForeignBuilding:
+    """The building that another program computes, started; raises InputError where it cannot be."""
+    system = true_system(reality)
+    plan, rows = system.plan, true_ground(system)
+    pace = RealTime(plan) if real(setting.clock) else AsFastAsItGoes(PATIENCE_S, str, "building")
+    return ForeignBuilding(plan, foreign.started(plan, rows[0]), rows, pace)
 
 
 def serve(
@@ -122,16 +136,21 @@ class Served:
 
 
 def warm_up_served(reality: Reality) -> None:
-    """Compile the master's kernels for a client's building."""
+    """Compile the master's kernels for a building of a client or of another program."""
     plan = reality.plan
     compensator(plan)
     for kind in kinds.kinds_of(plan).values():
         CoupledLaboratory(kind.coupling(plan), plan.test.interval, 1).resists(0.0)
-    of_own(reality, Outputs(0.0, 0.0, 0.0, 0.0, [(0.0,) * substructure.SENT_VALUES for _ in plan.roles], []))
+    storeys = [0.0] * (len(OF_STOREYS) * plan.storeys * plan.foreign)
+    sent = [(0.0,) * substructure.SENT_VALUES for _ in plan.roles]
+    of_own(reality, Outputs(0.0, 0.0, 0.0, 0.0, sent, storeys))
 
 
 def warm_up(reality: Reality) -> None:
     """Compile the kernels by calling them once."""
+    if reality.plan.foreign:
+        warm_up_served(reality)
+        return
     of_own(reality, master_step(reality)(0, 0.0, 0.0, [0.0] * len(reality.plan.roles)))
 
 

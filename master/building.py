@@ -44,6 +44,8 @@ class Answering(Protocol):
 class BuildingStep:
     """Computes from the measurements of a tick what the laboratories do in the coming interval."""
 
+    code = "client"  # of the event that says why it cannot continue
+
     def join(self, lab: Laboratory, partners: Sequence[Answering]) -> None:
         """Receive the master's laboratory, with its clock, and the slaves; called before the handshake."""
 
@@ -76,8 +78,12 @@ class BuildingStep:
         return FINE
 
     def recorded(self, outputs: Outputs) -> tuple[Sequence[float], Sequence[float]]:
-        """Its values in a row of the recording: those before and those after the values of the master's laboratory."""
-        raise NotImplementedError
+        """Its values in a row of the recording: those before and those after the values of the master's laboratory.
+
+        They are the ground and the storeys' motion, then their numerical forces.
+        """
+        forces = len(outputs.storeys) - len(outputs.storeys) // len(OF_STOREYS)
+        return (outputs.ground_acceleration, *outputs.storeys[:forces]), outputs.storeys[forces:]
 
     def leave(self) -> None:
         """Close connections; called when the test has ended."""

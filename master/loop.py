@@ -199,7 +199,7 @@ class MasterLoop(RigLoop):
     def _building_failed(self, error: InterlockError | LostError, tick: int) -> None:
         """End the test, because the building computes no further displacements."""
         event = Event.LOSE if isinstance(error, LostError) else Event.TRIP
-        self.lab.fail(event, error, code="client", tick=tick)
+        self.lab.fail(event, error, code=self._building.code, tick=tick)
 
     def _finding(self, tick: int) -> tuple[WatchdogFinding, str]:
         """The worst finding of the watchdogs on the building and the slaves, and the name of the first that has it."""

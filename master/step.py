@@ -26,13 +26,13 @@ class MasterStep(BuildingStep):
         self._sent = [slice(place, place + width) for place in range(first, end, width)]
         self._end = end
         self._advance = bound(substructure.enter, building, 0, 0.0, 0.0)
-        self._storeys = plan.storeys
 
     def __call__(self, tick: int, position: float, force: float, forces: Sequence[float]) -> Outputs:
         """Compute a tick from position (m) and force (N) of the master's laboratory and the slaves' `forces` (N)."""
         for place, used in enumerate(forces):
             self._forces[place] = used
         self._advance(tick, position, force)
+<<<<<<< HEAD
         row = tuple(self._output.tolist())
         sent = [row[place] for place in self._sent]
         return computed((*row[: substructure.OF_SLAVES], sent, row[self._end :], False))
@@ -41,3 +41,9 @@ class MasterStep(BuildingStep):
         """The ground and the storeys' motion, and their numerical forces."""
         motion, forces = outputs.storeys[: -self._storeys], outputs.storeys[-self._storeys :]
         return (outputs.ground_acceleration, *motion), forces
+=======
+        row = self._output.tolist()
+        sent = [tuple(row[place]) for place in self._sent]
+        ground, target, command, effort = row[: substructure.OF_SLAVES]
+        return computed((ground, target, command, effort, sent, row[self._end :], False))
+>>>>>>> faba49a (A model of OpenSees or an FMU is the building of the master)

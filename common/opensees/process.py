@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-import contextlib
-import json
 import math
 import os
-import re
 import struct
-import subprocess
 import sys
-import tempfile
-import weakref
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import InputError, RigError
 from common.opensees import server
+from common.piped import EndedError, PipedProgram
 
 Array = NDArray[np.float64]
 
@@ -40,22 +35,13 @@ class SpecimenProcess:
 
     def __init__(self, name: str, task: Mapping[str, Any]) -> None:
         self._name = name
-        self._said = tempfile.TemporaryFile()  # noqa: SIM115 - closed with the process
-        words = [os.environ.get(INTERPRETER) or sys.executable, server.__file__, json.dumps(task)]
+        self._program = started(server.__file__, task)
+        self.close = self._program.close
         try:
-            self._process = subprocess.Popen(
-                words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._said
-            )
-        except OSError as error:
-            self._said.close()
-            raise InputError(f"{words[0]} in {INTERPRETER} cannot be started: {error.strerror}.") from None
-        self.close = weakref.finalize(self, _end, self._process, self._said)
-        if self._answer() is None:
-            self._process.wait()
-            said = self._words()
+            self._answer()
+        except EndedError as error:
             self.close()
-            hint = f": {INSTALL}" if "openseespy" in said else ""
-            raise InputError(f"OpenSees cannot be the specimen {name} ({said}){hint}.")
+            raise InputError(f"OpenSees cannot be the specimen {name} ({error}){hint(str(error))}.") from None
 
     def force(self, way: Sequence[float] | Array) -> float:
         """The force (N) at the end of a path of deformations (m).
@@ -63,15 +49,11 @@ class SpecimenProcess:
         Raises:
             RigError: OpenSees finds no equilibrium, or its process has ended.
         """
-        assert self._process.stdin is not None  # noqa: S101 - it is a pipe
         try:
-            self._process.stdin.write(server.COUNT.pack(len(way)) + struct.pack(f"<{len(way)}d", *way))
-            self._process.stdin.flush()
+            self._program.send(server.COUNT.pack(len(way)) + struct.pack(f"<{len(way)}d", *way))
             found = self._answer()
-        except (BrokenPipeError, ValueError):
-            found = None
-        if found is None:
-            raise RigError(f"OpenSees has ended as the specimen {self._name} ({self._words()})")
+        except EndedError as error:
+            raise RigError(f"OpenSees has ended as the specimen {self._name} ({error})") from None
         if math.isnan(found):
             raise RigError(
                 f"OpenSees finds no equilibrium of {self._name} at {way[-1] * 1e3:.4g} mm: refine the model, or "
@@ -79,29 +61,22 @@ class SpecimenProcess:
             )
         return found
 
-    def _answer(self) -> float | None:
-        assert self._process.stdout is not None  # noqa: S101 - it is a pipe
-        answer = self._process.stdout.read(server.VALUE.size)
-        return float(server.VALUE.unpack(answer)[0]) if len(answer) == server.VALUE.size else None
-
-    def _words(self) -> str:
-        """The last line of the standard error of the process, without the type of the error."""
-        if self._said.closed:
-            return "its process is closed"
-        self._said.seek(0)
-        lines = [line for line in self._said.read().splitlines() if line.strip() and ENDED not in line]
-        last = lines[-1].decode(errors="replace").strip() if lines else "it said nothing"
-        return re.sub(r"^\w+Error: ", "", last)
+    def _answer(self) -> float:
+        return float(server.VALUE.unpack(self._program.answer(server.VALUE.size) or b"")[0])
 
 
-def _end(process: subprocess.Popen[bytes], said: IO[bytes]) -> None:
-    """End the process and close its streams."""
-    process.kill()
-    for stream in (process.stdin, process.stdout, said):
-        if stream is not None and not stream.closed:
-            with contextlib.suppress(BrokenPipeError):  # `close` flushes to a process that has ended
-                stream.close()
-    process.wait()
+def started(file: str, task: Mapping[str, Any]) -> PipedProgram:
+    """The program in a Python file, in the interpreter that has OpenSees; raises InputError where there is none."""
+    words = [os.environ.get(INTERPRETER) or sys.executable, file]
+    try:
+        return PipedProgram(words, task, ENDED)
+    except OSError as error:
+        raise InputError(f"{words[0]} in {INTERPRETER} cannot be started: {error.strerror}.") from None
+
+
+def hint(said: str) -> str:
+    """How to install OpenSees, where its absence is why a program ended."""
+    return f": {INSTALL}" if "openseespy" in said else ""
 
 
 def absolute(file: str) -> str:

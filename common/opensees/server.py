@@ -1,7 +1,7 @@
-"""A process with one OpenSees specimen: `python server.py TASK`, started by `common.opensees.process`.
+"""A process with one OpenSees specimen: `python server.py`, started by `common.opensees.process`.
 
 OpenSees has one domain per process, so each specimen has a process of its own. It may run in another interpreter, and
-imports nothing of rths. It reads a count and as many deformations (m, eight bytes each) from standard input and
+imports nothing of rths. It reads its task, a line of JSON, then a count and as many deformations (m, eight bytes each) from standard input and
 answers with the force (N) at the last, NaN if OpenSees finds no equilibrium. The standard output of OpenSees is
 redirected to standard error.
 """
@@ -96,12 +96,12 @@ def main() -> int:
     """Serve until standard input ends."""
     out = os.dup(1)
     os.dup2(2, 1)
-    task = json.loads(sys.argv[1])
+    source = sys.stdin.buffer
+    task = json.loads(source.readline())
     ops: Any = importlib.import_module("openseespy.opensees")
     own = task.get("model")
     specimen = Model(ops, own, task["options"]) if own else MaterialUnderTest(ops, task["materials"])
     os.write(out, VALUE.pack(0.0))
-    source = sys.stdin.buffer
     while head := source.read(COUNT.size):
         (count,) = COUNT.unpack(head)
         way = [value for (value,) in VALUE.iter_unpack(source.read(count * VALUE.size))]

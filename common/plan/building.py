@@ -13,7 +13,7 @@ from common.plan.kinds import COLUMN, OWN, TABLE, known_kind
 from common.plan.laboratory_tables import Actuator, ServoHydraulics
 from common.plan.plan import Plan
 from common.plan.schema import StoreysOrMatrix
-from common.plan.tables import Experimental, Structure
+from common.plan.tables import FMU, OF_CLIENT, OF_PLAN, OPENSEES, Experimental, Structure
 from common.roles import name_of
 
 ASYMMETRY = 1e-9  # of the largest entry: far above double precision, far below the digits that a user writes
@@ -28,6 +28,34 @@ def with_modal_damping(structure: Structure, given: dict[str, Any]) -> Structure
     if structure.damping_ratio == 0.0 or "damping" in given:
         return structure
     return replace(structure, damping=(0.0,) * len(structure.mass))
+
+
+def check_model(structure: Structure, given: Mapping[str, Any]) -> None:
+    """Raise PlanError for a model that is none of those known, and for keys that do not fit it.
+
+    A model that another program computes needs the masses and stiffnesses `given`: they say how many floors there are,
+    and the pre-flight checks reckon with them.
+    """
+    model = structure.model
+    foreign = model.startswith(OPENSEES) or model.endswith(FMU)
+    if not foreign and model not in (OF_PLAN, OF_CLIENT):
+        raise PlanError(
+            f"model in [structure] is '{model}', but must be one of {OF_PLAN}, {OF_CLIENT}, {OPENSEES}FILE.py, "
+            f"FILE{FMU}."
+        )
+    if structure.options and not foreign:
+        raise PlanError("options in [structure] are for a model of OpenSees or an FMU: leave them out.")
+    missing = [name for name in ("mass", "stiffness") if foreign and name not in given]
+    if missing:
+        raise PlanError(
+            f"[structure] names the model '{model}' without {' and '.join(missing)}: give floor masses and storey "
+            "stiffnesses near those of the model, from which the margins before the start are computed."
+        )
+    if foreign and structure.experimental is not None:
+        raise PlanError(
+            f"[structure.experimental] says what a specimen takes over of the plan's building, but '{model}' is the "
+            "building: leave it out, and leave the specimen out of the model."
+        )
 
 
 def check(plan: Plan) -> None:

@@ -28,6 +28,7 @@ from common.plan.laboratory_tables import (
 from common.plan.schema import nearest, plain
 from common.plan.tables import (
     OF_CLIENT,
+    OF_PLAN,
     GroundMotionTable,
     Limits,
     Link,
@@ -95,6 +96,18 @@ class Plan:
     def served(self) -> bool:
         """Whether the building is a client's, which asks for displacements and is answered with forces."""
         return self.structure.model == OF_CLIENT
+
+    @property
+    def foreign(self) -> bool:
+        """Whether the building is a model that a program beside the master computes."""
+        return self.structure.model not in (OF_PLAN, OF_CLIENT)
+
+    @property
+    def by_tables(self) -> Plan:
+        """The plan with the linear building of [structure] in place of a model that another program computes."""
+        if not self.foreign:
+            return self
+        return replace(self, structure=replace(self.structure, model=OF_PLAN, options={}))
 
     @property
     def storeys(self) -> int:
@@ -184,7 +197,7 @@ class Plan:
                 del lab["kind"]
         if self.device == DeviceTable():
             del tables["device"]
-        for name in CLIENT if not self.served else ():
+        for name in unsaid(self):
             del tables["structure"][name]
         return tables
 
@@ -215,7 +228,13 @@ class Plan:
         return hashlib.blake2b(text.encode(), digest_size=8).hexdigest()
 
 
-CLIENT = ("model", "intervals")  # keys of [structure] that say that a client has the building
+def unsaid(plan: Plan) -> tuple[str, ...]:
+    """The keys of [structure] that do not apply to what computes the building."""
+    if plan.foreign:
+        return ("intervals",)
+    return ("options",) if plan.served else ("model", "options", "intervals")
+
+
 BESIDE = ("slaves", "base", "follows_in", "eased")  # fields that are not tables of a file
 TABLES = tuple(name for name in Plan.__dataclass_fields__ if name not in BESIDE)
 INTERFACE = tuple(dict.fromkeys(name for names in TABLES_OF_KIND.values() for name in names))

@@ -62,6 +62,7 @@ def from_tables(tables: dict[str, Any], base: Path) -> Plan:
     given = {name: fill(types[name], tables[name], name) for name in tables if name != "slave" or not slaves}
     if "structure" in given:
         given["structure"] = building.with_modal_damping(given["structure"], tables["structure"])
+        building.check_model(given["structure"], tables["structure"])
     plan = Plan(base=base, **given)
     plan = replace(plan, slaves={name: slave_laboratory(plan, name, slaves[name]) for name in slaves})
     check_laboratories(plan)

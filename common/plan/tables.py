@@ -62,6 +62,7 @@ class Experimental:
 
 
 OF_PLAN, OF_CLIENT = "plan", "client"  # whose model the building is
+OPENSEES, FMU = "opensees:", ".fmu"  # beginning and end of a model that a program beside the master computes
 
 
 @dataclass(frozen=True)
@@ -85,10 +86,11 @@ class Structure:
     integrator: str = key("integration method", default="newmark_explicit")
     rho_infinity: float = key("KR-α: spectral radius at infinity", default=0.5, least=0.0, most=1.0)
     model: str = key(
-        "what computes the building: plan, from these tables; or client, the program that rths serve answers",
+        "what computes the building: plan, from these tables; opensees:FILE.py, a model of OpenSees, or FILE.fmu, "
+        "whose code the test then runs; or client, the program that rths serve answers",
         default=OF_PLAN,
-        choices=(OF_PLAN, OF_CLIENT),
     )
+    options: dict[str, Any] = key("opensees: keyword arguments of build; FMU: inputs, outputs, start", default={})
     intervals: int = key(
         "client: control intervals in which each of its displacements is imposed",
         default=1,

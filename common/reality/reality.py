@@ -217,6 +217,7 @@ def true_plan(tables: dict[str, Any], plan: Plan) -> Plan:
     merged = plan.tables()
     del merged["tolerances"]
     check_device(tables, "device")
+    check_building(tables, plan)
     for name in TRUE_TABLES:
         given = table_of(tables, name, name)
         if given:
@@ -235,6 +236,16 @@ def true_table(name: str, planned: Mapping[str, Any], given: Mapping[str, Any]) 
     """A planned table with the values that a reality gives for it."""
     kept = replaced(name, planned, given)
     return kept | within(kept, given)
+
+
+def check_building(tables: Mapping[str, Any], plan: Plan) -> None:
+    """Raise PlanError where [structure] gives another key than the options of a model that a program computes."""
+    for key in table_of(tables, "structure", "structure") if plan.foreign else ():
+        if key != "options":
+            raise PlanError(
+                f"{key} in [structure] says nothing of '{plan.structure.model}', which computes the building: give "
+                "its options, or leave it out."
+            )
 
 
 def check_device(tables: Mapping[str, Any], where: str) -> None:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from common.errors import InputError
 from common.plan.schema import nearest
 
-NAMES = ("partition", "peaks", "sensors", "rig", "link", "disk")
+NAMES = ("partition", "peaks", "building", "sensors", "rig", "link", "disk")
 
 
 class Risk(NamedTuple):

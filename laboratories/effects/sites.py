@@ -11,7 +11,8 @@ from laboratories.kind import Kind
 from laboratories.kinds import kinds_of
 from laboratories.table.kind import TABLE
 
-BUILDING, LINK = ("ground", "structure"), "link"
+STRUCTURE, LINK = "structure", "link"
+BUILDING = ("ground", STRUCTURE)
 OF_TEST = (*BUILDING, LINK)  # in no laboratory
 
 
@@ -43,6 +44,8 @@ def of_plan(plan: Plan) -> tuple[str, ...]:
     """The sites that the test of a plan has; raises InputError where one of its kinds cannot be loaded."""
     kinds = kinds_of(plan)
     found = of_kinds(kinds.pop(MASTER, None), kinds.values())
+    if plan.foreign:  # a model that another program computes, of which no effect is known
+        found = tuple(site for site in found if site != STRUCTURE)
     return found if LINK in found or not plan.roles else (*found, LINK)
 
 

@@ -46,9 +46,10 @@ class Findings(NamedTuple):
 def findings(plan: Plan) -> Findings:
     """Analyse a plan by its nominal models; raises InputError where a model or parameter is not valid.
 
-    Peaks are compared with the limits that hold with a rig, even where those of emulated laboratories are larger.
+    Peaks are compared with the limits that hold with a rig, even where those of emulated laboratories are larger. The
+    linear building of [structure] stands for one that another program computes.
     """
-    plan = patience.strict(plan)
+    plan = patience.strict(plan).by_tables
     found = assess(plan)
     top, unstable, check = simulated_peaks(plan, known_unstable=found.unstable)
     return Findings(found, top, unstable, [partition_check(plan, found), check])

@@ -44,12 +44,12 @@ class RealTime:
 
 
 class AsFastAsItGoes:
-    """Virtual time stands still until the client sends or a stop is requested, at most for `seconds` of wall time."""
+    """Virtual time stands still until `who` sends or a stop is requested, at most for `seconds` of wall time."""
 
     settles = False
 
-    def __init__(self, seconds: float, stopping: Callable[[], str]) -> None:
-        self._seconds, self._stopping = seconds, stopping
+    def __init__(self, seconds: float, stopping: Callable[[], str], who: str = "client") -> None:
+        self._seconds, self._stopping, self._who = seconds, stopping, who
 
     def until(self, lab: Laboratory, tick: int) -> Callable[[], float]:
         """The remaining time, in slices so that a request to stop is noticed."""
@@ -59,4 +59,4 @@ class AsFastAsItGoes:
     def over(self) -> None:
         """End the test, because the client sends nothing."""
         if not self._stopping():
-            raise ClientError(f"No displacement has come from the client for {self._seconds:g} s.")
+            raise ClientError(f"No displacement has come from the {self._who} for {self._seconds:g} s.")

@@ -108,7 +108,7 @@ def in_virtual_time(
     """Run the test in this process on the virtual clock; the error that ended it."""
     from simulation import virtual
 
-    said = before_the_start(plan, output, gate)
+    said = before_the_start(plan, output, gate, paced=False)
     with Working("running") as working:
         bench = virtual.assemble(plan, reality, output, partial(virtual_report, working), gate=gate)
         sys.stderr.writelines(f"{line}\n" for line in said)
@@ -133,26 +133,30 @@ def say_speed(bench: VirtualTest, seconds: float) -> None:
     sys.stderr.write(f"{length:g} s of test in {seconds:.1f} s of computing\n")
 
 
-def before_the_start(plan: Plan, output: Path, gate: Gate) -> list[str]:
+def before_the_start(plan: Plan, output: Path, gate: Gate, *, paced: bool = True) -> list[str]:
     """Make the pre-flight checks that need no laboratory; a line on each that passed or whose risk is accepted.
 
     Raises:
         RefusedError: a check failed whose risk is not accepted.
         InputError: a model or parameter of the plan cannot be used.
     """
-    made = checks(plan, output)
+    made = checks(plan, output, paced=paced)
     gate.judge(made)
     said = (f"risk '{one.risk.name}' is accepted" if one.risk else one.text for one in made)
     return [f"pre-flight: {text}." for text in said]
 
 
-def checks(plan: Plan, output: Path) -> list[PreflightCheck]:
-    """The pre-flight checks that need no laboratory: of the plan, and of the disk."""
+def checks(plan: Plan, output: Path, *, paced: bool = True) -> list[PreflightCheck]:
+    """The pre-flight checks that need no laboratory: of the plan, of a model beside it, and of the disk.
+
+    Of a model that another program computes its time per step is judged where the test is `paced`, in real time.
+    """
+    from loop import foreign
     from loop.nominal import preflight
     from recorder import space
 
     nominal = [] if plan.served else preflight.checks(plan)
-    return [*nominal, space.check(plan, output.parent)]
+    return [*nominal, *foreign.checked(plan, paced=paced), space.check(plan, output.parent)]
 
 
 def virtual_report(working: Working, kind: str, data: Any) -> None:
