@@ -56,7 +56,9 @@ class ForeignModel:
         if count != floors:
             self.close()
             has = f"has {count} floors" if found else f"is not built after {PATIENCE_S:g} s"
-            raise InputError(f"'{self.name}' {has}, but [structure] gives {floors} masses: give one per floor.")
+            raise InputError(
+                f"'{self.name}' {has}, but [structure] gives {floors} masses: give one per floor."
+            )
         self._floors = floors
         self._forces, self._motion = struct.Struct(f"<{floors}d"), struct.Struct(f"<{5 * floors}d")
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 MASTER, SLAVE, RECORDER, LATENCY = "master", "slave", "recorder", "latency"
 OPERATOR, OBSERVER = "operator", "observer"
 CLIENT = "client"  # a program that has the building, where the master's laboratories are served to one
+BUILDING = "building"  # a program beside the master that computes the building's model
 RAMP = "_ramp"
 
 

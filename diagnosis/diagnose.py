@@ -206,7 +206,7 @@ def parts_of(record: Record) -> list[Part]:
     parts: list[Part] = []
     if record.ground is not None and record.has("ground_acceleration"):
         parts.append(Ground(record, record.ground))
-    if record.has(*BUILDING, *used(record)):
+    if record.has(*BUILDING, *used(record)) and not record.plan.foreign:
         parts.append(Building(record))
     for lab in record.labs:
         if driven(record, lab):
@@ -231,6 +231,11 @@ def driven(record: Record, lab: RecordedLaboratory) -> bool:
 def not_recorded(record: Record) -> list[str]:
     """What cannot be judged for lack of signals, in sentences."""
     result = []
+    if record.plan.foreign:
+        result.append(
+            f"'{record.plan.structure.model}' computed the building, which is not judged: the gap is that of the "
+            "laboratories by themselves, each from what it was told."
+        )
     for lab in record.labs:
         if lab.kind.name == COLUMN and not driven(record, lab) and record.has(*lab.measured):
             (command,) = lab.commands

@@ -11,7 +11,7 @@ from common.safety.risks import Risk
 from common.udp.account import quantile
 from laboratories.kind import Follows
 from laboratories.kinds import kinds_of
-from loop import substructure
+from loop import assembly, substructure
 from models.registry import Array
 
 # Most steps and seconds for which a model is timed: enough for the strong part of an earthquake at 10 ms, and no longer
@@ -41,7 +41,7 @@ def stiffnesses(plan: Plan) -> list[float]:
     found = [0.0] * plan.storeys
     for role, kind in kinds_of(plan).items():
         coupling = kind.coupling(plan.of(role))
-        substructure.check_place(plan, role, coupling)
+        assembly.check_place(plan, role, coupling)
         if coupling.follows is Follows.DRIFT:
             found[coupling.place - 1] += coupling.stiffness
     return found
@@ -67,7 +67,9 @@ def judged(plan: Plan, name: str, ranked: list[float], *, paced: bool) -> Prefli
     """The check from sorted durations (s) of steps."""
     typical, least = quantile(ranked, TYPICAL), quantile(ranked, TYPICAL) / plan.link.wait_share
     least = math.ceil(least / FINE) * FINE
-    times = f"{quantile(ranked, 0.5) * 1e3:.2f} ms, {TYPICAL:.0%} of {len(ranked)} at most {typical * 1e3:.2f} ms"
+    times = (
+        f"{quantile(ranked, 0.5) * 1e3:.2f} ms, {TYPICAL:.0%} of {len(ranked)} at most {typical * 1e3:.2f} ms"
+    )
     text = f"A step of the building '{name}' takes {times}: it holds intervals from {least * 1e3:.1f} ms on"
     if not paced or least <= plan.test.interval:
         return PreflightCheck(text)

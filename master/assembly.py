@@ -141,7 +141,7 @@ def warm_up_served(reality: Reality) -> None:
     compensator(plan)
     for kind in kinds.kinds_of(plan).values():
         CoupledLaboratory(kind.coupling(plan), plan.test.interval, 1).resists(0.0)
-    storeys = [0.0] * (len(OF_STOREYS) * plan.storeys * plan.foreign)
+    storeys = [0.0] * (len(OF_STOREYS) * plan.storeys * (not plan.served))
     sent = [(0.0,) * substructure.SENT_VALUES for _ in plan.roles]
     of_own(reality, Outputs(0.0, 0.0, 0.0, 0.0, sent, storeys))
 

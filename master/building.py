@@ -44,7 +44,7 @@ class Answering(Protocol):
 class BuildingStep:
     """Computes from the measurements of a tick what the laboratories do in the coming interval."""
 
-    code = "client"  # of the event that says why it cannot continue
+    who = CLIENT  # in messages, and the code of the event that says why it cannot continue
 
     def join(self, lab: Laboratory, partners: Sequence[Answering]) -> None:
         """Receive the master's laboratory, with its clock, and the slaves; called before the handshake."""

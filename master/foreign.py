@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from common.foreign import FloorMotion, ForeignModel
 from common.lab.laboratory import Laboratory
 from common.plan.plan import Plan
-from common.roles import MASTER
+from common.roles import BUILDING, MASTER
 from common.safety.watchdog import Watchdog, WatchdogFinding
 from common.signals import OF_STOREYS
 from common.udp.account import quantile
@@ -25,13 +25,11 @@ from master.client.coupled import CoupledLaboratory, couplings_of
 from master.client.pace import Pace
 from models.registry import Array
 
-CODE = "building"  # of its events
-
 
 class ForeignBuilding(BuildingStep):
     """The building `model` under the ground motion `rows` (2, ticks + 1), as `substructure.ground_rows` gives them."""
 
-    code = CODE
+    who = BUILDING
 
     def __init__(self, plan: Plan, model: ForeignModel, rows: Array, pace: Pace) -> None:
         self._model, self._pace, self._interval = model, pace, plan.test.interval
@@ -107,7 +105,7 @@ class ForeignBuilding(BuildingStep):
         return self._outputs
 
     def _follow(self, lab: CoupledLaboratory, motion: FloorMotion) -> tuple[float, ...]:
-        """The values for one laboratory at the end of the interval, the motor's force by the building's own velocity."""
+        """The values for one laboratory at the end of the interval, its motor's force by the building's velocity."""
         coupling, place = lab.coupling, lab.coupling.place - 1
         moved, speed = motion.ahead[place], motion.velocity_ahead[place]
         if coupling.follows is Follows.FLOOR:
@@ -132,8 +130,8 @@ class ForeignBuilding(BuildingStep):
         return self._watchdog.look(tick - 1, self._heard, self._heard)
 
     def leave(self) -> None:
-        """Record how long the steps took, and end the program."""
-        if self._lab is not None and self._waits:
+        """In real time record how long the steps took, and end the program."""
+        if self._lab is not None and self._waits and self._pace.settles:
             ranked = sorted(self._waits)
             values = {
                 "steps": float(len(ranked)),
@@ -146,5 +144,5 @@ class ForeignBuilding(BuildingStep):
                 f"{name} {values[f'waited_{name}'] * 1e3:.2f} ms" for name in ("p50", "p99", "max")
             )
             text = f"{len(ranked)} steps of '{self._model.name}', {self._late} ticks without one; a tick waited {times}"
-            self._lab.note(CODE, text, tick=self._lab.tick, values=values)
+            self._lab.note(BUILDING, text, tick=self._lab.tick, values=values)
         self._model.close()

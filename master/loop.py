@@ -34,7 +34,7 @@ from common.protocol.messages import (
 )
 from common.recording.outcome import COMPLETED
 from common.rig import GuardedRig
-from common.roles import CLIENT, MASTER, RECORDER
+from common.roles import MASTER, RECORDER
 from common.safety.modes import Turn
 from common.safety.watchdog import WatchdogFinding
 from laboratories import kinds
@@ -199,7 +199,7 @@ class MasterLoop(RigLoop):
     def _building_failed(self, error: InterlockError | LostError, tick: int) -> None:
         """End the test, because the building computes no further displacements."""
         event = Event.LOSE if isinstance(error, LostError) else Event.TRIP
-        self.lab.fail(event, error, code=self._building.code, tick=tick)
+        self.lab.fail(event, error, code=self._building.who, tick=tick)
 
     def _finding(self, tick: int) -> tuple[WatchdogFinding, str]:
         """The worst finding of the watchdogs on the building and the slaves, and the name of the first that has it."""

@@ -32,18 +32,6 @@ class MasterStep(BuildingStep):
         for place, used in enumerate(forces):
             self._forces[place] = used
         self._advance(tick, position, force)
-<<<<<<< HEAD
         row = tuple(self._output.tolist())
         sent = [row[place] for place in self._sent]
         return computed((*row[: substructure.OF_SLAVES], sent, row[self._end :], False))
-
-    def recorded(self, outputs: Outputs) -> tuple[Sequence[float], Sequence[float]]:
-        """The ground and the storeys' motion, and their numerical forces."""
-        motion, forces = outputs.storeys[: -self._storeys], outputs.storeys[-self._storeys :]
-        return (outputs.ground_acceleration, *motion), forces
-=======
-        row = self._output.tolist()
-        sent = [tuple(row[place]) for place in self._sent]
-        ground, target, command, effort = row[: substructure.OF_SLAVES]
-        return computed((ground, target, command, effort, sent, row[self._end :], False))
->>>>>>> faba49a (A model of OpenSees or an FMU is the building of the master)

@@ -19,7 +19,7 @@ from common.recording.rows import RowPacker
 from common.reporting import Report, silent
 from common.rig import GuardedRig
 from common.rig_time import RigTime
-from common.roles import CLIENT, MASTER, SLAVE, title
+from common.roles import BUILDING, CLIENT, MASTER, SLAVE, title
 from common.safety.modes import Cause, Mode, Safety, Turn
 from common.signals import Signal
 
@@ -253,7 +253,9 @@ class Laboratory:
             return
         most = self.plan.safety.ramp_after
         milliseconds = most * self.plan.test.interval * 1e3
-        message = "displacement" if who == CLIENT else "feedback" if self.name == MASTER else "command"
+        message = (
+            "displacement" if who in (CLIENT, BUILDING) else "feedback" if self.name == MASTER else "command"
+        )
         whom = "laboratory B" if who == SLAVE else f"the {who}"
         error = LostError(f"No valid {message} from {whom} for {milliseconds:g} ms.")
         self.fail(Event.LOSE, error, code="watchdog", tick=tick, values={"intervals": float(most)})

@@ -88,7 +88,9 @@ class Frame:
         ops.constraints("Transformation")
         ops.numberer("RCM")
         ops.system("BandGeneral")
-        ops.algorithm("Linear", "-factorOnce")  # its matrix is that of the initial stiffness
+        ops.algorithm(
+            "Linear", "-initial", "-factorOnce"
+        )  # the method takes the initial stiffness throughout
         ops.integrator("AlphaOS", 1.0)
         ops.analysis("Transient", "-noWarnings")
 

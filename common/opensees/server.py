@@ -1,9 +1,9 @@
 """A process with one OpenSees specimen: `python server.py`, started by `common.opensees.process`.
 
 OpenSees has one domain per process, so each specimen has a process of its own. It may run in another interpreter, and
-imports nothing of rths. It reads its task, a line of JSON, then a count and as many deformations (m, eight bytes each) from standard input and
-answers with the force (N) at the last, NaN if OpenSees finds no equilibrium. The standard output of OpenSees is
-redirected to standard error.
+imports nothing of rths. It reads its task, a line of JSON, then a count and as many deformations (m, eight bytes each)
+from standard input and answers with the force (N) at the last, NaN if OpenSees finds no equilibrium. The standard
+output of OpenSees is redirected to standard error.
 """
 
 from __future__ import annotations

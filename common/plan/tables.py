@@ -90,7 +90,9 @@ class Structure:
         "whose code the test then runs; or client, the program that rths serve answers",
         default=OF_PLAN,
     )
-    options: dict[str, Any] = key("opensees: keyword arguments of build; FMU: inputs, outputs, start", default={})
+    options: dict[str, Any] = key(
+        "opensees: keyword arguments of build; FMU: inputs, outputs, start", default={}
+    )
     intervals: int = key(
         "client: control intervals in which each of its displacements is imposed",
         default=1,

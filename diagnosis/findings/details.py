@@ -122,7 +122,7 @@ def remains(found: Diagnosis, far: Response) -> Remaining:
 def nominal_signals(found: Diagnosis) -> dict[str, Array] | None:
     """Signals of the closed loop of nominal models, None where there is no loop."""
     record = found.record
-    if record.ground is None or not record.has("displacement", *record.targets[:1]):
+    if record.ground is None or not record.simulable or not record.has(*record.targets[:1]):
         return None
     return simulated(record, record.systems, record.ground)
 

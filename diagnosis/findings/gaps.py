@@ -31,7 +31,7 @@ class RecordingGaps:
         self.found, self.record, self.mask = found, record, mask
         names = tuple(name for name in record.responses if record.has(name))
         self.loop: RecordedLoop | None = None
-        if record.ground is not None and record.has("displacement", *record.targets) and names:
+        if record.simulable and record.has(*record.targets) and names and record.ground is not None:
             exchange = link.exchange_of(record.run, record.ticks) if found.link else None
             self.loop = RecordedLoop(record, record.ground, exchange, names)
 

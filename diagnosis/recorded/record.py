@@ -110,6 +110,11 @@ class Record:
         """The target signals of the laboratories."""
         return tuple(lab.signal(lab.kind.channels.target.name) for lab in self.labs)
 
+    @property
+    def simulable(self) -> bool:
+        """Whether its closed loop can be simulated: its ground motion is known, and its building is the plan's own."""
+        return self.ground is not None and self.has("displacement") and not self.plan.foreign
+
     def unit(self, name: str) -> str:
         """The unit of a signal, empty for one that is not known."""
         rows = (*OF_BUILDING, *(row for lab in self.labs for row in lab.rows))

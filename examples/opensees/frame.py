@@ -1,7 +1,7 @@
 """A reinforced-concrete frame of two storeys for OpenSees, as the building of a hybrid test.
 
-Two bays of 5 m, storeys of 3 m, columns of 350 × 350 mm and beams of 300 × 450 mm with fibre sections. The middle column
-of the lower storey is the laboratory's: the model has a bar in its place, which carries its axial force alone.
+Two bays of 5 m, storeys of 3 m, columns of 350 × 350 mm and beams of 300 × 450 mm with fibre sections. The middle
+column of the lower storey is the laboratory's: the model has a bar in its place, which carries its axial force alone.
 
     [structure]
     model = "opensees:frame.py"
@@ -76,9 +76,9 @@ def members(ops: Any) -> None:
             if low == 2:
                 ops.element("Truss", low, low, low + 10, COLUMN[0] * COLUMN[1], ELASTIC)
             else:
-                ops.element("forceBeamColumn", low, low, low + 10, 1, 1)
+                ops.element("dispBeamColumn", low, low, low + 10, 1, 1)
             if line < LINES[-1]:
-                ops.element("forceBeamColumn", low + 110, low + 10, low + 11, 2, 2)
+                ops.element("dispBeamColumn", low + 110, low + 10, low + 11, 2, 2)
 
 
 def weigh(ops: Any) -> None:

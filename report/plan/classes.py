@@ -1,7 +1,8 @@
-"""The classes that a plan would run, and where their code lies; none of it is imported here.
+"""The classes and models that a plan would run, and where their code lies; none of it is imported here.
 
-A plan that names a class, for a rig or for a kind of laboratory, runs that class's code with the rights of the user who
-starts the test. The class of a kind also runs when the plan is checked or simulated.
+A plan that names a class, for a rig or for a kind of laboratory, or a model of the building that another program
+computes, runs that code with the rights of the user who starts the test. The class of a kind also runs when the plan is
+checked or simulated, and the model when it is checked.
 """
 
 from __future__ import annotations
@@ -11,10 +12,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 from common.plan.plan import Plan
+from common.plan.tables import OPENSEES
 
 
 class Code(NamedTuple):
-    """One class that a plan names."""
+    """One class or model that a plan names."""
 
     where: str  # table of the plan
     name: str  # as the plan has it
@@ -22,7 +24,7 @@ class Code(NamedTuple):
 
 
 def named(plan: Plan) -> list[Code]:
-    """The classes of a plan: those of kinds of laboratory, then those of rigs, each in the plan's order."""
+    """The code of a plan: the building's model, then classes of kinds of laboratory, then of rigs, in its order."""
     given = {role: kind for role, kind in plan.kinds.items() if ":" in kind}
     rigs = {"master.rig": plan.master.rig}
     rigs |= (
@@ -31,7 +33,11 @@ def named(plan: Plan) -> list[Code]:
         else {"slave.rig": plan.slave.rig}
     )
     given |= {where: rig.class_ for where, rig in rigs.items() if rig.class_}
-    return [Code(where, name, file_of(name, plan.base)) for where, name in given.items()]
+    found = [Code(where, name, file_of(name, plan.base)) for where, name in given.items()]
+    if not plan.foreign:
+        return found
+    path = plan.base / plan.structure.model.removeprefix(OPENSEES)
+    return [Code("structure", plan.structure.model, str(path.resolve()) if path.is_file() else ""), *found]
 
 
 def file_of(reference: str, base: Path) -> str:

@@ -14,7 +14,7 @@ from common.udp import probe
 from common.udp.account import quantile
 from common.udp.probe import Probed
 from laboratories.kinds import kind_of
-from loop import substructure
+from loop import foreign, substructure
 from loop.nominal import limited
 from loop.nominal.partition import felt, matrices, taken_over
 from loop.nominal.preflight import Findings, expected_delay, findings
@@ -31,7 +31,8 @@ def facts(plan: Plan, file: Path) -> dict[str, Any]:
     found = findings(plan)
     rigs_there = [rig(one, plan) for one in probed(plan)]
     refusing = [one["risk"] for one in rigs_there if one["risk"]]
-    made = [*found.checks, space.check(plan, existing(Path(plan.recording.folder)))]
+    built = foreign.checked(plan)
+    made = [*found.checks, *built, space.check(plan, existing(Path(plan.recording.folder)))]
     return {
         "plan": str(file),
         "test": plan.test.name,
@@ -39,7 +40,7 @@ def facts(plan: Plan, file: Path) -> dict[str, Any]:
         "interval": plan.test.interval,
         "ticks": plan.ticks,
         "ground_motion": ground(plan, motion),
-        "structure": structure(plan),
+        "structure": structure(plan) | {"model": built[0].text if built else ""},
         "transfer_systems": transfer_systems(plan),
         "delay": delay(plan, found),
         "stable": not found.unstable,

@@ -35,6 +35,8 @@ def described(facts: Mapping[str, Any]) -> Iterator[str]:
     )
     ground = facts["ground_motion"]
     yield f"ground motion     {ground['text']}; × {ground['scale']:g}: peak {ground['peak']:.3g} m/s²"
+    if facts["structure"]["model"]:
+        yield f"building          {facts['structure']['model']}; the modes are those of [structure]"
     for number, mode in enumerate(facts["structure"]["modes"], start=1):
         yield f"mode {number}            {mode_text(mode)}"
     if specimen := facts["structure"].get("specimen"):
@@ -125,8 +127,9 @@ def code(classes: Sequence[Mapping[str, str]], *, emulated: bool = True) -> Iter
     """The classes that a plan names, each in a sentence; `emulated` where it has no rig of the user's."""
     for one in classes:
         place = one["file"] or "a file that is not there"
+        what = "model" if one["where"] == "structure" else "class"
         yield (
-            f"[{one['where']}] runs the class '{one['name']}' from {place}, with your rights: only run plans that "
+            f"[{one['where']}] runs the {what} '{one['name']}' from {place}, with your rights: only run plans that "
             "you trust."
         )
     if not classes:

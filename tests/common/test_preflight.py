@@ -69,7 +69,7 @@ def test_a_gate_tells_the_recording_once_what_was_passed_and_what_was_overruled(
 
 
 @pytest.mark.parametrize(
-    ("word", "hint"), [("peeks", "did you mean peaks?"), ("x", "known here: disk, link")]
+    ("word", "hint"), [("peeks", "did you mean peaks?"), ("x", "known here: building, disk, link")]
 )
 def test_a_risk_that_is_none_is_said_with_the_nearest(word: str, hint: str) -> None:
     parser = argparse.ArgumentParser()

@@ -127,7 +127,7 @@ def test_a_model_without_equilibrium_ends_the_test_with_a_sentence(tmp_path: Pat
 @with_opensees
 def test_an_opensees_that_dies_ends_the_test_with_a_sentence() -> None:
     rig = Specimen(0.002, 3, **ELASTIC)
-    os.kill(rig._process._process.pid, signal.SIGKILL)
+    os.kill(rig._process._program._process.pid, signal.SIGKILL)
     with pytest.raises(RigError, match="OpenSees has ended as the specimen 'Elastic'"):
         rig.write(ColumnCommand(1e-3))
     rig.disarm()
