@@ -7,6 +7,7 @@ from typing import NamedTuple, Protocol
 
 from common.lab.laboratory import Laboratory
 from common.protocol.messages import Feedback
+from common.roles import CLIENT
 from common.safety.watchdog import FINE, WatchdogFinding
 from common.signals import OF_STOREYS
 

@@ -203,7 +203,7 @@ class MasterLoop(RigLoop):
 
     def _finding(self, tick: int) -> tuple[WatchdogFinding, str]:
         """The worst finding of the watchdogs on the building and the slaves, and the name of the first that has it."""
-        return self._together.look(tick, self._building.look(tick), CLIENT)
+        return self._together.look(tick, self._building.look(tick), self._building.who)
 
     def _write(self, wanted: Any, outputs: Outputs, *, held: bool) -> None:
         """Write the tick's command to the rig, or the last one again if the tick is too late (`held`)."""

@@ -98,7 +98,7 @@ def test_the_loop_with_an_fmu_is_that_with_the_masters_own_building(folder: Path
     found = played(FOREIGN, folder, tmp_path / "found.mcap").columns["master"]
     for name in ("displacement", "column_target", "column_force"):
         assert np.max(np.abs(found[name] - own[name])) <= 1e-9 * np.max(np.abs(own[name])), name
-    # the FMU gives the velocity at the end of a step with the acceleration of its beginning, and the latter one step later
+    # the FMU gives the velocity at the end of a step, and the acceleration at its beginning: one step later
     assert found["velocity"] == pytest.approx(own["velocity"], abs=1e-5)
     assert found["acceleration"][1:] == pytest.approx(own["acceleration"][:-1], abs=1e-9)
 

@@ -19,7 +19,7 @@ from common.recording.run import Run
 from loop import foreign, substructure
 from loop.nominal import partition
 from master.assembly import warm_up_served
-from master.client import AsFastAsItGoes, Pace
+from master.client.pace import AsFastAsItGoes, Pace
 from master.foreign import ForeignBuilding
 from simulation import virtual
 from tests.foreign.storeys import DAMPING, MASS, STIFFNESS, Storeys
