@@ -1,7 +1,9 @@
-"""How large a friction is at a speed: `F·tanh(|v|/v₀)·(1 − d·(1 − exp(−|v|/v_s)))`.
+"""The size of a friction force at a speed: `F·tanh(|v|/v₀)·(1 − d·(1 − exp(−|v|/v_s)))`.
 
-Below v₀ it falls off, which makes the law smooth; beyond, a moving contact may rub less than a slow one, or more with
-d < 0. B. Armstrong-Hélouvry, P. Dupont and C. Canudas de Wit, Automatica 30 (1994), 1083-1138, section 2.
+Below v₀ the force decreases to zero, which makes the law smooth. At higher speeds friction is lower than at low ones,
+or higher if d < 0.
+
+B. Armstrong-Hélouvry, P. Dupont and C. Canudas de Wit, Automatica 30 (1994), 1083-1138, section 2.
 """
 
 from __future__ import annotations
@@ -10,12 +12,12 @@ import numpy as np
 
 from models.compiled import jit
 
-COULOMB = 1e-6  # m/s, up to which v₀ stands for no falling off at all
+COULOMB = 1e-6  # m/s; with v₀ up to this value the force does not decrease at low speed: Coulomb friction
 
 
 @jit
 def left(rate: float, velocity: float, drop: float, speed: float) -> float:
-    """Share of a friction that is left at a rate (m/s): v₀ = `velocity` and v_s = `speed` in m/s, d = `drop`."""
+    """The factor on a friction force at a rate (m/s): v₀ = `velocity` and v_s = `speed` in m/s, d = `drop`."""
     size = abs(rate)
     share = 1.0 if velocity <= COULOMB else np.tanh(size / velocity)
     if drop != 0.0:

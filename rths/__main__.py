@@ -25,7 +25,7 @@ VERBS = {
     "init": "write a plan to begin with, and the skeleton of a rig",
     "check": "describe a plan: periods, delays, peaks, likely slips of units, classes of your own that it would run",
     "simulate": "compute the closed loop of nominal models",
-    "predict": "foretell the next test with what a diagnosis found, with a band",
+    "predict": "predict the next test from what a diagnosis found, with a band",
     "update": "write a plan with the nominal models that a diagnosis found",
     "sweep": "compute many tests of a plan: motions, scales, parameters, compensators, drawn laboratories",
     "fragility": "fit the chance that a limit is passed against the motion's intensity to the table of a sweep",

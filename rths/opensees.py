@@ -1,6 +1,7 @@
 """A column whose specimen is a material or a model of OpenSees: `class = "rths.opensees:Specimen"` in a rig's table.
 
-The actuator is the one that ships, emulated; what it reaches is imposed on OpenSees, in a process of its own.
+The actuator is the emulated one of this program. The displacement that it reaches is imposed on OpenSees, which runs in
+a process of its own.
 """
 
 from __future__ import annotations
@@ -12,16 +13,19 @@ from common.errors import InputError
 from common.opensees.process import SpecimenProcess, absolute
 from laboratories.column.under_actuator import WHERE, Array, UnderActuator
 
-SUBSTEPS = 4  # deformations of an interval through which a specimen is led
+# Deformations per interval that are imposed one after the other: at 2 ms those are the 0.5 ms in which an actuator
+# with a time constant of 30 ms moves almost in a straight line.
+SUBSTEPS = 4
 
 
 class Specimen(UnderActuator):
     """Laboratory A or a column at a slave: an actuator, and a specimen of OpenSees under it.
 
-    Either `materials` are given, rows as `uniaxialMaterial` takes them, of which the last is the specimen, with
-    deformation (m) as strain and force (N) as stress; or a `file` with a function `build(ops, **options)` that makes a
-    model and gives node and direction (from 1) that are moved. `actuator` and `sensors` are the laboratory's own, as
-    the plan has these tables; the actuator does not feel the force.
+    Either `materials` or `file` is given. `materials` are rows as `uniaxialMaterial` takes them; the last one is the
+    specimen, with its deformation (m) as strain and its force (N) as stress. `file` has a function
+    `build(ops, **options)`, which makes a model and returns the node and the direction (from 1) to be moved.
+    `actuator` and `sensors` are the laboratory's own tables, with the keys of the plan's. The force does not act back
+    on the actuator.
 
     Raises:
         InputError: the options do not fit together, OpenSees is not installed, or it refuses what they say.
@@ -45,18 +49,22 @@ class Specimen(UnderActuator):
         return self._process.force(way)
 
     def arm(self) -> None:
-        """Refuse a specimen whose process has ended."""
+        """Raise RigError if the process of the specimen has ended."""
         self._process.force([0.0])
 
     def disarm(self) -> None:
-        """The actuator stays where it is, and OpenSees ends."""
+        """Leave the actuator where it is, and end OpenSees."""
         self._process.close()
 
 
 def task(
     materials: Sequence[Sequence[Any]], file: str, options: Mapping[str, Any]
 ) -> tuple[str, dict[str, Any]]:
-    """The name of a specimen and what its process is told; raises InputError where it is none, or two."""
+    """The name of a specimen and the description for its process.
+
+    Raises:
+        InputError: both or none of `materials` and `file` are given, or a row is no material.
+    """
     if bool(materials) == bool(file):
         raise InputError(f"[{WHERE}] needs either materials or a file with a model of OpenSees.")
     if file:

@@ -1,4 +1,4 @@
-"""What a diagnosis found, as a reality says it: the plan that it is of, and laws that were learned from a recording."""
+"""The entries of a reality that a diagnosis wrote: which plan it belongs to, and the laws learned from a recording."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from common.errors import PlanError
 from common.plan.plan import Plan
 from common.roles import MASTER
 
-# the tables of a plan that say what the laboratories are: what was found is of these nominal models
+# Tables of a plan that describe the laboratories: findings are valid for a plan with the same nominal models.
 OF_MODELS = ("column", "actuator", "table", "damper", "device", "master", "slave")
-BUILDING = "structure"  # table of the plan, and the part of an effect's name that stands before its point
-CHOSEN = "compensator"  # key of a laboratory's table that a plan may choose anew
+BUILDING = "structure"  # the plan's table of the building, and the site in the names of effects on it
+CHOSEN = "compensator"  # key of a laboratory's table that does not belong to its nominal model
 
 
 class LearnedEntry(NamedTuple):
@@ -30,16 +30,16 @@ class LearnedEntry(NamedTuple):
 
 
 def models_of(plan: Plan) -> str:
-    """Sixteen hex digits that agree where two plans have the same nominal laboratories.
+    """Sixteen hex digits that are equal if two plans have the same nominal laboratories.
 
-    The building, the motion, compensators and the control are free.
+    Building, ground motion, compensators and control may differ.
     """
     tables = plan.tables()
     return digest({name: without_choices(tables.get(name)) for name in OF_MODELS})
 
 
 def building_of(plan: Plan) -> str:
-    """Sixteen hex digits that agree where two plans have the same building."""
+    """Sixteen hex digits that are equal if two plans have the same building."""
     return digest(plan.tables()[BUILDING])
 
 
@@ -57,7 +57,7 @@ def without_choices(plain: Any) -> Any:
 
 
 def of_building(tables: Mapping[str, Any]) -> list[str]:
-    """What a reality says of the building: the table's name, and its effects."""
+    """The entries of a reality that concern the building: its table, and effects on it."""
     effects = tables.get("effect", [])
     names = (
         [str(one.get("name")) for one in effects if isinstance(one, dict)]
@@ -69,7 +69,7 @@ def of_building(tables: Mapping[str, Any]) -> list[str]:
 
 
 def for_another_building(tables: Mapping[str, Any], plan: Plan) -> tuple[dict[str, Any], list[str]]:
-    """The tables of a reality for a plan, and what of them was left out because it is of another building."""
+    """The tables of a reality for a plan, and the entries left out because they belong to another building."""
     found = tables.get("found", {})
     if not isinstance(found, dict) or found.get("building", building_of(plan)) == building_of(plan):
         return dict(tables), []
@@ -81,7 +81,7 @@ def for_another_building(tables: Mapping[str, Any], plan: Plan) -> tuple[dict[st
 
 
 def check_found(tables: Mapping[str, Any], plan: Plan) -> None:
-    """Raise PlanError where a reality was found with other nominal models than the plan's."""
+    """Raise PlanError if a reality belongs to other nominal models, or to another building, than the plan's."""
     given = tables.get("found", {})
     if not isinstance(given, dict):
         raise PlanError(f"[found] must be a table, not {given!r}.")
@@ -94,8 +94,8 @@ def check_found(tables: Mapping[str, Any], plan: Plan) -> None:
     building = given.get("building", "")
     if building and building != building_of(plan) and of_building(tables):
         raise PlanError(
-            f"it says of another building than this plan's how it differs ({', '.join(of_building(tables))}): leave "
-            "that out of the file, or give the plan that it was found with."
+            f"it holds changes of another building than this plan's ({', '.join(of_building(tables))}): delete these "
+            "entries from the file, or give the plan that it was found with."
         )
 
 
@@ -124,7 +124,7 @@ def entry_of(entry: Mapping[str, Any], plan: Plan, base: Path) -> LearnedEntry:
 
 
 def law_in(path: Path, name: str) -> tuple[float, ...]:
-    """A law in an .npz file; raises PlanError where it cannot be read or is no series of finite numbers."""
+    """A law in an .npz file; raises PlanError if it cannot be read or is no list of finite numbers."""
     try:
         with np.load(path, allow_pickle=False) as file:
             law = np.asarray(file[name], dtype=np.float64)
@@ -134,6 +134,6 @@ def law_in(path: Path, name: str) -> tuple[float, ...]:
         ) from None
     if law.ndim != 1 or law.size == 0 or not np.all(np.isfinite(law)):
         raise PlanError(
-            f"The law '{name}' in {path} is no series of finite numbers: diagnose the recording anew."
+            f"The law '{name}' in {path} is no list of finite numbers: diagnose the recording again."
         )
     return tuple(law.tolist())

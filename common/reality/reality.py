@@ -26,7 +26,7 @@ Entry = tuple[str, Mapping[str, float]]  # name of an effect of the catalogue, a
 
 TRUE_TABLES = ("ground_motion", "structure", "column", "actuator", "table", "damper", "device", "sensors")
 OF_LABORATORY = ("actuator", "column", "table", "damper", "device")  # true tables that a named slave may have
-# keys of [device] that the plan chooses, so that reality cannot differ in them
+# Keys of [device] that are choices of the plan, so that reality cannot differ in them.
 DESIGNED = ("place", "ratio", "scale", "compensator", "limits")
 MERGED = (
     "experimental",

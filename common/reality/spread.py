@@ -1,6 +1,6 @@
-"""How sure a diagnosis is of what it found: spread of parameters, noise of sensors, the rest, and the ranges seen.
+"""The uncertainty of a diagnosis: covariance of parameters, noise of sensors, the unexplained rest, the ranges seen.
 
-`rths diagnose --found` writes it into the file beside the reality, and `rths predict` draws laboratories from it.
+`rths diagnose --found` writes it into the .npz file beside the reality, and `rths predict` draws laboratories from it.
 """
 
 from __future__ import annotations
@@ -18,47 +18,47 @@ from numpy.typing import NDArray
 
 from common.errors import PlanError
 
-KNOWN, COVARIANCE = "known", "covariance"  # names in the file beside a reality
+KNOWN, COVARIANCE = "known", "covariance"  # names of arrays in the .npz file beside a reality
 KEY = "rest"  # of [found]: the name of that file
 
 ByRole = dict[str, dict[str, float]]
 
 
 class UncertainParameter(NamedTuple):
-    """One parameter that a diagnosis found, and on which scale its spread is given.
+    """One parameter that a diagnosis found, and the scale of its spread.
 
-    The spread of a nominal parameter is that of a factor on it; the spread of an effect's parameter that of its value,
-    or of its value's logarithm.
+    For a nominal parameter the spread is that of a factor on it. For an effect's parameter it is that of the value or,
+    if `logarithmic`, of the value's logarithm.
     """
 
     laboratory: str  # role
     parameter: str  # `table.name` of the plan, or the name of an effect's parameter
     effect: str = ""  # the effect's name in the catalogue, empty for a nominal parameter
-    storey: int = 0  # the only storey whose value is meant, from 1; 0 for all
+    storey: int = 0  # the storey whose value is meant, counted from 1; 0 for all storeys
     logarithmic: bool = False
     least: float = -math.inf
     most: float = math.inf
 
 
 class SeenRange(NamedTuple):
-    """What one laboratory was seen to do in the recording that was diagnosed."""
+    """The range of one laboratory's motion in the diagnosed recording."""
 
-    amplitudes: dict[str, float]  # largest magnitude of each reading that stands out of its noise, SI units
-    band: tuple[float, float]  # Hz, which holds nearly all of its target's motion
+    amplitudes: dict[str, float]  # largest magnitude of each reading that exceeds its noise, SI units
+    band: tuple[float, float]  # Hz, frequencies that hold nearly all of the target's energy
 
 
 @dataclass(frozen=True)
 class Spread:
-    """What is known of the errors of a reality that was found."""
+    """The uncertainty of a reality that a diagnosis found."""
 
     parameters: tuple[UncertainParameter, ...] = ()
     covariance: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
     noise: ByRole = field(default_factory=dict)  # rms of each channel's noise by role
-    rest: ByRole = field(default_factory=dict)  # what is left of each signal over its envelope, by role
+    rest: ByRole = field(default_factory=dict)  # unexplained share of each signal's envelope, by role
     seen: dict[str, SeenRange] = field(default_factory=dict)  # by role
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """The arrays that a file holds."""
+        """The arrays for the .npz file."""
         text = json.dumps(
             {
                 "parameters": [one._asdict() for one in self.parameters],
@@ -80,8 +80,8 @@ def beside(tables: Mapping[str, Any], base: Path) -> Spread:
     name = given.get(KEY) if isinstance(given, dict) else None
     if not isinstance(name, str):
         raise PlanError(
-            "it does not say how sure it is: give the file that `rths diagnose --found` wrote, not a reality of "
-            "your own."
+            "it does not hold the uncertainty of a diagnosis: give a file that `rths diagnose --found` wrote, not a "
+            "reality of your own."
         )
     path = base / name
     try:
@@ -89,7 +89,8 @@ def beside(tables: Mapping[str, Any], base: Path) -> Spread:
             return read(json.loads(str(file[KNOWN])), np.asarray(file[COVARIANCE], dtype=np.float64))
     except (OSError, ValueError, KeyError, TypeError, AttributeError, BadZipFile):
         raise PlanError(
-            f"Cannot read what {path} says of its errors: keep the file that `rths diagnose --found` wrote beside it."
+            f"Cannot read the uncertainty in {path}: keep the .npz file that `rths diagnose --found` wrote beside the "
+            "reality."
         ) from None
 
 

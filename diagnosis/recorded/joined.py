@@ -1,4 +1,4 @@
-"""One laboratory in several recordings as one part: what explains it must explain all of them."""
+"""One laboratory in several recordings as one part: one hypothesis must explain all recordings."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from diagnosis.recorded.record import Record
 from models.registry import Array
 from models.system import System
 
-# The tables of a plan that say what the laboratories are. The motion, the building, the compensation and the control
-# may differ from test to test: a laboratory is judged from the commands that it got.
+# Tables of a plan that describe the laboratories. Ground motion, building, compensation and control may differ from
+# test to test, because a laboratory is judged from the commands that it received.
 OF_LABORATORIES = (
     "column",
     "actuator",
@@ -29,10 +29,10 @@ OF_LABORATORIES = (
 
 
 class JoinedPart:
-    """The same laboratory in several recordings, one after the other; in each of them it begins anew.
+    """The same laboratory in several recordings, one after the other; each recording begins at rest.
 
-    Nominal parameters and effects are the same in all of them. So is what a logger did, its delay and its gain: the
-    recordings are of one logger.
+    Nominal parameters and effects are the same in all of them. So are the delay and the gain of a data logger, because
+    one logger recorded all of them.
     """
 
     def __init__(self, pieces: Sequence[Part]) -> None:
@@ -44,11 +44,11 @@ class JoinedPart:
         self.present = np.concatenate([piece.present for piece in self.pieces])
 
     def predict(self, system: System) -> Array:
-        """What the pieces would have given, without noise; (ticks of all, signals)."""
+        """The predicted readings of all pieces without noise, (ticks of all pieces, signals)."""
         return np.concatenate([piece.predict(system) for piece in self.pieces])
 
     def first(self, ticks: int) -> Part:
-        """The pieces over the first ticks of all."""
+        """The pieces, cut off after a number of ticks that is counted over all pieces."""
         kept: list[Part] = []
         for piece in self.pieces:
             if ticks > 0:
@@ -58,9 +58,9 @@ class JoinedPart:
 
 
 def joined(part: Part, others: Sequence[Part], group: int) -> Part:
-    """A part with the same one of other recordings, each whole averaged samples of `group` ticks long.
+    """A part joined with the same part of other recordings, each cut to whole groups of `group` ticks.
 
-    Parts of other recordings that lack it, or that hold other readings, are left out.
+    Parts of other recordings with other readings are left out, as are exact parts.
     """
     same = [one for one in others if one.name == part.name and one.signals == part.signals and not one.exact]
     if part.exact or not same:
@@ -70,13 +70,13 @@ def joined(part: Part, others: Sequence[Part], group: int) -> Part:
 
 
 def refuse_others(record: Record, others: Sequence[Record]) -> None:
-    """Raise InputError where a further recording is not of the same laboratories as the first."""
+    """Raise InputError if a further recording has other laboratories than the first."""
     for other in others:
         found = differing(record.plan, other.plan)
         if found:
             raise InputError(
-                f"{other.run.path} is not of the laboratories of {record.run.path}: their plans differ in "
-                f"{', '.join(found)}. Diagnose it by itself, or say with --plan what the laboratories are."
+                f"{other.run.path} does not have the laboratories of {record.run.path}, since their plans differ in "
+                f"{', '.join(found)}: diagnose it by itself, or give with --plan the plan of the laboratories."
             )
 
 

@@ -20,7 +20,16 @@ VELOCITY = Parameter(
 )
 
 FURTHER = {
-    "": Parameter("law", "", 0.0, 0.0, 1.0, (), "0 the same both ways, 1 by direction and speed", shape=True),
+    "": Parameter(
+        "law",
+        "",
+        0.0,
+        0.0,
+        1.0,
+        (),
+        "0 the same in both directions and at all speeds, 1 by direction and speed",
+        shape=True,
+    ),
     "friction_asymmetry": Parameter(
         "asymmetry",
         "",
@@ -28,11 +37,18 @@ FURTHER = {
         least=-0.95,
         most=0.95,
         sizes=(),
-        says="share more in the positive direction, and less in the other",
+        says="share by which the force of law 1 is larger in the positive direction, and smaller in the negative one",
         shape=True,
     ),
     "friction_drop": Parameter(
-        "drop", "", null=0.0, least=-3.0, most=0.95, sizes=(), says="share that is lost at speed", shape=True
+        "drop",
+        "",
+        null=0.0,
+        least=-3.0,
+        most=0.95,
+        sizes=(),
+        says="share by which the force of law 1 decreases at high speed",
+        shape=True,
     ),
     "friction_speed": Parameter(
         "speed",
@@ -41,14 +57,14 @@ FURTHER = {
         least=1e-4,
         most=1.0,
         sizes=(),
-        says="at which two thirds of that are lost",
+        says="speed at which two thirds of that decrease are reached",
         shape=True,
     ),
 }
-"""Of the second law, by the field that each sets; the number of the law itself sets none."""
+"""Parameters of the second law, by the field that each sets; the number of the law itself sets no field."""
 
 
 def laws(shapes: Mapping[str, float]) -> tuple[Law, ...]:
-    """The laws of a friction that has these shapes: the same both ways and at all speeds, or not."""
+    """The two laws of a friction with these parameters of shape: Coulomb's, and one by direction and speed."""
     sided = {"velocity": 3e-4, "asymmetry": 0.0, "drop": 0.1, "speed": 0.02}
     return Law("Coulomb", shapes), Law("by direction and speed", {**shapes, **sided})

@@ -3,9 +3,9 @@
 The sum of squares of the force's misfit is minimised by a trust-region method (Branch, Coleman and Li, SIAM J.
 Sci. Comput. 21 (1999), 1-23) from a few fixed starting points, because it has more than one minimum. Long
 records are thinned to the extremes of equal blocks, which keeps every turning point; the misfit that is
-reported is that of all rows. Two parameters are tied, as a path cannot tell them apart: β + γ = 1 (any other
-sum is another yield displacement), and the hardening of `clough` is sought as a share of what its open
-cracks leave.
+reported is that of all rows. Two parameters are tied, because a path does not determine them
+separately: β + γ = 1 (any other sum is equivalent to another yield displacement), and the hardening of `clough` is
+sought as a share of the stiffness that its open cracks leave.
 
 The intervals hold for independent errors of equal variance. The errors of a model that does not fit are neither, so
 the intervals then describe how sharp the minimum is, not how much another column may differ.
@@ -136,7 +136,7 @@ FREE: dict[str, dict[str, SearchRange]] = {
 
 @jit
 def rollout(kind: int, p: Array, s: Array, path: Array, force: Array) -> None:
-    """Force (N) of a model along a path (m), into `force`; its memory `s` moves on."""
+    """Write the force (N) of a model along a path (m) into `force`; the state `s` is updated."""
     for i in range(path.size):
         force[i] = specimens.step(kind, p, s, path[i])
 
@@ -154,10 +154,11 @@ def fit(
 ) -> SpecimenFit:
     """Parameters of `model` with which it follows a path of deformation (m) and force (N) from rest.
 
-    `start` are parameters to start from instead of the fixed points, by name; what it leaves out is theirs.
+    `start` holds parameters by name, from which the fit starts instead of the fixed points; a parameter that it lacks
+    has the value of the first fixed point.
 
     Raises:
-        InputError: the model or a parameter is unknown, or the record is none.
+        InputError: the model or a parameter is unknown, or the record cannot be fitted.
     """
     path, measured = record(model, deformation, force)
     fields = SPECIMENS[model].params._fields

@@ -4,17 +4,17 @@
     unloading:  k_u = k·(c·δ_y/δ_m)^a, never below the secant to the peak
     reloading:  from where the force is zero, δ_0, straight to the corner (δ_c, p·f_m), then straight to the peak
                 (δ_m, f_m);  δ_c = δ_0 + q·(δ_m − (1 − p)·f_m/k_u − δ_0);  never stiffer than k_u
-    damage:     δ_m grows by the factor 1 + d·L/δ_y at every reversal, L the way of δ_0 since the last
+    damage:     δ_m grows by the factor 1 + d·L/δ_y at every reversal; L is the path of δ_0 since the last one
 
-δ_m is the largest deformation so far on the side that the motion goes to, at first that of the first bend, and f_m the
-skeleton's force there. With p = 1, q = 1 and c = 1 reloading is Clough's and Johnston's. A partial unloading and
-reloading goes at k_u until it meets the line that it left.
+δ_m is the largest deformation so far on the side to which the motion goes, initially that of the first bend, and f_m
+is the skeleton's force there. With p = 1, q = 1 and c = 1 reloading is that of Clough and Johnston. A partial
+unloading and reloading has the stiffness k_u until it meets the line that it left.
 
 The rules of reloading are those of M. H. Scott and F. C. Filippou's material Hysteretic in OpenSees (as its manual
 states them), after M. Saiidi and M. A. Sozen, Simple nonlinear seismic analysis of R/C structures, J. Struct. Div.
-ASCE 107 (1981), 937-953; damage by accumulated plastic deformation in the manner of Y. J. Park and A. H.-S. Ang,
-Mechanistic seismic damage model for reinforced concrete, J. Struct. Eng. ASCE 111 (1985), 722-739, is told from the
-branches' ends alone, so that an increment of any size is exact.
+ASCE 107 (1981), 937-953. Damage by accumulated plastic deformation is similar to that of Y. J. Park and A. H.-S. Ang,
+Mechanistic seismic damage model for reinforced concrete, J. Struct. Eng. ASCE 111 (1985), 722-739. It is computed from
+the ends of the branches only, so that an increment of any size is exact.
 
 Not to be confused with `bwbn`, which is smooth, or with `trilinear`, whose reloading does not aim at a peak.
 """
@@ -32,25 +32,27 @@ class PinchedParams(NamedTuple):
     """Parameters, in the order of the kernel's array."""
 
     stiffness: float  # k, N/m
-    yield_displacement: float  # δ_y, m: where the third line of the skeleton begins
+    yield_displacement: float  # δ_y, m, deformation where the skeleton's third line begins
     hardening: float = 0.0  # α, stiffness of the third line over the first
-    first_bend: float = 1.0  # c, where the second line begins, over δ_y
+    first_bend: float = 1.0  # c, deformation where the second line begins over δ_y
     second_stiffness: float = 0.5  # m, stiffness of the second line over the first
     pinch_force: float = 0.5  # p, force at the corner over that at the peak; 1: no pinching
-    pinch_displacement: float = 0.5  # q, where the corner is on the way to the peak
-    unloading: float = 0.0  # a, 0: unloading stays elastic
-    damage: float = 0.0  # d, growth of the peak per plastic deformation of δ_y
+    pinch_displacement: float = 0.5  # q, place of the corner on the way to the peak, from 0 to 1
+    unloading: float = 0.0  # a, exponent of the unloading stiffness; 0: it stays k
+    damage: float = 0.0  # d, relative growth of δ_m per plastic deformation of δ_y
 
 
 RULES = {
     "stiffness": Rule("elastic stiffness", "N/m", least=0.0),
     "yield_displacement": Rule("deformation where the skeleton's third line begins", "m", above=0.0),
     "hardening": Rule("stiffness of the third line over the first", above=-1.0, most=1.0),
-    "first_bend": Rule("where the second line begins, over yield_displacement", above=0.0, most=1.0),
+    "first_bend": Rule(
+        "deformation where the second line begins over yield_displacement", above=0.0, most=1.0
+    ),
     "second_stiffness": Rule("stiffness of the second line over the first", least=0.0, most=1.0),
     "pinch_force": Rule("force at the corner of reloading over that at the peak", least=0.0, most=1.0),
     "pinch_displacement": Rule(
-        "where the corner of reloading is on the way to the peak", least=0.0, most=1.0
+        "place of the corner of reloading on the way to the peak", least=0.0, most=1.0
     ),
     "unloading": Rule("exponent of the unloading stiffness", least=0.0, most=1.0),
     "damage": Rule("growth of the peak per plastic deformation of yield_displacement", least=0.0, most=10.0),
@@ -58,16 +60,17 @@ RULES = {
 STIFFNESS, YIELD_DISPLACEMENT, HARDENING, FIRST_BEND, SECOND_STIFFNESS = range(5)
 PINCH_FORCE, PINCH_DISPLACEMENT, UNLOADING, DAMAGE = range(5, 9)
 
-# of the last call: δ (m), f (N), way (±1, 0 before any motion); then, of upward and downward motion each, the peak that
-# it goes to (m, as a size), where the force was zero as it began (m, in its direction), and the way of that place since
-# the peak last grew (m); at last that place
+# Places in the state. Of the last call: δ (m), f (N), and the direction of motion (±1, 0 before any motion). For upward
+# motion and, behind it, for downward motion: the peak to which it goes (m, as a magnitude), the deformation where the
+# force was zero when the branch began (m, in its direction), and the path of that deformation since the peak last grew
+# (m). LAST is the newest deformation of zero force (m).
 DEFORMATION, FORCE, WAY, PEAK, ZERO, TRAVELLED, LAST = 0, 1, 2, 3, 5, 7, 9
 STATE_SIZE = 10
 
 
 @jit
 def skeleton(p: Array, size: float) -> float:
-    """Force (N) of the skeleton at a deformation (m)."""
+    """Force (N) of the skeleton at a magnitude of deformation (m)."""
     limit = p[YIELD_DISPLACEMENT]
     first = p[FIRST_BEND] * limit
     if size <= first:
@@ -79,7 +82,7 @@ def skeleton(p: Array, size: float) -> float:
 
 @jit
 def unloading_stiffness(p: Array, peak: float) -> float:
-    """Stiffness (N/m) at which the force leaves the side whose peak (m) this is."""
+    """Unloading stiffness (N/m) of the side whose peak (m) is given."""
     first = p[FIRST_BEND] * p[YIELD_DISPLACEMENT]
     if peak <= first:
         return p[STIFFNESS]
@@ -88,7 +91,7 @@ def unloading_stiffness(p: Array, peak: float) -> float:
 
 @jit
 def rise(p: Array, force: float, start: float, end: float, zero: float, peak: float, other: float) -> float:
-    """Force (N) after the deformation grew from `start` to `end` (m), `other` the peak of the side that it leaves."""
+    """Force (N) after the deformation grew from `start` to `end` (m), away from the side with the peak `other` (m)."""
     if start < zero:
         if end < zero:
             return min(force + unloading_stiffness(p, other) * (end - start), 0.0)
@@ -103,7 +106,7 @@ def rise(p: Array, force: float, start: float, end: float, zero: float, peak: fl
     corner = zero + p[PINCH_DISPLACEMENT] * ahead
     if end < corner:
         return min(elastic, share * aim * (end - zero) / (corner - zero))
-    if peak <= corner:  # the force was zero beyond the peak: the skeleton has fallen to nothing
+    if peak <= corner:  # the force is zero beyond the peak, where the skeleton has fallen to zero
         return min(elastic, aim)
     return min(elastic, aim * (share + (1.0 - share) * (end - corner) / (peak - corner)))
 
@@ -125,11 +128,11 @@ def turn(p: Array, s: Array, side: int, way: float) -> None:
 
 @jit
 def step(p: Array, s: Array, deformation: float) -> float:
-    """Force (N) at a deformation (m) reached from that of the last call; `s` (10,) moves on."""
+    """Force (N) at a deformation (m), reached from that of the last call; `s` (10,) is updated."""
     moved = deformation - s[DEFORMATION]
     if moved == 0.0:
         return s[FORCE]
-    # a deformation that shrinks is one that grows, seen in the mirror
+    # downward motion is computed as upward motion with all signs reversed
     way, side = (1.0, 0) if moved > 0.0 else (-1.0, 1)
     if way != s[WAY]:
         s[WAY] = way

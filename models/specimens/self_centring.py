@@ -1,6 +1,7 @@
-"""Self-centring specimen: a flag-shaped loop on each side of the origin, as of a post-tensioned frame.
+"""Self-centring specimen: a flag-shaped loop on each side of the origin, as a post-tensioned frame has it.
 
-    f moves at the stiffness k between two lines on the side of its deformation, for δ > 0
+On each side of the origin the force changes with the stiffness k between two lines; for δ > 0 these are
+
     upper: k·δ up to δ_a, then k·δ_a + α·k·(δ − δ_a)
     lower: k·δ up to (1 − β)·δ_a, then k·(1 − β)·δ_a + α·k·(δ − (1 − β)·δ_a)
 
@@ -8,7 +9,7 @@ C. Christopoulos, R. Tremblay, H.-J. Kim and M. Lacerte, Self-centering energy d
 seismic resistance of structures, J. Struct. Eng. ASCE 134 (2008), 96-107, without their slip and bearing. Every branch
 is a straight line, so an increment of any size is exact. With β = 0 it is elastic with a bend.
 
-Not to be confused with `bilinear`, which rests away from the origin, nor with `pinched`, whose loop goes round it.
+Not to be confused with `bilinear`, which comes to rest away from the origin, or `pinched`, whose loop encloses it.
 """
 
 from __future__ import annotations
@@ -24,8 +25,8 @@ class SelfCentringParams(NamedTuple):
     """Parameters, in the order of the kernel's array."""
 
     stiffness: float  # k, N/m
-    yield_displacement: float  # δ_a, m: where the upper line bends
-    hardening: float = 0.0  # α, stiffness beyond over elastic stiffness
+    yield_displacement: float  # δ_a, m, deformation where the upper line bends
+    hardening: float = 0.0  # α, stiffness beyond the bend over the elastic stiffness
     loop: float = 0.5  # β, height of the flag over the force at the bend
 
 
@@ -49,9 +50,9 @@ def line(p: Array, size: float, bend: float) -> float:
 
 @jit
 def step(p: Array, s: Array, deformation: float) -> float:
-    """Force (N) at a deformation (m) reached from that of the last call; `s` (2,) moves on."""
+    """Force (N) at a deformation (m), reached from that of the last call; `s` (2,) is updated."""
     bend = p[YIELD_DISPLACEMENT]
-    # a side to which the deformation crosses is entered at the origin, as the flag of the other is closed there
+    # the other side is entered at the origin, because the flag of the side that is left closes there
     crossed = deformation * s[DEFORMATION] <= 0.0
     stretched = deformation if crossed else s[STRETCHED] + deformation - s[DEFORMATION]
     sign, size = (1.0, deformation) if deformation >= 0.0 else (-1.0, -deformation)

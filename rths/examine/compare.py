@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--predicted",
         type=Path,
         metavar="FILE",
-        help="instead of B: what rths predict -o foretold of A; exit with 1 where it did not hold",
+        help="instead of B: the prediction of A that rths predict -o wrote; exit 1 if it did not hold",
     )
     parser.add_argument(
         "--tolerance", type=float, metavar="X", help="exit with 1 where an NRMSE exceeds this"
@@ -149,7 +149,7 @@ def write_tables(listed: Sequence[TitledTable], stream: TextIO) -> None:
 
 
 def against_prediction(args: argparse.Namespace) -> int:
-    """Say what of a recording lay outside the band that was foretold; 1 where the prediction did not hold."""
+    """Report which signals of a recording left the predicted band; 1 if the prediction did not hold."""
     if args.html or args.output or args.signals:
         raise InputError(
             "--html, -o and --signals are of several recordings: leave them out with --predicted."

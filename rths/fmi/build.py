@@ -26,7 +26,7 @@ PLATFORM = f"{ {'AMD64': 'x86_64', 'arm64': 'aarch64'}.get(platform.machine(), p
 
 
 class AskedFor(NamedTuple):
-    """What an FMU shall be."""
+    """Everything that an FMU is built from."""
 
     name: str
     says: str
@@ -34,8 +34,8 @@ class AskedFor(NamedTuple):
     outputs: Sequence[Signal]
     interval: float  # s
     seed: int
-    stop: float  # s, suggested
-    command: Sequence[str]  # words of the program; the folder of the resources comes behind them
+    stop: float  # s, suggested end of a simulation
+    command: Sequence[str]  # the program and its arguments; the folder of the resources is the last argument
     resources: Mapping[str, str]  # texts by file name
 
 
@@ -48,7 +48,7 @@ def build(wanted: AskedFor, path: Path) -> None:
     compiler = shutil.which("cc") or shutil.which("gcc")
     if not sys.platform.startswith("linux") or compiler is None:
         raise InputError(
-            "An FMU is compiled for Linux with a C compiler, and there is no `cc` here: install gcc."
+            "An FMU is compiled on Linux with a C compiler, but there is no `cc` here: install gcc."
         )
     token = hashlib.blake2b(repr(wanted).encode(), digest_size=16).hexdigest()
     with tempfile.TemporaryDirectory() as folder:
@@ -77,7 +77,7 @@ def build(wanted: AskedFor, path: Path) -> None:
 
 
 def description(wanted: AskedFor, token: str) -> bytes:
-    """The model description."""
+    """The model description, as XML."""
     root = Xml.Element(
         "fmiModelDescription",
         {
@@ -116,7 +116,7 @@ def description(wanted: AskedFor, token: str) -> bytes:
 
 
 def units(root: Xml.Element, wanted: AskedFor) -> None:
-    """The units of all variables; one that is not known has no exponents."""
+    """Write the units of all variables; an unknown unit has no exponents of base units."""
     table = Xml.SubElement(root, "UnitDefinitions")
     for name in dict.fromkeys(["s", *(row.unit for row in (*wanted.inputs, *wanted.outputs) if row.unit)]):
         unit = Xml.SubElement(table, "Unit", {"name": name})
@@ -125,7 +125,7 @@ def units(root: Xml.Element, wanted: AskedFor) -> None:
 
 
 def variables(root: Xml.Element, wanted: AskedFor) -> None:
-    """Time, seed, inputs and outputs."""
+    """Write the variables: time, seed, inputs and outputs."""
     table = Xml.SubElement(root, "ModelVariables")
     time = {"name": "time", "valueReference": "0", "causality": "independent", "variability": "continuous"}
     Xml.SubElement(table, "Float64", {**time, "unit": "s"})

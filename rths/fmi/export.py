@@ -17,10 +17,10 @@ from rths.fmi import build, served
 
 
 def export(plan_name: Path, path: Path, lab: str, reality_path: Path | None) -> Kind:
-    """Write the FMU of a plan's laboratory `lab`: master, slave, or a slave's name; its kind.
+    """Write the FMU of a plan's laboratory, and return its kind; `lab` is master, slave, or the name of a slave.
 
     Raises:
-        InputError: the plan has no such laboratory, the reality cannot be, or no compiler is there.
+        InputError: the plan has no such laboratory, the reality does not fit the plan, or there is no compiler.
     """
     file = cli.plan_path(str(plan_name))
     plan = plans.load(file)

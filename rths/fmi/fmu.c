@@ -1,10 +1,14 @@
-/* The shared library of a laboratory's FMU (FMI 3.0, co-simulation): it starts the program that is the laboratory and hands
-   commands and measurements through its standard input and output.
+/* The shared library of a laboratory's FMU (FMI 3.0, co-simulation). It starts the program that emulates the laboratory, and
+   passes commands and measurements through the program's standard input and output.
 
-   Compiled with INPUTS, OUTPUTS, INTERVAL, TOKEN. Value references: 0 time, 1 seed, 10 … inputs, 100 … outputs.
-   The file `command` in the resources has the program's words, one a line; the folder of the resources comes behind them.
-   RTHS_FMU_PYTHON takes the place of the first. To the program: 'S' and the seed, then 'C' and the commands per interval.
-   From it: a zero and the measurements (float64), or a one, two bytes of length and a sentence. */
+   INPUTS, OUTPUTS, INTERVAL (s), TOKEN and SEED_START are given to the compiler. The value references are 0 for time, 1 for
+   the seed, 10 and following for inputs, 100 and following for outputs.
+
+   The file `command` in the resources holds the program and its arguments, one per line; the folder of the resources is
+   added as the last argument. If RTHS_FMU_PYTHON is set, it replaces the program.
+
+   The program is sent 'S' and the seed once, then 'C' and the commands at every interval. It answers with a zero and the
+   measurements (float64), or with a one, a length of two bytes and an error message. */
 
 #include <math.h>
 #include <signal.h>
@@ -60,7 +64,7 @@ static int answered(Laboratory *lab)
     if (!whole(lab->from, &head, 1, false))
         return failed(lab, "The laboratory's program has ended: see what it wrote to standard error.");
     if (head == 0)
-        return whole(lab->from, lab->outputs, sizeof lab->outputs, false) ? OK : failed(lab, "The program has ended.");
+        return whole(lab->from, lab->outputs, sizeof lab->outputs, false) ? OK : failed(lab, "The laboratory's program has ended.");
     if (!whole(lab->from, size, 2, false))
         return failed(lab, "The laboratory's program has ended.");
     size_t length = size[0] + 256 * size[1];
@@ -73,7 +77,7 @@ static int begin(Laboratory *lab)
 {
     int to[2], from[2];
     if (pipe(to) || pipe(from))
-        return failed(lab, "No pipe to the laboratory's program.");
+        return failed(lab, "No pipe to the laboratory's program can be opened.");
     lab->child = fork();
     if (lab->child == 0) {
         dup2(to[0], 0);
@@ -105,7 +109,7 @@ static void end(Laboratory *lab)
     waitpid(lab->child, NULL, 0);
 }
 
-/* ---- what FMI 3.0 asks for ------------------------------------------------------------------------------------- */
+/* ---- the functions of FMI 3.0 ------------------------------------------------------------------------------------- */
 
 API const char *fmi3GetVersion(void) { return "3.0"; }
 
@@ -251,13 +255,13 @@ API int fmi3SetInt64(void *it, const uint32_t *references, size_t count, const i
     (void)size;
     for (size_t i = 0; i < count; i++) {
         if (references[i] != SEED || lab->started || values[i] < 0)
-            return failed(lab, "The seed is at least 0, and set before the initialization.");
+            return failed(lab, "The seed must be at least 0, and must be set before the initialization.");
         lab->seed = values[i];
     }
     return OK;
 }
 
-/* What the model description says that it cannot, and types that it has no variables of. */
+/* Functions of capabilities that the model description denies, and of types that no variable has. */
 #define CANNOT(name) API int name(void *it) { return failed(it, #name " is not provided."); }
 #define NONE(name) API int name(void *it, const uint32_t *references, size_t count) \
     { (void)references; return count ? failed(it, #name ": there is no variable of that type.") : OK; }

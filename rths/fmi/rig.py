@@ -32,7 +32,7 @@ class Fmu:
     `inputs` and `outputs` are names of its variables of type Float64, `start` values by name.
 
     Raises:
-        InputError: the file is no FMU that can be stepped here, or lacks a variable.
+        InputError: the file is no FMU of FMI 3.0 for co-simulation, or lacks a variable.
     """
 
     def __init__(
@@ -48,27 +48,28 @@ class Fmu:
             raise InputError(f"There is no FMU {file}.")
         try:
             self._description = fmpy.read_model_description(file)
-        except Exception as error:  # a damaged archive or description, whatever reads it says
-            raise InputError(f"{file} is no FMU that can be read: {error}") from None
+        except Exception as error:  # FMPy raises many types for a damaged archive or description
+            raise InputError(f"{file} cannot be read as an FMU: {error}") from None
         if self._description.coSimulation is None or not self._description.fmiVersion.startswith("3."):
             version = self._description.fmiVersion
-            raise InputError(f"{file} is by FMI {version}, but must be for co-simulation by FMI 3.0.")
+            raise InputError(f"{file} is of FMI {version}, but must be an FMU of FMI 3.0 for co-simulation.")
         self._references = {row.name: row.valueReference for row in self._description.modelVariables}
         inputs, outputs = inputs or self._channels()[0], outputs or self._channels()[1]
         self._inputs, self._outputs = (self._of(file, names) for names in (inputs, outputs))
         self._of(file, start)
         self._file, self._start, self._interval, self._ticks = file, dict(start), interval, 0
         self._instance: Any = None
-        self._folder = self._said = ""  # unpacked; the last thing that it complained of
+        self._folder = self._said = ""  # where the FMU is unpacked; its last error message
 
     def _channels(self) -> tuple[Sequence[str], Sequence[str]]:
-        """Commands and measurements of the kind of laboratory whose names the FMU's variables have."""
+        """The names of commands and measurements of the shipped kind whose channels the FMU's variables have."""
         for kind in KINDS.values():
             pair = (kind.channels.drives, kind.channels.names)
             if set(pair[0]) | set(pair[1]) <= self._references.keys():
                 return pair
         raise InputError(
-            f"The variables of {self._description.modelName} are none of a kind's channels: give inputs and outputs."
+            f"The variables of {self._description.modelName} do not have the names of a kind's channels: give inputs "
+            "and outputs."
         )
 
     def _of(self, file: str, names: Iterable[str]) -> list[int]:
@@ -79,12 +80,12 @@ class Fmu:
         return [self._references[name] for name in names]
 
     def suggest(self, name: str, value: Any) -> None:
-        """Start a variable with a value where the FMU has it and nothing else was given."""
+        """Set the start value of a variable if the FMU has it and no other value was given."""
         if name in self._references:
             self._start.setdefault(name, value)
 
     def begin(self) -> None:
-        """Load and initialize it; raises RigError where it fails."""
+        """Load and initialize the FMU; raises RigError if that fails."""
         fmpy, simulation = library("fmpy"), library("fmpy.simulation")
         self._folder = tempfile.mkdtemp(prefix="rths-fmu-")
         try:
@@ -95,17 +96,17 @@ class Fmu:
             simulation.apply_start_values(self._instance, self._description, self._start)
             self._instance.enterInitializationMode(startTime=0.0)
             self._instance.exitInitializationMode()
-        except Exception as error:  # an FMU may fail anyhow
+        except Exception as error:  # FMPy and the FMU raise many types
             raise RigError(
                 f"the FMU {Path(self._file).name} cannot be started: {self._said or error}"
             ) from None
 
     def _told(self, _environment: Any, status: int, _category: bytes, message: bytes) -> None:
-        if status > 1:  # beyond a warning
+        if status > 1:  # more severe than a warning
             self._said = message.decode(errors="replace")
 
     def step(self, values: Sequence[float], share: float = 1.0) -> None:
-        """Set the inputs and go on by a share of the interval; raises RigError where the FMU refuses."""
+        """Set the inputs and advance by a share of the interval; raises RigError if the FMU refuses."""
         length = share * self._interval
         try:
             self._instance.setFloat64(self._inputs, list(values))
@@ -117,12 +118,12 @@ class Fmu:
         self._ticks += 1
 
     def outputs(self) -> list[float]:
-        """Its outputs now."""
+        """The present outputs."""
         found: list[float] = self._instance.getFloat64(self._outputs)
         return found
 
     def end(self) -> None:
-        """Let it go."""
+        """Terminate the FMU, and delete its unpacked files."""
         instance, self._instance = self._instance, None
         try:
             if instance is not None:
@@ -133,10 +134,11 @@ class Fmu:
 
 
 class Rig:
-    """A whole laboratory in an FMU: `inputs` take the commands, `outputs` give what is measured, each in its order.
+    """A whole laboratory in an FMU.
 
-    Without these the variables have the names of the channels of a kind that ships. A parameter `seed` of the FMU is
-    set where it has one, unless `start` gives it.
+    `inputs` are the FMU's variables for the commands and `outputs` those for the measurements, in the order of the
+    kind's channels. If they are not given, the variables must have the names of the channels of a shipped kind. If the
+    FMU has a parameter `seed`, it is set, unless `start` gives it.
     """
 
     def __init__(
@@ -156,22 +158,22 @@ class Rig:
         self._fmu.begin()
 
     def read(self) -> list[float]:
-        """Its outputs."""
+        """The present measurements."""
         return self._fmu.outputs()
 
     def write(self, command: Sequence[float]) -> None:
-        """One interval."""
+        """Advance by one interval under a command."""
         self._fmu.step(command)
 
     def disarm(self) -> None:
-        """End it."""
+        """End the FMU."""
         self._fmu.end()
 
 
 class Specimen(UnderActuator):
-    """A specimen in an FMU under the emulated actuator, of a deformation (m) as input and a force (N) as output.
+    """A specimen in an FMU under the emulated actuator: the FMU takes a deformation (m) and gives a force (N).
 
-    `names` gives the FMU's names of `deformation` and `force` where these are others.
+    `names` has the FMU's names for `deformation` and `force` if they differ from these.
     """
 
     def __init__(
@@ -188,7 +190,7 @@ class Specimen(UnderActuator):
         super().__init__(interval, seed, self._forced, actuator, sensors, substeps)
         own = {"deformation": "deformation", "force": "force"} | dict(names or {})
         if len(own) > 2:
-            raise InputError("names of an FMU's specimen has the keys deformation and force, and no others.")
+            raise InputError("names of an FMU's specimen takes the keys deformation and force only.")
         self._fmu = Fmu(file, interval, [own["deformation"]], [own["force"]], start or {})
         self._share = 1.0 / substeps
 
@@ -202,5 +204,5 @@ class Specimen(UnderActuator):
         self._fmu.begin()
 
     def disarm(self) -> None:
-        """The actuator stays where it is, and the FMU ends."""
+        """Leave the actuator where it is, and end the FMU."""
         self._fmu.end()

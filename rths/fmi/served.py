@@ -1,7 +1,7 @@
 """The program inside an FMU of a laboratory: `python -m rths.fmi.served RESOURCES`, started by its shared library.
 
-RESOURCES hold the plan, the reality where one is hidden, and `laboratory.json` with the role and the folders from which
-classes are looked for.
+The folder RESOURCES holds the plan, the reality if there is one, and `laboratory.json` with the role and the folders
+from which the paths of classes start.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from common.rig import GuardedRig, command_of
 from loop import rigs
 
 PLAN, REALITY, ROLE = "plan.toml", "reality.toml", "laboratory.json"
-LONGEST = 500  # bytes of a sentence
+LONGEST = 500  # bytes of an error message: the shared library reads it into 512 bytes
 
 
 def reality_in(resources: Path) -> tuple[Reality, str]:
@@ -35,7 +35,7 @@ def reality_in(resources: Path) -> tuple[Reality, str]:
 
 
 def serve(resources: Path, source: BinaryIO, out: int) -> None:
-    """Build the laboratory when its seed comes, then play one interval per command, until the source ends."""
+    """Build the laboratory when its seed arrives, then advance it one interval per command, until the source ends."""
     whole, role = reality_in(resources)
     reality = whole.of(role)
     kind = rigs.hosted(reality, role)

@@ -1,4 +1,4 @@
-"""`rths serve`: laboratories as elements of a user's OpenSees model, in real time or as fast as it goes."""
+"""`rths serve`: laboratories as elements of a user's OpenSees model, in real time or in virtual time."""
 
 from __future__ import annotations
 
@@ -22,7 +22,9 @@ from rths.perform import run as tests
 if TYPE_CHECKING:
     from master.client.building import ClientBuilding
 
-PATIENCE_S = 60.0  # for a client's next displacement in virtual time: a step of a large model takes seconds
+PATIENCE_S = (
+    60.0  # s, wait for a client's next displacement in virtual time: a step of a large model takes seconds
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -48,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def checked(plan: Plan, addresses: Sequence[str]) -> None:
-    """Raise InputError where elements cannot be served at these addresses, before anything starts."""
+    """Raise InputError if the elements cannot be served at these addresses."""
     from master.client.building import check_count
 
     check_count(addresses, len(plan.kinds))
@@ -57,15 +59,15 @@ def checked(plan: Plan, addresses: Sequence[str]) -> None:
         host, number = port.address_of(text)
         if port.is_open(host):
             sys.stderr.write(
-                f"warning: {host}:{number} is open: anybody who reaches it can move the rigs; OpenSees knows neither "
-                "keys nor passwords.\n"
+                f"warning: {host}:{number} is open: anybody who can reach it can move the rigs, since OpenSees "
+                "has neither keys nor passwords.\n"
             )
 
 
 def in_virtual_time(
     addresses: Sequence[str], plan: Plan, reality: Reality, output: Path, stopping: Stopper, gate: Gate
 ) -> RthsError | None:
-    """The test in this process, as fast as the client asks; the error that ended it."""
+    """Run the test in this process, as fast as the client asks; the error that ended it, or None."""
     from master.assembly import warm_up_served
     from master.client.building import ClientBuilding
     from master.client.pace import AsFastAsItGoes
@@ -87,7 +89,7 @@ def in_virtual_time(
 
 
 def came(building: ClientBuilding, stopping: Stopper) -> bool:
-    """Wait until OpenSees moves the laboratories, which it does before any time passes; not where somebody stops."""
+    """Wait until OpenSees moves the laboratories, before time passes; False if the operator stops first."""
     sys.stderr.write(f"waits for {building.awaited}\n")
     while building.awaited:
         building.look_after()

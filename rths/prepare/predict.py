@@ -1,4 +1,4 @@
-"""`rths predict`: the next test foretold with what a diagnosis found, with a band that holds 90 % of the time."""
+"""`rths predict`: the next test predicted from a diagnosis, with a band that should hold for 90 % of the time."""
 
 from __future__ import annotations
 

@@ -85,7 +85,7 @@ def show(
     stream.write("\n".join(("nominal models as found:", *(f"  {row}" for row in updated.said))) + "\n")
     if not updated.said:
         stream.write("  nothing that a plan says differs\n")
-    stream.write("".join(f"not said: {sentence}\n" for sentence in updated.unsaid))
+    stream.write("".join(f"not in the plan: {sentence}\n" for sentence in updated.unsaid))
     stream.write("\n")
     rows = [["column's path", "critical delay", "expected", "margin", "damping lost"]]
     rows += [[name, *margin_cells(one)] for name, one in zip(("as planned", "as found"), both, strict=True)]

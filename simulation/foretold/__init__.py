@@ -1,1 +1,1 @@
-"""The next test foretold: laboratories drawn from what a diagnosis found, bands of their response, how they held."""
+"""Predictions of the next test: laboratories drawn from a diagnosis, bands of their response, whether a band held."""

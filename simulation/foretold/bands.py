@@ -23,10 +23,11 @@ from simulation.foretold import rest
 from simulation.foretold.draws import Ensemble, FoundLaboratories, ensemble, has_random_links
 from simulation.foretold.rest import RangeSeen
 
-HELD = 0.9  # share of the time that a band is to hold
+HELD = 0.9  # share of the time for which a signal should lie within its band
 LOW, HIGH = 0.5 * (1.0 - HELD), 0.5 * (1.0 + HELD)
-DRAWS = 64
-# Draws without which no band of 90 % stands between the smallest and the largest: (n + 1)·0.05 must be 1 at least.
+DRAWS = 64  # three draws beyond each end of the band; with the default test they take a few seconds
+# Fewest draws with which both ends of a band of 90 % lie between the smallest and the largest draw: (n + 1)·0.05 must
+# be at least 1.
 LEAST = 20
 
 
@@ -40,7 +41,7 @@ class PeakBand(NamedTuple):
 
 
 class LimitChance(NamedTuple):
-    """How near a limit of the plan a quantity comes, and in how many draws it passes the limit."""
+    """How close a quantity comes to a limit of the plan, and in how many draws it passes the limit."""
 
     peak: PeakBand
     limit: float
@@ -49,7 +50,7 @@ class LimitChance(NamedTuple):
 
 @dataclass(frozen=True)
 class Prediction:
-    """The next test foretold."""
+    """The predicted test: ends and median of the band of every signal, its peaks and its limits."""
 
     plan: Plan
     low: Rollout
@@ -74,12 +75,12 @@ def predict(found: FoundLaboratories, plan: Plan, count: int = DRAWS, tell: Tell
         InputError: too few of them reach the end of the test for a band.
     """
     if count < LEAST:
-        raise InputError(f"{count} laboratories are too few for a band: draw {LEAST} at least.")
+        raise InputError(f"{count} laboratories are too few for a band: draw at least {LEAST}.")
     drawn = ensemble(found, count, tell)
     if len(drawn.drawn) < LEAST:
         raise InputError(
-            f"Nothing can be foretold: in {drawn.diverged} of {count} laboratories drawn from what was found the test "
-            "is unstable; choose another compensator or a weaker motion."
+            f"No prediction is possible, because the test is unstable in {drawn.diverged} of the {count} laboratories "
+            "drawn: choose another compensator or a weaker motion."
         )
     as_found = drawn.central.finite and not has_random_links(found.truth)
     middle = drawn.central if as_found else quantile(drawn.drawn, 0.5)
@@ -107,17 +108,18 @@ def about(found: FoundLaboratories, drawn: Ensemble, count: int) -> list[str]:
     result = []
     if found.left_out:
         result.append(
-            f"{', '.join(found.left_out)} was found in another building than this plan's and is left out."
+            f"{', '.join(found.left_out)} belongs to another building than this plan's and is left out."
         )
     if not drawn.central.finite:
         result.append(
             "In the laboratories as found the test is unstable: the line foretold is the median of those drawn."
         )
     if drawn.diverged:
-        result.append(f"In {drawn.diverged} of {count} laboratories drawn the test is unstable.")
+        result.append(f"The test is unstable in {drawn.diverged} of the {count} laboratories drawn.")
     if not found.spread.rest:
         result.append(
-            "The recording that was diagnosed shows no response, so what is left unexplained is not in the band."
+            "The diagnosed recording holds no response of the building, so the band does not include the part of the "
+            "gap that is unexplained."
         )
     return result
 
@@ -125,7 +127,7 @@ def about(found: FoundLaboratories, drawn: Ensemble, count: int) -> list[str]:
 def erring(
     found: FoundLaboratories, plan: Plan, drawn: Ensemble, reach: Mapping[str, RangeSeen]
 ) -> list[Rollout]:
-    """The rollouts with what was left unexplained as an error of their signals."""
+    """The rollouts with an error added to each signal, for the part of the gap that the diagnosis left unexplained."""
     random = np.random.default_rng([plan.test.seed, 1])
     tolerance = plan.tolerances.default
 
@@ -159,7 +161,7 @@ def mapped(rollouts: Sequence[Rollout], change: Callable[[str, str, Array], Arra
 
 
 def taken(like: Rollout, stacked: Stacked, place: int) -> Rollout:
-    """One rollout out of stacked signals."""
+    """One rollout from stacked signals."""
     master, slaves = stacked
     return like._replace(
         master={name: values[place] for name, values in master.items()},
@@ -168,9 +170,9 @@ def taken(like: Rollout, stacked: Stacked, place: int) -> Rollout:
 
 
 def quantile(rollouts: Sequence[Rollout], level: float) -> Rollout:
-    """The level below which a share of the draws lies, tick by tick.
+    """The quantile of the draws at a level (0 to 1), tick by tick.
 
-    Places are those of Weibull, (n + 1)·level: among n draws and one more of the same kind, as often as it says.
+    With Weibull's plotting positions, (n + 1)·level, one more draw lies below it with the probability `level`.
     """
 
     def of_draws(_role: str, _name: str, series: Array) -> Array:
@@ -211,7 +213,7 @@ def drifts(plan: Plan, rollouts: Sequence[Rollout]) -> dict[int, PeakBand]:
 
 
 def chances(plan: Plan, rollouts: Sequence[Rollout], diverged: int) -> dict[str, LimitChance]:
-    """How near the limits of the plan the draws come; one that diverges has passed every limit."""
+    """How close the draws come to the limits of the plan; a draw that diverges counts as beyond every limit."""
     most = limited.most(plan)
     tops: dict[str, list[float]] = {}
     for one in rollouts:
@@ -228,7 +230,7 @@ def chances(plan: Plan, rollouts: Sequence[Rollout], diverged: int) -> dict[str,
 
 
 def plain(found: Prediction) -> dict[str, Any]:
-    """The prediction's figures as JSON holds them."""
+    """The prediction's figures as plain values for JSON."""
     limits = {
         name: one.peak._asdict() | {"limit": one.limit, "passed_in": one.passed, "draws": found.draws}
         for name, one in found.limits.items()

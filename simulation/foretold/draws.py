@@ -1,4 +1,4 @@
-"""Laboratories drawn from what a diagnosis found and how sure it is of it, and the closed loop of each."""
+"""Laboratories drawn from the findings of a diagnosis and their uncertainty, and the closed loop of each."""
 
 from __future__ import annotations
 
@@ -30,7 +30,8 @@ from models.ground_motion import GroundMotion
 from models.registry import Array
 from models.system import System
 
-# Of one nominal parameter, the largest change that is drawn: its tolerance is a few percent, and it stays positive.
+# Largest relative change of a nominal parameter that is drawn. Tolerances are a few per cent, so that hardly any draw
+# is cut off, and every parameter stays positive.
 FARTHEST = 0.5
 LARGEST = 100.0  # logarithm of a factor beyond which every parameter is at its bound
 
@@ -39,11 +40,11 @@ Moves = Mapping[UncertainParameter, float]
 
 @dataclass(frozen=True)
 class FoundLaboratories:
-    """A plan's laboratories as a diagnosis found them, and how sure it is."""
+    """A plan's laboratories as a diagnosis found them, with the uncertainty of the findings."""
 
     truth: Reality
     spread: Spread
-    left_out: tuple[str, ...] = ()  # what was found of another building than the plan's
+    left_out: tuple[str, ...] = ()  # findings that belong to another building than the plan's
 
 
 class Ensemble(NamedTuple):
@@ -59,7 +60,7 @@ def load(path: Path, plan: Plan) -> FoundLaboratories:
     """The laboratories of a file that `rths diagnose --found` wrote, on top of a plan.
 
     Raises:
-        PlanError: the file cannot be read, was found with other nominal models, or does not say how sure it is.
+        PlanError: the file cannot be read, belongs to other nominal models, or does not hold its uncertainty.
         InputError: it names a plug-in, or an effect that the plan's test cannot have.
     """
     tables = load_tables(path, "reality")
@@ -121,7 +122,7 @@ def has_random_links(truth: Reality) -> bool:
 
 
 def square_root(covariance: Array) -> Array:
-    """A matrix (p, p) whose product with its transpose is a covariance; what rounding made negative counts as zero."""
+    """A matrix (p, p) whose product with its transpose is the covariance; eigenvalues below zero are rounding."""
     if not covariance.size:
         return covariance
     values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T))
@@ -129,7 +130,7 @@ def square_root(covariance: Array) -> Array:
 
 
 def drawn(found: FoundLaboratories, place: Array, seed: int) -> dict[str, System]:
-    """The systems by role, the master's first, with parameters `place` (p,) away from those that were found."""
+    """The systems by role, the master's first, with uncertain parameters moved by `place` (p,) from those found."""
     truth = replace(found.truth, seed=seed)
     kinds, result = kinds_of(truth.plan), {}
     for role in (MASTER, *truth.plan.roles):
@@ -163,7 +164,7 @@ def with_nominal(plan: Plan, kind: Kind | None, moves: Moves) -> Plan:
 
 
 def of_building(system: System, parameter: UncertainParameter, factor: float) -> System:
-    """The system with a parameter of the building multiplied: of every storey, or of one that the plan has."""
+    """The system with a parameter of the building multiplied, for every storey or the one that `parameter` names."""
     key = parameter.parameter.partition(".")[2]
     values, place = getattr(system.plan.structure, key), parameter.storey - 1
     if place < 0:
@@ -174,7 +175,7 @@ def of_building(system: System, parameter: UncertainParameter, factor: float) ->
 
 
 def moved(name: str, values: Mapping[str, float], moves: Moves) -> Mapping[str, float]:
-    """The parameters of an effect, those that are uncertain moved within what is possible."""
+    """The parameters of an effect, with the uncertain ones moved, each within its bounds."""
     result = dict(values)
     for one, by in moves.items():
         if one.effect == name and one.parameter in result:
@@ -185,7 +186,7 @@ def moved(name: str, values: Mapping[str, float], moves: Moves) -> Mapping[str, 
 
 
 def silent(effects: tuple[Entry, ...], known: Mapping[str, float]) -> tuple[Entry, ...]:
-    """Effects without the noise of sensors whose whole noise is known."""
+    """The effects without additional sensor noise on signals whose whole noise is already in `known`."""
     return tuple(
         (name, values)
         for name, values in effects

@@ -1,4 +1,4 @@
-"""A prediction as a recording: the test as foretold on its own topics, its band on topics of their own beside them."""
+"""A prediction as a recording: the predicted test on the topics of a test, its band on topics of their own."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from loop.signals import rows
 from recorder import files
 from simulation.foretold.bands import HELD, Prediction, plain
 
-LOWER, UPPER = "lower", "upper"  # before the name of a topic
-ABOUT = "prediction"  # metadata: share of the time that the band is to hold, and the figures as JSON
+LOWER, UPPER = "lower", "upper"  # prefixes of the topics for the ends of the band
+ABOUT = "prediction"  # metadata: the share of the time for which the band should hold, and the figures as JSON
 
 
 def band_topic(end: str, topic: str) -> str:
@@ -25,7 +25,7 @@ def band_topic(end: str, topic: str) -> str:
 
 
 def write(path: Path, found: Prediction, source: str) -> None:
-    """Write a prediction from what the file `source` found."""
+    """Write a prediction that was made with the findings in the file `source`."""
     plan = found.plan
     more: dict[str, tuple[Signal, ...]] = {
         band_topic(end, topic): signals
@@ -59,6 +59,6 @@ def about(run: Run) -> dict[str, object]:
         figures["band"] = float(given["band"])
     except (KeyError, ValueError, TypeError):
         raise InputError(
-            f"{run.path} is no prediction: give the file that `rths predict -o` wrote."
+            f"{run.path} is no prediction: give a file that `rths predict -o` wrote."
         ) from None
     return dict(figures)

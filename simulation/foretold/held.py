@@ -1,4 +1,4 @@
-"""Whether a prediction held: what of a recording lay outside its band, when and how far, and what that says."""
+"""Whether a prediction held: which signals of a recording left their bands, when and how far, and what follows."""
 
 from __future__ import annotations
 
@@ -14,19 +14,16 @@ from simulation.foretold import file
 from simulation.foretold.bands import HELD
 from simulation.foretold.shape import ErrorShape, shape_of
 
-# Share of the time inside a band of 90 %, over all signals, below which a prediction has not held: of one test the
-# shares scatter, since what is left of a signal rises and falls slowly.
+# Mean share of the time, over all signals, that must lie inside a band of 90 % for a prediction to hold. It is less
+# than 90 %, because the error of a signal changes slowly, so that the share scatters from test to test.
 ENOUGH = HELD - 0.1
-LEAST = (
-    0.5  # of one signal: a parameter at the edge of its band still leaves more than half of the time inside
-)
-GAP = 0.1  # s, between two ticks outside that count as one departure: a fifth of a period of the default building
-SHORT = (
-    0.02  # s, of a departure that noise alone makes now and then, and that says nothing of the laboratories
-)
-NARROW = (
-    1e-6  # width of a band over its signal's peak below which the signal is computed exactly, with no band
-)
+# The same for each single signal: a parameter at the end of its interval still leaves a signal inside for more than
+# half of the time.
+LEAST = 0.5
+GAP = 0.1  # s, between two times outside that count as one departure: a fifth of a period of the default building
+SHORT = 0.02  # s, longest departure that is ignored, because sensor noise alone causes it now and then
+# Width of a band over the peak of its signal below which the signal counts as exact and has no band: rounding only.
+NARROW = 1e-6
 
 
 class Departure(NamedTuple):
@@ -38,20 +35,20 @@ class Departure(NamedTuple):
 
 
 class HeldSignal(NamedTuple):
-    """How a signal lay in its band."""
+    """How one signal compares with its band."""
 
     topic: str
-    inside: float  # share of the time
-    departures: tuple[Departure, ...]  # those that last, the first one first
+    inside: float  # share of the time inside the band
+    departures: tuple[Departure, ...]  # those longer than `SHORT`, in the order of time
     farthest: float  # largest distance from the band over its half width, 0 where it was never left
     farthest_at: float  # s
     unit: str
     peak: float  # largest magnitude that was measured
-    shape: ErrorShape  # of its error against what was foretold
+    shape: ErrorShape  # of its error against the prediction
 
 
 class Band(NamedTuple):
-    """A signal as it was foretold, each (ticks, storeys or slaves)."""
+    """The prediction of one signal, each (ticks, storeys or slaves)."""
 
     low: Values
     middle: Values
@@ -59,26 +56,26 @@ class Band(NamedTuple):
 
 
 class Held(NamedTuple):
-    """How a recording lay in a prediction."""
+    """How a recording compares with a prediction."""
 
     ticks: int
     signals: dict[str, HeldSignal]
     inside: float  # mean share over the signals
     held: bool  # whether the prediction held
-    figures: Mapping[str, Any]  # what the prediction says of itself
-    same_plan: bool  # whether the test was recorded under the plan that was foretold
+    figures: Mapping[str, Any]  # those that the prediction's file holds
+    same_plan: bool  # whether the test and the prediction have the same plan
 
 
 def held(measured: Run, predicted: Run) -> Held:
-    """How a recording lies in a prediction.
+    """Compare a recording with a prediction.
 
     Raises:
-        InputError: the one is no prediction, or they have no tick and signal in common.
+        InputError: `predicted` is no prediction, or it has no tick and signal in common with `measured`.
     """
     figures = file.about(predicted)
     if file.ABOUT in measured.metadata:
         raise InputError(
-            f"{measured.path} is itself a prediction: give the recording of the test that was played."
+            f"{measured.path} is itself a prediction: give the recording of the test that was run."
         )
     found: dict[str, HeldSignal] = {}
     ticks = 0
@@ -120,7 +117,7 @@ def of_topic(measured: Run, predicted: Run, topic: str) -> tuple[int, dict[str, 
 
 
 def of_signal(t: Values, values: Values, band: Band, topic: str, unit: str) -> HeldSignal:
-    """One signal, (ticks, storeys or slaves)."""
+    """Compare one signal, (ticks, storeys or slaves), with its band."""
     low, middle, high = band
     half = 0.5 * (high - low)
     usual = float(np.median(half)) or float(np.max(half))
@@ -142,7 +139,7 @@ def of_signal(t: Values, values: Values, band: Band, topic: str, unit: str) -> H
 
 
 def departures(t: Values, outside: Values, distance: Values) -> list[Departure]:
-    """The times outside that last, those close to each other as one."""
+    """The times outside the band that last longer than `SHORT`; those at most `GAP` apart count as one."""
     places = np.flatnonzero(outside)
     if not places.size:
         return []
@@ -166,13 +163,13 @@ def departures(t: Values, outside: Values, distance: Values) -> list[Departure]:
 
 
 def same_plan(measured: Run, predicted: Run) -> bool:
-    """Whether a test was recorded under the plan that was foretold."""
+    """Whether a test and a prediction have the same plan."""
     one, other = (run.metadata.get("plan", {}).get("digest") for run in (measured, predicted))
     return bool(one == other)
 
 
 def plain(found: Held) -> dict[str, Any]:
-    """The comparison as JSON holds it."""
+    """The comparison as plain values for JSON."""
     return {
         "ticks": found.ticks,
         "held": found.held,

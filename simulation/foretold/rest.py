@@ -1,7 +1,7 @@
-"""What a diagnosis left unexplained, as an error of the predicted signals that grows beyond what was seen.
+"""The unexplained rest of a gap as an error of the predicted signals, which grows beyond the motion that was seen.
 
-The error of a signal is a share of its analytic signal with a phase at random: it has the signal's own frequencies
-and rises and falls with its envelope.
+The error of a signal is a share of its analytic signal with a random phase: it has the frequencies of the signal, and
+rises and falls with its envelope.
 """
 
 from __future__ import annotations
@@ -20,24 +20,24 @@ from loop.closed_loop import Rollout
 from loop.signals import by_role
 from models.registry import Array
 
-# Ratio of a predicted motion to the largest one seen from which on the prediction says that it leaves what was seen:
-# below it noise alone would do so.
+# Ratio of a predicted motion to the largest one seen above which the prediction warns that it goes beyond the diagnosed
+# recording. Up to 10 % more, the scatter of the draws alone would cause the warning.
 BEYOND = 1.1
-# Share of the energy of a target outside the frequencies seen from which on it is said: five times what lies outside
-# of them in the recording itself.
+# Share of a target's energy outside the frequencies seen above which the prediction says so: five times the share that
+# lies outside them in the diagnosed recording itself.
 OUTSIDE = 0.05
-# Share of the plan's tolerance that is added per multiple of the largest motion seen. A law that was found goes on
-# beyond what was seen far better than a nominal model: with the whole tolerance, bands of 90 % held 98 % of the time at
-# twice the motion (tests/diagnosis/test_bands.py).
+# Share of the plan's tolerance that is added per multiple of the largest motion seen. A fitted law extrapolates far
+# better than a nominal model: with the whole tolerance, bands of 90 % held 98 % of the time at twice the motion
+# (tests/diagnosis/test_bands.py).
 NEW = 0.1
 
 
 @dataclass(frozen=True)
 class RangeSeen:
-    """How far a laboratory's predicted motion leaves what was seen of it."""
+    """How far a laboratory's predicted motion goes beyond the diagnosed recording."""
 
     role: str
-    signal: str  # the reading that goes farthest beyond
+    signal: str  # the reading with the largest ratio
     ratios: Array  # (ticks,) largest magnitude so far over the largest one seen
     band: tuple[float, float]  # Hz, seen
     outside: float  # share of the energy of the target that lies outside the band
@@ -53,7 +53,7 @@ class RangeSeen:
 
 
 def reaches(plan: Plan, rollout: Rollout, spread: Spread) -> dict[str, RangeSeen]:
-    """How far every laboratory leaves what was seen of it, by role."""
+    """How far every laboratory goes beyond the diagnosed recording, by role."""
     columns, result = by_role(plan, rollout), {}
     for role, kind in kinds_of(plan).items():
         seen = spread.seen.get(role)
@@ -82,10 +82,10 @@ def energy_outside(target: Array, seen: SeenRange, interval: float) -> float:
 
 
 def growth(of: Mapping[str, RangeSeen], role: str, tolerance: float) -> tuple[Array | float, Array | float]:
-    """By what the share left of a signal of a role is multiplied at every tick, and what is added to it.
+    """The factor on the unexplained share of a signal of a role, and the share that is added to it, tick by tick.
 
-    Beyond the amplitudes seen a share grows as the amplitude does. A part of the `tolerance` of the plan's nominal
-    models is added per multiple of the amplitude, and for frequencies not seen.
+    Beyond the amplitudes seen, the share grows as the amplitude does. `NEW` times the `tolerance` of the plan's nominal
+    models is added per multiple of the amplitude, and for energy at frequencies that were not seen.
     """
     chosen = [of[role]] if role in of and role != MASTER else list(of.values())
     if not chosen:
@@ -97,7 +97,7 @@ def growth(of: Mapping[str, RangeSeen], role: str, tolerance: float) -> tuple[Ar
 
 
 def share_of(spread: Spread, role: str, name: str) -> float:
-    """What is left of a signal over its envelope; of one that was not recorded as much as of the worst that was."""
+    """The unexplained share of a signal's envelope; for one that was not recorded, the largest share of the others."""
     known = spread.rest.get(role, {})
     if name in known:
         return known[name]
@@ -108,7 +108,7 @@ def share_of(spread: Spread, role: str, name: str) -> float:
 
 
 def errors(series: Array, share: Array | float, random: np.random.Generator) -> Array:
-    """An error drawn for every row of `series` (draws, ticks, …), whose rms is a share of the envelope."""
+    """A random error for each row of `series` (draws, ticks, …), whose rms is a share of the row's envelope."""
     if series.shape[1] < 2 or not np.any(share):
         return np.zeros_like(series)
     phases = random.standard_normal((2, series.shape[0], *[1] * (series.ndim - 1)))
@@ -118,20 +118,20 @@ def errors(series: Array, share: Array | float, random: np.random.Generator) -> 
 
 
 def sentences(of: Mapping[str, RangeSeen], interval: float) -> list[str]:
-    """Where a prediction leaves what was seen, in sentences."""
+    """Where a prediction goes beyond the diagnosed recording, in sentences."""
     result = []
     for role, one in of.items():
         at = one.since(interval)
         if at is not None:
             result.append(
-                f"In the laboratory of the {title(role)} {one.signal} reaches {one.ratio:.2g} times the largest value "
-                f"seen in the diagnosed recording, from t = {at:.2f} s on: beyond what was seen the band is wider, and "
-                "an effect that only shows there is not in it."
+                f"In the laboratory of the {title(role)} {one.signal} reaches {one.ratio:.2g} times its largest value "
+                f"in the diagnosed recording, and exceeds that value from t = {at:.2f} s on: the band is wider there, "
+                "and does not include an effect that only shows beyond that value."
             )
         if one.outside > OUTSIDE:
             low, high = one.band
             result.append(
-                f"In the laboratory of the {title(role)} {100 * one.outside:.0f} % of the energy of the target lies "
-                f"outside the {low:.2g} to {high:.2g} Hz that were seen: the band is wider for it."
+                f"In the laboratory of the {title(role)} {100 * one.outside:.0f} % of the target's energy lies outside "
+                f"the {low:.2g} to {high:.2g} Hz of the diagnosed recording, which makes the band wider."
             )
     return result

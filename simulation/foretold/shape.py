@@ -1,4 +1,4 @@
-"""Which one shape explains most of a signal's error: offset, drift, size, delay or noise."""
+"""The shape that explains most of a signal's error: an offset, a drift, a wrong amplitude, a delay, or noise."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ NONE = ""
 
 
 class ErrorShape(NamedTuple):
-    """What explains most of a signal's error against what was foretold."""
+    """The shape that explains most of a signal's error against the prediction."""
 
     kind: str  # offset, drift, size, delay or noise; empty where there is no error
     factor: float  # SI: offset, drift per second, relative change of size, delay in s, rms of the noise
@@ -22,8 +22,8 @@ class ErrorShape(NamedTuple):
 def shape_of(values: Values, foretold: Values, t: Values) -> ErrorShape:
     """The shape that explains most of values - foretold, both (ticks, storeys or slaves).
 
-    Size is the factor of what was foretold, delay that of its time derivative. White noise is what differs from tick
-    to tick: half of the energy of the differences of successive errors.
+    `size` is a factor on the prediction, `delay` a factor on its time derivative. The energy of white noise is half of
+    the energy of the differences between successive errors.
     """
     error = values - foretold
     power = float(np.sum(error**2))

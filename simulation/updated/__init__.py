@@ -1,1 +1,1 @@
-"""A plan whose nominal models are those that a diagnosis found, and what serves best on the laboratories found."""
+"""A plan with the nominal models that a diagnosis found, and compensators tried on the laboratories as found."""

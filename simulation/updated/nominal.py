@@ -1,4 +1,4 @@
-"""A plan with the nominal models that a diagnosis found, as far as a plan's language can say them."""
+"""A plan with the nominal models that a diagnosis found, as far as a plan has parameters for them."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ from laboratories.kinds import kinds_of
 from models.system import Effects, System
 from simulation.foretold.draws import FoundLaboratories
 
-# Relative difference of a sensor's noise from the plan's from which on the plan is changed: the rms of some thousand
-# samples is known to two percent.
+# Relative difference between a sensor's noise and the plan's above which the plan is changed. The rms of some thousand
+# samples is known to 2 %, so that a difference of 5 % is no chance.
 NOISIER = 0.05
-DIGITS = 3  # of a sensor's noise: it is known no better
+DIGITS = 3  # of a sensor's noise, which is not known better than to some parts in a thousand
 PLACES = (("ground_motion", "record"), ("link.security", "folder"))  # paths of a plan, by table and key
-CODE = ".py:"  # in a class of the user's, behind the path of its file
+CODE = ".py:"  # separates file and class in the name of a user's class
 
 
 class UpdatedPlan(NamedTuple):
-    """The plan, and what it says and cannot say, in sentences."""
+    """The updated plan, its differences from the one before, and the findings that no plan can express."""
 
     plan: Plan
     said: tuple[str, ...]
@@ -42,7 +42,7 @@ class UpdatedPlan(NamedTuple):
 def update(found: FoundLaboratories, plan: Plan) -> UpdatedPlan:
     """The plan with the nominal models that were found."""
     whole = replace(found.truth.plan, ground_motion=plan.ground_motion, tolerances=plan.tolerances)
-    unsaid = [f"{name} is of another building than this plan's." for name in found.left_out]
+    unsaid = [f"{name} belongs to another building than this plan's." for name in found.left_out]
     for role in (MASTER, *plan.roles):
         own, noise = effects.of_role(plan, role), found.spread.noise.get(role, {})
         for entry in found.truth.of(role).effects:
@@ -62,14 +62,14 @@ def update(found: FoundLaboratories, plan: Plan) -> UpdatedPlan:
 
 
 def holder(plan: Plan, role: str, effect: Effect) -> str:
-    """The role at which an effect that reaches `role` is said: those of the building are once the master's."""
+    """The role for which an effect on `role` is reported: the master for effects on the building, so that each is reported once."""
     if effect.site in sites.BUILDING:
         return MASTER
     return next(iter(plan.roles), role) if effect.site == sites.LINK and role == MASTER else role
 
 
 def laid(whole: Plan, role: str, entry: Entry, effect: Effect) -> tuple[Plan, str]:
-    """The plan with an effect, where parameters of a plan can say it; otherwise a sentence on it."""
+    """The plan with an effect that parameters of a plan can express; otherwise the same plan and a sentence."""
     name, values = entry
     system = effect.apply(System(whole.of(role)), **effect.values(values))
     column, left = as_table(system.plan.column, system.effects.column)
@@ -84,12 +84,12 @@ def laid(whole: Plan, role: str, entry: Entry, effect: Effect) -> tuple[Plan, st
 
 
 def learned(law: LearnedEntry) -> str:
-    """A sentence on a law that no plan can say."""
-    return f"What was learned of the {law.machine} of the {title(law.role)} is no parameter of a plan."
+    """A sentence on a learned law, which no plan can express."""
+    return f"The law learned for the {law.machine} of the {title(law.role)} is no parameter of a plan."
 
 
 def merged(whole: Plan, role: str, own: Plan) -> Plan:
-    """The whole plan with the tables of one role's laboratory and, of the master, the building."""
+    """The whole plan with the tables of one role's laboratory and, for the master, those of the building."""
     name = name_of(role)
     if name:
         taken = TABLES_OF_KIND[known_kind(whole.kinds[role])]
@@ -100,7 +100,7 @@ def merged(whole: Plan, role: str, own: Plan) -> Plan:
 
 
 def with_noise(whole: Plan, plan: Plan, role: str, found: Mapping[str, float]) -> tuple[Plan, str]:
-    """The plan with the noise of one role's sensors as it was found, where all laboratories of its kind share it."""
+    """The plan with the sensor noise found for one role, if no other laboratory of its kind shares its table."""
     kinds = kinds_of(plan)
     if role not in kinds:
         return whole, ""
@@ -123,7 +123,7 @@ def with_noise(whole: Plan, plan: Plan, role: str, found: Mapping[str, float]) -
 
 
 def differences(before: Plan, after: Plan) -> list[str]:
-    """What two plans differ in by five digits, a line for each key."""
+    """The keys in which two plans differ within five digits, one line each."""
 
     def rows(path: str, one: Any, other: Any) -> list[str]:
         if one == other:
@@ -150,16 +150,16 @@ def text(value: Any) -> str:
 
 
 def toml(updated: UpdatedPlan, source: str, folder: Path) -> str:
-    """The text of the plan for a file in a folder, with what it cannot say as comments at its head."""
+    """The text of the plan for a file in `folder`, with the findings that it cannot express as comments at its head."""
     head = [f"Nominal models as found: {source}."]
-    head += [f"Not said here: {sentence}" for sentence in updated.unsaid]
+    head += [f"Not in this plan: {sentence}" for sentence in updated.unsaid]
     tables = updated.plan.written()
     relocated(tables, updated.plan.base, folder)
     return "".join(f"# {line}\n" for line in head) + "\n" + tomli_w.dumps(tables)
 
 
 def relocated(tables: dict[str, Any], base: Path, folder: Path) -> None:
-    """Let the paths in nested tables start from another folder."""
+    """Change the paths in nested tables so that they start from another folder."""
     if base.resolve() == folder.resolve():
         return
     for table, key in PLACES:
@@ -176,7 +176,7 @@ def relocated(tables: dict[str, Any], base: Path, folder: Path) -> None:
 
 
 def moved(path: str, base: Path, folder: Path) -> str:
-    """A path that starts from another folder."""
+    """A path from another folder to the same file."""
     return path if Path(path).is_absolute() else os.path.relpath((base / path).resolve(), folder.resolve())
 
 

@@ -24,8 +24,8 @@ from models.compensators import COMPENSATORS
 from simulation.foretold.draws import FoundLaboratories, drawn
 
 PLANNED = "as planned"
-# Gains of the loop beside a feedforward: those of the default test, of the paper, and weaker ones beside an inverse,
-# which leaves the loop little to do.
+# Gains of the feedback loop: GAINS, those of the paper and of the default test, beside a feedforward; WEAKER beside an
+# inverse model, which leaves the feedback little to correct.
 GAINS = {"proportional": 1.93, "integral": 0.047, "derivative": 0.0}
 WEAKER = {"proportional": 1.0, "integral": 0.0, "derivative": 0.0}
 
@@ -39,41 +39,41 @@ class Lag(NamedTuple):
 
     @property
     def whole(self) -> float:
-        """Its delay at low frequency, s."""
+        """The total delay at low frequency, s."""
         return self.delay + self.time_constant
 
     @property
     def inverse(self) -> dict[str, float]:
-        """The first coefficients of the series of its inverse in the derivatives of the target."""
+        """Coefficients of the derivatives of the target, up to the third, in the series of its inverse."""
         late, lag = self.delay, self.time_constant
         series = (1.0, late + lag, late * (0.5 * late + lag), late**2 * (late / 6.0 + 0.5 * lag))
         return {f"a{order}": value / self.gain for order, value in enumerate(series)}
 
 
 class Margins(NamedTuple):
-    """What pre-flight says of the column's path under a compensator."""
+    """The figures of pre-flight for the column's path under a compensator."""
 
     critical: float  # s, delay beyond which the loop is unstable
     expected: float  # s, delay to expect
-    damping_points: float  # damping ratio that the path costs the first mode
+    damping_points: float  # change of the first mode's damping ratio by the path
 
     @property
     def margin(self) -> float:
-        """The one over the other."""
+        """Critical over expected delay; inf if no delay is expected."""
         return self.critical / self.expected if self.expected > 0.0 else math.inf
 
 
 class Trial(NamedTuple):
-    """One compensator on the laboratories found."""
+    """The results of one compensator on the laboratories as found."""
 
     name: str
     chosen: CompensatorTable
     error: float  # rms of measured minus target over that of the target; inf where the loop diverges
     margins: Margins
-    limit: float  # largest peak over its limit
+    limit: float  # largest ratio of a peak to its limit
 
     def serves(self, wanted: float) -> bool:
-        """Whether it keeps the plan's limits and the margin wanted."""
+        """Whether the loop is stable, keeps the plan's limits and has at least the wanted margin."""
         return self.limit <= 1.0 and math.isfinite(self.error) and self.margins.margin >= wanted
 
 
@@ -85,7 +85,7 @@ def margins(plan: Plan) -> Margins:
 
 
 def lag_of(plan: Plan) -> Lag:
-    """The actuator of a plan at low frequency; one that interacts with its specimen as a pure delay."""
+    """The actuator of a plan at low frequency; a servo-hydraulic one counts as a pure delay."""
     actuator = plan.actuator
     if actuator.model == "servo_hydraulic":
         bare = replace(plan, compensator=replace(plan.compensator, kind="none", parameters={}))
@@ -94,7 +94,7 @@ def lag_of(plan: Plan) -> Lag:
 
 
 def settings(plan: Plan) -> dict[str, CompensatorTable]:
-    """Every compensator with parameters that follow from the actuator of a plan; the plan's own stands first."""
+    """The plan's own compensator first, then every other with parameters derived from the plan's actuator."""
     lag = lag_of(plan)
     known = {"delay": lag.delay, "time_constant": lag.time_constant, "gain": lag.gain}
     given: dict[str, dict[str, float]] = {
@@ -115,9 +115,9 @@ def settings(plan: Plan) -> dict[str, CompensatorTable]:
 
 
 def trials(found: FoundLaboratories, updated: Plan, tell: Tell = untold) -> list[Trial]:
-    """All compensators, the best first; none where the master drives no column.
+    """The results of all compensators, the best first; empty if the master drives no column.
 
-    The error is that of the laboratories as found, the margins are those of the updated plan's models.
+    Errors are those of the laboratories as found; margins are those of the updated plan's nominal models.
     """
     if updated.kinds.get(MASTER) != COLUMN:
         return []
@@ -131,14 +131,14 @@ def trials(found: FoundLaboratories, updated: Plan, tell: Tell = untold) -> list
 
 
 def with_compensator(plan: Plan, chosen: CompensatorTable) -> Plan:
-    """The plan with another compensator of the actuator; what is done to the measured force stays."""
+    """The plan with another compensator of the actuator, and with the same correction of the measured force."""
     return replace(
         plan, compensator=replace(plan.compensator, kind=chosen.kind, parameters=dict(chosen.parameters))
     )
 
 
 def trial(found: FoundLaboratories, updated: Plan, name: str, chosen: CompensatorTable) -> Trial:
-    """One compensator."""
+    """Simulate the test with one compensator on the laboratories as found."""
     truth = replace(found.truth, plan=with_compensator(found.truth.plan, chosen))
     systems = drawn(replace(found, truth=truth), np.zeros(len(found.spread.parameters)), truth.seed)
     rollout = rolled_out(truth, systems, substructure.motion(systems[MASTER].plan), noise=True)
@@ -156,7 +156,7 @@ def trial(found: FoundLaboratories, updated: Plan, name: str, chosen: Compensato
 
 
 def plain(one: Trial) -> dict[str, Any]:
-    """A trial as JSON holds it."""
+    """A trial as plain values for JSON."""
     return {
         "name": one.name,
         "kind": one.chosen.kind,
@@ -168,10 +168,10 @@ def plain(one: Trial) -> dict[str, Any]:
 
 
 def plain_margins(one: Margins) -> dict[str, float | None]:
-    """Margins as JSON holds them."""
+    """Margins as plain values for JSON."""
     return {name: finite(value) for name, value in (one._asdict() | {"margin": one.margin}).items()}
 
 
 def finite(value: float) -> float | None:
-    """A number as JSON can hold it."""
+    """A finite number, or None, since JSON has no infinity."""
     return value if math.isfinite(value) else None

@@ -79,7 +79,7 @@ def test_laws_are_read_from_the_file_beside(tmp_path: Path) -> None:
         ({"laboratory": "other", "machine": "column", "file": "f.npz"}, "which the plan does not have"),
         ({"laboratory": "master", "machine": "column", "file": "none.npz"}, "Cannot read the law"),
         ({"laboratory": "master", "machine": "actuator", "file": "f.npz"}, "Cannot read the law"),
-        ({"laboratory": "master", "machine": "column", "file": "f.npz"}, "no series of finite numbers"),
+        ({"laboratory": "master", "machine": "column", "file": "f.npz"}, "no list of finite numbers"),
         ({"laboratory": "master", "machine": "column", "file": "text.npz"}, "Cannot read the law"),
     ],
 )

@@ -1,4 +1,4 @@
-"""Bands hold what they say: known causes are fitted, the next test is foretold, and played in the true laboratory."""
+"""Bands hold as often as they should: known causes are fitted, the next test is predicted and then run."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ def error(rollout: Rollout, true: Rollout) -> float:
 
 
 def play(case: Case, seed: int, folder: Path) -> Outcome:
-    """Fit the first test, foretell the next one, play it."""
+    """Fit the first test, predict the next one, and run it."""
     first, following = short(SECONDS), short(SECONDS, scale=case.scale)
     if case.motion:
         motion = replace(following.ground_motion, record=case.motion)

@@ -217,9 +217,9 @@ def test_what_cannot_be_an_fmu_or_lacks_a_variable_is_said(elastic: Path, tmp_pa
         archive.writestr("readme", "")
     cases: list[tuple[str, dict[str, Any], str]] = [
         ("nowhere.fmu", {}, "There is no FMU nowhere.fmu"),
-        (str(tmp_path / "no.fmu"), {}, "is no FMU that can be read"),
-        (str(tmp_path / "empty.fmu"), {}, "is no FMU that can be read"),
-        (str(elastic), {}, "are none of a kind's channels: give inputs and outputs"),
+        (str(tmp_path / "no.fmu"), {}, "cannot be read as an FMU"),
+        (str(tmp_path / "empty.fmu"), {}, "cannot be read as an FMU"),
+        (str(elastic), {}, "do not have the names of a kind's channels: give inputs and outputs"),
         (str(elastic), {"inputs": ["deformation"], "outputs": ["froce"]}, "has no variable 'froce': it has"),
     ]
     for file, options, text in cases:

@@ -1,4 +1,4 @@
-"""The next test foretold: draws follow the spread, bands hold what they say, bad files are one sentence."""
+"""Predictions: draws follow the spread, bands hold as often as they should, bad files end in one sentence."""
 
 from __future__ import annotations
 
@@ -264,9 +264,9 @@ def test_another_building_leaves_out_what_is_of_the_first(tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("wrong", "says"),
     [
-        ({"noise": {"slave": {"damper_force": math.nan}}}, "Cannot read what"),
-        ({"rest": {"slave": {"damper_force": -1.0}}}, "Cannot read what"),
-        ({"covariance": np.zeros((3, 3))}, "Cannot read what"),
+        ({"noise": {"slave": {"damper_force": math.nan}}}, "Cannot read the uncertainty"),
+        ({"rest": {"slave": {"damper_force": -1.0}}}, "Cannot read the uncertainty"),
+        ({"covariance": np.zeros((3, 3))}, "Cannot read the uncertainty"),
         (
             {"noise": {"slave": {"damper_farce": 1.0}}},
             "of 'slave.damper_farce', which the plan does not have",
@@ -294,10 +294,10 @@ def test_too_few_draws_make_no_band(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ('seed = 1\n[[effect]]\nname = "damper.friction"\nforce = 1.0\n', "does not say how sure it is"),
+        ('seed = 1\n[[effect]]\nname = "damper.friction"\nforce = 1.0\n', "does not hold the uncertainty"),
         ('[found]\nmodels = "0000000000000000"\nrest = "found.npz"\n', "other nominal models"),
-        ('[found]\nrest = "none.npz"\n', "Cannot read what"),
-        ('[found]\nrest = "text.npz"\n', "Cannot read what"),
+        ('[found]\nrest = "none.npz"\n', "Cannot read the uncertainty"),
+        ('[found]\nrest = "text.npz"\n', "Cannot read the uncertainty"),
         ('[found]\nrest = "found.npz"\n[[effect]]\nname = "damper.frictoin"\n', "Unknown effect"),
     ],
 )

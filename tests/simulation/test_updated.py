@@ -46,7 +46,7 @@ def test_a_plan_says_what_its_language_can_and_lists_the_rest(
     assert len(updated.said) == 3
     assert updated.unsaid == ("column.friction (force = 400) of the master is no parameter of a plan.",)
     text = nominal.toml(updated, "found.toml", tmp_path)
-    assert text.startswith("# Nominal models as found: found.toml.\n# Not said here: column.friction")
+    assert text.startswith("# Nominal models as found: found.toml.\n# Not in this plan: column.friction")
     assert parse(text, tmp_path).actuator == updated.plan.actuator
 
 

@@ -2,8 +2,9 @@
 
     f = f_column + force·s/presliding,    ṡ = δ̇ while |s| < presliding, else s stays
 
-It acts as a spring that slides at `force`, before which the contact deforms by `presliding` to either side. With
-`law` 1 the force is larger by the share `asymmetry` one way than the other, and loses the share `drop` at speed.
+It acts as a spring that slides at `force`; before it slides, the contact deforms by `presliding` to either side. With
+`law` 1 the force is larger by the share `asymmetry` in the positive direction and smaller by it in the negative one,
+and decreases by the share `drop` at high speed.
 Not to be confused with `column.viscous`, whose loop grows with speed, or `column.yielding`, which has no loop at small
 amplitude.
 """

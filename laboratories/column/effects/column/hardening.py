@@ -1,10 +1,12 @@
-"""The specimen stiffens (or softens) with the deformation, and gives back what it took: an elastic curve, no loop.
+"""The specimen stiffens or softens with the deformation along an elastic curve, without a loop.
 
     f = f_column + share·k·δ·(δ/δ_ref)²,    δ_ref = 2 mm
 
-With `law` 1 it does so at a bend: f = f_column + share·k·(δ − clip(δ, −bend, +bend)). A negative share softens. Not to
-be confused with `column.yielding`, which dissipates, `column.degradation`, which does not come back, or
-`column.pinching`, which is soft at the origin and stiff beyond, towards a line.
+With `law` 1 the stiffness changes at a bend: f = f_column + share·k·(δ − clip(δ, −bend, +bend)). With a negative share
+the specimen softens.
+
+Not to be confused with `column.yielding`, which dissipates energy, `column.degradation`, which is permanent, or
+`column.pinching`, whose stiffness is low around the origin only.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ EFFECT = sets(
             least=-10.0,
             most=10.0,
             sizes=(0.03, 0.08, 0.2, 0.5),
-            says="stiffness gained over the first: as a secant at 2 mm, or beyond the bend",
+            says="additional stiffness over the elastic one: of the secant at 2 mm (law 0), beyond the bend (law 1)",
         ),
     },
     further={
@@ -44,7 +46,7 @@ EFFECT = sets(
             least=1e-05,
             most=0.1,
             sizes=(0.0005, 0.001, 0.002, 0.003),
-            says="deformation from which on it is stiffer or softer",
+            says="deformation at the bend of law 1",
             shape=True,
         ),
     },

@@ -1,10 +1,11 @@
 """The specimen centres itself: a flag-shaped loop that closes before the origin.
 
-    f = k·δ up to `displacement`, with the stiffness hardening·k beyond; back at the stiffness k down to the line that
-    bends at (1 − loop)·displacement, and along it
+Loading follows f = k·δ up to `displacement`, and the stiffness hardening·k beyond. Unloading has the stiffness k down
+to the line that bends at (1 − loop)·displacement, and then follows that line (`models/specimens/self_centring.py`).
+Post-tensioned frames, rocking walls and shape memory alloys behave in this way.
 
-as of post-tensioned frames, rocking walls and shape memory alloy (models/specimens/self_centring.py). Not to be
-confused with `column.yielding`, which rests away from the origin, or `column.hardening`, which has no loop.
+Not to be confused with `column.yielding`, which comes to rest away from the origin, or `column.hardening`, which has no
+loop.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ EFFECT = sets(
             least=1e-05,
             most=0.1,
             sizes=(0.004, 0.0025, 0.0015, 0.0008),
-            says="where it bends",
+            says="deformation at the bend",
         ),
         "centring_hardening": Parameter(
             "hardening",
@@ -34,14 +35,14 @@ EFFECT = sets(
             least=-0.2,
             most=1.0,
             sizes=(0.02, 0.1, 0.3),
-            says="stiffness beyond over elastic",
+            says="stiffness beyond the bend over the elastic stiffness",
             shape=True,
         ),
         "centring_loop": Parameter(
             "loop",
             "",
             null=0.6,
-            least=0.1,  # a lower flag is a bend without a loop: `column.hardening`
+            least=0.1,  # with a lower loop it can hardly be told from `column.hardening`, which has none
             most=1.0,
             sizes=(0.3, 0.6, 0.9),
             says="height of the loop over the force at the bend",

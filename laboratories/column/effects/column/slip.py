@@ -1,15 +1,19 @@
-"""Loose fixture: within a gap the specimen moves without any force.
+"""The fixture has a gap, within which the specimen moves without any force.
 
     f = f_column(δ'),    δ' = δ − clip(δ, −gap/2, +gap/2)
 
-`gap` is the whole gap, from one contact to the other, around the origin. The parameter `law` moves it: with 1 it is
-where the specimen rests, so that δ' follows the contact that loads it until the force is zero, and stays there until a
-contact is met again; the gap goes along with a specimen that yields. With 2 something holds the specimen, and δ' stays
-where the motion turns until the gap is used up (the play operator of control engineering). With 3 the share 1 − `share`
-of the stiffness k is beside the gap and acts inside it as well: f = f_column(δ') + (1 − share)·k·(δ − δ').
+`gap` is the whole gap, from one contact to the other. The parameter `law` says where it lies:
 
-Not to be confused with `actuator.backlash`, where the actuator's motion itself has play, or `column.pinching`, which
-has no edge.
+    0   around the origin
+    1   where the specimen rests: δ' follows the contact that loads the specimen until the force is zero, and stays
+        there until a contact is reached again, so that the gap moves along with a specimen that yields
+    2   where the specimen is held by friction: δ' stays where the motion reverses until the gap is used up (the play
+        operator of control engineering)
+    3   beside a part without a gap, which has the share 1 − `share` of the stiffness k and also acts inside the gap:
+        f = f_column(δ') + (1 − share)·k·(δ − δ')
+
+Not to be confused with `actuator.backlash`, where the actuator's motion itself has play, or `column.pinching`, whose
+transition is smooth.
 """
 
 from __future__ import annotations
@@ -39,7 +43,7 @@ EFFECT = sets(
             least=0.0,
             most=3.0,
             sizes=(),
-            says="0 around the origin, 1 where the specimen rests, 2 where it is held, 3 beside a part without play",
+            says="0 around the origin, 1 where the specimen rests, 2 where friction holds it, 3 beside a gapless part",
             shape=True,
         ),
         "slip_share": Parameter(
@@ -49,7 +53,7 @@ EFFECT = sets(
             least=0.01,
             most=1.0,
             sizes=(),
-            says="of the stiffness that is behind the gap, of law 3",
+            says="share of the stiffness that lies behind the gap of law 3",
             shape=True,
         ),
     },

@@ -2,12 +2,18 @@
 
     f = α·k·δ + (1 − α)·k·δ_y·z,    dz/dδ = (1 − |z|ⁿ·(1 + sgn(z·dδ))/2) / δ_y
 
-with yield displacement δ_y, hardening α and exponent n. The parameter `law` chooses another formula: 1 the bilinear
-one, 2 that of Menegotto and Pinto with R₀ as the exponent, 3 the peak-oriented one of Clough and Johnston with the
-exponent `unloading` of its unloading stiffness, 4 the trilinear one, 5 the pinched one, whose reloading stiffness is
-damaged with every cycle, 6 the same with a trilinear skeleton (models/specimens). Not to be confused with
-`column.degradation`, which softens without a loop, `column.friction`, whose loop has the same height at every
-amplitude, or `column.self_centring`, whose loop closes before the origin.
+with yield displacement δ_y, hardening α and exponent n. The parameter `law` chooses another formula, which
+`models/specimens` holds:
+
+    1   bilinear
+    2   Menegotto and Pinto, with R₀ as the exponent
+    3   peak-oriented (Clough and Johnston); `unloading` is the exponent of its unloading stiffness
+    4   trilinear
+    5   pinched; its reloading stiffness decreases with every cycle by `damage`
+    6   pinched, with a trilinear skeleton
+
+Not to be confused with `column.degradation`, which softens without a loop, `column.friction`, whose loop has the same
+height at every amplitude, or `column.self_centring`, whose loop closes before the origin.
 """
 
 from __future__ import annotations
@@ -22,7 +28,7 @@ RELOADING = {"pinch_force": 0.5, "pinch_displacement": 0.5, "unloading": 0.2, "d
 
 
 def share(name: str, null: float, least: float, says: str) -> Parameter:
-    """A shape of some laws that is a share."""
+    """A parameter of shape between `least` and 1 that only some of the laws have."""
     return Parameter(name, "", null, least, 1.0, (), says, shape=True)
 
 
@@ -37,6 +43,7 @@ EFFECT = sets(
             least=1e-05,
             most=0.1,
             sizes=(0.004, 0.0025, 0.0015, 0.0008),
+            says="deformation at which it yields",
         ),
         "hardening": Parameter(
             "hardening",
@@ -45,7 +52,7 @@ EFFECT = sets(
             least=-0.2,
             most=1.0,
             sizes=(0.0, 0.05, 0.2),
-            says="stiffness after yielding over elastic",
+            says="stiffness after yielding over the elastic stiffness",
             shape=True,
         ),
         "exponent": Parameter(
@@ -81,13 +88,23 @@ EFFECT = sets(
             shape=True,
         ),
         "first_bend": share(
-            "first_bend", 1.0, 0.02, "where laws 4 and 6 first bend, over yield_displacement"
+            "first_bend", 1.0, 0.02, "deformation at the first bend of laws 4 and 6 over yield_displacement"
         ),
-        "second_stiffness": share("second_stiffness", 0.5, 0.0, "stiffness between the bends over the first"),
+        "second_stiffness": share(
+            "second_stiffness",
+            0.5,
+            0.0,
+            "stiffness of laws 4 and 6 between the bends over the elastic stiffness",
+        ),
         "pinch_force": share(
-            "pinch_force", 1.0, 0.0, "corner of reloading of laws 5 and 6, over the peak's force"
+            "pinch_force",
+            1.0,
+            0.0,
+            "force at the corner of reloading of laws 5 and 6 over the force at the peak",
         ),
-        "pinch_displacement": share("pinch_displacement", 1.0, 0.0, "its place on the way to the peak"),
+        "pinch_displacement": share(
+            "pinch_displacement", 1.0, 0.0, "place of that corner on the way to the peak, from 0 to 1"
+        ),
         "damage": Parameter(
             "damage",
             "",
@@ -95,7 +112,7 @@ EFFECT = sets(
             least=0.0,
             most=10.0,
             sizes=(),
-            says="growth of the peak of laws 5 and 6 per plastic deformation of yield_displacement",
+            says="relative growth of the peak of laws 5 and 6 per plastic deformation of yield_displacement",
             shape=True,
         ),
     },
