@@ -16,7 +16,9 @@ from recorder import files
 from simulation.foretold.bands import HELD, Prediction, plain
 
 LOWER, UPPER = "lower", "upper"  # prefixes of the topics for the ends of the band
-ABOUT = "prediction"  # metadata: the share of the time for which the band should hold, and the figures as JSON
+ABOUT = (
+    "prediction"  # metadata: the share of the time for which the band should hold, and the figures as JSON
+)
 
 
 def band_topic(end: str, topic: str) -> str:
@@ -58,7 +60,5 @@ def about(run: Run) -> dict[str, object]:
         figures = json.loads(given["figures"])
         figures["band"] = float(given["band"])
     except (KeyError, ValueError, TypeError):
-        raise InputError(
-            f"{run.path} is no prediction: give a file that `rths predict -o` wrote."
-        ) from None
+        raise InputError(f"{run.path} is no prediction: give a file that `rths predict -o` wrote.") from None
     return dict(figures)

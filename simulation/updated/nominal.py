@@ -62,7 +62,7 @@ def update(found: FoundLaboratories, plan: Plan) -> UpdatedPlan:
 
 
 def holder(plan: Plan, role: str, effect: Effect) -> str:
-    """The role for which an effect on `role` is reported: the master for effects on the building, so that each is reported once."""
+    """The role for which an effect on `role` is reported: for effects on the building the master, and so only once."""
     if effect.site in sites.BUILDING:
         return MASTER
     return next(iter(plan.roles), role) if effect.site == sites.LINK and role == MASTER else role
