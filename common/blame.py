@@ -17,11 +17,15 @@ def source_of(kind: type[object]) -> str:
 def place(error: BaseException, source: str) -> str:
     """File name and line of an exception: the innermost frame in the file `source`, else the innermost user frame.
 
-    A user frame is one outside this project's folder. The text is empty where the exception passed through none.
+    A user frame is one in a file outside this project's folder. The text is empty if the exception passed through none.
     """
     frames = traceback.extract_tb(error.__traceback__)
     own = [frame for frame in frames if frame.filename == source]
-    others = [frame for frame in frames if HOUSE not in Path(frame.filename).parents]
+    others = [
+        frame
+        for frame in frames
+        if HOUSE not in Path(frame.filename).parents and not frame.filename.startswith("<")
+    ]
     found = own or others
     return f"{Path(found[-1].filename).name}, line {found[-1].lineno}" if found else ""
 

@@ -131,10 +131,9 @@ def role_of(plan: Plan, part: str, name: str = "") -> str:
         return having[names.index(name)]
     what = part if wanted else "laboratory"
     if name or not having:
-        whose = f"The plan's {name}" if name else "No laboratory of the plan"
-        lacks = "has no" if name else "has a"
-        known = f": it is in that of the {', '.join(names)}" if having else ""
-        raise InputError(f"{whose} {lacks} {what}{known}; look at kind in [master] and [slave].")
+        where = f"the laboratory '{name}' of the plan" if name else "any laboratory of the plan"
+        known = f", but in that of the {', '.join(names)}" if having else ""
+        raise InputError(f"There is no {what} in {where}{known}: see kind in [master] and [slave].")
     if len(having) > 1:
         raise InputError(f"Several laboratories have a {what}: say which with --name ({', '.join(names)}).")
     return having[0]

@@ -83,7 +83,5 @@ def absolute(file: str) -> str:
     """The absolute path of a model's file; raises InputError if there is no such file."""
     path = Path(file).expanduser()
     if not path.is_file():
-        raise InputError(
-            f"There is no OpenSees model {path}: its path starts from the folder of the command."
-        )
+        raise InputError(f"There is no OpenSees model {path}: give the path of its file.")
     return str(path.resolve())

@@ -128,7 +128,7 @@ def law_in(path: Path, name: str) -> tuple[float, ...]:
     try:
         with np.load(path, allow_pickle=False) as file:
             law = np.asarray(file[name], dtype=np.float64)
-    except (OSError, ValueError, KeyError, BadZipFile):
+    except (OSError, EOFError, ValueError, KeyError, BadZipFile):
         raise PlanError(
             f"Cannot read the law '{name}' in {path}: keep the file that `rths diagnose --found` wrote beside it."
         ) from None

@@ -87,7 +87,7 @@ def beside(tables: Mapping[str, Any], base: Path) -> Spread:
     try:
         with np.load(path, allow_pickle=False) as file:
             return read(json.loads(str(file[KNOWN])), np.asarray(file[COVARIANCE], dtype=np.float64))
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, BadZipFile):
+    except (OSError, EOFError, ValueError, KeyError, TypeError, AttributeError, BadZipFile):
         raise PlanError(
             f"Cannot read the uncertainty in {path}: keep the .npz file that `rths diagnose --found` wrote beside the "
             "reality."

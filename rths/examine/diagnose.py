@@ -35,6 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "more",
         type=Path,
         nargs="*",
+        default=[],
         metavar="MORE",
         help="further recordings of the same laboratories: one cause must explain all of them",
     )

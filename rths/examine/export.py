@@ -26,7 +26,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--lab",
-        default=MASTER,
         metavar="ROLE",
         help="the laboratory that becomes an FMU: master, slave, or a slave's name (default: master)",
     )
@@ -39,6 +38,10 @@ def run(args: argparse.Namespace) -> int:
     """Export."""
     if args.output.suffix.lower() == ".fmu":
         return laboratory(args)
+    if args.lab is not None or args.reality is not None:
+        raise InputError(
+            f"--lab and --reality are for an FMU, not for {args.output}: give a name that ends in .fmu."
+        )
     from common.recording.reader import read
     from report.text import tabular
     from report.text.progress import Progress
@@ -73,10 +76,12 @@ def run(args: argparse.Namespace) -> int:
 
 def laboratory(args: argparse.Namespace) -> int:
     """Export a laboratory as an FMU."""
+    if args.events:
+        raise InputError("An FMU holds no events: leave out --events.")
     from rths.fmi.export import export
 
     with outputs.writing(args.output, args.force) as path:
-        kind = export(args.file, path, args.lab, args.reality)
+        kind = export(args.file, path, args.lab or MASTER, args.reality)
     names = {"inputs": list(kind.channels.drives), "outputs": list(kind.channels.names)}
     if args.json:
         sys.stdout.write(json.dumps({"file": str(args.output), **names}) + "\n")

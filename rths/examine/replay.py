@@ -88,7 +88,12 @@ def planned(recording: Run, place: str | None = None) -> Plan:
     plan = whole_plan(recording)
     if plan is None or not recording.has(MASTER):
         raise InputError(f"{recording.path} cannot be replayed: it lacks the plan or the master's signals.")
-    return plan if place is None else replace(plan, base=cli.plan_path(place).parent)
+    if place is None:
+        return plan
+    file = cli.plan_path(place)
+    if not file.is_file():
+        raise InputError(f"There is no plan {file}: give the path of a TOML file.")
+    return replace(plan, base=file.parent)
 
 
 def replay_master(recording: Run, plan: Plan, tell: Tell = untold) -> dict[str, Match]:

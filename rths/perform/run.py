@@ -83,6 +83,8 @@ def carry_out(args: argparse.Namespace, plan: Plan, virtually: VirtualTime) -> i
     gate = Gate(cli.accepted_risks(args))
     if not 0 <= args.live_port <= 65535:
         raise InputError(f"--live-port {args.live_port} must be from 1 to 65535, or 0 for a free one.")
+    if args.live_port and not args.live:
+        raise InputError("--live-port is the port of the page of --live: give --live too.")
     if args.live and args.virtual:
         raise InputError(
             "--live shows a test in real time: leave out --virtual, or give its recording to rths live."

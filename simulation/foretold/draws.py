@@ -77,7 +77,7 @@ def load(path: Path, plan: Plan) -> FoundLaboratories:
 
 
 def check(spread: Spread, plan: Plan) -> None:
-    """Raise PlanError where what is known of the errors is of laboratories that the plan does not have."""
+    """Raise PlanError if the uncertainty is that of laboratories that the plan does not have."""
     kinds = kinds_of(plan)
     known = {
         f"{role}.{BUILDING}.{one.name}" for role in (MASTER, *plan.roles) for one in fields(plan.structure)
@@ -90,8 +90,8 @@ def check(spread: Spread, plan: Plan) -> None:
     for name in named:
         if name not in known:
             raise PlanError(
-                f"what is known of its errors is of '{name}', which the plan does not have: give the plan that it was "
-                "found with."
+                f"it holds the uncertainty of '{name}', which the plan does not have: give the plan that it was found "
+                "with."
             )
 
 
@@ -178,7 +178,7 @@ def moved(name: str, values: Mapping[str, float], moves: Moves) -> Mapping[str, 
     """The parameters of an effect, with the uncertain ones moved, each within its bounds."""
     result = dict(values)
     for one, by in moves.items():
-        if one.effect == name and one.parameter in result:
+        if by and one.effect == name and one.parameter in result:
             value = result[one.parameter]
             value = value * float(np.exp(min(by, LARGEST))) if one.logarithmic else value + by
             result[one.parameter] = min(max(value, one.least), one.most)

@@ -34,6 +34,11 @@ OF_A_RECORDING = (
     "export",
     "layout",
     "compare",
+    "report",
+    "live --no-browser",
+    "diagnose {recording}",
+    "diagnose {recording} --validate",
+    "compare {recording} --predicted",
 )
 ENDS = {
     "plot": ["-o", "{tmp}/out"],
@@ -53,6 +58,15 @@ OF_A_PLAN = (
     "diagnose {recording} --plan",
     "simulate default -o {tmp}/out.mcap --duration",
     "run --virtual --reality",
+    "check",
+    "predict --found {tmp}/found.toml",
+    "predict default --found",
+    "update --found {tmp}/found.toml -o {tmp}/new.toml",
+    "update default -o {tmp}/new.toml --found",
+    "serve --opensees 8090",
+    "serve default --opensees 8090 --virtual --reality",
+    "export -o {tmp}/laboratory.fmu",
+    "export default -o {tmp}/laboratory.fmu --reality",
 )
 PLANS = ("missing.toml", "folder", "binary.toml", "open.toml", "other.toml", "file/x.toml")
 
@@ -83,6 +97,20 @@ MISTAKES = [
     *(f"export {{recording}} -o {place}" for place in ("/proc/x.csv", "{tmp}/file/x.mat", "{tmp}/out.pdf")),
     *(f"import {{tmp}}/{name} --map {{tmp}}/map.toml -o {{tmp}}/out.mcap"
       for name in ("missing.csv", "folder", "text.mcap", "empty.csv", "file/x.csv")),
+    *(f"init {place}" for place in ("..", "/proc/x", "{tmp}/file/x", "{tmp}/folder/a/b")),
+    *(f"serve default {words}" for words in ("--opensees x", "--opensees 0", "--opensees 8090 --intervals 0",
+      "--opensees 8090 --opensees 8091 --opensees 8092", "--opensees 8090 --accept-risk x",
+      "--opensees 8090 --virtual -o /proc/x")),
+    *(f"export {words}" for words in ("{recording} -o {tmp}/out.csv --lab slave", "default -o {tmp}/out.fmu --events",
+      "default -o {tmp}/out.fmu --lab x")),
+    *(f"diagnose {{recording}} {words}" for words in ("{recording}", "--validate {recording}", "--require nan",
+      "--name x", "--found /proc/x.toml", "--found {tmp}/out.txt", "--found {tmp}/a.toml --json {tmp}/a.toml")),
+    "compare {recording} --predicted {recording}",
+    "compare {recording}",
+    "replay {recording} --plan {tmp}/missing.toml",
+    "run --virtual --live-port 5",
+    "predict default --found {tmp}/other.toml --draws 5",
+    "update default --found {tmp}/other.toml -o {tmp}/other.toml",
     "identify {recording} --fit x",
     "bench colum default",
     "budget {recording} --budget {tmp}/other.toml",

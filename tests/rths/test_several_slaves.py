@@ -193,7 +193,8 @@ def test_bench_refuses_a_slaves_name_for_what_is_the_masters(
 ) -> None:
     assert call("bench", part, plan_file, "--name", "cellar", "-o", tmp_path / "a.mcap") == 2
     assert capsys.readouterr().err == (
-        f"rths: The plan's cellar has no {part}: it is in that of the master; look at kind in [master] and [slave].\n"
+        f"rths: There is no {part} in the laboratory 'cellar' of the plan, but in that of the master: see kind in "
+        "[master] and [slave].\n"
     )
     assert not (tmp_path / "a.mcap").exists()
 

@@ -54,10 +54,10 @@ def tables(plan: Plan, **more: Any) -> dict[str, Any]:
     return {"found": origin, "effect": [friction]} | more
 
 
-def written(folder: Path, plan: Plan, **more: Any) -> Path:
-    """A file of what was found, with the file beside it."""
+def written(folder: Path, plan: Plan, spread: Spread = SPREAD, **more: Any) -> Path:
+    """The path of a reality that a diagnosis found, with the file of its uncertainty beside it."""
     with (folder / "found.npz").open("wb") as stream:
-        np.savez(stream, **SPREAD.arrays())  # type: ignore[arg-type]
+        np.savez(stream, **spread.arrays())  # type: ignore[arg-type]
     path = folder / "found.toml"
     path.write_text(tomli_w.dumps(tables(plan, **more)), encoding="utf-8")
     return path
@@ -287,7 +287,7 @@ def test_what_is_said_of_errors_is_checked(wrong: dict[str, Any], says: str, tmp
 
 
 def test_too_few_draws_make_no_band(folder: Path) -> None:
-    with pytest.raises(InputError, match="19 laboratories are too few for a band: draw 20 at least"):
+    with pytest.raises(InputError, match="19 laboratories are too few for a band: draw at least 20"):
         bands.predict(draws.load(folder / "found.toml", short()), short(), 19)
 
 
@@ -298,12 +298,18 @@ def test_too_few_draws_make_no_band(folder: Path) -> None:
         ('[found]\nmodels = "0000000000000000"\nrest = "found.npz"\n', "other nominal models"),
         ('[found]\nrest = "none.npz"\n', "Cannot read the uncertainty"),
         ('[found]\nrest = "text.npz"\n', "Cannot read the uncertainty"),
+        ('[found]\nrest = "empty.npz"\n', "Cannot read the uncertainty"),
+        (
+            '[found]\nrest = "found.npz"\n[[effect]]\nname = "damper.friction"\nforce = -1.0\n',
+            "must be at least 0",
+        ),
         ('[found]\nrest = "found.npz"\n[[effect]]\nname = "damper.frictoin"\n', "Unknown effect"),
     ],
 )
 def test_a_bad_file_is_one_sentence(text: str, says: str, tmp_path: Path) -> None:
     written(tmp_path, short())
     (tmp_path / "text.npz").write_text("no archive", encoding="utf-8")
+    (tmp_path / "empty.npz").touch()
     path = tmp_path / "bad.toml"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(InputError, match=says):

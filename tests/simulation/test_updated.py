@@ -121,7 +121,7 @@ def test_slaves_of_a_name_have_their_own_tables(tmp_path: Path) -> None:
     plan = plans.load(Path("rths/plans/two_dampers.toml"))
     name = next(iter(plan.slaves))
     heavier = {"name": "damper.mass", "laboratory": f"slave.{name}", "factor": 1.1}
-    found = draws.load(written(tmp_path, plan, effect=[heavier]), plan)
+    found = draws.load(written(tmp_path, plan, Spread(), effect=[heavier]), plan)
     updated = nominal.update(found, plan).plan
     masses = {one: lab.damper.mass / plan.slaves[one].damper.mass for one, lab in updated.slaves.items()}
     assert masses.pop(name) == pytest.approx(1.1)
