@@ -24,6 +24,7 @@ from laboratories.checks import PATIENCE
 from laboratories.table.kind import TABLE
 from master.building import Outputs
 from master.limits import MasterLimits
+from rths.__main__ import VERBS
 from slave.limits import SlaveLimits
 from tests.faults.rows import motion_bound
 from tests.helpers import ROOT
@@ -157,3 +158,9 @@ def test_the_table_of_verbs_has_every_event_of_the_protocol_and_every_turn_of_th
     shown = set(re.findall(r"^\| ([a-z]+)", page[page.index("## The verbs") :], flags=re.MULTILINE))
     named = {"secured": "secure", "settled": "settle"}  # a verb's table says what is done, a turn that it was
     assert {named.get(one.value, one.value) for one in (*Event, *Turn)} <= shown
+
+
+def test_the_table_of_commands_has_every_command() -> None:
+    page = (generate.FOLDER / "reference" / "words.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| ([a-z0-9, ]+) \|", page[page.index("## The commands") :], flags=re.MULTILINE)
+    assert sorted(", ".join(rows[1:]).split(", ")) == sorted(VERBS)

@@ -104,7 +104,7 @@ MISTAKES = [
     *(f"export {words}" for words in ("{recording} -o {tmp}/out.csv --lab slave", "default -o {tmp}/out.fmu --events",
       "default -o {tmp}/out.fmu --lab x")),
     *(f"diagnose {{recording}} {words}" for words in ("{recording}", "--validate {recording}", "--require nan",
-      "--name x", "--found /proc/x.toml", "--found {tmp}/out.txt", "--found {tmp}/a.toml --json {tmp}/a.toml")),
+      "--name x", "--found {tmp}/out.txt", "--found {tmp}/a.toml --json {tmp}/a.toml")),
     "compare {recording} --predicted {recording}",
     "compare {recording}",
     "replay {recording} --plan {tmp}/missing.toml",
