@@ -16,10 +16,10 @@ from common.terminal.telling import Tell, untold
 from diagnosis.findings import readings, report
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.verdict import PartVerdict, heard, judge, seen_in, sharpest
-from diagnosis.fits import fitting
-from diagnosis.fits.fitting import Data
+from diagnosis.fits import residuals
+from diagnosis.fits.residuals import Data
 from diagnosis.fits.scales import Scales
-from diagnosis.fits.search import Searcher
+from diagnosis.fits.search import search
 from diagnosis.learned.learn import learn
 from diagnosis.recorded import link, link_effects
 from diagnosis.recorded.ground import Ground
@@ -104,10 +104,10 @@ def examine(record: Record, tell: Tell = untold, more: Sequence[Record] = ()) ->
     for number, given in enumerate(parts, 1):
         part = given if late is None or not isinstance(given, LaboratoryPart) else given.logged(late)
         tell(part.name, number, len(parts))
-        datas.append(fitting.prepare(part, record, steps))
+        datas.append(residuals.prepare(part, record, steps))
         scales = Scales(record, part.shift() if isinstance(part, Ground) else 0.0)
         whole = joined(part, further, datas[-1].group)
-        data = datas[-1] if whole is part else fitting.prepare(whole, record, steps)
+        data = datas[-1] if whole is part else residuals.prepare(whole, record, steps)
         verdicts.append(seen_in(datas[-1], judged(data, scales, other_view(part, record, steps))))
         found = verdicts[-1].search
         if isinstance(found.data.part, LoggedBuilding):
@@ -130,7 +130,7 @@ def examine(record: Record, tell: Tell = untold, more: Sequence[Record] = ()) ->
 def other_view(part: Part, record: Record, steps: Mapping[str, float]) -> Data | None:
     """A building as one whose forces a logger recorded, None for all else."""
     logged = part.logged() if isinstance(part, Building) else None
-    return None if logged is None else fitting.prepare(logged, record, logged.rounded(steps))
+    return None if logged is None else residuals.prepare(logged, record, logged.rounded(steps))
 
 
 def judged(data: Data, scales: Scales, logged: Data | None = None) -> PartVerdict:
@@ -139,15 +139,15 @@ def judged(data: Data, scales: Scales, logged: Data | None = None) -> PartVerdic
     It is so from the start where the forces recorded have noise that those used had not.
     """
     if logged is None or not own_noise(logged):
-        verdict = judge(Searcher(data, scales).run())
+        verdict = judge(search(data, scales))
         if logged is None or verdict.outcome not in UNNAMED:
             return verdict
-    return judge(Searcher(logged, scales).run())
+    return judge(search(logged, scales))
 
 
 def own_noise(data: Data) -> bool:
     """Whether the balance of a building's forces has noise that its motion, and so the forces used, had not."""
-    used = fitting.noise(data.part.measured)
+    used = residuals.noise(data.part.measured)
     least = SMOOTH * np.sqrt(np.mean(np.square(data.part.measured), axis=0))
     return bool(np.any(data.white > np.maximum(OTHERS * used, least)))
 

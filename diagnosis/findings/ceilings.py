@@ -7,8 +7,9 @@ import numpy as np
 from common.errors import InputError
 from diagnosis.findings import where
 from diagnosis.findings.found import Diagnosis
-from diagnosis.fits import fitting
-from diagnosis.fits.search import Search, gaps
+from diagnosis.fits import fitting, hypothesis, residuals
+from diagnosis.fits.search import Search
+from diagnosis.fits.unexplained import gaps
 from diagnosis.recorded.parts import LaboratoryPart
 from diagnosis.report.evidence import Ceiling, Coordinate, Dependence, Unknown
 from diagnosis.signals import windows
@@ -37,7 +38,7 @@ def inputs_of(found: Diagnosis, search: Search) -> dict[str, Array]:
     result: dict[str, Array] = {}
     if isinstance(part, LaboratoryPart):
         result |= {name: values for name, values in part.inputs.items() if np.ptp(values) > 0.0}
-    predicted = part.predict(fitting.lay(search.data, search.chosen.z, {}))
+    predicted = part.predict(hypothesis.lay(search.data, search.chosen.z, {}))
     for name, values in zip(part.signals, predicted.T, strict=True):
         if np.ptp(values) > 0.0:
             result[PREDICTED + name] = values
@@ -64,11 +65,11 @@ def flexible_share(found: Diagnosis, search: Search) -> float | None:
     """Share of the commissioned residual's energy that a flexible model explains, None where data are too few."""
     interval = found.record.plan.test.interval
     place = worst(search, search.commissioned)
-    residual = search.data.residual(fitting.lay(search.data, search.commissioned.z, {}))[:, place]
+    residual = search.data.residual(hypothesis.lay(search.data, search.commissioned.z, {}))[:, place]
     columns = inputs_of(found, search)
     if not columns:
         return None
-    held = fitting.withheld_ticks(residual.size, interval)
+    held = residuals.withheld_ticks(residual.size, interval)
     try:
         return ceiling(
             np.column_stack(list(columns.values())),
@@ -92,7 +93,7 @@ def described(found: Diagnosis, search: Search) -> Unknown:
     """Description of what the chosen effects leave in one part."""
     data = search.data
     place = worst(search, search.chosen)
-    residual = data.residual(fitting.lay(data, search.chosen.z, search.chosen.values))[:, place]
+    residual = data.residual(hypothesis.lay(data, search.chosen.z, search.chosen.values))[:, place]
     interval = found.record.plan.test.interval
     shares = dependence(found, search, residual, float(data.sigma[place]))
     spectrum = windows.bands(residual, float(data.white[place]), interval)

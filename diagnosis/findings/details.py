@@ -16,9 +16,11 @@ from diagnosis.findings.rest import shown
 from diagnosis.findings.series import numbers, strongest
 from diagnosis.findings.verdict import PartVerdict
 from diagnosis.findings.where import SiteTrace
-from diagnosis.fits import fitting
-from diagnosis.fits.fitting import Data, Fit
-from diagnosis.fits.search import SEEN, remaining
+from diagnosis.fits import fitting, hypothesis
+from diagnosis.fits.fitting import Fit
+from diagnosis.fits.residuals import Data
+from diagnosis.fits.unexplained import remaining
+from diagnosis.fits.worth import SEEN
 from diagnosis.recorded.laboratory import RecordedLaboratory
 from diagnosis.recorded.loop import simulated
 from diagnosis.recorded.paths import force_path, paths
@@ -154,8 +156,8 @@ def reading(record: Record, data: Data, fit: Fit, trace: SiteTrace) -> Reading:
     """The signal that shows a trace, measured and predicted, in its strongest seconds."""
     place = data.part.signals.index(trace.signal)
     shown = strongest(trace.series, record.plan.test.interval)
-    nominal = data.part.predict(fitting.lay(data, fit.z, {}))[:, place]
-    corrected = data.part.predict(fitting.lay(data, fit.z, fit.values))[:, place]
+    nominal = data.part.predict(hypothesis.lay(data, fit.z, {}))[:, place]
+    corrected = data.part.predict(hypothesis.lay(data, fit.z, fit.values))[:, place]
     measured = data.part.measured[:, place]
     return Reading(
         signal=trace.signal,
@@ -218,8 +220,8 @@ def curve(record: Record, data: Data, fit: Fit, trace: SiteTrace, pair: tuple[st
     place = data.part.signals.index(pair[1])
     shown = strongest(trace.series, record.plan.test.interval)
     own = {name: values for name, values in fit.values.items() if data.catalogue[name].site != trace.site}
-    before = data.part.predict(fitting.lay(data, fit.z, own))[:, place]
-    after = data.part.predict(fitting.lay(data, fit.z, fit.values))[:, place]
+    before = data.part.predict(hypothesis.lay(data, fit.z, own))[:, place]
+    after = data.part.predict(hypothesis.lay(data, fit.z, fit.values))[:, place]
     x, y = (name.replace("_", " ") for name in pair)
     return NaturalCurve(
         title=f"{trace.site}: {y} over {x}",

@@ -6,8 +6,8 @@ import numpy as np
 
 from common.errors import InputError
 from diagnosis.findings.found import Diagnosis
-from diagnosis.fits import fitting
-from diagnosis.fits.search import SEEN
+from diagnosis.fits import hypothesis
+from diagnosis.fits.worth import SEEN
 
 
 def not_exercised(found: Diagnosis) -> tuple[str, ...]:
@@ -15,7 +15,7 @@ def not_exercised(found: Diagnosis) -> tuple[str, ...]:
     result = []
     for verdict in found.verdicts:
         data, fit = verdict.search.data, verdict.search.chosen
-        whole = data.part.predict(fitting.lay(data, fit.z, fit.values))
+        whole = data.part.predict(hypothesis.lay(data, fit.z, fit.values))
         for effect in data.part.candidates:
             strength = [item for item in effect.parameters if not item.shape]
             if effect.name in fit.names or len(strength) != 1:
@@ -23,7 +23,7 @@ def not_exercised(found: Diagnosis) -> tuple[str, ...]:
             shapes = {item.name: item.default for item in effect.parameters if item.default is not None}
             values = {**shapes, strength[0].name: strength[0].sizes[-1]}
             try:
-                more = data.part.predict(fitting.lay(data, fit.z, fit.values | {effect.name: values}))
+                more = data.part.predict(hypothesis.lay(data, fit.z, fit.values | {effect.name: values}))
             except InputError:
                 result.append(effect.name)
                 continue

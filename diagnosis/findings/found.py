@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from common.plan.plan import Plan
 from diagnosis.findings.readings import SensorFinding
 from diagnosis.findings.verdict import PartVerdict
-from diagnosis.fits.fitting import Values
+from diagnosis.fits.hypothesis import Values
 from diagnosis.learned.learn import LearnedLaw, Of
 from diagnosis.recorded.link import LinkFinding
 from diagnosis.recorded.record import Record

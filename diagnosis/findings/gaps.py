@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from diagnosis.findings.found import Diagnosis
-from diagnosis.fits import fitting
-from diagnosis.fits.search import SEEN
+from diagnosis.fits import residuals
+from diagnosis.fits.worth import SEEN
 from diagnosis.recorded import link
 from diagnosis.recorded.loop import RecordedLoop
 from diagnosis.recorded.record import Record
@@ -21,7 +21,7 @@ QUIET = 0.2  # noise over a signal's rms from which on a gap relative to that rm
 
 def held_out(record: Record) -> Mask:
     """Ticks that no fit has seen."""
-    return fitting.withheld_ticks(record.ticks, record.plan.test.interval)
+    return residuals.withheld_ticks(record.ticks, record.plan.test.interval)
 
 
 class RecordingGaps:

@@ -16,8 +16,10 @@ import numpy as np
 
 from common.errors import InputError
 from diagnosis.findings.found import Diagnosis
-from diagnosis.fits import fitting
-from diagnosis.fits.fitting import Data, Fit, Problem
+from diagnosis.fits import hypothesis
+from diagnosis.fits.fitting import Fit
+from diagnosis.fits.hypothesis import Problem
+from diagnosis.fits.residuals import Data
 from diagnosis.fits.search import Search, exchanged_pair
 from diagnosis.recorded.parts import LaboratoryPart
 from models.registry import Array
@@ -72,7 +74,7 @@ def separations(search: Search, other: Fit) -> list[tuple[str, float]]:
 
 def separation(data: Data, one: Fit, other: Fit) -> float:
     """Distance of two hypotheses in a test, in standard deviations of the noise."""
-    truth = data.part.predict(fitting.lay(data, one.z, one.values))
+    truth = data.part.predict(hypothesis.lay(data, one.z, one.values))
     part = played(data, truth)
     problem = Problem(part, other.values)
     p = problem.place(other.values, other.z)

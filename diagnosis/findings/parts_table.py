@@ -9,8 +9,8 @@ import numpy as np
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.gaps import QUIET
 from diagnosis.findings.verdict import PartVerdict, heard
-from diagnosis.fits import fitting
-from diagnosis.fits.fitting import Data
+from diagnosis.fits import hypothesis, residuals
+from diagnosis.fits.residuals import Data
 from diagnosis.recorded.parts import BALANCE, ColumnAlone, LaboratoryPart
 from diagnosis.recorded.record import Record
 from diagnosis.report.records import NoiseEntry, PartOfGap
@@ -29,7 +29,7 @@ def part(verdict: PartVerdict, found: Diagnosis, require: float | None) -> PartO
     search = verdict.search
     data, bare, fit = search.data, search.commissioned, search.chosen
     noise = rms(heard(search) / levels(data), data)
-    systems = [data.system, fitting.lay(data, bare.z, {}), fitting.lay(data, fit.z, fit.values)]
+    systems = [data.system, hypothesis.lay(data, bare.z, {}), hypothesis.lay(data, fit.z, fit.values)]
     systems.append(systems[-1])
     for law in found.learned:
         if law.site in sites_of(data):
@@ -73,7 +73,9 @@ def levels(data: Data) -> Array:
 
 def above(data: Data, system: System, noise: float) -> float:
     """Rms over the readings of rms(recorded - predicted)/rms(recorded), without the noise's share."""
-    residual = np.nan_to_num(data.residual(system), nan=fitting.FAR, posinf=fitting.FAR, neginf=-fitting.FAR)
+    residual = np.nan_to_num(
+        data.residual(system), nan=residuals.FAR, posinf=residuals.FAR, neginf=-residuals.FAR
+    )
     whole = rms(np.sqrt(np.mean(np.square(residual), axis=0)) / levels(data), data)
     return math.sqrt(max(0.0, whole**2 - noise**2))
 

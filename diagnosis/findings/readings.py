@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from diagnosis.fits.fitting import Data
+from diagnosis.fits.residuals import Data
 from diagnosis.recorded.parts import Building
 from diagnosis.recorded.record import Record
 from diagnosis.signals.noise import quantum

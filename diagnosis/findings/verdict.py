@@ -7,19 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.fits import fitting, sensor_noise
-from diagnosis.fits.fitting import TOLERANCES, Data, Fit, Problem
-from diagnosis.fits.search import (
-    DATA_GAIN,
-    MATERIAL,
-    PRIOR_GAIN,
-    SEEN,
-    Search,
-    exchanged_pair,
-    gaps,
-    leaves,
-    tied,
-)
+from diagnosis.fits import fitting, hypothesis, residuals, sensor_noise
+from diagnosis.fits.fitting import Fit
+from diagnosis.fits.hypothesis import TOLERANCES, Problem
+from diagnosis.fits.residuals import Data
+from diagnosis.fits.search import Search, exchanged_pair, tied
+from diagnosis.fits.unexplained import MATERIAL, gaps, leaves
+from diagnosis.fits.worth import DATA_GAIN, PRIOR_GAIN, SEEN
 from diagnosis.recorded.parts import MODEL_ERROR
 from diagnosis.report.records import Outcome
 from models.registry import Array
@@ -112,7 +106,7 @@ def seen_in(data: Data, verdict: PartVerdict) -> PartVerdict:
     lines = None if joined.data.lines is None else joined.data.lines[:ticks]
     spikes = None if joined.data.spikes is None else joined.data.spikes[:ticks]
     here = replace(
-        fitting.measured_by(data, joined.data.white), noise=joined.data.noise, lines=lines, spikes=spikes
+        residuals.measured_by(data, joined.data.white), noise=joined.data.noise, lines=lines, spikes=spikes
     )
     if here.noise:
         here = replace(here, related=sensor_noise.related(here, here.system))
@@ -178,14 +172,14 @@ def heard(search: Search) -> Array:
 def sharpest(search: Search) -> Array:
     """Rms noise (signals,) of a part's sensors at the highest frequencies, without the lines that they pick up."""
     data, fit = search.data, search.chosen
-    return fitting.noise(data.residual(fitting.lay(data, fit.z, fit.values)))
+    return residuals.noise(data.residual(hypothesis.lay(data, fit.z, fit.values)))
 
 
 def unproven(search: Search) -> bool:
     """Whether a large share of a gap is taken for noise for which the residual itself is the only evidence."""
     before, after = search.commissioned, search.chosen
     left = [
-        np.sqrt(np.mean(np.square(fit.data.residual(fitting.lay(fit.data, fit.z, fit.values))), axis=0))
+        np.sqrt(np.mean(np.square(fit.data.residual(hypothesis.lay(fit.data, fit.z, fit.values))), axis=0))
         for fit in (before, after)
     ]
     seen = np.array([item.ratio > MATERIAL for item in gaps(before, search.data.group)])

@@ -10,9 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from common.plan.kinds import COLUMN, TABLE
-from diagnosis.fits import fitting
-from diagnosis.fits.fitting import Data, Fit
-from diagnosis.fits.search import SEEN, gaps
+from diagnosis.fits import hypothesis
+from diagnosis.fits.fitting import Fit
+from diagnosis.fits.residuals import Data
+from diagnosis.fits.unexplained import gaps
+from diagnosis.fits.worth import SEEN
 from diagnosis.recorded.parts import ColumnAlone, LaboratoryPart
 from diagnosis.recorded.record import Record
 from diagnosis.signals import windows
@@ -39,14 +41,14 @@ class SiteTrace:
 
 def traces(data: Data, fit: Fit) -> list[SiteTrace]:
     """What each site's effects do to the signals: the prediction with all effects against that without them."""
-    whole = data.part.predict(fitting.lay(data, fit.z, fit.values))
+    whole = data.part.predict(hypothesis.lay(data, fit.z, fit.values))
     sites: dict[str, list[str]] = {}
     for name in fit.names:
         sites.setdefault(data.catalogue[name].site, []).append(name)
     result = []
     for site, names in sites.items():
         less = {name: values for name, values in fit.values.items() if name not in names}
-        change = (whole - data.part.predict(fitting.lay(data, fit.z, less))) / data.sigma
+        change = (whole - data.part.predict(hypothesis.lay(data, fit.z, less))) / data.sigma
         change[~data.part.present] = 0.0
         result.append(shown(site, data, change))
     return result
@@ -63,7 +65,7 @@ def shown(site: str, data: Data, change: Array) -> SiteTrace:
 
 def unexplained(data: Data, fit: Fit) -> SiteTrace:
     """Trace of what a fit leaves, at the site where it most likely arises."""
-    residual = data.residual(fitting.lay(data, fit.z, fit.values)) / data.sigma
+    residual = data.residual(hypothesis.lay(data, fit.z, fit.values)) / data.sigma
     left = [item.ratio for item in gaps(fit, data.group)]
     site = culprit(data, residual, left)
     kept = residual[:, int(np.argmax(left))]

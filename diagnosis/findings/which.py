@@ -11,7 +11,8 @@ import numpy as np
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.verdict import Interval, PartVerdict, intervals
 from diagnosis.fits.fitting import Fit
-from diagnosis.fits.search import MATERIAL, PRIOR_GAIN, gaps
+from diagnosis.fits.unexplained import MATERIAL, gaps
+from diagnosis.fits.worth import PRIOR_GAIN
 from diagnosis.report.records import Candidate
 from diagnosis.report.values import Parameters, Value
 from laboratories.effects.effect import Effect

@@ -11,7 +11,9 @@ from dataclasses import replace
 import numpy as np
 
 from diagnosis.fits import fitting
-from diagnosis.fits.fitting import Data, Fit, Values
+from diagnosis.fits.fitting import Fit
+from diagnosis.fits.hypothesis import Values
+from diagnosis.fits.residuals import Data
 from laboratories.effects.effect import Effect
 
 FIRST = 0.02  # of the largest residual, from which on the stop has been met

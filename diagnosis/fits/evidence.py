@@ -15,7 +15,8 @@ import math
 
 import numpy as np
 
-from diagnosis.fits.fitting import Fit, Problem
+from diagnosis.fits.fitting import Fit
+from diagnosis.fits.hypothesis import Problem
 from diagnosis.signals import colour
 from diagnosis.signals.noise_model import NoiseModel
 

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from scipy.optimize import minimize
 
 from common.plan.kinds import COLUMN
 from diagnosis.fits import fitting
-from diagnosis.fits.fitting import Fit, Problem, excess
+from diagnosis.fits.fitting import Fit, excess
+from diagnosis.fits.hypothesis import Problem
+from diagnosis.fits.unexplained import remaining
 from diagnosis.recorded.joined import JoinedPart
 from diagnosis.recorded.parts import ColumnAlone, LaboratoryPart, Part
-from laboratories.effects.effect import Effect, Parameter
+from laboratories.effects.effect import Effect, Law, Parameter
 from models.registry import Array
 from models.specimens import fit as specimens
 
@@ -22,25 +24,94 @@ from models.specimens import fit as specimens
 NEARER = np.geomspace(0.5, 1.3, 10)  # times the strength found under another law
 FINER = (0.0, 0.5, 1.5)  # times the sizes of the first shape that a law has, beside these
 REACHED = (0.15, 0.3, 0.5, 0.75)  # of the largest deformation: where a bend is looked for
-FITTED = 4  # of the laws, those with the best starts
-STEPS, ROUNDS = 8, 2  # of a fit
+FITTED = 4  # of an effect's laws, those with the best starts
+ROUGH = 3  # steps of a first fit, after which laws are held against each other
+LEADING = 4  # of all laws, those that are fitted to their end
+STEPS, ROUNDS = 8, 2  # of such a fit
 TURNS, EVALUATIONS = 2, 60  # of the simplex with the effects' parameters, each followed by a fit of all
 LOGARITHMIC, LINEAR = 0.06, 0.4  # first edges of the simplex, of the logarithm and of a shape over its size
 SURELY = 25.0  # cost by which another law must be better: 5 standard deviations squared
+FARTHEST = 30.0  # times what the best fit leaves: one that leaves more is under no law the right one
+SLIGHT = (
+    0.02  # systematic residual over noise below which one law is as good as another: it can hardly be seen
+)
 BETTER = 0.9  # of what is left beyond noise: less of it is worth another law than the first
 
 
-def in_best_law(fit: Fit) -> Fit:
-    """The fit with its last effect under the law that leaves least; the first one where none is much better."""
-    effect = fit.data.catalogue[fit.names[-1]]
-    begun = [begun_under(fit, effect, place) for place in range(1, len(effect.laws))]
-    begun = sorted(begun, key=lambda item: item.cost)[:FITTED]
-    best = fit
-    for start in sorted(begun, key=lambda item: len(Problem(item.data, item.values).frees)):
-        found = fitting.fit(fit.data, start.values, start.z, STEPS, rounds=ROUNDS)
-        surely = found.cost < best.cost - SURELY
-        best = found if surely and excess(found) < BETTER * excess(best) else best
-    return best if best is fit else settled(best)
+def in_best_laws(fits: list[Fit]) -> list[Fit]:
+    """The fits, best first, with the effect that came last under that law of its mechanism that leaves least.
+
+    Nothing is tried where the best fit leaves too little to be seen. The best one is first fitted to its end under its
+    own law: another law would else explain what that fit has not reached yet.
+    """
+    if not fits or remaining(fits[0]) < SLIGHT:
+        return fits
+    if len(last(fits[0]).laws) > 1:
+        fits = sorted([fitting.polished(fits[0]), *fits[1:]], key=cost)
+        if remaining(fits[0]) < SLIGHT:
+            return fits
+    others = raced([item for item in fits if excess(item) <= FARTHEST * excess(fits[0])])
+    better = sorted((others.get(item.names[-1], item) for item in fits), key=cost)
+    return ending(better, fits)
+
+
+def ending(better: list[Fit], fits: list[Fit]) -> list[Fit]:
+    """Fits, best first, with those that lead under another law than in `fits` moved to the bottom of their valley."""
+    done: list[Fit] = []
+    while better and not any(better[0] is item for item in (*fits, *done)):
+        done.append(settled(better[0]))
+        better = sorted([done[-1], *better[1:]], key=cost)
+    return better
+
+
+def raced(fits: list[Fit]) -> dict[str, Fit]:
+    """The fits whose last effect leaves less under another law than the first, by that effect.
+
+    The laws of all effects are fitted for a few steps, and those that then lead to their end.
+    """
+    firsts = {item.names[-1]: item for item in reversed(fits)}
+    starts = [start for item in firsts.values() for start in begun(item)]
+    rough = sorted((fitted(start, ROUGH, 1) for start in starts), key=cost)
+    least = min(map(excess, fits))
+    found: dict[str, list[Fit]] = {}
+    for item in rough[:LEADING]:
+        if excess(item) <= FARTHEST * least:
+            found.setdefault(item.names[-1], []).append(fitted(item, STEPS, ROUNDS))
+    chosen = {name: simplest(firsts[name], others) for name, others in found.items()}
+    return {name: item for name, item in chosen.items() if item is not firsts[name]}
+
+
+def fitted(start: Fit, steps: int, rounds: int) -> Fit:
+    """A fit moved on by a few steps."""
+    return fitting.fit(start.data, start.values, start.z, steps, rounds=rounds)
+
+
+def simplest(first: Fit, others: list[Fit]) -> Fit:
+    """The first fit, or one under another law: with more free parameters only where it is much better."""
+    best = first
+    for item in sorted(others, key=lambda item: len(Problem(item.data, item.values).frees)):
+        if item.cost < best.cost - SURELY and excess(item) < BETTER * excess(best):
+            best = item
+    return best
+
+
+def begun(fit: Fit) -> list[Fit]:
+    """The fit with its last effect under further laws, where a fit of each starts best: those with the best starts."""
+    way = path(fit.data.part)
+    models = sorted({law.model for law in last(fit).laws[1:] if law.model}) if way is not None else []
+    followed = {model: specimens.fit(model, *way).parameters for model in models} if way is not None else {}
+    places = range(1, len(last(fit).laws))
+    return sorted((begun_under(fit, place, followed) for place in places), key=cost)[:FITTED]
+
+
+def last(fit: Fit) -> Effect:
+    """The effect of a fit that came last."""
+    return fit.data.catalogue[fit.names[-1]]
+
+
+def cost(fit: Fit) -> float:
+    """The figure by which fits are ranked."""
+    return fit.cost
 
 
 def settled(fit: Fit) -> Fit:
@@ -53,12 +124,12 @@ def settled(fit: Fit) -> Fit:
         steps = [LOGARITHMIC if item.logarithmic else LINEAR for item in problem.frees]
         corners[1:] += np.diag(steps)
 
-        def cost(free: Array, problem: Problem = problem, z: Array = z) -> float:
+        def cost_of(free: Array, problem: Problem = problem, z: Array = z) -> float:
             values = problem.values(np.concatenate([z, free]))
             return fitting.at(problem.data, values, z).cost
 
         options = {"initial_simplex": corners, "maxfev": EVALUATIONS, "fatol": 1.0, "xatol": 1e-4}
-        found = minimize(cost, start[count:], method="Nelder-Mead", options=options).x
+        found = minimize(cost_of, start[count:], method="Nelder-Mead", options=options).x
         values = problem.values(np.concatenate([z, found]))
         fit = min(
             (fit, fitting.fit(fit.data, values, z, STEPS, rounds=1), fitting.at(fit.data, values, z)),
@@ -67,35 +138,44 @@ def settled(fit: Fit) -> Fit:
     return fit
 
 
-def begun_under(fit: Fit, effect: Effect, place: int) -> Fit:
-    """The fit with an effect under the law at a place of its laws, where a fit of it starts best.
+def begun_under(fit: Fit, place: int, followed: Mapping[str, Mapping[str, float]]) -> Fit:
+    """The fit with its last effect under the law at a place of its laws, where a fit of it starts best.
 
-    From the plan's parameters, as those of a fit under a wrong law mean nothing.
+    From the plan's parameters, as those of a fit under a wrong law mean nothing. `followed` are the parameters with
+    which models of specimens follow the measured path, by model.
     """
+    effect = last(fit)
     begun = (
         fitting.at(fit.data, fit.values | {effect.name: values}, np.zeros(fit.z.size))
-        for values in starts(fit, effect, place)
+        for values in starts(fit, effect, place, followed)
     )
-    return min(begun, key=lambda item: item.cost)
+    return min(begun, key=cost)
 
 
-def starts(fit: Fit, effect: Effect, place: int) -> Iterator[dict[str, float]]:
+def starts(
+    fit: Fit, effect: Effect, place: int, followed: Mapping[str, Mapping[str, float]]
+) -> Iterator[dict[str, float]]:
     """Parameters from which a law may start: of the specimen that it is, or near those under another law."""
     base, law = effect.under(place, fit.values[effect.name]), effect.laws[place]
     (strength,) = (item for item in effect.parameters if not item.shape)
-    way = path(fit.data.part) if law.model else None
-    if way is not None:
-        found = specimens.fit(law.model, *way).parameters
-        known = {item.name: item for item in effect.every}
-        if "first_bend" in found.keys() - law.shapes.keys():  # without it the law yields at the same force
-            bend = found["first_bend"]
-            found["yield_displacement"] *= bend + found["second_stiffness"] * (1.0 - bend)
-        for name in (strength.name, *law.shapes):
-            base[name] = within(known[name], found[law.renamed.get(name, name)])
-        yield base
+    if law.model in followed:
+        yield base | as_specimen(effect, law, strength, followed[law.model])
         return
     for share, shape in itertools.product(NEARER.tolist(), shapes(fit, effect, place)):
         yield base | shape | {strength.name: within(strength, share * base[strength.name])}
+
+
+def as_specimen(
+    effect: Effect, law: Law, strength: Parameter, found: Mapping[str, float]
+) -> dict[str, float]:
+    """The parameters of an effect under a law from those of the specimen that it is."""
+    known = {item.name: item for item in effect.every}
+    values = dict(found)
+    if "first_bend" in values.keys() - law.shapes.keys():  # without it the law yields at the same force
+        bend = values["first_bend"]
+        values["yield_displacement"] *= bend + values["second_stiffness"] * (1.0 - bend)
+    names = (strength.name, *law.shapes)
+    return {name: within(known[name], values[law.renamed.get(name, name)]) for name in names}
 
 
 def shapes(fit: Fit, effect: Effect, place: int) -> list[dict[str, float]]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from diagnosis.fits import fitting
+from diagnosis.fits import hypothesis
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.scales import Scales
 from laboratories.effects.effect import Effect
@@ -40,7 +40,7 @@ class Plane:
         self._off = rest - self._basis @ self._here
         self._prior = np.eye(count, size)
         room = np.full(size, np.inf)
-        room[:count] = fitting.TOLERANCES + 1e-6
+        room[:count] = hypothesis.TOLERANCES + 1e-6
         at = np.concatenate([fit.z, np.zeros(size - count)])
         self._low, self._high = -room - at, room - at
         self._alone = self._cost(np.zeros(size), 0.0, 0.0, (0.0, 1e-12))[0] if size else float(fit.cost)
@@ -91,7 +91,7 @@ def look(effect: Effect, plane: Plane, scales: Scales) -> list[ScreenedEffect]:
         return []
     best: dict[tuple[float, ...], ScreenedEffect] = {}
     for form, values in scales.starts(effect):
-        moved = fit.data.reduced(fitting.lay(fit.data, fit.z, fit.values | {effect.name: values}))
+        moved = fit.data.reduced(hypothesis.lay(fit.data, fit.z, fit.values | {effect.name: values}))
         gain, share = plane.gain((moved - fit.reduced).ravel(), scales.stretch(effect))
         if form not in best or gain > best[form].gain:
             best[form] = ScreenedEffect(effect, scales.stretched(effect, values, share), gain)

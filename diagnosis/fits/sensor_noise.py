@@ -14,8 +14,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy import signal
 
-from diagnosis.fits import fitting
-from diagnosis.fits.fitting import Data, Fit
+from diagnosis.fits import hypothesis, residuals
+from diagnosis.fits.fitting import Fit
+from diagnosis.fits.residuals import Data
 from diagnosis.recorded.joined import JoinedPart
 from diagnosis.recorded.parts import ColumnAlone, LaboratoryPart, LoggedBuilding, Part
 from diagnosis.signals import colour, pickup
@@ -56,10 +57,10 @@ def quieter(after: Data, before: Data) -> bool:
 
 def remodelled(fit: Fit) -> Data:
     """The data of a fit with the noise that it leaves."""
-    data, system = fit.data, fitting.lay(fit.data, fit.z, fit.values)
+    data, system = fit.data, hypothesis.lay(fit.data, fit.z, fit.values)
     if data.part.exact:
         return data
-    return modelled(fitting.measured_by(data, fitting.noise(data.residual(system))), system)
+    return modelled(residuals.measured_by(data, residuals.noise(data.residual(system))), system)
 
 
 def modelled(data: Data, system: System) -> Data:
@@ -72,7 +73,7 @@ def modelled(data: Data, system: System) -> Data:
     white = np.array([item.rms for item in models])
     lines = rest.lines if rest.lines.any() else None
     spiky = rest.spikes if rest.spikes.any() else None
-    return fitting.measured_by(replace(data, noise=models, lines=lines, spikes=spiky), white)
+    return residuals.measured_by(replace(data, noise=models, lines=lines, spikes=spiky), white)
 
 
 def remainder(data: Data, system: System) -> Remainder:
@@ -90,9 +91,9 @@ def remainder(data: Data, system: System) -> Remainder:
         if not seen[place]:
             raw[:, place] = 0.0
             continue
-        whole = fitting.filled(raw[:, place], there[:, place])
+        whole = residuals.filled(raw[:, place], there[:, place])
         spiky[:, place] = spikes(whole) & there[:, place]
-        raw[:, place] = fitting.filled(whole, ~spiky[:, place])
+        raw[:, place] = residuals.filled(whole, ~spiky[:, place])
     for number, span in enumerate(spans(part)):
         lines[span], picked, kept = picked_up(raw[span], interval)
         raw[span] -= lines[span] + kept
@@ -151,7 +152,9 @@ def coloured(data: Data) -> bool:
 def whitened(fit: Fit) -> Data:
     """The data of a fit with white noise of the level of the highest frequencies, lines and spikes taken away."""
     data = replace(fit.data, noise=())
-    return fitting.measured_by(data, fitting.noise(data.residual(fitting.lay(data, fit.z, fit.values))))
+    return residuals.measured_by(
+        data, residuals.noise(data.residual(hypothesis.lay(data, fit.z, fit.values)))
+    )
 
 
 def share(data: Data) -> float:
@@ -164,7 +167,7 @@ def share(data: Data) -> float:
 
 def loudest(fit: Fit) -> Array:
     """Largest rms density (signals,) of each sensor's noise over that at the highest frequencies; one if white."""
-    white = fitting.noise(fit.data.residual(fitting.lay(fit.data, fit.z, fit.values)))
+    white = residuals.noise(fit.data.residual(hypothesis.lay(fit.data, fit.z, fit.values)))
     result = np.ones(white.size)
     for place, item in enumerate(fit.data.noise):
         if item.density is not None:
@@ -247,7 +250,7 @@ def model(data: Data, rest: Remainder, quiet: Mask, source: Source, place: int) 
     lines = pickup.named(rest.found[place])
     resolution = float(data.rounded[place])
     segments = stretches(rest.noise[:, place], quiet)
-    stepping = resolution > fitting.STEPPING * flat  # counts by itself, and more than noise of its size
+    stepping = resolution > residuals.STEPPING * flat  # counts by itself, and more than noise of its size
     if stepping or not segments or not np.any(rest.noise[:, place]) or is_white(segments, flat, resolution):
         return NoiseModel(flat, lines=lines, resolution=resolution)
     if alike(rest.noise[:, place], quiet):

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from common.plan.kinds import COLUMN, TABLE
-from diagnosis.fits import fitting
+from diagnosis.fits import hypothesis
 from diagnosis.fits.fitting import Fit
 from diagnosis.recorded.parts import ColumnAlone, LaboratoryPart
 from diagnosis.signals.mask import Mask
@@ -45,7 +45,7 @@ class Equation:
 
 def equations(fit: Fit) -> list[Equation]:
     """The equations of the machines in a fit's part; their models have the effects of the fit."""
-    part, system = fit.data.part, fitting.lay(fit.data, fit.z, fit.values)
+    part, system = fit.data.part, hypothesis.lay(fit.data, fit.z, fit.values)
     if isinstance(part, ColumnAlone):
         site = part.lab.site("column")
         return [of_specimen(site, system, part.inputs, part.measured[:, 0], part.present[:, 0])]

@@ -19,7 +19,7 @@ from diagnosis.findings import readings
 from diagnosis.findings.foretelling.as_reality import as_reality
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.verdict import heard, judge
-from diagnosis.fits import fitting
+from diagnosis.fits import fitting, residuals
 from diagnosis.fits.search import Search
 from diagnosis.recorded import record
 from loop import substructure
@@ -89,7 +89,7 @@ def fitted(path: Path, effects: Effects) -> Diagnosis:
     shown = record.build(read(path))
     verdicts = []
     for part in parts_of(shown):
-        data = fitting.prepare(part, shown)
+        data = residuals.prepare(part, shown)
         own = {
             name: shown.catalogue[name].values(values)
             for name, values in effects.items()

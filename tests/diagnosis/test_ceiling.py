@@ -9,7 +9,7 @@ import pytest
 from scipy import signal
 
 from common.errors import InputError
-from diagnosis.fits.fitting import withheld_ticks
+from diagnosis.fits.residuals import withheld_ticks
 from diagnosis.signals.ceiling import ceiling, depends_on
 from diagnosis.signals.features import plays
 from diagnosis.signals.mask import Mask

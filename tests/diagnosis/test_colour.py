@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from diagnosis.fits.search import gap
+from diagnosis.fits.unexplained import gap
 from diagnosis.signals import colour, pickup
 from diagnosis.signals.ceiling import Crosswise
 from diagnosis.signals.features import features

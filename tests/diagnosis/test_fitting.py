@@ -15,8 +15,9 @@ from hypothesis import strategies as st
 from common.plan import read as plans
 from common.plan.plan import Plan
 from common.recording.reader import read
-from diagnosis.fits import fitting
-from diagnosis.fits.fitting import Data, Fit
+from diagnosis.fits import fitting, hypothesis, residuals
+from diagnosis.fits.fitting import Fit
+from diagnosis.fits.residuals import Data
 from diagnosis.recorded import record
 from diagnosis.recorded.nuisances import of_building
 from diagnosis.recorded.parts import MODEL_ERROR, Building, LaboratoryPart, Part
@@ -33,7 +34,7 @@ PARTS: dict[str, Callable[[Record], Part]] = {"a": lab_a, "b": lab_b, "building"
 def data_of(cases: Cases, kind: str, **options: float) -> Data:
     """A part of a clean laboratory with jittered parameters."""
     found = cases.record(**options)  # type: ignore[arg-type]
-    return fitting.prepare(PARTS[kind](found), found)
+    return residuals.prepare(PARTS[kind](found), found)
 
 
 def at_nominal(data: Data) -> Fit:
@@ -78,7 +79,7 @@ def test_commissioning_finds_what_the_building_is(tmp_path: Path) -> None:
     base = short(6.0)
     made.play(base, made.tables(base, {}, off, 1), tmp_path / "a.mcap")
     whole = record.build(read(tmp_path / "a.mcap"))
-    fit = fitting.fit(fitting.prepare(Building(whole), whole), {})
+    fit = fitting.fit(residuals.prepare(Building(whole), whole), {})
     assert found_z(fit) == pytest.approx(off, abs=0.3)
     assert found_z(fit)["structure.stiffness"] - found_z(fit)["structure.mass"] == pytest.approx(
         -1.8, abs=0.2
@@ -104,8 +105,8 @@ def test_the_noise_is_found(cases: Cases, kind: str, default_plan: Plan) -> None
 def test_noise_of_white_noise_over_anything_smooth() -> None:
     t = np.arange(5000) * 0.002
     smooth = np.stack([1e3 * np.sin(2 * np.pi * 3 * t), 50 * t**2], axis=1)
-    assert fitting.noise(smooth + 0.1 * white(0, 5000, 2)) == pytest.approx([0.1, 0.1], rel=0.05)
-    assert np.all(fitting.noise(smooth) < 1e-3)
+    assert residuals.noise(smooth + 0.1 * white(0, 5000, 2)) == pytest.approx([0.1, 0.1], rel=0.05)
+    assert np.all(residuals.noise(smooth) < 1e-3)
 
 
 def test_residuals_of_white_noise_have_unit_variance(cases: Cases) -> None:
@@ -134,7 +135,7 @@ def test_what_is_missing_does_not_count(cases: Cases) -> None:
 
 def differences(fit: Fit, place: int, step: float) -> Array:
     """A column of the jacobian by central differences."""
-    problem = fitting.Problem(fit.data, fit.values)
+    problem = hypothesis.Problem(fit.data, fit.values)
     p = problem.place(fit.values, fit.z)
     up, down = p.copy(), p.copy()
     up[place] += step
@@ -151,7 +152,7 @@ def differences(fit: Fit, place: int, step: float) -> Array:
         ("building", {"structure.damping": {"factor": 1.2}}),
     ],
 )
-def test_slopes_are_those_of_finer_differences(cases: Cases, kind: str, values: fitting.Values) -> None:
+def test_slopes_are_those_of_finer_differences(cases: Cases, kind: str, values: hypothesis.Values) -> None:
     data = data_of(cases, kind, duration=4.0)
     fit = fitting.at(data, values, np.zeros(len(data.part.nuisances)))
     assert fit.jacobian.shape == (fit.reduced.size, fit.z.size + len(values))
@@ -189,14 +190,14 @@ def test_a_model_that_the_plan_cannot_have_is_far_off(cases: Cases) -> None:
     with pytest.raises(AttributeError):
         data.reduced(wrong)  # a mistake of ours is not taken for a bad hypothesis
     diverging = data.system.moved("column", stiffness=math.inf)
-    assert np.max(np.abs(data.reduced(diverging))) == fitting.FAR
+    assert np.max(np.abs(data.reduced(diverging))) == residuals.FAR
 
 
 @given(st.sampled_from(sorted(CATALOGUE)), st.floats(0.01, 0.99))
 def test_parameters_go_in_and_out_of_a_fit(name: str, share: float) -> None:
     effect = CATALOGUE[name]
     values = {item.name: item.sizes[0] if item.sizes else item.least for item in effect.parameters}
-    for item in fitting.free(effect, values):
+    for item in hypothesis.free(effect, values):
         low, high = item.bounds
         assert low < high
         place = item.inward(values[item.parameter.name])

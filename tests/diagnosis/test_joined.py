@@ -11,7 +11,7 @@ import pytest
 from common.errors import InputError
 from diagnosis.diagnose import judged
 from diagnosis.findings.verdict import intervals
-from diagnosis.fits import fitting
+from diagnosis.fits import fitting, residuals
 from diagnosis.fits.scales import Scales
 from diagnosis.recorded.joined import JoinedPart, joined, refuse_others
 from diagnosis.recorded.parts import Building
@@ -75,7 +75,7 @@ def test_a_second_recording_narrows_the_interval(cases: Cases) -> None:
     first, second = (cases.record(FRICTION, duration=4.0, scale=scale) for scale in (0.1, 0.2))
     widths = []
     for others in ([], [lab_b(second)]):
-        data = fitting.prepare(joined(lab_b(first), others, 4), first)
+        data = residuals.prepare(joined(lab_b(first), others, 4), first)
         found = intervals(fitting.fit(data, FRICTION))["damper.friction"]["force"]
         assert found.low < 3.0 < found.high
         widths.append(found.high - found.low)
@@ -86,5 +86,5 @@ def test_a_cause_in_one_recording_only_explains_not_both(cases: Cases) -> None:
     clean, stuck = cases.record(duration=4.0), cases.record(FRICTION, duration=4.0)
     part = joined(lab_b(stuck), [lab_b(clean)], 4)
     part.candidates = tuple(effect for effect in part.candidates if effect.name in FRICTION)
-    data = fitting.prepare(part, stuck)
+    data = residuals.prepare(part, stuck)
     assert judged(data, Scales(stuck)).outcome != "explained"

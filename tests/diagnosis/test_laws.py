@@ -8,8 +8,9 @@ import numpy as np
 
 from common.plan.plan import Plan
 from common.roles import MASTER
-from diagnosis.fits import fitting, laws
-from diagnosis.fits.fitting import Data, Fit
+from diagnosis.fits import fitting, hypothesis, laws, residuals
+from diagnosis.fits.fitting import Fit
+from diagnosis.fits.residuals import Data
 from diagnosis.recorded.joined import JoinedPart
 from diagnosis.recorded.nuisances import Nuisance
 from diagnosis.recorded.parts import ColumnAlone, Part
@@ -83,7 +84,7 @@ class Driven(ColumnAlone):
 
 
 def first_law(part: Part | None = None) -> Fit:
-    group, train = fitting.withheld(TICKS, INTERVAL)
+    group, train = residuals.withheld(TICKS, INTERVAL)
     level = np.array([NOISE])
     data = Data(part or MadeSpecimen(), System(Plan()), level, level, group, train, np.zeros(1))
     values = {"yield_displacement": 1e-3, "hardening": 0.1, "exponent": 2.0}
@@ -91,7 +92,7 @@ def first_law(part: Part | None = None) -> Fit:
 
 
 def test_a_pinched_law_with_damage_is_found_from_force_over_deformation() -> None:
-    found = laws.in_best_law(first_law(Driven()))
+    (found,) = laws.in_best_laws([first_law(Driven())])
     values = found.values["column.yielding"]
     effect = CATALOGUE["column.yielding"]
     assert effect.laws[int(values["law"])].name == "pinched trilinear"
@@ -112,7 +113,7 @@ def test_of_several_recordings_the_one_that_goes_farthest_starts_a_law() -> None
 
 def test_the_law_is_picked_and_its_parameters_are_those_of_the_column() -> None:
     before = first_law()
-    found = laws.in_best_law(before)
+    (found,) = laws.in_best_laws([before])
     values = found.values["column.yielding"]
     effect = CATALOGUE["column.yielding"]
     assert found.names == before.names
@@ -126,7 +127,7 @@ def test_a_parameter_that_a_law_lacks_is_not_fitted() -> None:
     effect = CATALOGUE["column.yielding"]
     base = {"yield_displacement": 1e-3, "hardening": 0.1, "exponent": 2.0}
     names = {
-        place: {item.parameter.name for item in fitting.free(effect, effect.under(place, base))}
+        place: {item.parameter.name for item in hypothesis.free(effect, effect.under(place, base))}
         for place in range(len(effect.laws))
     }
     assert names == {

@@ -11,9 +11,9 @@ from scipy import signal
 from diagnosis.diagnose import own_noise
 from diagnosis.findings import how_far, verdict
 from diagnosis.findings.found import Diagnosis
-from diagnosis.fits import fitting
+from diagnosis.fits import residuals
 from diagnosis.fits.scales import Scales
-from diagnosis.fits.search import Search, Searcher
+from diagnosis.fits.search import Search, search
 from diagnosis.recorded.parts import Building, LoggedBuilding, earlier
 from diagnosis.recorded.record import Record
 from diagnosis.report.records import HowFar
@@ -29,11 +29,11 @@ def relogged(whole: Record, name: str, values: Array) -> Record:
     return replace(whole, signals=whole.signals | {name: values})
 
 
-def logged(whole: Record) -> fitting.Data:
+def logged(whole: Record) -> residuals.Data:
     """Its building by the balance of its forces."""
     part = Building(whole).logged()
     assert part is not None
-    return fitting.prepare(part, whole)
+    return residuals.prepare(part, whole)
 
 
 def noisy(whole: Record, colour: float = 0.0) -> Record:
@@ -53,7 +53,7 @@ def test_forces_with_noise_of_their_own_came_through_a_logger(cases: Cases) -> N
 
 @pytest.mark.parametrize("colour", [0.0, 0.9])
 def test_a_logger_tells_its_delay_and_its_noise_is_no_gap(cases: Cases, colour: float) -> None:
-    found = Searcher(logged(noisy(cases.record(), colour)), Scales(cases.record())).run()
+    found = search(logged(noisy(cases.record(), colour)), Scales(cases.record()))
     assert found.chosen.names == ()
     assert isinstance(found.data.part, LoggedBuilding)
     assert found.data.part.late(found.chosen.z) == pytest.approx(LATE * 0.002, abs=1e-3)
@@ -71,7 +71,7 @@ def in_column(whole: Record, values: Array) -> Search:
     """What is found in the master's laboratory with something more in the displacement."""
     name = "column_displacement"
     changed = relogged(whole, name, whole.signals[name] + values)
-    return Searcher(fitting.prepare(lab_a(changed), changed), Scales(changed)).run()
+    return search(residuals.prepare(lab_a(changed), changed), Scales(changed))
 
 
 @pytest.fixture(scope="module")

@@ -9,8 +9,9 @@ import pytest
 
 from diagnosis.findings import next_test
 from diagnosis.findings.next_test import ChosenTest
-from diagnosis.fits import fitting
-from diagnosis.fits.fitting import Data, Values
+from diagnosis.fits import fitting, residuals
+from diagnosis.fits.hypothesis import Values
+from diagnosis.fits.residuals import Data
 from diagnosis.recorded.parts import LaboratoryPart
 from laboratories.effects import CATALOGUE, checked
 from tests.diagnosis.cases import Cases, lab_a
@@ -19,7 +20,7 @@ from tests.diagnosis.cases import Cases, lab_a
 def laboratory(cases: Cases) -> Data:
     """A clean laboratory A."""
     whole = cases.record(duration=8.0)
-    return fitting.prepare(lab_a(whole), whole)
+    return residuals.prepare(lab_a(whole), whole)
 
 
 def hypothesis(data: Data, effect: str, **given: float) -> fitting.Fit:

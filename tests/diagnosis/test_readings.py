@@ -8,7 +8,7 @@ import pytest
 from common.recording.reader import read
 from diagnosis.findings import readings
 from diagnosis.findings.readings import SensorFinding
-from diagnosis.fits import fitting
+from diagnosis.fits import residuals
 from diagnosis.recorded import record
 from diagnosis.recorded.record import Record
 from tests.diagnosis.cases import Cases, lab_a, lab_b, named
@@ -17,7 +17,7 @@ from tests.diagnosis.cases import Cases, lab_a, lab_b, named
 def found_in(whole: Record) -> list[SensorFinding]:
     """Findings as a diagnosis makes them."""
     steps = readings.steps(whole)
-    datas = [fitting.prepare(kind(whole), whole, steps) for kind in (lab_a, lab_b)]
+    datas = [residuals.prepare(kind(whole), whole, steps) for kind in (lab_a, lab_b)]
     return readings.findings(whole, readings.levels(datas), steps)
 
 
@@ -58,7 +58,7 @@ def test_sensors_as_planned_are_left_in_peace(cases: Cases) -> None:
 
 def test_sensors_that_are_all_noisier_than_planned_are_not_blamed(cases: Cases) -> None:
     whole = cases.record(duration=8.0)
-    datas = [fitting.prepare(kind(whole), whole) for kind in (lab_a, lab_b)]
+    datas = [residuals.prepare(kind(whole), whole) for kind in (lab_a, lab_b)]
     loud = {name: 1.9 * level for name, level in readings.levels(datas).items()}
     assert readings.findings(whole, loud, {}) == []
 
@@ -74,7 +74,7 @@ def test_decimals_that_readings_of_a_unit_share_are_the_logger_s(cases: Cases) -
 
 def test_noise_of_a_converter_is_the_logger_s(cases: Cases) -> None:
     whole = cases.record(duration=8.0)
-    levels = readings.levels([fitting.prepare(kind(whole), whole) for kind in (lab_a, lab_b)])
+    levels = readings.levels([residuals.prepare(kind(whole), whole) for kind in (lab_a, lab_b)])
     loud = levels | {"damper_stroke": 6e-4 * float(np.max(np.abs(whole.signals["damper_stroke"])))}
     assert [item.effect for item in readings.findings(whole, loud, {})] == ["sensor.damper_stroke.noise"]
     assert readings.findings(whole, loud, {}, logged=True) == []

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis.fits import fitting, search
+from diagnosis.fits import candidates, fitting, residuals, unexplained
 from diagnosis.fits.scales import Scales
-from diagnosis.fits.search import Searcher
+from diagnosis.fits.search import search
 from tests.diagnosis.cases import Cases, Effects, counts_as, estimate, lab_a, named, white
 
 ALONE: list[tuple[str, dict[str, float], dict[str, float]]] = [  # effect, truth, relative error allowed
@@ -99,27 +99,27 @@ def test_what_these_signals_cannot_tell_apart_stands_together(cases: Cases, true
 
 def test_the_gap_of_noise_is_none_and_that_of_a_trend_is_seen() -> None:
     for seed in range(20):
-        assert search.gap(white(seed, 1250), 4).ratio < search.MATERIAL
+        assert unexplained.gap(white(seed, 1250), 4).ratio < unexplained.MATERIAL
     slow = 2.0 * np.sin(np.linspace(0.0, 60.0, 1250))
-    found = search.gap(white(0, 1250) + slow, 4)
+    found = unexplained.gap(white(0, 1250) + slow, 4)
     assert found.significance > 20.0
     assert found.ratio == pytest.approx(
         np.sqrt(2.0) / np.sqrt(4.0), rel=0.15
     )  # rms over that of a single sample
-    assert search.gap(np.zeros(5), 4) == (0.0, 0.0)
+    assert unexplained.gap(np.zeros(5), 4) == (0.0, 0.0)
 
 
 def test_a_search_says_what_it_explained(cases: Cases) -> None:
     whole = cases.record({"column.friction": {"force": 900.0}})
-    data = fitting.prepare(lab_a(whole), whole)
-    found = Searcher(data, Scales(whole)).run()
+    data = residuals.prepare(lab_a(whole), whole)
+    found = search(data, Scales(whole))
     assert found.chosen.names == ("column.friction",)
     assert found.explained > 0.99
-    assert found.left < search.MATERIAL
+    assert found.left < unexplained.MATERIAL
     assert fitting.excess(found.chosen) < 0.01 * fitting.excess(found.commissioned)
     costs = [item.cost for item in found.alternatives]
     assert costs == sorted(costs)
-    assert costs[0] > found.chosen.cost + search.TIED
+    assert costs[0] > found.chosen.cost + candidates.TIED
 
 
 LINKS: dict[str, Effects] = {

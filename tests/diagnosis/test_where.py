@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from diagnosis.findings import where
 from diagnosis.findings.where import SiteTrace
-from diagnosis.fits import fitting
-from diagnosis.fits.fitting import Data
+from diagnosis.fits import fitting, hypothesis, residuals
+from diagnosis.fits.residuals import Data
 from diagnosis.recorded.parts import Building, Part
 from diagnosis.recorded.record import Record
 from laboratories.effects import CATALOGUE, checked, lay
@@ -81,7 +81,7 @@ def test_a_site_that_does_nothing_gets_nothing() -> None:
     assert found["column"] == found["actuator"] == (2.0, 1.0, 3.0)
 
 
-SITES: dict[str, tuple[str, fitting.Values]] = {
+SITES: dict[str, tuple[str, hypothesis.Values]] = {
     "column": ("a", {"column.friction": {"force": 900.0}}),
     "actuator": ("a", {"actuator.backlash": {"width": 3e-4}}),
     "damper": ("b", {"damper.friction": {"force": 3.0}}),
@@ -94,10 +94,10 @@ SITES: dict[str, tuple[str, fitting.Values]] = {
 PARTS: dict[str, Callable[[Record], Part]] = {"a": lab_a, "b": lab_b, "building": Building}
 
 
-def spoilt(cases: Cases, kind: str, effects: fitting.Values) -> Data:
+def spoilt(cases: Cases, kind: str, effects: hypothesis.Values) -> Data:
     """A part whose readings show effects, with noise."""
     whole = cases.record(duration=8.0)
-    data = fitting.prepare(PARTS[kind](whole), whole)
+    data = residuals.prepare(PARTS[kind](whole), whole)
     truth = data.part.predict(lay(data.system, tuple(effects.items())))
     data.part.measured = truth + data.white * white(5, *truth.shape)
     return data

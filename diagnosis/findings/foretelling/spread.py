@@ -14,7 +14,8 @@ from common.roles import MASTER
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.gaps import RecordingGaps, held_out
 from diagnosis.findings.verdict import PartVerdict, covariance
-from diagnosis.fits.fitting import Fit, Problem
+from diagnosis.fits.fitting import Fit
+from diagnosis.fits.hypothesis import Problem
 from diagnosis.recorded.loop import NOISY, noised
 from diagnosis.signals.mask import Mask
 from models.registry import Array

@@ -1,0 +1,104 @@
+"""Hypotheses with one effect more, or with one effect exchanged for another.
+
+Every effect is first laid over the present hypothesis at a few sizes, and what it could gain once the nominal
+parameters give way is read off a linear projection; the most promising are then fitted, the best of these to their end.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+
+from diagnosis.fits import contact, fitting, laws
+from diagnosis.fits.fitting import Fit, excess
+from diagnosis.fits.hypothesis import Values
+from diagnosis.fits.scales import Scales
+from diagnosis.fits.screening import WORKERS, ScreenedEffect, screen
+from diagnosis.fits.unexplained import MATERIAL, remaining
+from diagnosis.fits.worth import LOUD
+
+# Effort: a fit takes many predictions of the part, a projection few.
+FITTED = 6  # candidates of the projection that are fitted at every step
+FINE = 3  # of these, candidates that are fitted to their end,
+HOPELESS = 30.0  # as long as they leave no more than this times what the best one leaves
+ROUGH = 4  # steps of a first fit
+STEPS = 6  # steps between two weightings of a further fit
+LAST = 5  # steps over the whole test after those over its beginning
+TIED = 9.0  # cost by which hypotheses differ that can be told apart: 3 standard deviations squared
+
+
+def extended(fit: Fit, scales: Scales, count: int = FITTED, known: Fit | None = None) -> list[Fit]:
+    """Fits with one effect more, best first: all a few steps over a beginning, the best of them to their end.
+
+    Those that leave far more than the best, or than a fit that is `known`, stay as they are after a few steps.
+    """
+    data, near = fit.data, fitting.begun(fit)
+    promising = screen(near, data.part.candidates, scales)[:count]
+    slopes = near.jacobian[:, : fit.z.size]
+
+    def rough(candidate: ScreenedEffect) -> Fit:
+        start: Values = {**fit.values, candidate.effect.name: candidate.values}
+        return fitting.fit(near.data, start, near.z, ROUGH, slopes, rounds=1)
+
+    def fine(item: Fit) -> Fit:
+        z = np.clip(item.z, -fitting.NEAR, fitting.NEAR)
+        if data.part.exact:  # cheap, and free of noise: fits go to their end
+            return fitting.fit(data, item.values, z, rounds=8)
+        better = fitting.fit(near.data, item.values, z, STEPS, rounds=2)
+        return fitting.fit(data, better.values, better.z, LAST, rounds=1)
+
+    with ThreadPoolExecutor(WORKERS) as pool:
+        fits = sorted(pool.map(rough, promising), key=lambda item: item.cost)
+        least = min((excess(item) for item in fits), default=0.0)
+        if known is not None:
+            least = min(least, max(excess(known), TIED))
+        hopeful = [item for item in fits if excess(item) <= HOPELESS * least][:FINE]
+        hopeful = fits if data.part.exact else hopeful
+        rest = [fitting.at(data, item.values, item.z) for item in fits[len(hopeful) :]]
+        fits = sorted([*pool.map(fine, hopeful), *rest], key=lambda item: item.cost)
+    if fits and remaining(fits[0]) > MATERIAL and (known is None or hopeful):
+        fits[0] = fitting.fit(data, fits[0].values, fits[0].z, STEPS, rounds=3)
+    return with_stop(fit, fits)
+
+
+def with_stop(fit: Fit, fits: list[Fit]) -> list[Fit]:
+    """The fits, and one with an end stop where all the others leave a large residual."""
+    stops = [effect for effect in fit.data.part.candidates if effect.contact]
+    if not fits or not stops or remaining(fits[0]) < LOUD or stops[0].name in fit.names:
+        return fits
+    found = contact.stopped(fit.data, fit, stops[0])
+    rest = [item for item in fits if stops[0].name not in item.names]
+    if found is None or found.cost > min(item.cost for item in fits):
+        return fits
+    return sorted([found, *rest], key=lambda item: item.cost)
+
+
+def best_laws(fit: Fit, scales: Scales) -> list[Fit]:
+    """Fits with one effect more, best first, each effect under the law of its mechanism that leaves least."""
+    return laws.in_best_laws(extended(fit, scales))
+
+
+def without(fit: Fit, name: str) -> Fit:
+    """The fit again with one effect taken away."""
+    return fitting.fit(fit.data, {key: value for key, value in fit.values.items() if key != name}, fit.z)
+
+
+def exchanged(fit: Fit, scales: Scales) -> Fit:
+    """A better fit with one effect exchanged for another, if there is any."""
+    for name in fit.names[:-1]:
+        others = extended(without(fit, name), scales, count=3, known=fit)
+        if others and others[0].cost < fit.cost - TIED:
+            fit = others[0]
+    return fit
+
+
+def alternatives(fit: Fit, first: list[Fit], scales: Scales) -> tuple[Fit, ...]:
+    """Fits in which one effect is exchanged for another, best first; `first` are those with one only."""
+    if len(fit.names) < 2:
+        return tuple(item for item in first if item.names != fit.names)
+    result: list[Fit] = []
+    for name in fit.names:
+        others = extended(without(fit, name), scales, known=fit)
+        result += [other for other in others if set(other.names) != set(fit.names)]
+    return tuple(sorted(result, key=lambda item: item.cost))

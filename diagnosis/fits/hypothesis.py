@@ -1,0 +1,170 @@
+"""A hypothesis as a fit moves it: nominal parameters within their tolerances, and effects laid over the plan."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagnosis.fits.residuals import Data
+from laboratories.effects.effect import Effect, Parameter
+from models.registry import Array
+from models.system import System
+
+TOLERANCES = 3.0  # most that a nominal parameter is moved: beyond it the plan is wrong
+STEP, FINE_STEP = 0.4, 2e-3  # tolerances between differences: over the kinks of friction, or exactly
+KEPT = 3  # residuals of the last places that are kept: a fit asks for those of a step and of the one before it again
+REUSED = 3  # iterations for which the slopes over the nominal parameters serve again
+
+Values = dict[str, dict[str, float]]  # effect → parameter → value
+
+
+def lay(data: Data, z: Array, values: Values) -> System:
+    """The plan with parameters moved and effects laid over it."""
+    system = data.system
+    for nuisance, place in zip(data.part.nuisances, z, strict=True):
+        system = nuisance.moved(system, float(place))
+    for name, given in values.items():
+        system = data.catalogue[name].apply(system, **given)
+    return system
+
+
+@dataclass(frozen=True)
+class Free:
+    """One parameter of an effect that a fit moves, on the scale it is moved on."""
+
+    effect: str
+    parameter: Parameter
+    scale: float
+    logarithmic: bool
+
+    def inward(self, value: float) -> float:
+        """From the parameter's value to the fit's."""
+        if self.logarithmic:
+            return math.log(value)
+        return (value - self._origin) / self.scale
+
+    def outward(self, place: float) -> float:
+        """From the fit's value to the parameter's."""
+        if self.logarithmic:
+            return math.exp(place)
+        return self._origin + place * self.scale
+
+    @property
+    def _origin(self) -> float:
+        return 0.0 if self.parameter.shape else self.parameter.null
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Range of the fit's value."""
+        least, most = self.parameter.least, min(self.parameter.most, self.parameter.believed)
+        if self.logarithmic:
+            return math.log(max(least, 1e-12)), math.log(most)
+        return self.inward(least), self.inward(most)
+
+
+def free(effect: Effect, values: Mapping[str, float]) -> list[Free]:
+    """The parameters of an effect as a fit moves them, from where it starts."""
+    result = []
+    law = effect.law(values)
+    for parameter in effect.every:
+        if law and parameter.shape and parameter.name not in law.shapes:
+            continue
+        logarithmic = math.isinf(parameter.null) or (parameter.shape and parameter.least > 0.0)
+        if parameter.shape and parameter.default == parameter.least == values[parameter.name]:
+            continue  # a shape that is left out
+        size = abs(values[parameter.name] - (0.0 if parameter.shape else parameter.null))
+        scale = size if size > 0.0 and math.isfinite(size) else 1.0
+        result.append(Free(effect.name, parameter, scale, logarithmic))
+    return result
+
+
+class Problem:
+    """One hypothesis as `least_squares` takes it.
+
+    `slopes` of the residuals over the nominal parameters, known from elsewhere, serve as long as
+    the fit goes on; without them they are computed anew every few iterations.
+    """
+
+    def __init__(
+        self, data: Data, start: Values, slopes: Array | None = None, weights: Array | None = None
+    ) -> None:
+        self.data = data
+        self._start = start
+        kept = int(np.sum(data.train))
+        self._weights = np.tile(weights, kept) if weights is not None else 1.0
+        self._train = np.repeat(data.train, data.sigma.size)
+        self.names = tuple(start)
+        self.frees = tuple(item for name in start for item in free(data.catalogue[name], start[name]))
+        self.count = len(data.part.nuisances)
+        self._step = FINE_STEP if data.part.exact else STEP
+        self._slopes = slopes
+        self._uses = 0 if slopes is None else -1
+        self._kept: dict[bytes, Array] = {}
+
+    def place(self, values: Values, z: Array) -> Array:
+        """What the fit moves, from the parameters."""
+        inside = [item.inward(values[item.effect][item.parameter.name]) for item in self.frees]
+        return np.concatenate([z, np.array(inside)])
+
+    def values(self, p: Array) -> Values:
+        """The effects' parameters at a place of the fit."""
+        result: Values = {name: dict(values) for name, values in self._start.items()}
+        for item, place in zip(self.frees, p[self.count :], strict=True):
+            value = item.outward(float(place))
+            result[item.effect][item.parameter.name] = min(
+                max(value, item.parameter.least), item.parameter.most
+            )
+        return result
+
+    def reduced(self, p: Array) -> Array:
+        """Residuals at a place (groups, signals)."""
+        known = self._kept.get(p.tobytes())
+        if known is not None:
+            return known
+        return self.keep(p, self.data.reduced(lay(self.data, p[: self.count], self.values(p))))
+
+    def keep(self, p: Array, reduced: Array) -> Array:
+        """Keep the residuals of a place in the stead of the oldest ones, and return them."""
+        if len(self._kept) >= KEPT:
+            del self._kept[next(iter(self._kept))]
+        self._kept[p.tobytes()] = reduced
+        return reduced
+
+    def stacked(self, p: Array) -> Array:
+        """Residuals and prior in one vector."""
+        fitted = self.reduced(p).ravel()[self._train]
+        return np.concatenate([fitted * self._weights, p[: self.count]])
+
+    def bounds(self) -> tuple[Array, Array]:
+        """Bounds of all that is moved."""
+        ranges = [(-TOLERANCES, TOLERANCES)] * self.count + [item.bounds for item in self.frees]
+        low, high = np.array(ranges, dtype=np.float64).reshape(-1, 2).T
+        return low, high
+
+    def jacobian(self, p: Array, here: Array | None = None, first: int = 0, last: int | None = None) -> Array:
+        """Differences of the residuals over some of the parameters, (groups·signals, parameters)."""
+        here = self.reduced(p).ravel() if here is None else here
+        columns = []
+        _, high = self.bounds()
+        for place in range(first, p.size if last is None else last):
+            step = self._step * (1.0 if place < self.count else 0.1 * max(1.0, abs(p[place])))
+            if p[place] + step > high[place]:
+                step = -step
+            moved = p.copy()
+            moved[place] += step
+            there = self.data.reduced(lay(self.data, moved[: self.count], self.values(moved)))
+            columns.append((there.ravel() - here) / step)
+        return np.stack(columns, axis=1) if columns else np.zeros((here.size, 0))
+
+    def stacked_jacobian(self, p: Array) -> Array:
+        """Derivative of `stacked`."""
+        here = self.reduced(p).ravel()
+        if self._slopes is None or self._uses == 0:
+            self._slopes, self._uses = self.jacobian(p, here, last=self.count), REUSED
+        self._uses -= 1
+        slopes = np.concatenate([self._slopes, self.jacobian(p, here, first=self.count)], axis=1)
+        fitted = (slopes[self._train].T * self._weights).T
+        return np.concatenate([fitted, np.eye(self.count, p.size)])

@@ -1,0 +1,171 @@
+"""A part's residuals in the form that fits use: in units of the noise, averaged over a few ticks, some held out.
+
+The residuals of a part are driven by exactly known commands, so the unit σ is the noise of its sensors. They are
+averaged over a few ticks first, which loses nothing that moves.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from common.errors import InputError
+from diagnosis.recorded.parts import EXACT, MODEL_ERROR, Part
+from diagnosis.recorded.record import Record
+from diagnosis.signals import colour
+from diagnosis.signals.ceiling import Crosswise
+from diagnosis.signals.mask import Mask
+from diagnosis.signals.noise_model import NoiseModel
+from laboratories.effects import CATALOGUE
+from laboratories.effects.effect import Effect
+from models.registry import Array
+from models.system import System
+
+AVERAGED = 0.008  # s, over which residuals are averaged: the laboratories move much more slowly
+BLOCK = 1.0  # s, of the blocks that are held out in turn: longer than a model's error is correlated
+HELD_OUT = (2, 4)  # of every five blocks, these
+STEPPING = 2.0  # steps over the noise from which on a reading is rounded to more than its noise
+COARSE = 3.0  # steps that count as noise where a reading is rounded to more than its noise
+SPARSE = 0.5  # of an averaged sample's ticks that must be there
+FAR = 1e6  # residual, in σ, of a hypothesis that diverges: worse than any that does not
+
+
+@dataclass(frozen=True)
+class Data:
+    """A part's residuals in the form that fits use."""
+
+    part: Part
+    system: System  # the plan
+    sigma: Array  # (signals,) what a residual is measured by: noise, and what a good model may err by
+    white: Array  # (signals,) the noise alone
+    group: int  # ticks averaged
+    train: Mask  # (groups,) fitted on; the others judge
+    rounded: Array  # (signals,) step that a reading is rounded to, 0 for none
+    catalogue: Mapping[str, Effect] = field(default_factory=lambda: CATALOGUE)  # the effects of the test
+    noise: tuple[NoiseModel, ...] = ()  # of each signal; none: white, of rms `white`
+    lines: Array | None = None  # (ticks, signals) what the sensors pick up
+    spikes: Mask | None = None  # (ticks, signals) single samples that do not count
+    related: Crosswise | None = None  # what may follow from the part's inputs
+
+    @property
+    def groups(self) -> int:
+        """Number of averaged samples."""
+        return self.part.measured.shape[0] // self.group
+
+    def residual(self, system: System) -> Array:
+        """Recorded minus predicted, (ticks, signals), zero where nothing was recorded and where a reading has a spike.
+
+        Narrow lines that the sensors pick up are taken away.
+        """
+        with np.errstate(all="ignore"):
+            result = self.part.measured - self.part.predict(system)
+        if self.lines is not None:
+            result -= self.lines[: len(result)]
+        result[~self.there] = 0.0
+        return result
+
+    @cached_property
+    def there(self) -> Mask:
+        """Where readings count, (ticks, signals)."""
+        present = self.part.present
+        return present if self.spikes is None else present & ~self.spikes[: len(present)]
+
+    @cached_property
+    def factors(self) -> Array | None:
+        """Factors (groups, signals) on the residuals' spectra that make the noise white; None where it is white."""
+        if all(item.density is None for item in self.noise):
+            return None
+        columns = np.ones((self.groups, self.sigma.size))
+        for place, item in enumerate(self.noise):
+            if item.density is not None:
+                others = (
+                    self.sigma[place] ** 2 - self.white[place] ** 2
+                )  # what a model may err by, and rounding
+                columns[:, place] = self.sigma[place] * colour.gains(item.density + others, self.groups)
+        return columns
+
+    def averaged(self, raw: Array) -> Array:
+        """Means of ticks (ticks, …) over groups (groups, …), scaled so that white noise keeps its rms."""
+        count = self.groups * self.group
+        sums = raw[:count].reshape(self.groups, self.group, *raw.shape[1:]).sum(axis=1)
+        return np.asarray(sums / math.sqrt(self.group))
+
+    def reduced(self, system: System) -> Array:
+        """Residuals in σ averaged over groups, (groups, signals), each of unit variance for white noise."""
+        try:
+            raw = self.residual(system) / self.sigma
+        except InputError:  # a hypothesis that this plan's model cannot have
+            return np.full((self.groups, self.sigma.size), FAR)
+        if self.factors is None:
+            return finite(self.averaged(raw))
+        for place in np.flatnonzero(~self.there.all(axis=0)):
+            raw[:, place] = filled(raw[:, place], self.there[:, place])
+        result = finite(colour.whitened(finite(self.averaged(raw)), self.factors))
+        result[self.averaged(self.there.astype(np.float64)) < SPARSE * math.sqrt(self.group)] = 0.0
+        return result
+
+
+def finite(values: Array) -> Array:
+    """Residuals of which none is further away than `FAR`."""
+    return np.clip(np.nan_to_num(values, nan=FAR, posinf=FAR, neginf=-FAR), -FAR, FAR)
+
+
+def filled(x: Array, there: Mask) -> Array:
+    """A series (n,) with straight lines where nothing is there; zero where there is nothing at all."""
+    if there.all() or not there.any():
+        return x if there.all() else np.zeros_like(x)
+    return np.asarray(np.interp(np.arange(x.size), np.flatnonzero(there), x[there]))
+
+
+def prepare(part: Part, record: Record, steps: Mapping[str, float] | None = None) -> Data:
+    """Residuals of a part; σ from what is left at the highest frequencies once its model is taken away.
+
+    `steps` of readings that are rounded, by signal: a coarse step's error is no white noise and must not
+    be taken for a gap.
+    """
+    system = record.systems[part.role]
+    interval = record.plan.test.interval
+    group, train = withheld(part.measured.shape[0], interval)
+    ones = np.ones(part.measured.shape[1])
+    rounded = np.array([(steps or {}).get(name, 0.0) for name in part.signals])
+    data = Data(part, system, ones, 0.0 * ones, group, train, rounded, record.catalogue)
+    return measured_by(data, 0.0 * ones if part.exact else noise(data.residual(system)))
+
+
+def withheld(ticks: int, interval: float) -> tuple[int, Mask]:
+    """How many ticks are averaged, and which of the averaged samples (groups,) fits may see: blocks in turn."""
+    group = max(1, round(AVERAGED / interval))
+    groups = ticks // group
+    block = max(1, round(BLOCK / (interval * group)))
+    if groups < 5 * block:
+        return group, np.arange(groups) % 5 < min(HELD_OUT)
+    return group, ~np.isin((np.arange(groups) // block) % 5, HELD_OUT)
+
+
+def withheld_ticks(ticks: int, interval: float) -> Mask:
+    """Ticks (ticks,) that no fit sees."""
+    group, train = withheld(ticks, interval)
+    mask = np.zeros(ticks, dtype=bool)
+    mask[: train.size * group] = np.repeat(~train, group)
+    return mask
+
+
+def measured_by(data: Data, white: Array) -> Data:
+    """The data with residuals in units of a noise (signals,)."""
+    level = np.sqrt(np.mean(np.square(data.part.measured), axis=0))
+    least = (EXACT if data.part.exact else MODEL_ERROR) * level + 1e-15
+    rounding = np.where(
+        data.rounded > STEPPING * white, COARSE * data.rounded, data.rounded / math.sqrt(12.0)
+    )
+    return replace(data, sigma=np.sqrt(white**2 + least**2 + rounding**2), white=white)
+
+
+def noise(residual: Array) -> Array:
+    """Rms of the white part of each residual (ticks, signals)."""
+    rough = np.diff(residual, n=4, axis=0)
+    result: Array = 1.4826 * np.median(np.abs(rough), axis=0) / math.sqrt(70.0)
+    return result

@@ -1,0 +1,125 @@
+"""A fit and the noise that it leaves, found in turn: fits of which one follows from the other.
+
+Where the noise is not known, what a fit leaves tells of it; and how good a fit is depends on the noise. What looks like
+coloured noise may be an effect, so that effects are held against noise as well.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from diagnosis.fits import evidence, fitting, sensor_noise
+from diagnosis.fits.fitting import Fit
+from diagnosis.fits.residuals import Data
+from diagnosis.fits.scales import Scales
+from diagnosis.fits.screening import screen
+from diagnosis.fits.sensor_noise import quieter
+from diagnosis.fits.unexplained import MATERIAL, SIGNIFICANT, leaves
+
+ROUNDS = 4  # in which a fit and the noise that it leaves are found in turn
+STEPS = 6  # of a fit between two of these
+RIVALS, ROUGH = 3, 4  # candidates that are fitted in the place of coloured noise, and steps of their fits
+LOUDEST = (
+    10.0  # noise at its loudest frequency over that at the highest ones: pink noise of a whole test has less
+)
+SMALL = (
+    0.05  # of a reading's rms that may be coloured noise where only the residual beside effects tells of it
+)
+UNEVEN = 3.0  # times what the energy of normal noise varies by: such noise comes and goes, as a motion does
+
+
+def settled(fit: Fit) -> Fit:
+    """The fit under the noise that it leaves, which is that of its data.
+
+    Where much of what it leaves follows from the inputs, the quiet part holds a gap as well as noise: the noise is
+    then taken to be white, of the level of the highest frequencies.
+    """
+    if fit.data.part.exact:
+        return fit
+    found, data = fit, sensor_noise.remodelled(fit)
+    for _ in range(ROUNDS):
+        if not sensor_noise.coloured(data):
+            break
+        found = again(found, data)
+        better = sensor_noise.remodelled(found)
+        if not quieter(better, data):
+            break
+        data = better
+    else:
+        found = again(found, data)
+    if sensor_noise.coloured(data):
+        if not hidden(found):
+            return replace(found, data=data) if found.data is not data else found
+        data = sensor_noise.remodelled(fit)
+        data = replace(data, noise=(), lines=None, spikes=None)
+    return under_white(found, data, fit.data)
+
+
+def under_white(fit: Fit, data: Data, before: Data) -> Fit:
+    """The fit under white noise: that of `before` where it is no lower."""
+    changed = bool(before.noise) or before.lines is not None or before.spikes is not None
+    data = data if changed or quieter(data, before) else replace(before, related=data.related)
+    found = fitting.at(data, fit.values, fit.z)
+    return fitting.polished(found) if found.names and leaves(found) else found
+
+
+def again(fit: Fit, data: Data) -> Fit:
+    """A fit moved to the best parameters under another noise; white noise leaves it where it is."""
+    if sensor_noise.coloured(data):
+        return fitting.fit(data, fit.values, fit.z, STEPS, rounds=1)
+    return fitting.at(data, fit.values, fit.z)
+
+
+def hidden(fit: Fit) -> bool:
+    """Whether the noise that a fit is measured by may hold a gap.
+
+    Something is left beside that noise, and either the inputs foresee it or the noise is far louder at some frequency
+    than at the highest ones, as the noise of no sensor is; or it comes and goes, or what effects leave would be a
+    large share of a reading.
+    """
+    if fit.names and sensor_noise.share(fit.data) > SMALL:
+        return True
+    seen = any(
+        item.ratio > MATERIAL and item.significance > SIGNIFICANT for item in sensor_noise.foreseen(fit)
+    )
+    loud = sensor_noise.loudest(fit) > LOUDEST
+    uneven = np.array([item.tails > UNEVEN for item in fit.data.noise])
+    return seen or bool(np.any(loud & uneven)) or (bool(np.any(loud)) and leaves(fit))
+
+
+def instead_of_colour(bare: Fit, scales: Scales) -> tuple[Fit, list[Fit]]:
+    """The fit without effects, and those with one, best first, under the noise that the best of these leaves.
+
+    What is taken for coloured noise may be an effect, at rest as in motion: effects are fitted under white noise,
+    and the best is taken if the data are far more probable under it and the noise that it leaves. Without such an
+    effect the list is empty.
+    """
+    if not sensor_noise.coloured(bare.data):
+        return bare, []
+    fits = in_white_noise(bare, scales)
+    if not fits or not far_likelier(fits[0], bare):
+        return bare, []
+    best = settled(fits[0])
+    return again(bare, best.data), [best, *(again(item, best.data) for item in fits[1:])]
+
+
+def in_white_noise(bare: Fit, scales: Scales) -> list[Fit]:
+    """Fits with one effect over a beginning under white noise, held against the whole test, best first."""
+    white = fitting.at(sensor_noise.whitened(bare), {}, bare.z)
+    near = fitting.begun(white)
+    slopes = near.jacobian[:, : bare.z.size]
+    found = screen(near, white.data.part.candidates, scales)[:RIVALS]
+    fits = [
+        fitting.fit(near.data, {item.effect.name: item.values}, near.z, ROUGH, slopes, rounds=1)
+        for item in found
+    ]
+    whole = [fitting.at(white.data, item.values, item.z) for item in fits]
+    return sorted(whole, key=lambda item: item.cost)
+
+
+def far_likelier(fit: Fit, bare: Fit) -> bool:
+    """Whether the data are far more probable under a fit and the noise that it leaves than without effects."""
+    found = fitting.at(sensor_noise.remodelled(fit), fit.values, fit.z)
+    return evidence.surprise(found) < evidence.surprise(bare) - evidence.BEYOND

@@ -1,0 +1,77 @@
+"""What a fit leaves unexplained: what is systematic in its residuals, and whether that is more than noise.
+
+It is judged by sums over averaged samples, because noise averages out and systematic errors do not.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from diagnosis.fits import sensor_noise
+from diagnosis.fits.fitting import Fit
+from diagnosis.fits.sensor_noise import Foreseen
+from diagnosis.signals.noise_model import NoiseModel
+from models.registry import Array
+
+# The figures below were set on draws of `rths blind --set tune` (docs/decisions/0012-diagnosis.md), as a compromise
+# between effects that are overlooked and effects that are named without a cause.
+LEVELS = (1, 4, 16)  # averaged samples in a sum, from fast to slow systematic errors
+MATERIAL = 0.12  # systematic residual over noise below which a gap would interest nobody
+SIGNIFICANT = (
+    5.0  # standard deviations from which on it is no chance, with all signals and time scales looked at
+)
+
+
+class SystematicGap(NamedTuple):
+    """What is systematic in one signal's residual."""
+
+    ratio: float  # rms of the systematic part over that of the noise
+    significance: float  # standard deviations above white noise
+
+
+def gap(reduced: Array, group: int, noise: NoiseModel | None = None) -> SystematicGap:
+    """Systematic part of averaged residuals (groups,) in σ: what their sums over time exceed noise by.
+
+    How well the noise itself is known, and how heavy its tails are, goes into the standard error.
+    """
+    known, tails = (noise.samples, noise.tails) if noise else (math.inf, 1.0)
+    ratio, significance = 0.0, 0.0
+    for level in LEVELS:
+        count = reduced.size // level
+        if count < 8:
+            continue
+        sums = reduced[: count * level].reshape(count, level).sum(axis=1) / math.sqrt(level)
+        excess = float(np.mean(sums**2)) - 1.0
+        error = math.sqrt(2.0 * tails**2 / count + 2.0 * tails**2 * level / known)
+        significance = max(significance, excess / error)
+        ratio = max(ratio, math.sqrt(max(0.0, excess - 3.0 * error) / (level * group)))
+    return SystematicGap(ratio, significance)
+
+
+def gaps(fit: Fit, group: int) -> list[SystematicGap]:
+    """The systematic part of the residual of every signal."""
+    noises = fit.data.noise or (None,) * fit.reduced.shape[1]
+    return [gap(column, group, noise) for column, noise in zip(fit.reduced.T, noises, strict=True)]
+
+
+def remaining(fit: Fit) -> float:
+    """Largest systematic residual over noise that a fit leaves."""
+    return max((item.ratio for item in gaps(fit, fit.data.group)), default=0.0)
+
+
+def leaves(fit: Fit, allowed: Array | None = None) -> bool:
+    """Whether a fit leaves more than noise: the test of a residual that is white, of unit variance, where it is noise.
+
+    Its sums over time must not exceed noise, and where the noise is coloured nothing of it may follow from the inputs.
+    What is `allowed` in each signal (signals,), over σ, does not count.
+    """
+    least = np.maximum(MATERIAL, np.zeros(fit.data.sigma.size) if allowed is None else allowed)
+    found: list[tuple[SystematicGap | Foreseen, float]] = [
+        *zip(gaps(fit, fit.data.group), least, strict=True)
+    ]
+    if sensor_noise.coloured(fit.data):
+        found += zip(sensor_noise.foreseen(fit), least, strict=True)
+    return any(item.ratio > limit and item.significance > SIGNIFICANT for item, limit in found)

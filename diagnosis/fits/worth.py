@@ -1,0 +1,82 @@
+"""Whether a further effect is worth its parameters: it must be visible, explain enough, and not undo another one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from diagnosis.fits import fitting
+from diagnosis.fits.fitting import Fit, excess
+from diagnosis.fits.unexplained import MATERIAL, leaves, remaining
+from models.registry import Array
+
+# The figures below were set on draws of `rths blind --set tune` (docs/decisions/0012-diagnosis.md), as a compromise
+# between effects that are overlooked and effects that are named without a cause.
+PRIOR_GAIN, DATA_GAIN = 6.25, 25.0  # 2.5 tolerances squared; 5 standard deviations squared
+SUSPICIOUS = 8.0  # of Σ z²: nominal parameters that are all off together imitate an effect
+
+# A further effect explains
+REST = 0.85  # this share of what is left,
+TRACE = 2e-4  # and more than this share of the whole gap, which keeps out effects that fit the noise;
+HALF, SHARE = 0.5, 0.03  # or this share of what is left and this of the whole gap;
+LOUD, STEP_OF_REST, STEP_OF_WHOLE = (
+    10.0,
+    0.4,
+    0.01,
+)  # or these, where more than so many times the noise is left
+
+SEEN = 0.3  # trace over noise that an effect must leave: a smaller one is not visible in a plot
+CANCELLED = 4.0  # times the gap that one of several effects may make: beyond it effects undo each other
+
+
+def is_gap(fit: Fit) -> bool:
+    """Whether a fit leaves anything to explain: beyond noise, or beyond its tolerances."""
+    far = float(np.max(np.abs(fit.z), initial=0.0)) ** 2 > PRIOR_GAIN
+    return leaves(fit) or fit.prior > SUSPICIOUS or far
+
+
+def enough(bare: Fit, fit: Fit) -> bool:
+    """Whether the residual is too small for a further effect to be worth it."""
+    return not is_gap(fit) or (excess(fit) < TRACE * excess(bare) and fit.prior <= SUSPICIOUS)
+
+
+def is_worth(bare: Fit, before: Fit, after: Fit) -> bool:
+    """Whether the fit `after` with one effect more is worth its parameters; `bare` is the fit without effects."""
+    noise = max(1.0, after.chi / after.reduced.size)
+    prior, data = before.prior - after.prior, (before.chi - after.chi) / noise
+    if max(prior, 0.0) / PRIOR_GAIN + max(data, 0.0) / DATA_GAIN < 1.0 or prior + data <= 0.0:
+        return False
+    sizes = changes(after)
+    if before is bare or idle(after, sizes):
+        return not idle(after, sizes)
+    if prior > PRIOR_GAIN and data > -1.0 and remaining(before) < MATERIAL:
+        return True
+    return not cancelling(bare, sizes) and refines(bare, before, after)
+
+
+def idle(fit: Fit, sizes: list[Array]) -> bool:
+    """Whether an effect of a fit has no visible influence; `sizes` as `changes` gives them."""
+    return any(float(np.max(size)) < SEEN**2 * fit.data.group for size in sizes)
+
+
+def changes(fit: Fit) -> list[Array]:
+    """Mean square change (signals,) of the residuals without each effect, the rest as it is."""
+    result = []
+    for name in fit.names:
+        rest = {key: values for key, values in fit.values.items() if key != name}
+        change = fitting.at(fit.data, rest, fit.z).reduced - fit.reduced
+        result.append(np.mean(np.square(change), axis=0))
+    return result
+
+
+def cancelling(bare: Fit, sizes: list[Array]) -> bool:
+    """Whether effects of a fit do far more than the gap they explain, and undo each other."""
+    gap = max(float(np.max(np.mean(np.square(bare.reduced), axis=0))), 1.0)
+    return any(float(np.max(size)) > CANCELLED**2 * gap for size in sizes)
+
+
+def refines(bare: Fit, before: Fit, after: Fit) -> bool:
+    """Whether a further effect takes away enough of what is left, and of the whole gap."""
+    left, saved, whole = excess(before), excess(before) - excess(after), excess(bare)
+    if remaining(before) > LOUD:  # far from any noise a model may well be refined in small steps
+        return saved > STEP_OF_REST * left and saved > STEP_OF_WHOLE * whole
+    return (saved > REST * left and saved > TRACE * whole) or (saved > HALF * left and saved > SHARE * whole)
