@@ -35,14 +35,18 @@ class ColumnEffects:
     first_bend: float = 1.0  # of a trilinear or pinched specimen, over the yield displacement
     second_stiffness: float = 0.5  # between the bends, over the first
     pinch_force: float = 1.0  # of a pinched specimen: the corner of reloading, over the peak's force
-    pinch_displacement: float = 1.0  # and its place on the way to the peak
+    pinch_displacement: float = (
+        1.0  # and its place: on the way to the peak, of the peak, or of where it unloads to
+    )
     damage: float = 0.0  # growth of that peak per plastic deformation of the yield displacement
     centring: float = math.inf  # m, deformation where a self-centring specimen bends
     centring_hardening: float = 0.05
     centring_loop: float = 0.5  # height of its flag over its force there
     stiffening: float = 0.0  # stiffness gained over the first one
-    stiffening_law: float = 0.0  # 0 with the square of the deformation, 1 from a bend on
+    stiffening_law: float = 0.0  # 0 with the square of the deformation, 1 from a bend on, 2 from two bends on
     stiffening_bend: float = 1e-3  # m
+    stiffening_second: float = 0.0  # stiffness gained from a second bend on
+    stiffening_second_bend: float = 2e-3  # m
     degradation: float = (
         0.0  # share of stiffness lost when the largest deformation is far beyond the reference
     )

@@ -179,7 +179,10 @@ def as_specimen(
 
 
 def shapes(fit: Fit, effect: Effect, place: int) -> list[dict[str, float]]:
-    """The first shape of a law at some sizes: a length that only some laws have follows what the column reaches."""
+    """The first shape of a law at some sizes: a length that only some laws have follows what the column reaches.
+
+    A second length of the law stays in proportion to it.
+    """
     law = effect.laws[place]
     shape = next((item for item in effect.every if item.name in law.shapes and item.sizes), None)
     if shape is None:
@@ -189,7 +192,13 @@ def shapes(fit: Fit, effect: Effect, place: int) -> list[dict[str, float]]:
         sizes = {share * float(np.max(np.abs(way[0]))) for share in REACHED}
     else:
         sizes = {share * size for share in (*FINER, 1.0) for size in shape.sizes}
-    return [{shape.name: within(shape, size)} for size in sorted(sizes)]
+    lengths = [item for item in effect.further if item.name in law.shapes and item.unit == shape.unit == "m"]
+    scaled = {item: law.shapes[item.name] / law.shapes[shape.name] for item in lengths if item is not shape}
+    return [
+        {shape.name: within(shape, size)}
+        | {item.name: within(item, ratio * size) for item, ratio in scaled.items()}
+        for size in sorted(sizes)
+    ]
 
 
 def within(parameter: Parameter, value: float) -> float:

@@ -25,6 +25,7 @@ from models.system import ColumnEffects
 PRESENT, STIFFNESS, YIELDS, DEGRADATION, PINCHING, PINCHING_WIDTH, PINCHING_HARDENING = range(7)
 FRICTION, PRESLIDING, VISCOUS, INERTIA, SLIP, FRICTION_VELOCITY = range(7, 13)
 ASYMMETRY, DROP, SPEED, PLAY, BESIDE, CENTRES, STIFFENING, BEND = range(13, 21)
+SECOND_STIFFENING, SECOND_BEND = range(21, 23)
 
 # places in `cell`; the last two are the specimen's place within play, and the force that it carried there
 DEFORMATION, RATE, LARGEST, SLIDER, LAST_STEP, REACTION, INSIDE, CARRIED = range(8)
@@ -36,8 +37,13 @@ LAWS = (
     "trilinear",
     "pinched",
     "pinched",
+    "pinched_by_peak",
+    "pinched_by_peak",
+    "pinched_by_rest",
+    "pinched_by_rest",
 )  # of yielding, in the order of `ColumnEffects.law`
 PLAYS = ORIGIN, RESTING, HELD, PARTLY = range(4)  # where the gap is: see `column.slip`
+TWICE = 2  # of `ColumnEffects.stiffening_law`: with two bends
 STIFFENED_AT = 2e-3  # m, reference deformation of hardening with the square of the deformation
 DEGRADED_AT = (
     2e-3  # m, reference deformation of degradation, at which 63 % of the stiffness is lost that will be
@@ -89,6 +95,8 @@ def build(column: Column, effects: ColumnEffects | None = None) -> Specimen:
         float(centres),
         more.stiffening * column.stiffness,
         bend,
+        more.stiffening_second * column.stiffness if more.stiffening_law == TWICE else 0.0,
+        more.stiffening_second_bend,
     ]
     law = np.array(more.learned)
     return Specimen(
@@ -124,7 +132,7 @@ def yielding(stiffness: float, effects: ColumnEffects) -> Array:
         return np.array([stiffness, limit, max(effects.hardening, 0.0), effects.unloading, 0.0, 0.0])
     if name == "trilinear":  # whose sliders cannot push
         return np.array([*skeleton[:-1], max(effects.second_stiffness, effects.hardening)])
-    if name == "pinched":
+    if name.startswith("pinched"):
         corner = [effects.pinch_force, effects.pinch_displacement]
         return np.array([*skeleton, *corner, effects.unloading, effects.damage])
     return np.array([stiffness, limit, effects.hardening])
@@ -194,6 +202,9 @@ def carried(specimen: Specimen, within: float) -> float:
         square = within * within / (STIFFENED_AT * STIFFENED_AT)
         beyond = within - min(max(within, -bend), bend)
         result += effects[STIFFENING] * (beyond if bend > 0.0 else square * within)
+    if effects[SECOND_STIFFENING] != 0.0:
+        farther = effects[SECOND_BEND]
+        result += effects[SECOND_STIFFENING] * (within - min(max(within, -farther), farther))
     return result
 
 

@@ -80,8 +80,12 @@ SPECIMENS = {
             self_centring.RULES,
             self_centring.STATE_SIZE,
         ),
+        # their codes less CORNERS say where the corner of reloading lies
+        SpecimenModel("pinched_by_peak", 9, pinched.PinchedParams, pinched.RULES, pinched.STATE_SIZE),
+        SpecimenModel("pinched_by_rest", 10, pinched.PinchedParams, pinched.RULES, pinched.STATE_SIZE),
     )
 }
+CORNERS = 8
 STATE_SIZE = max(model.state_size for model in SPECIMENS.values())
 
 
@@ -120,8 +124,8 @@ def step(kind: int, p: Array, s: Array, deformation: float) -> float:
         force = bwbn.step(p, s, deformation)
     elif kind == 5:
         force = menegotto_pinto.step(p, s, deformation)
-    elif kind == 6:
-        force = pinched.step(p, s, deformation)
+    elif kind in (6, 9, 10):
+        force = pinched.step(p, s, deformation, max(kind - CORNERS, pinched.ON_THE_WAY))
     elif kind == 7:
         force = trilinear.step(p, s, deformation)
     elif kind == 8:

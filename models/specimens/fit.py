@@ -87,6 +87,12 @@ SKELETON = {
     "first_bend": SearchRange(0.02, 1.0, (0.4, 0.8), log=False),
     "second_stiffness": SearchRange(0.0, 1.0, (0.5,), log=False),
 }
+PINCHED = SKELETON | {
+    "pinch_force": SearchRange(0.0, 1.0, (0.2, 0.8), log=False),
+    "pinch_displacement": SearchRange(0.0, 1.0, (0.5,), log=False),
+    "unloading": SearchRange(0.0, 1.0, (0.2,), log=False),
+    "damage": SearchRange(0.0, 1.0, (0.01,), log=False),
+}
 FREE: dict[str, dict[str, SearchRange]] = {
     "linear": {"stiffness": STIFFNESS},
     "bilinear": {"stiffness": STIFFNESS, "yield_displacement": YIELDING, "hardening": HARDENING},
@@ -118,13 +124,9 @@ FREE: dict[str, dict[str, SearchRange]] = {
         "loss": SearchRange(0.0, 0.98, (0.9,), log=False),
     },
     "trilinear": SKELETON,
-    "pinched": SKELETON
-    | {
-        "pinch_force": SearchRange(0.0, 1.0, (0.2, 0.8), log=False),
-        "pinch_displacement": SearchRange(0.0, 1.0, (0.5,), log=False),
-        "unloading": SearchRange(0.0, 1.0, (0.2,), log=False),
-        "damage": SearchRange(0.0, 1.0, (0.01,), log=False),
-    },
+    "pinched": PINCHED,
+    "pinched_by_peak": PINCHED,
+    "pinched_by_rest": PINCHED,
     "self_centring": {
         "stiffness": STIFFNESS,
         "yield_displacement": YIELDING,

@@ -46,7 +46,7 @@ def theirs(ops: Any, deformations: Array, *material: float | str) -> Array:
 
 
 def ours(name: str, deformations: Array, **params: float) -> Array:
-    kind, p, s = specimens.pack(name, stiffness=K, yield_displacement=DY, **params)
+    kind, p, s = specimens.pack(name, **{"stiffness": K, "yield_displacement": DY, **params})
     return np.array([specimens.step(kind, p, s, float(x)) for x in deformations])
 
 
@@ -99,6 +99,38 @@ def test_pinched_is_hysteretic(ops: Any, force: float, place: float, unloading: 
         unloading=unloading,
     )
     np.testing.assert_allclose(found, expected, rtol=0, atol=2e-3 * K * DY)
+
+
+def test_pinched_by_peak_is_pinching4(ops: Any) -> None:
+    # theirs has a fourth line, which is here as steep as the third
+    points, force, place, hardening = path(400), 0.3, 0.5, 0.05
+    bend, yields = 0.5 * K * DY, 0.8 * K * DY
+    farther = [x for far in (2.0, 40.0) for x in (yields + hardening * K * far * DY, (1.1 + far) * DY)]
+    skeleton = [bend, 0.5 * DY, yields, 1.1 * DY, *farther]
+    expected = theirs(ops, points, "Pinching4", *skeleton, place, force, 0.0, *[0.0] * 15, 10.0, "energy")
+    found = ours(
+        "pinched_by_peak",
+        points,
+        yield_displacement=1.1 * DY,
+        hardening=hardening,
+        first_bend=0.5 / 1.1,
+        second_stiffness=0.5,
+        pinch_force=force,
+        pinch_displacement=place,
+    )
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * K * DY)
+
+
+def test_pinched_by_rest_is_the_hinge_of_ibarra_medina_and_krawinkler(ops: Any) -> None:
+    # theirs drops to no force for ever at some partial unloadings, so that this path has none; its cap and its energy
+    # to failure are far away
+    points, hardening, force, place = path(400)[:2000], 0.05, 0.3, 0.5
+    yields, far = K * DY, [50.0 * DY] * 4
+    fate = [1e9] * 4 + [1.0] * 4 + far + [0.2, 0.2, 400.0 * DY, 400.0 * DY, 1.0, 1.0]
+    rules = [hardening, hardening, yields, -yields, force, force, place]
+    expected = theirs(ops, points, "ModIMKPinching", K, *rules, *fate)
+    found = ours("pinched_by_rest", points, hardening=hardening, pinch_force=force, pinch_displacement=place)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6 * K * DY)
 
 
 def test_trilinear_is_a_sum_of_steel01(ops: Any) -> None:

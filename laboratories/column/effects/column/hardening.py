@@ -2,8 +2,8 @@
 
     f = f_column + share·k·δ·(δ/δ_ref)²,    δ_ref = 2 mm
 
-With `law` 1 the stiffness changes at a bend: f = f_column + share·k·(δ − clip(δ, −bend, +bend)). With a negative share
-the specimen softens.
+With `law` 1 the stiffness changes at a bend: f = f_column + share·k·(δ − clip(δ, −bend, +bend)); with `law` 2 it
+changes at a second bend as well, by `second_share`. With a negative share the specimen softens.
 
 Not to be confused with `column.yielding`, which dissipates energy, `column.degradation`, which is permanent, or
 `column.pinching`, whose stiffness is low around the origin only.
@@ -25,7 +25,7 @@ EFFECT = sets(
             least=-10.0,
             most=10.0,
             sizes=(0.03, 0.08, 0.2, 0.5),
-            says="additional stiffness over the elastic one: of the secant at 2 mm (law 0), beyond the bend (law 1)",
+            says="additional stiffness over the elastic one: of the secant at 2 mm (law 0), beyond a bend (1, 2)",
         ),
     },
     further={
@@ -34,9 +34,9 @@ EFFECT = sets(
             "",
             null=0.0,
             least=0.0,
-            most=1.0,
+            most=2.0,
             sizes=(),
-            says="0 with the square of the deformation, 1 at a bend",
+            says="0 with the square of the deformation, 1 at a bend, 2 at two bends",
             shape=True,
         ),
         "stiffening_bend": Parameter(
@@ -46,11 +46,35 @@ EFFECT = sets(
             least=1e-05,
             most=0.1,
             sizes=(0.0005, 0.001, 0.002, 0.003),
-            says="deformation at the bend of law 1",
+            says="deformation at the bend of law 1, and at the first one of law 2",
+            shape=True,
+        ),
+        "stiffening_second": Parameter(
+            "second_share",
+            "",
+            null=0.0,
+            least=-10.0,
+            most=10.0,
+            sizes=(),
+            says="additional stiffness beyond the second bend of law 2 over the elastic one",
+            shape=True,
+        ),
+        "stiffening_second_bend": Parameter(
+            "second_bend",
+            "m",
+            null=0.002,
+            least=1e-05,
+            most=0.1,
+            sizes=(),
+            says="deformation at the second bend of law 2",
             shape=True,
         ),
     },
-    laws=(Law("cubic", {}), Law("with a bend", {"bend": 0.001})),
+    laws=(
+        Law("cubic", {}),
+        Law("with a bend", {"bend": 0.001}),
+        Law("with two bends", {"bend": 0.001, "second_share": 0.05, "second_bend": 0.0025}),
+    ),
     says="the specimen stiffens or softens with the deformation, without a loop",
     reference="Kerschen, Worden, Vakakis, Golinval, Mech. Syst. Signal Process. 20 (2006) 505-592",
 )

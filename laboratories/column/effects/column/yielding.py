@@ -11,6 +11,10 @@ with yield displacement δ_y, hardening α and exponent n. The parameter `law` c
     4   trilinear
     5   pinched; its reloading stiffness decreases with every cycle by `damage`
     6   pinched, with a trilinear skeleton
+    7   pinched, with the corner of reloading at a share of the peak's deformation
+    8   the same with a trilinear skeleton
+    9   pinched, with the corner of reloading at a share of the deformation that is left where the peak is unloaded
+    10  the same with a trilinear skeleton
 
 Not to be confused with `column.degradation`, which softens without a loop, `column.friction`, whose loop has the same
 height at every amplitude, or `column.self_centring`, whose loop closes before the origin.
@@ -72,9 +76,10 @@ EFFECT = sets(
             "",
             null=0.0,
             least=0.0,
-            most=6.0,
+            most=10.0,
             sizes=(),
-            says="0 Bouc and Wen, 1 bilinear, 2 Menegotto and Pinto, 3 peak-oriented, 4 trilinear, 5 pinched, 6 both",
+            says="0 Bouc and Wen, 1 bilinear, 2 Menegotto and Pinto, 3 peak-oriented, 4 trilinear, 5 pinched, 6 both, "
+            "7 and 8 as these with the corner by the peak, 9 and 10 by its rest",
             shape=True,
         ),
         "unloading": Parameter(
@@ -84,26 +89,32 @@ EFFECT = sets(
             least=0.0,
             most=1.0,
             sizes=(),
-            says="exponent of the unloading stiffness of laws 3, 5 and 6",
+            says="exponent of the unloading stiffness of laws 3 and 5 to 10",
             shape=True,
         ),
         "first_bend": share(
-            "first_bend", 1.0, 0.02, "deformation at the first bend of laws 4 and 6 over yield_displacement"
+            "first_bend",
+            1.0,
+            0.02,
+            "deformation at the first bend of laws 4, 6, 8 and 10 over yield_displacement",
         ),
         "second_stiffness": share(
             "second_stiffness",
             0.5,
             0.0,
-            "stiffness of laws 4 and 6 between the bends over the elastic stiffness",
+            "stiffness of laws 4, 6, 8 and 10 between the bends over the elastic stiffness",
         ),
         "pinch_force": share(
             "pinch_force",
             1.0,
             0.0,
-            "force at the corner of reloading of laws 5 and 6 over the force at the peak",
+            "force at the corner of reloading of laws 5 to 10 over the force at the peak",
         ),
         "pinch_displacement": share(
-            "pinch_displacement", 1.0, 0.0, "place of that corner on the way to the peak, from 0 to 1"
+            "pinch_displacement",
+            1.0,
+            0.0,
+            "place of that corner: on the way to the peak, over the peak's deformation, or over what is left of it",
         ),
         "damage": Parameter(
             "damage",
@@ -112,7 +123,7 @@ EFFECT = sets(
             least=0.0,
             most=10.0,
             sizes=(),
-            says="relative growth of the peak of laws 5 and 6 per plastic deformation of yield_displacement",
+            says="relative growth of the peak of laws 5 to 10 per plastic deformation of yield_displacement",
             shape=True,
         ),
     },
@@ -129,6 +140,14 @@ EFFECT = sets(
         Law("trilinear", {"hardening": 0.05, **SKELETON}, "trilinear"),
         Law("pinched", {"hardening": 0.05, **RELOADING}, "pinched"),
         Law("pinched trilinear", {"hardening": 0.05, **SKELETON, **RELOADING}, "pinched"),
+        Law("pinched by the peak", {"hardening": 0.05, **RELOADING}, "pinched_by_peak"),
+        Law(
+            "pinched by the peak, trilinear", {"hardening": 0.05, **SKELETON, **RELOADING}, "pinched_by_peak"
+        ),
+        Law("pinched by the rest", {"hardening": 0.05, **RELOADING}, "pinched_by_rest"),
+        Law(
+            "pinched by the rest, trilinear", {"hardening": 0.05, **SKELETON, **RELOADING}, "pinched_by_rest"
+        ),
     ),
     says="the specimen yields",
     reference="Wen, Method for random vibration of hysteretic systems, J. Eng. Mech. Div. ASCE 102 (1976) 249-263",
