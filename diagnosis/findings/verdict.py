@@ -214,13 +214,24 @@ def strain(search: Search) -> float:
 
 
 def equivalents(search: Search) -> tuple[tuple[str, ...], ...]:
-    """Sets of effects that the data cannot tell apart, one per chosen effect that has others beside it."""
-    sets: dict[str, list[str]] = {}
+    """Sets of effects that the data cannot tell apart, one per chosen effect that has others beside it.
+
+    Every name is in one set only: an effect that could stand for several chosen ones is counted where its predictions
+    agree best with those of the chosen effects.
+    """
+    nearest: dict[str, tuple[float, str]] = {}
     for other in search.alternatives:
         pair = exchanged_pair(search.chosen, other)
-        if pair is not None and tied(search, other):
-            sets.setdefault(pair[0], [pair[0]]).append(pair[1])
-    return tuple(tuple(names) for names in sets.values())
+        if pair is None or not tied(search, other):
+            continue
+        gone, come = pair
+        apart = float(np.sum(np.square(other.reduced - search.chosen.reduced)))
+        if come not in nearest or apart < nearest[come][0]:
+            nearest[come] = apart, gone
+    sets: dict[str, list[str]] = {}
+    for come, (_, gone) in nearest.items():
+        sets.setdefault(gone, [gone]).append(come)
+    return tuple(map(tuple, sets.values()))
 
 
 def scatter(fit: Fit) -> Array:
