@@ -245,6 +245,20 @@ def test_the_hardening_column_is_its_formulas(share: float, bend: float, where: 
     assert bent == pytest.approx(K * (where + share * beyond), abs=1e-6)
 
 
+@pytest.mark.parametrize("where", [-3e-3, -1.5e-3, 5e-4, 2.5e-3])
+def test_hardening_with_two_bends_is_three_lines(where: float) -> None:
+    more = ColumnEffects(
+        stiffening=-0.6,
+        stiffening_law=2.0,
+        stiffening_bend=1e-3,
+        stiffening_second=-0.24,
+        stiffening_second_bend=2e-3,
+    )
+    places, forces_there = [0.0, 1e-3, 2e-3, 3e-3], [0.0, K * 1e-3, K * 1.4e-3, K * 1.56e-3]
+    expected = math.copysign(float(np.interp(abs(where), places, forces_there)), where)
+    assert specimen_under(np.array([where]), more)[0] == pytest.approx(expected, abs=1e-6)
+
+
 def test_the_self_centring_column_loses_two_flags_and_rests_at_the_origin() -> None:
     place, loop, amplitude = 1e-3, 0.6, 3e-3
     _, path = cycles(amplitude, 1.0)
@@ -257,12 +271,12 @@ def test_the_self_centring_column_loses_two_flags_and_rests_at_the_origin() -> N
     assert abs(specimen_under(through(amplitude, 0.0), more)[-1]) < 1e-6
 
 
-@pytest.mark.parametrize("name", ["trilinear", "pinched"])
+@pytest.mark.parametrize("name", ["trilinear", "pinched", "pinched_by_peak", "pinched_by_rest"])
 def test_further_laws_of_yielding_are_their_models(name: str) -> None:
     path = through(2e-3, -3e-3, 2.5e-3, -1e-3)
     shapes = {"hardening": 0.03, "first_bend": 0.4, "second_stiffness": 0.6}
     corner = {"pinch_force": 0.3, "pinch_displacement": 0.6, "unloading": 0.2, "damage": 0.05}
-    given = shapes | (corner if name == "pinched" else {})
+    given = shapes | (corner if name != "trilinear" else {})
     law = float(specimen.LAWS.index(name))
     more: dict[str, Any] = {"yield_displacement": 1e-3, "law": law, **given}
     got = specimen_under(path, ColumnEffects(**more))
