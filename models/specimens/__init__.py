@@ -1,7 +1,7 @@
 """Rate-independent force-deformation models of columns, one file each, listed here.
 
 They serve for experimental columns and for the numerical columns of each storey. A model is a file with `Params`,
-`RULES`, `STATE_SIZE` and `step`; a line in `SPECIMENS` and one in `step` add it.
+`RULES`, `STATE_SIZE` and `step`; a line in `SPECIMENS` and one in `step` add it. The three pinched ones share a file.
 """
 
 from __future__ import annotations
@@ -80,12 +80,11 @@ SPECIMENS = {
             self_centring.RULES,
             self_centring.STATE_SIZE,
         ),
-        # their codes less CORNERS say where the corner of reloading lies
         SpecimenModel("pinched_by_peak", 9, pinched.PinchedParams, pinched.RULES, pinched.STATE_SIZE),
         SpecimenModel("pinched_by_rest", 10, pinched.PinchedParams, pinched.RULES, pinched.STATE_SIZE),
     )
 }
-CORNERS = 8
+CORNERS = 8  # by which the code of a further pinched model exceeds its corner of reloading in `pinched`
 STATE_SIZE = max(model.state_size for model in SPECIMENS.values())
 
 
