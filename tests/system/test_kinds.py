@@ -10,7 +10,7 @@ import pytest
 from common.recording.reader import read
 from common.recording.run import Run
 from tests.shapes import SHIPPED, plan_of
-from tests.system.test_real_time import finish, start, wait_for_ticks
+from tests.system.started import finish, start, wait_for_ticks
 
 pytestmark = pytest.mark.slow
 

@@ -19,7 +19,7 @@ from recorder import space
 from report.facts.laboratories import plan_of
 from tests.faults.rows import passed
 from tests.helpers import PATIENT
-from tests.system.test_real_time import crew, finish, start, wait_for_ticks
+from tests.system.started import crew, finish, start, wait_for_ticks
 
 pytestmark = [
     pytest.mark.faults,

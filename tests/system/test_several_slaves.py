@@ -14,7 +14,8 @@ import pytest
 from common.recording.reader import read
 from common.recording.run import Run
 from tests.helpers import PATIENT, SLOW_TOWER
-from tests.system.test_real_time import differing_from_virtual_time, finish, free_port, start, wait_for_ticks
+from tests.system.started import finish, free_port, start, wait_for_ticks
+from tests.system.test_real_time import differing_from_virtual_time
 
 pytestmark = pytest.mark.slow
 

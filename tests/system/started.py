@@ -1,0 +1,89 @@
+"""Commands and processes of the whole system, as a user starts them."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from common.recording.reader import read
+from tests.helpers import PATIENT
+from tests.processes import environment, tied
+
+
+def start(*words: str | Path, module: str = "rths", **options: Any) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        tied(sys.executable, "-m", module, *words),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment(),
+        **options,
+    )
+
+
+def finish(process: subprocess.Popen[str], seconds: float = 60.0) -> tuple[int, str, str]:
+    out, err = process.communicate(timeout=seconds)
+    return process.returncode, out, err
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+def plan_file(folder: Path, **link: float) -> Path:
+    path = folder / "plan.toml"
+    keys = "\n".join(f"{name} = {value}" for name, value in link.items())
+    path.write_text(
+        f"[test]\nname = 'trial'\nduration = 4.0\n[recording]\npatience = 1.0\n{PATIENT}[link]\n{keys}\n"
+    )
+    return path
+
+
+def crew(process: subprocess.Popen[str]) -> dict[str, int]:
+    """Process numbers of master, slave and recorder of a run, as soon as all are there."""
+    deadline = time.monotonic() + 20.0
+    found: dict[str, int] = {}
+    while set(found) != {"master", "slave", "recorder"}:
+        assert time.monotonic() < deadline, found
+        time.sleep(0.02)
+        found = {}
+        for children in Path(f"/proc/{process.pid}/task").glob("*/children"):
+            with contextlib.suppress(OSError):  # a thread that has ended meanwhile
+                found |= {module(child): int(child) for child in children.read_text().split()}
+    return found
+
+
+def module(number: str) -> str:
+    """What a process runs with `python -m`."""
+    words = Path(f"/proc/{number}/cmdline").read_text().split("\0")
+    return words[words.index("-m") + 1] if "-m" in words else ""
+
+
+def gone(number: int) -> bool:
+    """Whether a process has ended."""
+    try:
+        return Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
+    except OSError:
+        return True
+
+
+def wait_for_ticks(path: Path, ticks: int = 200, seconds: float = 30.0) -> None:
+    """Until a recording that is being written holds some ticks."""
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        if path.exists() and path.stat().st_size > 10_000:
+            try:
+                if read(path).ticks("master") >= ticks:
+                    return
+            except Exception:
+                continue
+        time.sleep(0.1)
+    raise AssertionError(f"no {ticks} ticks in {path} after {seconds} s")
