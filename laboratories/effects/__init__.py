@@ -109,8 +109,7 @@ def of_plan(plan: Plan) -> dict[str, Effect]:
 def lay(system: System, entries: Sequence[Entry], known: Mapping[str, Effect] | None = None) -> System:
     """The system with effects applied in the order given; `known` are the possible effects, by default those that ship.
 
-    Effects on parameters of the plan multiply or add, so that two of them accumulate; for effects with fields of their
-    own the last one holds.
+    Factors multiply and additions add, so that two of them accumulate; of effects that set a field the last one holds.
 
     Raises:
         InputError: an effect or a parameter is unknown, a parameter is missing or out of its bounds, or the plan's

@@ -79,8 +79,13 @@ def laid(system: System, *, site: str, fields: Mapping[str, str], null: float, *
 
 
 def of_site(site: str, field: str) -> Apply:
-    """The law that sets one field of a site's record to the factor."""
-    return partial(laid, site=site, fields={field: "factor"}, null=1.0)
+    """The law that multiplies one field of a site's record, which is 1 without an effect."""
+    return partial(strengthened, site=site, field=field)
+
+
+def strengthened(system: System, factor: float, *, site: str, field: str) -> System:
+    """The system with a field of a site's record times `factor`, so that several effects may act on it."""
+    return system.laid(site, **{field: factor * getattr(getattr(system.effects, site), field)})
 
 
 def of_plan(table: str, key: str) -> Apply:

@@ -167,12 +167,13 @@ def test_a_shape_without_its_effect_leaves_no_trace(effect: Effect) -> None:
 
 
 @EACH
-def test_null_after_the_effect_takes_its_fields_back_and_leaves_the_plan(effect: Effect) -> None:
+def test_null_after_the_effect_leaves_the_plan_and_takes_back_the_fields_that_it_sets(effect: Effect) -> None:
     before = lay(BASE, [(effect.name, strong(effect))])
     after = lay(before, [(effect.name, null_parameters(effect))])
     assert after.plan == before.plan
     sensors = {name: SensorEffects() for name in after.effects.sensors}
-    assert after.effects == Effects(sensors=sensors)
+    sets = lay(before, [(effect.name, strong(effect))]).effects == before.effects  # others multiply
+    assert after.effects == (Effects(sensors=sensors) if sets else before.effects)
 
 
 @EACH
@@ -332,6 +333,11 @@ def entries(draw: st.DrawFn) -> list[effects.Entry]:
         )
         for name in names
     ]
+
+
+def test_factors_on_one_field_multiply() -> None:
+    weaker = lay(BASE, [("damper.gain", {"factor": 0.9})])
+    assert lay(weaker, [("damper.gain", {"factor": 0.5})]).effects.damper.gain == 0.45
 
 
 @given(entries())
