@@ -1,0 +1,97 @@
+"""Laboratories of other kinds, and rigs of a user's, behind an element of a client."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from common.opensees import wire
+from common.opensees.wire import MessageCode
+from common.plan.plan import Plan
+from common.plan.read import parse
+from common.roles import SLAVE
+from laboratories.table.kind import TABLE
+from loop import replay
+from models.system import System
+from tests.serve.client import Element
+from tests.serve.serving import ALONE, IDEAL, serve
+
+STEPS = 300
+QUIET = (
+    IDEAL + "table_displacement = 0.0\ntable_acceleration = 0.0\ndamper_stroke = 0.0\ndamper_force = 0.0\n"
+)
+QUIET = QUIET.replace("[safety]\nhold_after = 3\nramp_after = 5\noverrun = 5\nsettle = 0.01\n", "")
+RIG = """
+class Rig:
+    def __init__(self, interval, seed, stiffness):
+        self._stiffness, self._place = stiffness, 0.0
+
+    def arm(self):
+        pass
+
+    def read(self):
+        return self._place, self._stiffness * self._place
+
+    def write(self, command):
+        self._place = command.actuator_command
+
+    def disarm(self):
+        pass
+"""
+
+
+def swayed(folder: Path, plan: Plan, dofs: int = 1) -> tuple[Any, Any, dict[str, Any]]:
+    """Displacements m of each step at 2.3 Hz, the forces (steps, dofs) N answered, and the recorded signals."""
+    places = 4e-3 * (1.0 - np.cos(2.0 * np.pi * 2.3 * 0.002 * np.arange(1, STEPS + 1)))
+    forces = []
+
+    def script(port: int) -> None:
+        client = Element(port, wire.element(dofs))
+        for step, place in enumerate(places.tolist(), 1):
+            forces.append(client.step([place] * dofs, 0.002 * step))
+        client.say(MessageCode.END)
+        client.close()
+
+    served = serve(script, folder, plan)
+    assert served.error is None
+    assert served.client.error is None
+    return places, np.array(forces), served.run.columns
+
+
+def pushes(plan: Plan, places: Any, forces: Any, columns: dict[str, Any]) -> None:
+    """A table at a floor follows it, its motor damps its velocity, and its damper's force pushes it."""
+    of, sent = columns[SLAVE], columns["master"]
+    assert np.array_equal(sent["table_target"][:STEPS], places)
+    speed = np.gradient(places, 0.002)
+    motor = plan.control.gain / plan.damper.force_scale * speed
+    assert sent["damper_command"][3 : STEPS - 1] == pytest.approx(motor[3:-1], abs=2e-3 * np.max(motor))
+    drive = np.stack([of["table_command"], of["damper_command"]], axis=1)
+    alone = replay.laboratory(TABLE, System(plan), drive)
+    assert of["damper_force"] == pytest.approx(alone[:, TABLE.channels.names.index("damper_force")], abs=1e-9)
+    # the force used at the displacement of step i was measured an interval before; OpenSees' elements resist
+    assert np.array_equal(forces, -plan.damper.force_scale * of["damper_force"][:STEPS])
+    assert np.max(np.abs(forces)) > 100.0
+
+
+def test_a_table_with_its_motor_stands_behind_an_element(tmp_path: Path) -> None:
+    plan = parse(QUIET + '[master]\nkind = "none"\n', tmp_path)
+    places, forces, columns = swayed(tmp_path, plan)
+    pushes(plan, places, forces[:, 0], columns)
+
+
+def test_a_column_and_a_table_stand_behind_one_element(tmp_path: Path) -> None:
+    plan = parse(QUIET, tmp_path)
+    places, forces, columns = swayed(tmp_path, plan, 2)
+    assert forces[:, 0] == pytest.approx(6.25e6 * places, rel=1e-12)
+    pushes(plan, places, forces[:, 1], columns)
+
+
+def test_a_rig_of_the_users_own_stands_behind_an_element(tmp_path: Path) -> None:
+    (tmp_path / "lab.py").write_text(RIG)
+    rig = '[master.rig]\nclass = "lab.py:Rig"\noptions = { stiffness = 9e6 }\n'
+    places, forces, columns = swayed(tmp_path, parse(IDEAL + ALONE + rig, tmp_path))
+    assert forces[:, 0] == pytest.approx(9e6 * 0.5 * places, rel=1e-12)  # the half column's deformation
+    assert columns["master"]["column_displacement"][1:STEPS] == pytest.approx(0.5 * places[:-1], rel=1e-12)
