@@ -24,7 +24,12 @@ NAMES = [str(path.relative_to(ROOT)) for path in PAGES]
 REAL_TIME = re.compile(r"\brths (?:(?:run|serve)(?!.* --virtual)|master|record|doctor)\b")
 TRIES = 3
 # module that a page needs beside what `make setup` installs, and the target of make that installs it
-NEEDS = {"docs/how-to/opensees-server.md": ("openseespy", "opensees"), "docs/how-to/fmus.md": ("fmpy", "fmi")}
+NEEDS = {
+    "docs/how-to/opensees-building.md": ("openseespy", "opensees"),
+    "docs/how-to/opensees-server.md": ("openseespy", "opensees"),
+    "docs/how-to/opensees-specimen.md": ("openseespy", "opensees"),
+    "docs/how-to/fmus.md": ("fmpy", "fmi"),
+}
 
 COMMAND = re.compile(
     r"(?:\$ |[A-Z_]+=\S+ )?(?:\S*/)?(?:rths|make|python3?|pip|pytest|git|docker|ssh|scp|for|until)\b(?!:)"
