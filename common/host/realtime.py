@@ -28,6 +28,9 @@ SWITCH_INTERVAL = (
     1e-4  # s; at Python's 5 ms one busy thread costs the loop more than an interval per hand-over
 )
 PR_SET_TIMERSLACK = 29
+give_way = getattr(
+    os, "sched_yield", lambda: None
+)  # lets others run on this processor; not every system has it
 MCL_CURRENT, MCL_FUTURE, MCL_ONFAULT = 1, 2, 4
 # Share of the spare memory that is locked at most. Locked memory cannot be paged out, so with more of it locked the
 # kernel might run out of memory and kill the process; half leaves as much again for growth and other processes.

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING
 import zenoh
 
 from common.errors import InputError, InterlockError, LostError
+from common.host.realtime import give_way
 from common.link.access import access_control, guests
 from common.link.address import checked, dialled, secured
 from common.link.transport import SAMPLES, Packet, Route, heard, said
@@ -49,7 +50,6 @@ ACCEPT_PENDING = 512
 MOST_MESSAGE = MOST_FRAME + (1 << 12)
 PREFIX = "rths"
 REFUSED = "zenoh_link_tls=warn"  # filter of zenoh's log that shows every refused TLS connection
-YIELD = getattr(os, "sched_yield", lambda: None)  # not every system has it
 
 if TYPE_CHECKING:
     from common.link.security import Identity
@@ -231,7 +231,7 @@ class ZenohLink:
     def send(self, channel: str, frame: bytes, to: str = "") -> None:
         """Hand a frame to the link; dropped where the network is congested."""
         self._publishers[channel, to].put(frame)
-        YIELD()  # lets the link's thread run on this processor, which writes the frame
+        give_way()  # lets the link's thread run on this processor, which writes the frame
 
     def close(self) -> None:
         """Close the session; otherwise zenoh's threads would keep the process alive."""

@@ -53,7 +53,7 @@ class ClientBuilding(BuildingStep):
         self._early: list[str] = []  # warnings before the start, when the time of the test is not known
         self._lab: Laboratory | None = None
         self._partners: Sequence[Answering] = ()
-        self._ports = Ports(ports(addresses, list(couplings.values()), self._say))
+        self._ports = Ports(ports(addresses, list(couplings.values()), self._say), pace.eager)
         self._moving, self._done = False, 0  # whether a displacement is under way, and its intervals so far
         self._from = self._to = (0.0,) * len(self._labs)
         self._time = self._step_time = 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable
 from typing import Protocol
@@ -18,6 +19,7 @@ class Pace(Protocol):
     """The time that a tick waits for the client."""
 
     settles: bool  # whether the client is answered in the time after the commands of a tick
+    eager: int  # ns for which its next message is looked for before the process sleeps until it comes
 
     def until(self, lab: Laboratory, tick: int) -> Callable[[], float]:
         """A function that returns the remaining time (s) to wait in a tick; 0 or less if it has passed."""
@@ -30,6 +32,7 @@ class RealTime:
     """A tick waits for the plan's share of the interval; longer silences are judged by the watchdog."""
 
     settles = True
+    eager = 0  # with real-time priority it would keep the client from its processor
 
     def __init__(self, plan: Plan) -> None:
         self._share_ns = round(plan.link.wait_share * plan.test.interval * 1e9)
@@ -47,6 +50,9 @@ class AsFastAsItGoes:
     """Virtual time stands still until `who` sends or a stop is requested, at most for `seconds` of wall time."""
 
     settles = False
+    # A client of one storey sends its next message within 50 µs, and to sleep and to be woken takes as long again. A
+    # large model takes ms for a step, beside which this does not count.
+    eager = 200_000 if (os.cpu_count() or 1) > 1 else 0
 
     def __init__(self, seconds: float, stopping: Callable[[], str], who: str = "client") -> None:
         self._seconds, self._stopping, self._who = seconds, stopping, who

@@ -47,6 +47,7 @@ class Ticking(Pace):
     """As in real time a tick ends whether the client has spoken or not; here after some ms of the wall clock."""
 
     settles = True
+    eager = 0
 
     def __init__(self, seconds: float = 0.1) -> None:
         self._seconds = seconds
